@@ -1,0 +1,35 @@
+#!/bin/sh
+# Runs the tests serially, on two ranks, and those marked `short` on three; stops at the first run that fails.
+#
+#     tools/test.sh PYTHON MPIRUN SECONDS [options for pytest]        (as `make test` does)
+set -eu
+cd "$(dirname "$0")/.."
+python=$1 mpirun=$2 limit=$3
+shift 3
+
+logs=$(mktemp -d)
+trap 'rm -rf "$logs"' EXIT
+export logs
+
+# What each rank does: rank 0 prints, the others write into a file, shown below if the run fails.
+rank='[ "$OMPI_COMM_WORLD_RANK" = 0 ] || exec >"$logs/rank-$OMPI_COMM_WORLD_RANK" 2>&1; exec "$@"'
+
+run() {
+    title=$1
+    shift
+    echo "== The tests $title"
+    status=0
+    timeout --foreground -k 10 "$limit" "$@" </dev/null || status=$?
+    [ $status = 0 ] && return
+    for log in "$logs"/*; do
+        [ ! -s "$log" ] || { echo "== ${log##*/}"; tail -n 100 "$log"; }
+    done
+    [ $status != 124 ] || echo "== Stopped after $limit s (make test LIMIT=... for more). Do ranks wait for each other?"
+    echo "== FAILED: the tests $title"
+    exit $status
+}
+
+run "serially" "$python" -m pytest "$@"
+run "on two ranks" $mpirun -n 2 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider "$@"
+run "on three ranks (the short ones)" $mpirun -n 3 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m short "$@"
+echo "== Passed: the tests serially, on two ranks and on three"
