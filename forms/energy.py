@@ -1,0 +1,27 @@
+"""Stored energies per unit of reference length.
+
+A stored energy is a function ``W(v, k, c)`` of the strains ``v`` and ``k`` (UFL vectors of shape (3,),
+body frame) and the scene's named constants ``c`` (``c.s`` is the arclength), that returns a UFL scalar.
+Contact force and moment follow by differentiation: ``n_i = dW/dv_i``, ``m_i = dW/dk_i``.
+What is below is a small stock of them; any other function of this form serves as well.
+"""
+
+from __future__ import annotations
+
+from ufl.core.expr import Expr
+
+
+def bending(k: Expr, stiffness: tuple[Expr, Expr, Expr]) -> Expr:
+    """Quadratic energy of bending and twist, ``1/2 sum_i stiffness_i k_i^2``."""
+    return sum(0.5 * b * k[i] ** 2 for i, b in enumerate(stiffness))
+
+
+def hemitropic(v: Expr, k: Expr, *, stretching: Expr, coupling: Expr, twisting: Expr, bending: Expr) -> Expr:
+    """Quadratic energy of a hemitropic rod, whose stretch and twist are coupled.
+
+    Gives ``n3 = stretching (v3 - 1) + coupling k3``, ``m3 = twisting k3 + coupling (v3 - 1)`` and
+    ``m1, m2 = bending (k1, k2)``: Healey, Math. Mech. Solids 7 (2002), and Kumar & Healey (2010), section 5.2.
+    Convex where ``stretching * twisting > coupling^2`` and ``bending > 0``.
+    """
+    e = v[2] - 1
+    return 0.5 * stretching * e**2 + coupling * e * k[2] + 0.5 * twisting * k[2] ** 2 + 0.5 * bending * (k[0] ** 2 + k[1] ** 2)

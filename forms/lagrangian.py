@@ -1,0 +1,47 @@
+"""One Lagrangian for every rod.
+
+The equilibria of a hyperelastic rod are the stationary points of the three-field (Hu-Washizu) functional ::
+
+    L = int_0^l [ W(v, k) + n . (r' - R v) + mu/2 (|q|^2 - 1) ] ds - (potential of the loads)
+
+with the strains ``v``, the contact force ``n`` and the unit-norm multiplier ``mu`` as fields of their own:
+stationarity in ``v`` is the constitutive law ``n_i = dW/dv_i`` (body components), in ``r`` the balance of forces
+``n' = 0``, in ``q`` the balance of moments, in ``n`` the kinematics ``r' = R v``.  Only the strains that a rod leaves
+free are unknowns; with none of them free this is (19) of Kumar & Healey (2010), with the stretch (18), with all (17).
+
+Where no force acts along the rod, ``n`` is constant and ``r`` drops out: with ``chord = r(l) - r(0)`` ::
+
+    L_reduced = int_0^l [ W(v, k) - n . R v + mu/2 (|q|^2 - 1) ] ds + n . chord
+
+in which a component of ``n`` is a known dead force or *one scalar* unknown, whose equation is the integral
+constraint ``int (R v)_i ds = chord_i``: their mixed formulation (36)-(40).
+"""
+
+from __future__ import annotations
+
+import ufl
+from ufl.core.expr import Expr
+
+
+def pointwise(W: Expr, R: Expr, v: Expr, dr: Expr, n: Expr, known: Expr) -> Expr:
+    """Integrand of ``L`` with the centreline as a field, without the unit-norm term.
+
+    ``dr = r'`` and the field ``n`` have shape (3,), as has ``known``: the contact force that dead end forces
+    prescribe, zero in the components in which both ends are held.  Its potential is ``-known . (r(l) - r(0))``,
+    up to what does not depend on the unknowns.
+    """
+    return W + ufl.dot(n, dr - ufl.dot(R, v)) - ufl.dot(known, dr)
+
+
+def reduced(W: Expr, R: Expr, v: Expr, n: Expr, chord_per_length: Expr) -> Expr:
+    """Integrand of ``L_reduced``, without the unit-norm term.
+
+    ``n`` of shape (3,) is constant along the rod; ``chord_per_length = (r(l) - r(0)) / l`` of shape (3,) is zero in
+    the components in which ``n`` is a known dead force.
+    """
+    return W + ufl.dot(n, chord_per_length - ufl.dot(R, v))
+
+
+def unit_norm(mu: Expr, q: Expr) -> Expr:
+    """Integrand ``mu/2 (|q|^2 - 1)``, to be collocated at the nodes by Gauss-Lobatto-Legendre quadrature."""
+    return 0.5 * mu * (ufl.dot(q, q) - 1)

@@ -1,0 +1,90 @@
+"""What a continuation produces: points, special points and branches of equilibria."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from petsc4py import PETSc
+
+FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
+
+
+@dataclass
+class Point:
+    """One equilibrium: state ``x``, unit ``tangent`` along its branch, ``arclength`` from the branch's start, and records.
+
+    ``slope`` is the load's component of the tangent; ``nearest`` the eigenvalue nearest zero relative to the metric;
+    ``error`` the last Newton correction.
+    """
+
+    x: PETSc.Vec
+    tangent: PETSc.Vec | None
+    arclength: float
+    load: float
+    ordinate: float
+    energy: float
+    stretch: float
+    negative: int
+    zero: int
+    nearest: float
+    slope: float
+    drift: float
+    error: float
+    spectrum: list[float] = field(default_factory=list)
+
+
+@dataclass
+class Special:
+    """A special point: what it is, how precisely it was located, its null vectors, and the index on either side.
+
+    ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` that of the discretisation: of the
+    load for folds and branch points, of the ordinate at user points and ends.  ``coupling`` is the cosine between the null
+    vector and the derivative of the equations in the load: zero at a branch point, not at a fold.
+    """
+
+    kind: str
+    point: Point
+    negative_before: int
+    negative_after: int
+    located_to: float
+    null_vectors: list[PETSc.Vec] = field(default_factory=list)
+    coupling: float = 0.0
+    error_estimate: float = float("nan")
+    ordinate_error: float = float("nan")
+    meets: tuple[str, int] | None = None
+    switched: bool = False
+    row: int = -1
+    note: str = ""
+
+    @property
+    def multiplicity(self) -> int:
+        """Number of eigenvalues that cross or touch zero here."""
+        return len(self.null_vectors)
+
+
+@dataclass
+class Branch:
+    """A connected piece of equilibria: its points in order, its special points, where it came from and why it ended."""
+
+    name: str
+    parent: tuple[str, int] | None
+    depth: int
+    points: list[Point] = field(default_factory=list)
+    special: list[Special] = field(default_factory=list)
+    ended: str = "not traced"
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    def insert(self, special: Special) -> None:
+        """Put a special point among the points by its arclength, and renumber the rows of all special points."""
+        self.special.append(special)
+        self.points.append(special.point)
+        self.renumber()
+
+    def renumber(self) -> None:
+        """Sort points and special points along the branch and set their rows."""
+        self.points.sort(key=lambda p: p.arclength)
+        row = {id(p): i for i, p in enumerate(self.points)}
+        self.special.sort(key=lambda s: s.point.arclength)
+        for special in self.special:
+            special.row = row[id(special.point)]

@@ -1,0 +1,137 @@
+"""All differences between dolfinx releases, bridged by what a release can do, not by its number.
+
+Supported: 0.5.2 (Debian 12) and 0.9.0 (Debian 13).  Nothing else in rodfem asks for a version.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from rodfem.errors import EnvironmentTrouble
+
+try:
+    import basix
+    import dolfinx
+    import dolfinx.fem.petsc
+    import dolfinx.mesh
+    import ufl
+    from dolfinx import fem
+except ModuleNotFoundError as missing:
+    raise EnvironmentTrouble(
+        f"This Python has no module {missing.name!r}: install Debian's python3-dolfinx and run with a virtual environment made by "
+        "'/usr/bin/python3 -m venv --system-site-packages .venv' ('make setup' does both)."
+    ) from missing
+
+
+def require_real_petsc() -> None:
+    """Raise :class:`EnvironmentTrouble` on a PETSc with complex numbers, where a saddle matrix has no inertia."""
+    from petsc4py import PETSc
+
+    if np.issubdtype(PETSc.ScalarType, np.complexfloating):
+        raise EnvironmentTrouble(
+            "This PETSc was built for complex numbers, and rodfem needs the real one: unset PETSC_DIR and SLEPC_DIR, or point both at the real build."
+        )
+
+
+def interval_mesh(comm: Any, elements: int, a: float, b: float) -> Any:
+    """Uniform mesh of ``[a, b]``."""
+    return dolfinx.mesh.create_interval(comm, elements, [a, b])
+
+
+def mixed_space(mesh: Any, parts: Sequence[tuple[bool, int, int]]) -> Any:
+    """Mixed space of Lagrange elements on Gauss-Lobatto-Legendre nodes.
+
+    Each part is ``(continuous, degree, components)``; a part with one component is scalar.
+    """
+    if hasattr(basix, "ufl") and hasattr(basix.ufl, "mixed_element"):
+        elements = [
+            basix.ufl.element(
+                "Lagrange",
+                mesh.basix_cell(),
+                degree,
+                basix.LagrangeVariant.gll_warped,
+                discontinuous=not continuous,
+                shape=(size,) if size > 1 else None,
+                dtype=mesh.geometry.x.dtype,
+            )
+            for continuous, degree, size in parts
+        ]
+        element = basix.ufl.mixed_element(elements)
+    else:
+        cell = mesh.ufl_cell()
+        single = [ufl.FiniteElement("Lagrange" if continuous else "DG", cell, degree) for continuous, degree, _ in parts]
+        element = ufl.MixedElement([ufl.VectorElement(e, dim=p[2]) if p[2] > 1 else e for e, p in zip(single, parts, strict=True)])
+    return fem.functionspace(mesh, element) if hasattr(fem, "functionspace") else fem.FunctionSpace(mesh, element)
+
+
+def nodes(degree: int) -> np.ndarray:
+    """Reference coordinates in [0, 1] of the nodes of a Lagrange element, in the order of its degrees of freedom."""
+    if degree == 0:
+        return np.array([0.5])
+    element = basix.create_element(basix.ElementFamily.P, basix.CellType.interval, degree, basix.LagrangeVariant.gll_warped)
+    return np.asarray(element.points)[:, 0]
+
+
+def lagrange_basis(degree: int, x: np.ndarray) -> np.ndarray:
+    """Values of the Lagrange basis on :func:`nodes` at reference points ``x`` of shape (m,): (m, degree + 1)."""
+    if degree == 0:
+        return np.ones((len(x), 1))
+    element = basix.create_element(basix.ElementFamily.P, basix.CellType.interval, degree, basix.LagrangeVariant.gll_warped)
+    return np.asarray(element.tabulate(0, np.asarray(x, dtype=float).reshape(-1, 1)))[0].reshape(len(x), degree + 1)
+
+
+def _table(adjacency: Any, cells: int) -> np.ndarray:
+    """Connectivity of one entity type as an array of shape (cells, entries per cell)."""
+    values = adjacency.array if hasattr(adjacency, "array") else adjacency
+    return np.asarray(values).reshape(cells, -1)
+
+
+def cell_dofs(space: Any, cells: int) -> np.ndarray:
+    """Local degrees of freedom of a scalar (sub-)space, numbered in its parent: (cells, per cell)."""
+    return _table(space.dofmap.list, cells)
+
+
+def cell_vertices(mesh: Any, cells: int) -> np.ndarray:
+    """Arclengths of the two vertices of each local cell, in reference order: (cells, 2)."""
+    x = np.asarray(mesh.geometry.x)[:, 0]
+    return x[_table(mesh.geometry.dofmap, cells)]
+
+
+def compile_form(form: Any) -> Any:
+    """Compile a UFL form; raises :class:`EnvironmentTrouble` where the form cache is locked by a killed run."""
+    try:
+        return fem.form(form)
+    except TimeoutError as locked:
+        raise EnvironmentTrouble(
+            "A compiled form never became ready, most likely because an earlier run was killed while compiling: "
+            "delete the folder ~/.cache/fenics (or $XDG_CACHE_HOME/fenics) and run again."
+        ) from locked
+
+
+@contextmanager
+def announce_compilation(say: Callable[[], None]) -> Iterator[None]:
+    """Call ``say`` once if forms are compiled inside the block, and keep the compilers' own chatter off the terminal."""
+    said: list[bool] = []
+
+    def silence(record: logging.LogRecord) -> bool:
+        if "Compiler stage 1" in record.getMessage() and not said:
+            said.append(True)
+            say()
+        return False
+
+    loggers = [logging.getLogger("ffcx"), logging.getLogger()]
+    levels = [log.level for log in loggers]
+    loggers[0].setLevel(logging.INFO)
+    for log in loggers:
+        log.addFilter(silence)
+    try:
+        yield
+    finally:
+        for log, level in zip(loggers, levels, strict=True):
+            log.removeFilter(silence)
+            log.setLevel(level)

@@ -1,0 +1,214 @@
+"""Pseudo-arclength continuation: following a curve of equilibria with control of the step.
+
+The predictor extrapolates the last points of the branch by a polynomial in arclength (up to cubic); the corrector is
+Newton's method on the plane through the prediction orthogonal to the predicted direction (Keller 1977).  The step is
+chosen such that the corrector moves a prediction by a set distance: small where the curve bends, large where it does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.branch import Point
+from rodfem.newton import Outcome, correct
+from rodfem.shape import Shape
+from rodfem.stability.inertia import Inertia, combine
+from rodfem.system import System
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Control of the step, in the metric (root mean square rotation in radian, load over its span).
+
+    ``largest`` also bounds how coarse a branch is drawn; ``aim`` is the distance from prediction to correction that is
+    aimed at; ``most`` the number of points at which a branch is given up.
+    """
+
+    first: float = 0.02
+    largest: float = 0.08
+    smallest: float = 1e-5
+    aim: float = 2e-3
+    most: int = 2000
+
+
+class Follower:
+    """Computes equilibria of one :class:`~rodfem.system.System` with their index and records.
+
+    It owns what such a computation needs once: the Newton solver's factors (in the system), the stability matrix, the shape.
+    """
+
+    def __init__(self, system: System) -> None:
+        """Allocate the stability matrix and tabulate the shape."""
+        self.system = system
+        self.inertia = Inertia(system)
+        self.shape = Shape(system)
+        self.axis = system.load_axis()
+
+    def start(self, load: float) -> PETSc.Vec:
+        """First guess at ``load``: the scene's ``start`` rotation, undeformed strains, zero forces."""
+        system, f = self.system, self.system.fields
+        x = f.coordinates(f.discretization.degree)
+        guess = system.scene.start
+        q = np.tile([1.0, 0.0, 0.0, 0.0], (x.size, 1)) if guess is None else np.asarray(guess(x.ravel()))
+        held = f.number[f.dofs["q"]] < 0
+        clamped = f.u.x.array[f.dofs["q"]]
+        f.u.x.array[f.dofs["q"]] = np.where(held, clamped, q.reshape(*x.shape, 4))
+        if "v" in f.dofs:
+            f.u.x.array[f.dofs["v"]] = [1.0 if i == 2 else 0.0 for i in system.scene.free_strains]
+        out = system.take()
+        system.set_load(out, load)
+        return out
+
+    def point(self, x: PETSc.Vec, arclength: float, tangent: PETSc.Vec | None, outcome: Outcome | None = None) -> Point:
+        """Evaluate all records of the equilibrium ``x``."""
+        system = self.system
+        index = self.inertia.count(x)
+        nearest = float(self.inertia.nearest(1, accuracy=1e-2)[0][0])
+        energy = system.comm.allreduce(fem.assemble_scalar(system.equations.energy), op=MPI.SUM)
+        return Point(
+            x=x,
+            tangent=tangent,
+            arclength=arclength,
+            load=system.scalar(x),
+            ordinate=self.shape.ordinate(x),
+            energy=float(energy),
+            stretch=self.shape.stretch(x),
+            negative=index.negative,
+            zero=index.zero,
+            nearest=nearest,
+            slope=float("nan") if tangent is None else system.scalar(tangent),
+            drift=max((abs(system.scalar(x, f"drift{i}")) for i in range(len(system.drifts))), default=0.0),
+            error=outcome.error if outcome else 0.0,
+        )
+
+    def row(self, direction: PETSc.Vec) -> PETSc.Vec:
+        """Row of the arclength equation for a direction: the metric times it, for a direction of unit size."""
+        row = self.system.metric * direction
+        row.scale(1.0 / self.system.norm(direction))
+        return row
+
+    def tangent(self, row: PETSc.Vec) -> PETSc.Vec:
+        """Unit tangent of the branch from the factors of the last correction, on the side to which ``row`` points."""
+        tangent = self.system.new_vector()
+        self.system.solve(self.axis, tangent)
+        tangent.scale(1.0 / self.system.norm(tangent))
+        return tangent
+
+    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, Outcome]:
+        """Equilibrium at exactly ``load`` by Newton's method from ``guess``; the phase reference must be set."""
+        x = guess.copy()
+        self.system.set_load(x, load)
+        outcome = correct(self.system, x, self.axis, reach=reach)
+        return x, outcome
+
+    def load_tangent(self, x: PETSc.Vec, increasing: bool) -> PETSc.Vec:
+        """Unit tangent at a regular point after :meth:`at_load`, in the direction of in- or decreasing load."""
+        tangent = self.tangent(self.axis)
+        if not increasing:
+            tangent.scale(-1.0)
+        return tangent
+
+
+def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of the values at ``nodes`` in their interpolating polynomial at ``s``, and in its derivative there."""
+    n = len(nodes)
+    value, slope = np.ones(n), np.zeros(n)
+    for j in range(n):
+        others = np.delete(nodes, j)
+        factors = (s - others) / (nodes[j] - others)
+        value[j] = np.prod(factors)
+        slope[j] = sum(np.prod(np.delete(factors, i)) / (nodes[j] - others[i]) for i in range(n - 1))
+    return value, slope
+
+
+def predict(points: list[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """Extrapolate a branch to arclength ``s``: state and unit-speed direction, from up to four points or one and its tangent."""
+    last = points[-1]
+    if len(points) < 3:
+        if last.tangent is None:
+            raise ValueError("A branch of one point needs a tangent to be continued.")
+        x = last.x.copy()
+        x.axpy(s - last.arclength, last.tangent)
+        return x, last.tangent
+    recent = points[-4:]
+    value, slope = lagrange(np.array([p.arclength for p in recent]), s)
+    states = [p.x for p in recent]
+    return combine(states, value), combine(states, slope)
+
+
+def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """Cubic through two points with their tangents at arclength ``s`` between them: state and direction."""
+    if a.tangent is None or b.tangent is None:
+        raise ValueError("Both ends of a piece of a branch need a tangent.")
+    h = b.arclength - a.arclength
+    t = (s - a.arclength) / h
+    parts = [a.x, a.tangent, b.x, b.tangent]
+    value = np.array([(1 + 2 * t) * (1 - t) ** 2, h * t * (1 - t) ** 2, t * t * (3 - 2 * t), h * t * t * (t - 1)])
+    slope = np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
+    return combine(parts, value), combine(parts, slope)
+
+
+def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[float, float]) -> Iterator[Point | str]:
+    """Continue a branch from its last point, yielding accepted points; a string at the end says why it ended.
+
+    ``bounds`` are the least and the greatest load; the branch ends exactly on them.  The caller appends (and may insert)
+    points in ``points``.  The direction is that of the last point's tangent.
+    """
+    system, step = follower.system, steps.first
+    low, high = bounds
+    while len(points) < steps.most:
+        last = points[-1]
+        x, direction = predict(points, last.arclength + step)
+        load = system.scalar(x)
+        if not low <= load <= high:
+            end = low if load < low else high
+            point = _to_load(follower, points, x, end, step)
+            if point is not None:
+                yield point
+                yield "end of range"
+                return
+            step /= 2
+        else:
+            row = follower.row(direction)
+            system.set_phase(x)
+            outcome = correct(system, x, row, most=8, reach=0.5 * step)
+            if outcome.converged:
+                tangent = follower.tangent(row)
+                turn = row.dot(tangent)
+            if outcome.converged and turn > 0.9:
+                change = last.x.copy()
+                change.aypx(-1.0, x)
+                yield follower.point(x, last.arclength + system.norm(change), tangent, outcome)
+                order = min(len(points) - 1, 3) + 1
+                factor = (steps.aim / max(outcome.moved, 1e-12)) ** (1 / order)
+                step = min(step * min(max(factor, 0.4), 1.6), steps.largest)
+                continue
+            step /= 2
+        if step < steps.smallest:
+            yield f"no convergence at {system.scene.load} = {last.load:.6g} (steps below {steps.smallest:g})"
+            return
+    yield f"{steps.most} points reached"
+
+
+def _to_load(follower: Follower, points: list[Point], guess: PETSc.Vec, load: float, step: float) -> Point | None:
+    """Last point of a branch, exactly at ``load``; None where Newton's method does not get there within the step."""
+    last, system = points[-1], follower.system
+    guessed = system.scalar(guess)
+    fraction = (load - last.load) / (guessed - last.load) if guessed != last.load else 0.0
+    if fraction <= 0:
+        return None
+    x, _ = predict(points, last.arclength + fraction * step)
+    system.set_phase(x)
+    x, outcome = follower.at_load(x, load, reach=0.5 * step)
+    if not outcome.converged:
+        return None
+    change = last.x.copy()
+    change.aypx(-1.0, x)
+    tangent = follower.load_tangent(x, load > last.load)
+    return follower.point(x, last.arclength + system.norm(change), tangent, outcome)

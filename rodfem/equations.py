@@ -1,0 +1,114 @@
+"""The equations of a scene on its fields: Lagrangian, weak form, Jacobian and metrics as compiled dolfinx forms."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from forms import inertia, lagrangian
+from forms.kinematics import curvature, strain
+from forms.rotation import rotation
+from rodfem.compat import compile_form
+from rodfem.fields import Fields
+
+
+class Equations:
+    """Compiled forms of one scene on one :class:`~rodfem.fields.Fields`.
+
+    Every parameter of the scene is ``p = base + direction * load`` with two dolfinx Constants and the scalar unknown
+    ``load``: any of them (or a combination) can be varied, and nothing is ever compiled again.
+
+    Attributes
+    ----------
+    residual, jacobian
+        First and second derivative of the Lagrangian in all fields and scalars.
+    metric
+        ``(4/l) int dq.dq + (1/l^3) int dr.dr``, the squared size of a change of state (about the mean square rotation).
+    kinetic
+        Kinetic metric of the spectrum, ``int w . w`` with the spin ``w`` (unit rotary inertia).
+    energy
+        Stored energy ``int W ds``.
+    """
+
+    def __init__(self, fields: Fields) -> None:
+        """Derive and compile the forms."""
+        self.fields, scene = fields, fields.scene
+        mesh, k = fields.mesh, fields.discretization.degree
+        self.names = list(scene.parameters)
+        self.base = fem.Constant(mesh, np.array([p.value for p in scene.parameters.values()]))
+        self.direction = fem.Constant(mesh, np.zeros(len(self.names)))
+        self.vary(scene.load)
+
+        u, test, trial = fields.u, ufl.TestFunction(fields.space), ufl.TrialFunction(fields.space)
+        dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": self.quadrature_degree(k)})
+        dx_nodes = ufl.dx(domain=mesh, metadata={"quadrature_degree": 2 * k - 1, "quadrature_rule": "GLL"})
+
+        f = self._named(ufl.split(u))
+        c = self._constants(f.scalars)
+        v = strain(scene.free_strains, self._components(f.v, len(scene.free_strains)))
+        W, R = scene.energy(v, curvature(f.q, f.q.dx(0)), c), rotation(f.q)
+        if fields.discretization.formulation == "reduced":
+            force = [scene.known_force(i, c) for i in range(3)]
+            for position, i in enumerate(fields.forces):
+                force[i] = f.scalars[position]
+            integrand = lagrangian.reduced(W, R, v, ufl.as_vector(force), self._chord(c) / scene.length)
+        else:
+            known = ufl.as_vector([scene.known_force(i, c) or 0.0 for i in range(3)])
+            integrand = lagrangian.pointwise(W, R, v, (f.r + self._lift(c)).dx(0), f.n, known)
+        L = integrand * dx + lagrangian.unit_norm(f.mu, f.q) * dx_nodes
+        first = ufl.derivative(L, u, test)
+        self.residual = compile_form(first)
+        self.jacobian = compile_form(ufl.derivative(first, u, trial))
+        self.energy = compile_form(W * dx)
+
+        a, b = self._named(ufl.split(test)), self._named(ufl.split(trial))
+        metric = inertia.rotation_metric(a.q, b.q) / scene.length
+        if f.r is not None:
+            metric += ufl.dot(a.r, b.r) / scene.length**3
+        self.metric = compile_form(metric * dx)
+        self.kinetic = compile_form(inertia.rotary(f.q, a.q, b.q, (1.0, 1.0, 1.0)) * dx)
+
+    @staticmethod
+    def quadrature_degree(degree: int) -> int:
+        """Gauss degree ``2k``, and the midpoint rule for k = 1, as in Kumar & Healey (2010)."""
+        return 1 if degree == 1 else 2 * degree
+
+    def vary(self, parameter: str) -> None:
+        """Make the scalar unknown ``load`` stand for ``parameter``; all others keep their values."""
+        chosen = np.array([name == parameter for name in self.names])
+        values = np.array([p.value for p in self.fields.scene.parameters.values()])
+        self.base.value[:] = np.where(chosen, 0.0, values)
+        self.direction.value[:] = chosen
+
+    def _named(self, parts: Any) -> SimpleNamespace:
+        found = SimpleNamespace(q=None, mu=None, v=None, r=None, n=None, scalars=parts[-1])
+        for block, part in zip(self.fields.blocks, parts, strict=False):
+            setattr(found, block.name, part)
+        found.scalars = self._components(parts[-1], len(self.fields.forces) + 1)
+        return found
+
+    @staticmethod
+    def _components(part: Any, size: int) -> list[Any]:
+        return [] if part is None else [part] if size == 1 else [part[i] for i in range(size)]
+
+    def _constants(self, scalars: list[Any]) -> SimpleNamespace:
+        load = scalars[-1]
+        values = {name: self.base[i] + self.direction[i] * load for i, name in enumerate(self.names)}
+        return SimpleNamespace(s=ufl.SpatialCoordinate(self.fields.mesh)[0], **values)
+
+    def _chord(self, c: SimpleNamespace) -> Any:
+        """Difference of the ends' positions where both are held, zero elsewhere."""
+        left, right = (end.held(c) for end in self.fields.scene.ends)
+        return ufl.as_vector([0.0 if a is None or b is None else b - a for a, b in zip(left, right, strict=True)])
+
+    def _lift(self, c: SimpleNamespace) -> Any:
+        """Linear in s and equal to the ends' positions: the unknown ``r`` is what comes on top, zero where held."""
+        start, stop = self.fields.scene.interval
+        x = (c.s - start) / (stop - start)
+        left, right = (end.held(c) for end in self.fields.scene.ends)
+        lift = [b if a is None else a if b is None else (1 - x) * a + x * b for a, b in zip(left, right, strict=True)]
+        return ufl.as_vector([value + 0 * x for value in lift])

@@ -1,0 +1,55 @@
+"""Newton's method on the bordered system, with chord steps where they converge fast enough."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+from petsc4py import PETSc
+
+from rodfem.system import System
+
+TOLERANCE = 1e-10
+"""A state is converged when the last correction is smaller: rotations in radian, load over its span, all else relative."""
+ROUND_OFF = 1e-6
+"""Below this a correction that no longer shrinks is round-off, not divergence; it is reported as the error."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a Newton iteration ended: ``error`` is the size of its last correction, ``moved`` that of all of them."""
+
+    converged: bool
+    iterations: int
+    error: float
+    moved: float
+
+
+def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3) -> Outcome:
+    """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
+
+    A Jacobian is factored first, and again only while corrections do not shrink tenfold from one to the next: near a
+    solution the old factors cost one solve where new ones cost five.  Fails, leaving ``x`` where it got to, after ``most``
+    iterations, at a singular matrix, or when ``x`` has moved further than ``reach``.
+    """
+    equations, step, origin = system.new_vector(), system.new_vector(), x.copy()
+    previous, size, refactor = float("inf"), float("inf"), True
+    iteration = 0
+    for iteration in range(1, most + 1):
+        system.residual(x, equations)
+        fresh = refactor
+        if fresh:
+            system.factor(row)
+        if not system.solve(equations, step):
+            break
+        x.axpy(-1.0, step)
+        size = max(system.norm(step), step.norm() / (1.0 + x.norm()))
+        if not isfinite(size) or size > reach:
+            break
+        if size < TOLERANCE or (fresh and ROUND_OFF > size > 0.5 * previous):
+            origin.aypx(-1.0, x)
+            return Outcome(True, iteration, size, system.norm(origin))
+        refactor = size > 0.02 or size > 0.1 * previous
+        previous = size
+    origin.aypx(-1.0, x)
+    return Outcome(False, iteration, size, float("inf"))

@@ -1,0 +1,210 @@
+"""The shape of a state: centreline, rotations, and all fields in natural order along the rod.
+
+In the reduced formulation the centreline is recovered by integrating ``r' = R v`` with the quadrature of the weak form, so that
+it closes exactly where the integral constraints say it does, and is as accurate as the pointwise one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.polynomial import legendre
+from petsc4py import PETSc
+from scipy.spatial.transform import Rotation
+
+from forms.kinematics import UNDEFORMED
+from rodfem import compat
+from rodfem.fields import LOAD
+from rodfem.system import System
+
+
+def directors(q: np.ndarray) -> np.ndarray:
+    """Rotation matrices of quaternions (..., 4), scalar first, of any length: (..., 3, 3)."""
+    flat = np.asarray(q).reshape(-1, 4)
+    return Rotation.from_quat(flat[:, [1, 2, 3, 0]]).as_matrix().reshape(*np.shape(q)[:-1], 3, 3)
+
+
+class Gauss:
+    """Gauss rule on [0, 1] with the integrals of its Lagrange basis from 0 to any point."""
+
+    def __init__(self, points: int) -> None:
+        """Make the rule; it is exact for polynomials of degree ``2 points - 1``."""
+        x, self.weights = legendre.leggauss(points)
+        self.points = (x + 1) / 2
+        self.weights = self.weights / 2
+        self._coefficients = np.linalg.inv(legendre.legvander(x, points - 1))
+
+    def integrals(self, x: np.ndarray) -> np.ndarray:
+        """Integrals of the Lagrange basis on the points from 0 to ``x`` of shape (m,): (m, points)."""
+        antiderivative = legendre.legint(self._coefficients, lbnd=-1, axis=0) / 2
+        return legendre.legval(2 * np.asarray(x, dtype=float) - 1, antiderivative).T
+
+
+class Shape:
+    """Evaluates shapes of the states of one :class:`~rodfem.system.System`; collective over its ranks."""
+
+    def __init__(self, system: System) -> None:
+        """Tabulate bases and quadrature."""
+        self.system, f = system, system.fields
+        k = f.discretization.degree
+        cells = slice(0, f.owned_cells)
+        self.start = f.vertices[cells, 0]
+        self.size = f.vertices[cells, 1] - f.vertices[cells, 0]
+        self.nodes = np.sort(compat.nodes(k))
+        self.gauss = Gauss(system.equations.quadrature_degree(k) // 2 + 1)
+        self._order = np.argsort(compat.nodes(k))
+        self._q_at_gauss = compat.lagrange_basis(k, self.gauss.points)
+        self._v_at_gauss = compat.lagrange_basis(k - 1, self.gauss.points)
+        self._probe_weights = self._position_weights(system.scene.ordinate.s)
+        self._cells = cells
+        self.reduced = f.discretization.formulation == "reduced"
+
+    def ordinate(self, x: PETSc.Vec) -> float:
+        """Ordinate of the scene at the state ``x``."""
+        self.system.bring(x)
+        of = self.system.scene.ordinate
+        r, q = self._at(of.s)
+        return float(of.of(r, q))
+
+    def stretch(self, x: PETSc.Vec) -> float:
+        """Smallest stretch ``v3`` at the nodes; 1 for an inextensible rod."""
+        f = self.system.fields
+        if 2 not in self.system.scene.free_strains:
+            return 1.0
+        self.system.bring(x)
+        mine = f.u.x.array[f.dofs["v"][self._cells]][:, :, -1]
+        return float(self.system.comm.allreduce(mine.min(), op=MPI.MIN))
+
+    def sample(self, x: PETSc.Vec) -> dict[str, Any]:
+        """All of a state in natural order on every rank, independent of the number of ranks.
+
+        ``s`` (m,), ``r`` (m, 3) and ``q`` (m, 4) at the nodes from left to right; each further field by name, continuous ones
+        (m, components), discontinuous ones (elements, nodes, components); scalars by name.
+        """
+        system, f = self.system, self.system.fields
+        system.bring(x)
+        local: dict[str, np.ndarray] = {"start": self.start}
+        for block in f.blocks:
+            values = f.u.x.array[f.dofs[block.name][self._cells]]
+            local[block.name] = values[:, np.argsort(compat.nodes(block.degree)), :]
+        if self.reduced:
+            slopes = self._slopes()
+            local["ends"] = np.einsum("g,cgi,c->ci", self.gauss.weights, slopes, self.size)
+            local["inside"] = np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), slopes, self.size)
+        order = np.argsort(all_cells := self._gather(local.pop("start")))
+        all_fields = {name: self._gather(values)[order] for name, values in local.items()}
+        h = np.diff(np.append(all_cells[order], system.scene.interval[1]))
+        out: dict[str, Any] = {"s": self._unique(all_cells[order][:, None, None] + h[:, None, None] * self.nodes[None, :, None])[:, 0]}
+        for block in f.blocks:
+            values = all_fields[block.name]
+            out[block.name] = self._unique(values) if block.continuous else values
+        load = system.scalar(x, LOAD)
+        if self.reduced:
+            ends = np.vstack([np.zeros(3), np.cumsum(all_fields["ends"], axis=0)])
+            out["r"] = self._anchor(load, ends[-1]) + self._unique(ends[:-1, None, :] + all_fields["inside"])
+        else:
+            out["r"] = out["r"] + self._lift(out["s"], load)
+        for name in system.scalars:
+            out[name] = system.scalar(x, name)
+        return out
+
+    def restore(self, sample: dict[str, Any]) -> PETSc.Vec:
+        """State vector of a :meth:`sample`, taken with the same formulation but any number of elements and degree."""
+        f = self.system.fields
+        ends = np.append(sample["s"][:: self._degree_of(sample)], sample["s"][-1])[: self._elements_of(sample) + 1]
+        for block in f.blocks:
+            x = f.coordinates(block.degree)
+            middle = x.mean(axis=1, keepdims=True)
+            values = self._evaluate(sample, block, ends, x, np.broadcast_to(middle, x.shape))
+            f.u.x.array[f.dofs[block.name]] = values
+        for position, name in enumerate(name for name in self.system.scalars if not name.startswith("drift")):
+            f.u.x.array[f.copies[:, position]] = sample[name]
+        return self.system.take()
+
+    # --- inside ------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _elements_of(sample: dict[str, Any]) -> int:
+        return int(sample["elements"]) if "elements" in sample else 0
+
+    def _degree_of(self, sample: dict[str, Any]) -> int:
+        return (len(sample["s"]) - 1) // self._elements_of(sample)
+
+    def _evaluate(self, sample: dict[str, Any], block: Any, ends: np.ndarray, x: np.ndarray, middle: np.ndarray) -> np.ndarray:
+        degree, cell = self._degree_of(sample), np.clip(np.searchsorted(ends, middle) - 1, 0, len(ends) - 2)
+        own = degree if block.continuous else degree - 1
+        table = np.asarray(sample[block.name])
+        if block.name == "r":
+            table = table - self._lift(sample["s"], sample[LOAD])
+        if block.continuous:
+            table = table[np.arange(len(ends) - 1)[:, None] * degree + np.arange(degree + 1)]
+        local = (x - ends[cell]) / (ends[cell + 1] - ends[cell])
+        basis = compat.lagrange_basis(own, local.ravel())[:, np.argsort(compat.nodes(own))]
+        return np.einsum("pn,pni->pi", basis, table[cell.ravel()]).reshape(*x.shape, block.size)
+
+    def _gather(self, values: np.ndarray) -> np.ndarray:
+        return values if self.system.comm.size == 1 else np.concatenate(self.system.comm.allgather(values))
+
+    @staticmethod
+    def _unique(values: np.ndarray) -> np.ndarray:
+        """Values at the nodes of a continuous field, (cells, nodes, ...) -> (m, ...)."""
+        return np.concatenate([values[:, :-1].reshape(-1, values.shape[-1]), values[-1:, -1]])
+
+    def _slopes(self) -> np.ndarray:
+        """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""
+        f = self.system.fields
+        q = np.einsum("gn,cni->cgi", self._q_at_gauss, f.u.x.array[f.dofs["q"][self._cells]])
+        v = np.broadcast_to(np.array(UNDEFORMED), (*q.shape[:2], 3)).copy()
+        free = list(self.system.scene.free_strains)
+        if free:
+            v[:, :, free] = np.einsum("gn,cni->cgi", self._v_at_gauss, f.u.x.array[f.dofs["v"][self._cells]])
+        return np.einsum("cgij,cgj->cgi", directors(q), v)
+
+    def _position_weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
+        """Weights of the slopes at Gauss points in the integral up to ``s``, and of the nodal values in the value at ``s``."""
+        local = (s - self.start) / self.size
+        integral = self.gauss.integrals(np.clip(local, 0, 1)) * self.size[:, None]
+        first, last = self.system.scene.interval
+        inside = (local > 0) & (local <= 1) if s > first else np.isclose(self.start, first)
+        value = np.zeros((len(local), len(self.nodes)))
+        value[inside] = compat.lagrange_basis(len(self.nodes) - 1, local[inside])
+        return integral, value
+
+    def _at(self, s: float) -> tuple[np.ndarray, np.ndarray]:
+        """Centreline (3,) and unit quaternion (4,) at the ordinate's arclength."""
+        system, f = self.system, self.system.fields
+        integral, value = self._probe_weights
+        u = f.u.x.array
+        parts = np.zeros((3, 4))
+        parts[0] = np.einsum("cn,cni->i", value, u[f.dofs["q"][self._cells]])
+        if self.reduced:
+            slopes = self._slopes()
+            parts[1, :3] = np.einsum("cg,cgi->i", integral, slopes)
+            parts[2, :3] = np.einsum("g,cgi,c->i", self.gauss.weights, slopes, self.size)
+        else:
+            parts[1, :3] = np.einsum("cn,cni->i", value, u[f.dofs["r"][self._cells]])
+        if system.comm.size > 1:
+            parts = system.comm.allreduce(parts)
+        load = float(f.u.x.array[f.copies[0, -1]])
+        r = parts[1, :3] + (self._anchor(load, parts[2, :3]) if self.reduced else self._lift(np.array([s]), load)[0])
+        return r, parts[0] / np.linalg.norm(parts[0])
+
+    def _held(self, load: float) -> list[list[float | None]]:
+        c = self.system.scene.constants(load)
+        return [[None if x is None else float(x) for x in end.held(c)] for end in self.system.scene.ends]
+
+    def _anchor(self, load: float, chord: np.ndarray) -> np.ndarray:
+        """Position of the left end: where it is held, or else a chord back from where the right end is held."""
+        left, right = self._held(load)
+        return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])
+
+    def _lift(self, s: np.ndarray, load: float) -> np.ndarray:
+        """Linear function of the ends' positions that the pointwise centreline is measured from, (m, 3)."""
+        start, stop = self.system.scene.interval
+        x = ((np.asarray(s) - start) / (stop - start))[:, None]
+        left, right = self._held(load)
+        a = np.array([p if p is not None else q for p, q in zip(left, right, strict=True)], dtype=float)
+        b = np.array([q if q is not None else p for p, q in zip(left, right, strict=True)], dtype=float)
+        return (1 - x) * a + x * b

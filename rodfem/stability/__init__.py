@@ -1,0 +1,1 @@
+"""Ways to answer "is it stable?": the inertia of the saddle matrix, and the spectrum of the singular pencil."""

@@ -1,0 +1,149 @@
+r"""The index of an equilibrium from the inertia of its saddle matrix.
+
+At fixed load the second variation and the constraints form the saddle matrix ``S = (K C; C^t 0)``.  Where ``C`` has full
+column rank, Sylvester's law of inertia gives
+
+    (negative eigenvalues of S) - (number of constraints) = number of negative eigenvalues of K on the kernel of C,
+
+and likewise for ``S - sigma M`` the number of eigenvalues below ``sigma``.  Counting at ``sigma = -tol`` and
+``+tol`` tells zero eigenvalues from small ones without ever factoring a singular matrix.  Symmetry modes do not
+disturb: the phase condition counts as one more constraint, and takes the zero mode out of the kernel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.errors import ConvergenceError
+from rodfem.system import System
+
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Index:
+    """Number of ``negative`` and of ``zero`` eigenvalues (symmetry modes included) of the constrained second variation."""
+
+    negative: int
+    zero: int
+
+
+class Inertia:
+    """Counts eigenvalues and finds the ones nearest zero, at states of one :class:`~rodfem.system.System`.
+
+    Eigenvalues ``mu`` are relative to the system's metric.  ``tolerance`` is the half width of what counts as zero, the
+    larger of 1e-7 of the rod's lowest bending eigenvalue and of ``resolution``: what the arithmetic resolves.
+    """
+
+    def __init__(self, system: System) -> None:
+        """Allocate the matrix and its LDL^t factors once."""
+        self.system = system
+        self.matrix = system.state_matrix()
+        self.solver = system._direct_solver("cholesky")
+        self.constraints = system.fields.constraints()
+        length = system.scene.length
+        bending = np.linalg.eigvalsh(system.scene.stiffness()[-3:, -3:])[0]
+        self.scale = float(bending * np.pi**2 / length)
+        self.tolerance = 1e-7 * self.scale
+        self.resolution = 0.0
+        self._vectors: list[PETSc.Vec] = []
+
+    def assemble(self, x: PETSc.Vec) -> None:
+        """Assemble ``S`` at ``x``, with the phase conditions that are active."""
+        system = self.system
+        with system.clock("assembly"):
+            system.bring(x)
+            self.matrix.zeroEntries()
+            fem.petsc.assemble_matrix(self.matrix, system.equations.jacobian)
+            if system.has_scalars:
+                self.matrix.setValue(system.load_index, system.load_index, 1.0, addv=True)
+            system.add_drifts(self.matrix)
+            self.matrix.assemble()
+        self.shift = 0.0
+        if not self.resolution:
+            mass = system.metric.getDiagonal().array_r[system.metric.getDiagonal().array_r > 0]
+            smallest = system.comm.allreduce(float(mass.min()) if len(mass) else np.inf, op=MPI.MIN)
+            self.resolution = 10 * EPS * self.matrix.norm(PETSc.NormType.INFINITY) / smallest
+            self.tolerance = max(self.tolerance, self.resolution)
+
+    def below(self, sigma: float) -> int:
+        """Number of eigenvalues below ``sigma`` at the state last assembled; symmetry modes not counted."""
+        with self.system.clock("stability"):
+            self.matrix.axpy(self.shift - sigma, self.system.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            self.shift = sigma
+            self.solver.setOperators(self.matrix)
+            pc = self.solver.getPC()
+            pc.setFactorSetUpSolverType()
+            factor = pc.getFactorMatrix()
+            factor.setMumpsIcntl(24, 1)
+            factor.setMumpsIcntl(13, 1)
+            factor.setMumpsCntl(3, -1e-300)
+            self.solver.setUp()
+            negative, zero, _ = factor.getInertia()
+        below = negative - self.constraints - self.system.active_drifts()
+        if zero or below < 0:
+            raise ConvergenceError(
+                f"The count of eigenvalues below {sigma:.2g} broke down ({zero} zero pivots, {negative} negative ones for "
+                f"{self.constraints} constraints): the constraints depend on each other, or the state is not an equilibrium."
+            )
+        return int(below)
+
+    def count(self, x: PETSc.Vec) -> Index:
+        """Index of the state ``x``; two factorisations, the last of which serves :meth:`nearest`."""
+        self.assemble(x)
+        negative = self.below(-self.tolerance)
+        return Index(negative, self.below(self.tolerance) - negative + self.system.active_drifts())
+
+    def nearest(self, number: int, accuracy: float = 1e-3, most: int = 60) -> tuple[np.ndarray, list[PETSc.Vec]]:
+        """Return the eigenvalues nearest zero of the matrix last factored, and their vectors (metric norm 1).
+
+        Block inverse iteration from the vectors of the last call, until the ``number`` wanted values change by less than
+        ``accuracy`` relative to themselves (or ``1e-3 accuracy`` of the rod's scale).  The block has one more vector.
+        """
+        metric, block = self.system.metric, number + 1
+        while len(self._vectors) < block:
+            self._vectors.append(self._seed(len(self._vectors)))
+        del self._vectors[block:]
+        values = np.full(block, np.inf)
+        for i, v in enumerate(self._vectors):
+            v.axpy(1e-3, self._seed(i))  # the old vectors may span an invariant space that misses the nearest one
+        with self.system.clock("stability"):
+            for _ in range(most):
+                images = [metric * v for v in self._vectors]
+                solved = [v.duplicate() for v in self._vectors]
+                for image, out in zip(images, solved, strict=True):
+                    self.solver.solve(image, out)
+                a = np.array([[y.dot(w) for w in images] for y in solved])
+                masses = [metric * y for y in solved]
+                b = np.array([[y.dot(w) for w in masses] for y in solved])
+                size = np.sqrt(np.diag(b))
+                theta, z = scipy.linalg.eigh(((a + a.T) / 2) / np.outer(size, size), ((b + b.T) / 2) / np.outer(size, size))
+                order = np.argsort(abs(theta + self.shift))
+                last, values = values, theta[order] + self.shift
+                self._vectors = [combine(solved, z[:, j] / size) for j in order]
+                change = abs(values - last)[:number]
+                if np.all(change <= accuracy * np.maximum(abs(values[:number]), 1e-3 * self.scale)):
+                    break
+        return values[:number], self._vectors[:number]
+
+    def _seed(self, i: int) -> PETSc.Vec:
+        """Vector with a bit of everything but the scalars."""
+        vector = self.system.new_vector()
+        begin, end = vector.getOwnershipRange()
+        numbers = np.arange(begin, min(end, self.system.fields.field_unknowns))
+        vector.array[: len(numbers)] = np.sin((1.0 + i) * (1.0 + 0.731 * numbers)) + 0.3
+        return vector
+
+
+def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:
+    """Linear combination of vectors."""
+    out = vectors[0].duplicate()
+    out.set(0.0)
+    out.maxpy(list(weights), vectors)
+    return out

@@ -1,0 +1,241 @@
+"""The bordered saddle point system of a scene: assembly, factorisation, and the vectors that live on it.
+
+The unknown vector ``x`` holds the free values of the fields, then the scalars: components of a constant contact force,
+the load, and one drift scalar for each symmetry.  The last two kinds are borders:
+
+* the row of the load is the linear equation ``row . (x - x0) = 0`` (an arclength or "fixed load" equation);
+* a drift scalar ``d`` adds ``d g`` to the equations, ``g`` the metric times the symmetry's generator at a reference
+  state, and its row is the phase condition ``g . (x - x0) = 0``.  By the symmetry ``d`` vanishes at an equilibrium.
+  At a state that the symmetry leaves alone the generator is zero, and the row is ``d = 0`` instead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.clock import Clock
+from rodfem.equations import Equations
+from rodfem.fields import LOAD, Discretization, Fields
+from rodfem.pattern import bordered_pattern, new_matrix
+from rodfem.scene import Scene
+
+SYMMETRIC_STATE = 1e-6
+"""A generator smaller than this (in the metric) is zero: the state has the symmetry itself."""
+
+
+class System:
+    """Residual, Jacobian and metric of a scene at a discretisation, and their borders.
+
+    Attributes
+    ----------
+    metric
+        Symmetric matrix of the squared size of a change of state: rotations, centreline, and the load over its span.
+    lu
+        KSP with the LU factors of the last Jacobian given to :meth:`factor`.
+    """
+
+    def __init__(self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD, clock: Clock | None = None) -> None:
+        """Compile the forms and allocate all matrices once."""
+        self.scene, self.comm = scene, comm
+        self.clock = clock or Clock()
+        self.fields = Fields(scene, discretization, comm)
+        self.equations = Equations(self.fields)
+        number, self.scalars = self.fields.number, self.fields.scalars
+        self.load_index = self.scalars[LOAD]
+        self.drifts = [self.scalars[f"drift{i}"] for i in range(len(scene.symmetries))]
+        self.has_scalars = comm.rank == comm.size - 1
+        without_load = np.where(number == self.load_index, -1, number).astype(PETSc.IntType)
+        all_map = PETSc.LGMap().create(number.astype(PETSc.IntType), comm=comm)
+        self._no_load = PETSc.LGMap().create(without_load, comm=comm)
+        self._equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
+        self._pattern = bordered_pattern(self.fields)
+        self.matrix = new_matrix(self.fields, self._pattern, self._no_load, all_map)
+        self.x_local = PETSc.Vec().createSeq(int((number >= 0).sum()), comm=PETSc.COMM_SELF)
+        self._numbered = np.flatnonzero(number >= 0)
+        self.workspace = self.matrix.createVecRight()
+        source = PETSc.IS().createGeneral(number[self._numbered].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        self._gather = PETSc.Scatter().create(self.workspace, source, self.x_local, None)
+        self._residual_local = np.zeros(len(self.fields.u.x.array))
+        self._set_clamps()
+        self.metric = self._assemble_metric()
+        self.phases: list[PETSc.Vec | None] = [None] * len(self.drifts)
+        self._phase_offset = [0.0] * len(self.drifts)
+        self.lu = self._direct_solver("lu")
+
+    # --- vectors -----------------------------------------------------------------------------------------------
+
+    def new_vector(self) -> PETSc.Vec:
+        """Zero vector of all unknowns."""
+        vector = self.workspace.duplicate()
+        vector.set(0.0)
+        return vector
+
+    def scalar(self, x: PETSc.Vec, name: str = LOAD) -> float:
+        """Value of a scalar unknown, the same on all ranks."""
+        value = x.getValue(self.scalars[name]) if self.has_scalars else 0.0
+        return self.comm.bcast(value, root=self.comm.size - 1) if self.comm.size > 1 else value
+
+    def set_load(self, x: PETSc.Vec, value: float) -> None:
+        """Set the load in ``x``."""
+        if self.has_scalars:
+            x.setValue(self.load_index, value)
+        x.assemble()
+
+    def load_axis(self) -> PETSc.Vec:
+        """Unit vector of the load: as a row it fixes the load."""
+        row = self.new_vector()
+        self.set_load(row, 1.0)
+        return row
+
+    def norm(self, d: PETSc.Vec) -> float:
+        """Size of a change of state in the metric."""
+        self.metric.mult(d, self.workspace)
+        return max(self.workspace.dot(d), 0.0) ** 0.5
+
+    def bring(self, x: PETSc.Vec) -> None:
+        """Put ``x`` into the dolfinx function on which the forms are assembled."""
+        self._gather.scatter(x, self.x_local, addv=PETSc.InsertMode.INSERT_VALUES)
+        self.fields.u.x.array[self._numbered] = self.x_local.array_r
+
+    def take(self) -> PETSc.Vec:
+        """Vector of the values that the dolfinx function holds; drift scalars are zero."""
+        x, f = self.new_vector(), self.fields
+        x.array[: len(f.free_owned)] = f.u.x.array[f.free_owned]
+        if self.has_scalars:
+            for position, name in enumerate(name for name in self.scalars if not name.startswith("drift")):
+                x.setValue(self.scalars[name], f.u.x.array[f.copies[0, position]])
+        x.assemble()
+        return x
+
+    # --- assembly ----------------------------------------------------------------------------------------------
+
+    def residual(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Equations at ``x`` into ``out``; the row of the load is left zero."""
+        with self.clock("assembly"):
+            self.bring(x)
+            self._residual_local[:] = 0.0
+            fem.assemble_vector(self._residual_local, self.equations.residual)
+            out.set(0.0)
+            targets = self._equation_targets
+            out.setValues(self.fields.number[targets], self._residual_local[targets], addv=PETSc.InsertMode.ADD_VALUES)
+            out.assemble()
+            for i, (phase, index) in enumerate(zip(self.phases, self.drifts, strict=True)):
+                drift = self.scalar(x, f"drift{i}")
+                value = drift
+                if phase is not None:
+                    out.axpy(drift, phase)
+                    value = phase.dot(x) - self._phase_offset[i]
+                if self.has_scalars:
+                    out.setValue(index, value)
+                out.assemble()
+
+    def jacobian(self, row: PETSc.Vec) -> PETSc.Mat:
+        """Jacobian at the state last brought by :meth:`residual`, with ``row`` as the row of the load."""
+        with self.clock("assembly"):
+            self.matrix.zeroEntries()
+            fem.petsc.assemble_matrix(self.matrix, self.equations.jacobian)
+            self.add_drifts(self.matrix)
+            begin, end = row.getOwnershipRange()
+            self.matrix.setValues([self.load_index], np.arange(begin, end, dtype=PETSc.IntType), row.array_r, addv=True)
+            self.matrix.assemble()
+        return self.matrix
+
+    def add_drifts(self, matrix: PETSc.Mat) -> None:
+        """Add rows and columns of the drift scalars: the generators, or a one where a drift is switched off."""
+        for phase, index in zip(self.phases, self.drifts, strict=True):
+            if phase is None:
+                if self.has_scalars:
+                    matrix.setValue(index, index, 1.0, addv=True)
+                continue
+            begin, end = phase.getOwnershipRange()
+            own = np.arange(begin, end, dtype=PETSc.IntType)
+            matrix.setValues([index], own, phase.array_r, addv=True)
+            matrix.setValues(own, [index], phase.array_r, addv=True)
+
+    def factor(self, row: PETSc.Vec) -> None:
+        """Assemble and factor the Jacobian at the state last brought."""
+        matrix = self.jacobian(row)
+        with self.clock("solve"):
+            self.lu.setOperators(matrix)
+            self.lu.setUp()
+
+    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> bool:
+        """Solve with the last factors; False where the matrix was found singular."""
+        with self.clock("solve"):
+            self.lu.solve(right, out)
+            return bool(self.lu.getConvergedReason() > 0)
+
+    def state_matrix(self) -> PETSc.Mat:
+        """Allocate a matrix for the second variation at fixed load (row and column of the load empty)."""
+        return new_matrix(self.fields, self._pattern, self._no_load, self._no_load)
+
+    # --- symmetry ----------------------------------------------------------------------------------------------
+
+    def generator(self, x: PETSc.Vec, symmetry: int) -> PETSc.Vec:
+        """Change of ``x`` under the infinitesimal symmetry, in all fields and scalar forces that it moves."""
+        self.bring(x)
+        f, u = self.fields, self.fields.u.x.array
+        out = self.new_vector()
+        change = np.zeros(len(u))
+        matrices = self.scene.symmetries[symmetry]
+        for name, matrix in matrices.items():
+            if name in f.dofs:
+                dofs = f.dofs[name].reshape(-1, f.dofs[name].shape[-1])
+                change[dofs] = u[dofs] @ np.array(matrix).T
+        out.array[: len(f.free_owned)] = change[f.free_owned]
+        if f.forces and "n" in matrices:
+            n = np.zeros(3)
+            n[f.forces] = [self.scalar(x, f"n{i + 1}") for i in f.forces]
+            if self.has_scalars:
+                for i, value in zip(f.forces, (np.array(matrices["n"]) @ n)[f.forces], strict=True):
+                    out.setValue(self.scalars[f"n{i + 1}"], value)
+        out.assemble()
+        return out
+
+    def set_phase(self, reference: PETSc.Vec | None) -> None:
+        """Take the phase conditions at ``reference``: active for each symmetry that it breaks; None: none active."""
+        for i in range(len(self.drifts)):
+            generator = None if reference is None else self.generator(reference, i)
+            size = 0.0 if generator is None else self.norm(generator)
+            if generator is None or reference is None or size < SYMMETRIC_STATE:
+                self.phases[i] = None
+                continue
+            phase = self.metric * generator
+            phase.scale(1.0 / size)
+            self.phases[i], self._phase_offset[i] = phase, phase.dot(reference)
+
+    def active_drifts(self) -> int:
+        """Number of symmetries that the current reference state breaks: as many zero eigenvalues belong to it."""
+        return sum(phase is not None for phase in self.phases)
+
+    # --- set-up ------------------------------------------------------------------------------------------------
+
+    def _set_clamps(self) -> None:
+        """Give the clamped degrees of freedom their values, once and for all."""
+        u, f = self.fields.u.x.array, self.fields
+        u[:] = 0.0
+        x = f.coordinates(f.discretization.degree)
+        for end, s in zip(self.scene.ends, self.scene.interval, strict=True):
+            if end.rotation is not None:
+                u[f.dofs["q"][np.isclose(x, s, rtol=0, atol=1e-9 * self.scene.length)]] = end.rotation
+
+    def _assemble_metric(self) -> PETSc.Mat:
+        metric = new_matrix(self.fields, self._pattern, self._no_load, self._no_load)
+        fem.petsc.assemble_matrix(metric, self.equations.metric)
+        if self.has_scalars:
+            a, b = self.scene.span
+            metric.setValue(self.load_index, self.load_index, 1.0 / (b - a) ** 2, addv=True)
+        metric.assemble()
+        return metric
+
+    def _direct_solver(self, kind: str) -> PETSc.KSP:
+        """Make a KSP that applies MUMPS factors, ``lu`` or ``cholesky`` (LDL^t, which also counts the inertia)."""
+        solver = PETSc.KSP().create(self.comm)
+        solver.setType("preonly")
+        pc = solver.getPC()
+        pc.setType(kind)
+        pc.setFactorSolverType("mumps")
+        return solver
