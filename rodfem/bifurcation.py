@@ -26,8 +26,10 @@ from rodfem.newton import correct
 from rodfem.stability.inertia import combine
 
 NODES = 6
-WINDOW = 0.03
+WINDOW = 0.02
 """Half length of the piece of a branch, in the metric, on which a special point is interpolated."""
+SHARP = 1e-11
+"""Uncertainty of a load, for the given mesh, at which a special point needs no sharper interpolation."""
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
 
@@ -55,21 +57,28 @@ def solve_at(follower: Follower, curve: Curve, s: float) -> PETSc.Vec:
     return x
 
 
-def sample(follower: Follower, curve: Curve, s: float, order: int) -> Sample:
-    """Solve at ``s`` and find the eigenvalue number ``order`` (0 is the left-most), which must be near zero."""
-    x = solve_at(follower, curve, s)
+def eigenvalue(follower: Follower, x: PETSc.Vec, order: int) -> tuple[float, PETSc.Vec]:
+    """Eigenvalue number ``order`` (0 is the left-most) of the state ``x`` and its vector; it must be one of those near zero."""
     below = follower.inertia.count(x).negative
     position = order - below if order >= below else below - 1 - order
-    wanted = position + 2
-    values, _ = follower.inertia.nearest(wanted, accuracy=1e-11)
-    side = np.sort(values[values >= -follower.inertia.tolerance]) if order >= below else -np.sort(-values[values < 0])[:]
-    while position >= len(side):
-        wanted += 2
-        if wanted > 16:
-            raise ConvergenceError(f"Eigenvalue number {order} is not among the sixteen nearest zero; use smaller steps.")
-        values, _ = follower.inertia.nearest(wanted, accuracy=1e-11)
-        side = np.sort(values[values >= -follower.inertia.tolerance]) if order >= below else -np.sort(-values[values < 0])
-    return Sample(s, x, follower.system.scalar(x), float(side[position]), below)
+    for wanted in (position + 1, position + 3, position + 6, position + 12):
+        values, vectors = follower.inertia.nearest(wanted, accuracy=1e-4)
+        side = np.flatnonzero(values >= -follower.inertia.tolerance if order >= below else values < -follower.inertia.tolerance)
+        if len(side) > position:
+            chosen = side[np.argsort(abs(values[side]))[position]]
+            return float(values[chosen]), vectors[chosen].copy()
+    raise ConvergenceError(f"Eigenvalue number {order} is not among those nearest zero; use smaller steps.")
+
+
+def sample(follower: Follower, curve: Curve, s: float, mode: PETSc.Vec) -> Sample:
+    """Solve at ``s`` and evaluate ``1 / (mode . M S^-1 M mode)`` there.
+
+    For a ``mode`` near the null vector this is the eigenvalue that vanishes, up to second order in their difference, but unlike the
+    ordered eigenvalues it is smooth where others come by; its zero is where ``S`` is singular.
+    """
+    x = solve_at(follower, curve, s)
+    below = follower.inertia.count(x).negative
+    return Sample(s, x, follower.system.scalar(x), follower.inertia.response(mode), below)
 
 
 @dataclass
@@ -125,20 +134,27 @@ def _barycentric(nodes: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
     return chebyshev.chebvander(np.array([t]), degree)[0] @ inverse, chebyshev.chebvander(np.array([t]), degree - 1)[0] @ derivative @ inverse
 
 
-def refine(follower: Follower, curve: Curve, center: float, half: float, order: int, zero_of: str) -> Located:
-    """Solve at Chebyshev nodes around ``center``, moving them until the zero lies among them."""
-    for _ in range(8):
+def refine(follower: Follower, curve: Curve, center: float, half: float, mode: PETSc.Vec, zero_of: str) -> Located:
+    """Solve at Chebyshev nodes around ``center``: move them until the zero lies among them, shrink them until it is sharp."""
+    best: Located | None = None
+    for _ in range(10):
         nodes = center + half * np.cos(np.pi * (np.arange(NODES)[::-1] + 0.5) / NODES)
-        samples = [sample(follower, curve, s, order) for s in nodes]
+        samples = [sample(follower, curve, s, mode) for s in nodes]
         located = interpolate(samples, zero_of, center)
         if located is not None and abs(located.s - center) <= half:
-            return located
-        if located is not None:
+            if located.uncertainty < SHARP or (best is not None and located.uncertainty > 0.1 * best.uncertainty):
+                return located if best is None or located.uncertainty < best.uncertainty else best
+            best, center, half = located, located.s, half / 4
+        elif located is not None:
             center = located.s
+        elif best is not None:
+            return best
         else:
             mu = [samples[0].mu, samples[-1].mu] if zero_of == "mu" else _slopes(samples)
             step = -mu[0] * (nodes[-1] - nodes[0]) / (mu[1] - mu[0]) if mu[1] != mu[0] else half
             center = nodes[0] + float(np.clip(step, -4 * half, 6 * half))
+    if best is not None:
+        return best
     raise ConvergenceError(f"A special point near load {samples[0].load:.8g} could not be located; use smaller steps.")
 
 
@@ -158,18 +174,18 @@ def locate(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -> 
     if zero_of == "slope":
         guess = a.arclength + h * a.slope / (a.slope - b.slope)
     else:
+        ends = a.arclength + 1e-3 * h, b.arclength - 1e-3 * h
 
         def mu(s: float) -> float:
-            return sample(follower, curve, s, order).mu
+            return eigenvalue(follower, solve_at(follower, curve, s), order)[0]
 
-        inner = 1e-3 * h
-        ends = a.arclength + inner, b.arclength - inner
         left, right = mu(ends[0]), mu(ends[1])
         if left * right > 0:
             guess = ends[0] if abs(left) < abs(right) else ends[1]
         else:
-            guess = float(brentq(mu, *ends, xtol=max(0.1 * WINDOW, 0.02 * h) if h > WINDOW else 0.1 * h))
-    return refine(follower, curve, guess, min(WINDOW, 0.45 * h), order, zero_of)
+            guess = float(brentq(mu, *ends, xtol=0.1 * min(WINDOW, h)))
+    _, mode = eigenvalue(follower, solve_at(follower, curve, guess), order)
+    return refine(follower, curve, guess, min(WINDOW, 0.45 * h), mode, zero_of)
 
 
 def special_at(follower: Follower, located: Located, arclength: float) -> Special:
@@ -216,7 +232,9 @@ def find_special(follower: Follower, a: Point, b: Point) -> list[Special]:
 
 def _special(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -> Special:
     located = locate(follower, a, b, order, zero_of)
-    return special_at(follower, located, located.s)
+    special = special_at(follower, located, located.s)
+    special.zero_of = zero_of
+    return special
 
 
 def directions(follower: Follower, special: Special) -> list[PETSc.Vec]:

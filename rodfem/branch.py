@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 from petsc4py import PETSc
 
@@ -55,6 +54,7 @@ class Special:
     meets: tuple[str, int] | None = None
     switched: bool = False
     row: int = -1
+    zero_of: str = "mu"
     note: str = ""
 
     @property
@@ -73,7 +73,6 @@ class Branch:
     points: list[Point] = field(default_factory=list)
     special: list[Special] = field(default_factory=list)
     ended: str = "not traced"
-    extra: dict[str, Any] = field(default_factory=dict)
 
     def insert(self, special: Special) -> None:
         """Put a special point among the points by its arclength, and renumber the rows of all special points."""

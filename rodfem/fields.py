@@ -9,6 +9,7 @@ no number at all: PETSc drops what is added to number -1, and no Dirichlet row e
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
@@ -77,8 +78,8 @@ class Fields:
         Global number of each scalar: ``n1``.. for ``forces``, ``load``, and ``drift0``.. one for each symmetry.
     """
 
-    def __init__(self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
-        """Make the mesh and number the unknowns; raises :class:`SceneError` for more ranks than elements."""
+    def __init__(self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD, mesh: Any = None) -> None:
+        """Make the mesh (unless given) and number the unknowns; raises :class:`SceneError` for more ranks than elements."""
         if comm.size > discretization.elements:
             raise SceneError(
                 f"{discretization.elements} elements cannot be shared by {comm.size} ranks: use more elements or fewer ranks."
@@ -89,7 +90,7 @@ class Fields:
         c = scene.constants()
         self.forces = [i for i in range(3) if reduced and scene.known_force(i, c) is None]
         names = [f"n{i + 1}" for i in self.forces] + [LOAD]
-        self.mesh = compat.interval_mesh(comm, discretization.elements, *scene.interval)
+        self.mesh = mesh or compat.interval_mesh(comm, discretization.elements, *scene.interval)
         parts = [(b.continuous, b.degree, b.size) for b in self.blocks] + [(False, 0, len(names))]
         self.space = compat.mixed_space(self.mesh, parts)
         self.u = fem.Function(self.space)
@@ -163,3 +164,17 @@ class Fields:
         words = [f"{names[b.name]} (P{b.degree})" for b in self.blocks]
         words += ["n" + ", n".join(str(i + 1) for i in self.forces) + " (scalar)"] if self.forces else []
         return ", ".join(words)
+
+    def left_out(self) -> list[str]:
+        """Unknowns that this scene does without, and why."""
+        scene, c = self.scene, self.scene.constants()
+        fixed = [i for i in range(3) if i not in scene.free_strains]
+        lines = []
+        if fixed:
+            lines.append(f"strain {', '.join(f'v{i + 1}' for i in fixed)}: the rod is {scene.rod}")
+        if self.discretization.formulation == "reduced":
+            lines.append("centreline r and the field of contact force: no force acts along the rod, so that the contact force is constant")
+            known = [f"n{i + 1}" for i in range(3) if scene.known_force(i, c) is not None]
+            if known:
+                lines.append(f"contact force {', '.join(known)}: a dead force at an end that is free to move there")
+        return lines

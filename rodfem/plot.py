@@ -201,7 +201,7 @@ def _place_labels(axes: Axes, pieces: list[Piece], legend: Bbox, obstacles: Floa
         seen.add((name, negative))
         half = np.array([0.33 * height * len(str(negative)) + 6.0, 0.38 * height + 6.0])
         best, chosen = math.inf, legend
-        for share, gap, side in product(np.linspace(0.1, 0.9, 13), (2.0, 8.0, 16.0, 26.0), (1.0, -1.0)):
+        for share, gap, side in product(np.linspace(0.1, 0.9, 13), (2.0, 8.0, 16.0), (1.0, -1.0)):
             middle = round(share * (len(curve) - 1))
             tangent = curve[min(middle + 4, len(curve) - 1)] - curve[max(middle - 4, 0)]
             normal = side * np.array([-tangent[1], tangent[0]]) / max(math.hypot(*tangent), 1e-9)
@@ -239,7 +239,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         diagram = json.loads(options.diagram.read_text(encoding="utf-8"))
         print(draw_diagram(diagram, options.output or options.diagram.with_suffix(".png")))
     except (KeyError, OSError, ValueError) as error:
-        advice = "" if type(error) is ValueError else " is wrong or missing: try the diagram.json of a scene"
+        advice = "" if type(error) is ValueError else "; try the diagram.json of a scene"
         print(f"cannot draw {options.diagram}: {error}{advice}", file=sys.stderr)
         return 2
     return 0

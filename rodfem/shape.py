@@ -93,10 +93,11 @@ class Shape:
             slopes = self._slopes()
             local["ends"] = np.einsum("g,cgi,c->ci", self.gauss.weights, slopes, self.size)
             local["inside"] = np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), slopes, self.size)
+        out: dict[str, Any] = {"elements": f.discretization.elements}
         order = np.argsort(all_cells := self._gather(local.pop("start")))
         all_fields = {name: self._gather(values)[order] for name, values in local.items()}
         h = np.diff(np.append(all_cells[order], system.scene.interval[1]))
-        out: dict[str, Any] = {"s": self._unique(all_cells[order][:, None, None] + h[:, None, None] * self.nodes[None, :, None])[:, 0]}
+        out["s"] = self._unique(all_cells[order][:, None, None] + h[:, None, None] * self.nodes[None, :, None])[:, 0]
         for block in f.blocks:
             values = all_fields[block.name]
             out[block.name] = self._unique(values) if block.continuous else values

@@ -11,6 +11,8 @@ the load, and one drift scalar for each symmetry.  The last two kinds are border
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
@@ -37,11 +39,18 @@ class System:
         KSP with the LU factors of the last Jacobian given to :meth:`factor`.
     """
 
-    def __init__(self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD, clock: Clock | None = None) -> None:
-        """Compile the forms and allocate all matrices once."""
+    def __init__(
+        self,
+        scene: Scene,
+        discretization: Discretization,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        clock: Clock | None = None,
+        mesh: Any = None,
+    ) -> None:
+        """Compile the forms and allocate all matrices once; on a given mesh if there is one."""
         self.scene, self.comm = scene, comm
         self.clock = clock or Clock()
-        self.fields = Fields(scene, discretization, comm)
+        self.fields = Fields(scene, discretization, comm, mesh)
         self.equations = Equations(self.fields)
         number, self.scalars = self.fields.number, self.fields.scalars
         self.load_index = self.scalars[LOAD]

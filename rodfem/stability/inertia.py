@@ -104,7 +104,7 @@ class Inertia:
         """Return the eigenvalues nearest zero of the matrix last factored, and their vectors (metric norm 1).
 
         Block inverse iteration from the vectors of the last call, until the ``number`` wanted values change by less than
-        ``accuracy`` relative to themselves (or ``1e-3 accuracy`` of the rod's scale).  The block has one more vector.
+        ``accuracy`` relative to themselves (or by what the arithmetic resolves).  The block has one more vector.
         """
         metric, block = self.system.metric, number + 1
         while len(self._vectors) < block:
@@ -128,9 +128,16 @@ class Inertia:
                 last, values = values, theta[order] + self.shift
                 self._vectors = [combine(solved, z[:, j] / size) for j in order]
                 change = abs(values - last)[:number]
-                if np.all(change <= accuracy * np.maximum(abs(values[:number]), 1e-3 * self.scale)):
+                if np.all(change <= np.maximum(accuracy * abs(values[:number]), self.resolution)):
                     break
         return values[:number], self._vectors[:number]
+
+    def response(self, mode: PETSc.Vec) -> float:
+        """Return ``1 / (mode . M S^-1 M mode)`` for a vector of metric norm 1: the eigenvalue where ``mode`` is its vector."""
+        with self.system.clock("stability"):
+            image = self.system.metric * mode
+            self.solver.solve(image, self.system.workspace)
+            return 1.0 / image.dot(self.system.workspace) + self.shift
 
     def _seed(self, i: int) -> PETSc.Vec:
         """Vector with a bit of everything but the scalars."""

@@ -1,0 +1,82 @@
+"""The command line that all demos share."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+
+class Parser(argparse.ArgumentParser):
+    """Argument parser whose complaints are one sentence, printed once under MPI."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print ``message`` and leave with status 2."""
+        complain(f"{message[:1].upper()}{message[1:]}; see {self.prog} --help.")
+
+
+def complain(sentence: str) -> NoReturn:
+    """Print one sentence on rank 0 and leave with status 2 on every rank."""
+    from mpi4py import MPI
+
+    if MPI.COMM_WORLD.rank == 0:
+        sys.stderr.write(f"error: {sentence}\n")
+        sys.stderr.flush()
+    MPI.COMM_WORLD.barrier()
+    sys.exit(2)
+
+
+def parser_for(name: str, description: str, load: str, span: tuple[float, float], elements: int, degree: int) -> Parser:
+    """Return the options that every demo has; a demo adds its own constants."""
+    parser = Parser(
+        prog=f"{name}.py",
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="Options for PETSc and SLEPc go after a lone --, as in: -- -log_view",
+    )
+    group = parser.add_argument_group("discretisation")
+    group.add_argument("--elements", type=int, default=elements, metavar="N", help=f"number of finite elements along the rod (default {elements})")
+    group.add_argument("--degree", type=int, default=degree, metavar="K", help=f"polynomial degree; the error falls as h^(2K) (default {degree})")
+    group.add_argument(
+        "--formulation",
+        default="reduced",
+        metavar="{reduced,pointwise}",
+        help="reduced: no centreline, the contact force as scalars; pointwise: all fields (default reduced)",
+    )
+    group = parser.add_argument_group("what to compute")
+    group.add_argument("--range", dest="span", type=float, nargs=2, default=span, metavar=("A", "B"), help=f"start at {load} = A, stay between A and B (default {span[0]:g} {span[1]:g})")
+    group.add_argument("--at", type=float, nargs="+", default=[], metavar="LOAD", help=f"compute every branch also at exactly these values of {load}")
+    group.add_argument("--spectrum", type=int, default=0, metavar="K", help="also compute the K left-most eigenvalues of every state with SLEPc")
+    group = parser.add_argument_group("output")
+    group.add_argument("--output", type=Path, default=Path("results") / name, metavar="DIR", help=f"folder for files and pictures (default results/{name})")
+    group.add_argument("--no-figures", dest="figures", action="store_false", help="draw nothing")
+    return parser
+
+
+def main(parser: Parser, scene_of: Callable[[argparse.Namespace], Any], arguments: Sequence[str] | None = None) -> None:
+    """Parse the command line, build the scene, run it; bad input ends with one sentence and status 2."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
+    options = parser.parse_args(ours)
+    from rodfem.errors import ConvergenceError, EnvironmentTrouble, SceneError, SymmetryError
+
+    try:
+        from petsc4py import PETSc
+
+        from rodfem.explore import Plan
+        from rodfem.fields import Discretization
+        from rodfem.run import run
+
+        if petsc:
+            PETSc.Options().insertString(" ".join(petsc))
+        discretization = Discretization(options.formulation, options.elements, options.degree)
+        if options.spectrum < 0:
+            raise SceneError(f"--spectrum {options.spectrum} is not a number of eigenvalues: give 0 or more.")
+        scene = scene_of(options)
+        span = tuple(options.span)
+        plan = Plan(span, at=tuple(options.at), spectrum=options.spectrum)
+        run(scene, discretization, plan, options.output, figures=options.figures)
+    except (SceneError, EnvironmentTrouble, SymmetryError, ConvergenceError) as trouble:
+        complain(str(trouble))

@@ -1,0 +1,165 @@
+"""A bifurcation diagram as plain columnar data: made from branches, saved to ``diagram.json`` and ``states.h5``.
+
+``diagram.json`` holds for each branch its columns (one entry a row, a row being an equilibrium) and its special points, each of which is
+a row too.  ``states.h5`` holds the same rows as shapes and fields in natural order along the rod, whatever the number of ranks:
+to draw them, or to start again from one with :func:`load_state`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.branch import Branch, Special
+from rodfem.clock import Clock
+from rodfem.continuation import Follower
+from rodfem.errors import SceneError
+from rodfem.system import System
+
+COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "nearest", "stretch", "slope", "drift", "arclength", "error")
+
+
+def as_data(branches: Sequence[Branch], system: System, clock: Clock, span: tuple[float, float]) -> dict[str, Any]:
+    """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene)."""
+    scene, d = system.scene, system.fields.discretization
+    s = clock.seconds
+    points = sum(len(b.points) for b in branches)
+    work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
+    return {
+        "scene": scene.name,
+        "title": scene.title or scene.name,
+        "parameter": scene.load,
+        "parameter_label": scene.parameters[scene.load].label or scene.load,
+        "ordinate": scene.ordinate.name,
+        "ordinate_label": scene.ordinate.label or scene.ordinate.name,
+        "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
+        "range": list(span),
+        "discretization": {"formulation": d.formulation, "elements": d.elements, "degree": d.degree, "unknowns": system.fields.unknowns},
+        "branches": [_branch_data(b) for b in branches],
+        "timing": {
+            "assembly_s": s.get("assembly", 0.0),
+            "solve_s": s.get("solve", 0.0),
+            "stability_s": s.get("stability", 0.0),
+            "error_bars_s": s.get("error bars", 0.0),
+            "setup_s": s.get("setup", 0.0),
+            "total_s": clock.total(),
+            "points": points,
+            "ms_per_point": 1e3 * work / max(points, 1),
+            "ranks": system.comm.size,
+        },
+    }
+
+
+def _branch_data(branch: Branch) -> dict[str, Any]:
+    columns: dict[str, list[Any]] = {name: [_plain(getattr(p, name)) for p in branch.points] for name in COLUMNS}
+    if any(p.spectrum for p in branch.points):
+        columns["spectrum"] = [p.spectrum for p in branch.points]
+    return {
+        "name": branch.name,
+        "parent": list(branch.parent) if branch.parent else None,
+        "ended": branch.ended,
+        "columns": columns,
+        "special": [_special_data(s) for s in branch.special],
+    }
+
+
+def _special_data(s: Special) -> dict[str, Any]:
+    return {
+        "kind": s.kind,
+        "load": s.point.load,
+        "ordinate": s.point.ordinate,
+        "energy": s.point.energy,
+        "row": s.row,
+        "negative_before": s.negative_before,
+        "negative_after": s.negative_after,
+        "zero": s.point.zero,
+        "multiplicity": s.multiplicity,
+        "error_estimate": _plain(s.error_estimate),
+        "ordinate_error_estimate": _plain(s.ordinate_error),
+        "located_to": s.located_to,
+        "coupling": s.coupling,
+        "meets": list(s.meets) if s.meets else None,
+        "note": s.note,
+    }
+
+
+def _plain(value: float) -> float | int | None:
+    """Number that JSON can hold; what is not finite becomes null."""
+    if isinstance(value, int):
+        return value
+    return float(value) if np.isfinite(value) else None
+
+
+def save_json(data: dict[str, Any], path: Path) -> None:
+    """Write a diagram whole or not at all, so that an interrupted run leaves the last good file."""
+    draft = path.with_suffix(".json.part")
+    draft.write_text(json.dumps(data, indent=1) + "\n")
+    os.replace(draft, path)
+
+
+def load_json(path: Path) -> dict[str, Any]:
+    """Read a diagram; raises :class:`SceneError` where there is none."""
+    try:
+        data: dict[str, Any] = json.loads(Path(path).read_text())
+    except (OSError, json.JSONDecodeError) as trouble:
+        raise SceneError(f"{path} is not a diagram ({trouble}): give the diagram.json of a run.") from trouble
+    return data
+
+
+def save_states(branch: Branch, follower: Follower, path: Path, first: bool) -> None:
+    """Append the states of a branch to an HDF5 file; collective, written on rank 0.
+
+    Group ``/branches/<name>`` has ``load`` (P,), ``r`` (P, m, 3), ``q`` (P, m, 4), every further field and scalar with P rows, and the
+    null vectors of its special points under ``special/<i>``.
+    """
+    samples = [follower.shape.sample(p.x) for p in branch.points]
+    modes = [[follower.shape.sample(v) for v in s.null_vectors] for s in branch.special]
+    if follower.system.comm.rank:
+        return
+    d = follower.system.fields.discretization
+    with h5py.File(path, "w" if first else "a") as file:
+        file.attrs.update(
+            scene=follower.system.scene.name,
+            parameter=follower.system.scene.load,
+            formulation=d.formulation,
+            elements=d.elements,
+            degree=d.degree,
+        )
+        if first:
+            file["s"] = samples[0]["s"]
+        group = file.create_group(f"branches/{branch.name}")
+        for name in samples[0]:
+            if name not in ("s", "elements"):
+                group[name] = np.array([s[name] for s in samples])
+        for i, vectors in enumerate(modes):
+            for j, mode in enumerate(vectors):
+                target = group.create_group(f"special/{i}/null_vector_{j}")
+                for name in ("q", "r"):
+                    target[name] = mode[name]
+
+
+def load_state(path: Path, branch: str, row: int, follower: Follower) -> PETSc.Vec:
+    """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
+
+    Raises :class:`SceneError` where the file has no such row, or has it in the other formulation.
+    """
+    wanted = follower.system.fields.discretization.formulation
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs["formulation"] != wanted:
+                raise SceneError(f"{path} holds states of the {file.attrs['formulation']} formulation, not of the {wanted} one asked for.")
+            group = file[f"branches/{branch}"]
+            sample = {name: value[row] for name, value in group.items() if isinstance(value, h5py.Dataset)}
+            sample["s"], sample["elements"] = file["s"][:], int(file.attrs["elements"])
+    except (OSError, KeyError, IndexError, ValueError) as trouble:
+        if isinstance(trouble, SceneError):
+            raise
+        raise SceneError(f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it.") from trouble
+    return follower.shape.restore(sample)

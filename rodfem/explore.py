@@ -1,0 +1,250 @@
+"""The whole diagram: tracing a branch with its special points, and what leaves from those, to a set depth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from petsc4py import PETSc
+from scipy.optimize import brentq
+
+from rodfem.accuracy import Richer
+from rodfem.bifurcation import directions, find_special, solve_at, start_branch
+from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
+from rodfem.continuation import Follower, Steps, follow, hermite
+from rodfem.errors import ConvergenceError, SceneError, SymmetryError
+from rodfem.report import Report
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars."""
+
+    span: tuple[float, float]
+    at: tuple[float, ...] = ()
+    depth: int = 2
+    steps: Steps = Steps()
+    error_bars: bool = True
+    spectrum: int = 0
+
+
+class Explorer:
+    """Explores the equilibria of a scene from its start state.
+
+    ``branches`` grows as the run goes; ``finished`` is called after each branch that is complete, so that nothing is lost.
+    """
+
+    def __init__(self, follower: Follower, plan: Plan, report: Report, finished: Callable[[], None]) -> None:
+        """Check the plan; raises :class:`SceneError` for a load outside the range."""
+        self.follower, self.plan, self.report, self.finished = follower, plan, report, finished
+        self.scene = follower.system.scene
+        self.scene.check_span(plan.span)
+        self.low, self.high = sorted(plan.span)
+        for load in plan.at:
+            if not self.low <= load <= self.high:
+                raise SceneError(
+                    f"The load {load:g} asked for is outside the range {self.low:g} to {self.high:g}: widen the range or leave it out."
+                )
+        self.branches: list[Branch] = []
+        self.richer: Richer | None = None
+
+    def run(self) -> list[Branch]:
+        """Trace the start state's branch, then what leaves each branch point, breadth first."""
+        self.trace(self._primary())
+        for branch in self.branches:  # grows while it is walked
+            if branch.depth < self.plan.depth:
+                for i, special in enumerate(branch.special):
+                    if special.kind == BRANCH_POINT and not special.switched:
+                        self._switch(branch, i, special)
+        return self.branches
+
+    def _primary(self) -> Branch:
+        start, stop = self.plan.span
+        follower = self.follower
+        follower.system.set_phase(None)
+        x, outcome = follower.at_load(follower.start(start), start)
+        if not outcome.converged:
+            raise ConvergenceError(f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: start at another load.")
+        follower.system.set_phase(x)
+        point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
+        return Branch(self.scene.states, None, 0, [point])
+
+    def _switch(self, parent: Branch, i: int, special: Special) -> None:
+        special.switched = True
+        for direction in directions(self.follower, special):
+            first: Point | None = None
+            for sign in (1.0, -1.0):
+                way = direction.copy()
+                way.scale(sign)
+                name = self._name(parent)
+                branch = start_branch(special, way, name, (parent.name, i), parent.depth + 1, self.follower)
+                if branch is None:
+                    continue
+                if first is not None and _equivalent(first, branch.points[1]):
+                    continue  # the mirror image of the branch just traced
+                first = branch.points[1]
+                if special.meets is None and self._traced_already(branch, special):
+                    continue
+                self.trace(branch)
+
+    def _name(self, parent: Branch) -> str:
+        siblings = sum(b.parent is not None and b.parent[0] == parent.name for b in self.branches)
+        return f"{parent.name + '.' if parent.depth else 'branch '}{siblings + 1}"
+
+    def _traced_already(self, branch: Branch, special: Special) -> bool:
+        """Whether another branch ended at this branch point coming along the same way."""
+        a, b = branch.points[1], special.point
+        for other in self.branches:
+            for end in other.special:
+                if end.meets is not None and _equivalent(end.point, b, 1e-6):
+                    before = other.points[max(end.row - 2, 0) : end.row]
+                    if any(_near(a, p) for p in before):
+                        return True
+        return False
+
+    def trace(self, branch: Branch) -> None:
+        """Follow a branch to its end, insert its special points, estimate errors, hand it on as finished."""
+        self.branches.append(branch)
+        self.report.branch(branch)
+        history = list(branch.points)
+        for item in follow(self.follower, history, self.plan.steps, (self.low, self.high)):
+            if isinstance(item, str):
+                branch.ended = item
+                break
+            previous = history[-1]
+            self._check_symmetry(item)
+            if item.stretch <= 0:
+                self._end_at_zero_stretch(branch, previous, item)
+                break
+            reason = self._between(branch, previous, item)
+            if reason:
+                branch.ended = reason
+                break
+            history.append(item)
+            branch.points.append(item)
+            self.report.progress(branch, item)
+            if self._closes(branch, previous, item):
+                branch.ended = "closed loop"
+                break
+        self._finish(branch)
+
+    def _between(self, branch: Branch, a: Point, b: Point) -> str:
+        """Insert folds, branch points and user points between two points; a reason if the branch ends there."""
+        specials = [] if a is branch.points[0] and branch.parent else find_special(self.follower, a, b)
+        pieces = [a, *(s.point for s in specials), b]
+        users = [u for p, q in zip(pieces, pieces[1:], strict=False) for u in self._users(branch, p, q, a, b)]
+        for special in sorted(specials + users, key=lambda s: s.point.arclength):
+            if special.kind == BRANCH_POINT:
+                reason = self._meeting(branch, special)
+                branch.insert(special)
+                self.report.special(branch, special)
+                if reason:
+                    return reason
+            else:
+                branch.insert(special)
+                self.report.special(branch, special)
+        return ""
+
+    def _users(self, branch: Branch, p: Point, q: Point, a: Point, b: Point) -> list[Special]:
+        """User points between two neighbours among which the load is monotone."""
+        found = []
+        for load in self.plan.at:
+            if (p.load - load) * (q.load - load) < 0 or (load == p.load and p is branch.points[0]) or (load == q.load and q is b):
+                s = p.arclength + (load - p.load) / (q.load - p.load) * (q.arclength - p.arclength)
+                for _ in range(3):
+                    x, direction = hermite(a, b, s)
+                    slope = self.follower.system.scalar(direction)
+                    if slope:
+                        s = min(max(s + (load - self.follower.system.scalar(x)) / slope, p.arclength), q.arclength)
+                point = self._user(hermite(a, b, s)[0], load, s, increasing=q.load > p.load)
+                found.append(Special(USER, point, p.negative, q.negative, 1e-12 * max(1.0, abs(load))))
+                found[-1].negative_before = found[-1].negative_after = point.negative
+        return found
+
+    def _user(self, guess: PETSc.Vec, load: float, s: float, increasing: bool) -> Point:
+        self.follower.system.set_phase(guess)
+        x, outcome = self.follower.at_load(guess, load, reach=1.0)
+        if not outcome.converged:
+            raise ConvergenceError(f"No equilibrium at {self.scene.load} = {load:g} between two points of the branch: use another load.")
+        return self.follower.point(x, s, self.follower.load_tangent(x, increasing), outcome)
+
+    def _meeting(self, branch: Branch, special: Special) -> str:
+        """Recognise a branch point that is known already; a reason if the branch ends there."""
+        for other in self.branches:
+            for i, known in enumerate(other.special):
+                if known.kind == BRANCH_POINT and _equivalent(known.point, special.point, 1e-6):
+                    special.meets = (other.name, i)
+                    special.switched = known.switched = True
+                    if branch.parent == special.meets:
+                        return "closed loop"
+                    return f"meets {other.name} at {self.scene.load} = {special.point.load:.8g}"
+        if special.zero_of == "slope":
+            return f"meets another branch at {self.scene.load} = {special.point.load:.8g}"
+        return ""
+
+    def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> None:
+        """Add the last admissible point, where the smallest stretch vanishes, and say so."""
+        shape = self.follower.shape
+        branch.ended = "stretch reaches zero"
+
+        def stretch(s: float) -> float:
+            return shape.stretch(solve_at(self.follower, lambda t: hermite(a, b, t), s))
+
+        h = b.arclength - a.arclength
+        s = brentq(stretch, a.arclength + 1e-9 * h, b.arclength, xtol=1e-11)
+        x = solve_at(self.follower, lambda t: hermite(a, b, t), s)
+        row = self.follower.row(hermite(a, b, s)[1])
+        last = self.follower.point(x, s, self.follower.tangent(row))
+        if not self._between(branch, a, last):
+            branch.points.append(last)
+
+    def _closes(self, branch: Branch, a: Point, b: Point) -> bool:
+        """Whether the branch passes its own beginning again between two points."""
+        if len(branch.points) < 12:
+            return False
+        first = branch.points[1]
+        if (a.load - first.load) * (b.load - first.load) > 0 or not _near(first, a, 4) or a.slope * first.slope <= 0:
+            return False
+        s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
+        point = self._user(hermite(a, b, s)[0], first.load, s, increasing=b.load > a.load)
+        return _equivalent(point, first, 1e-7)
+
+    def _check_symmetry(self, point: Point) -> None:
+        if point.drift > 1e-6 * self.follower.inertia.scale:
+            raise SymmetryError(
+                f"The scene states a symmetry that its equations do not have: the drift is {point.drift:.2g} at "
+                f"{self.scene.load} = {point.load:.6g} where it should vanish; leave the symmetry out of the scene."
+            )
+
+    def _finish(self, branch: Branch) -> None:
+        last = branch.points[-1] if branch.points else None
+        branch.renumber()
+        last = branch.points[-1]
+        if not any(s.point is last for s in branch.special):
+            branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
+            branch.renumber()
+        if self.plan.error_bars:
+            if self.richer is None:
+                self.richer = Richer(self.follower)
+            for special in branch.special:
+                with self.follower.system.clock("error bars"):
+                    self.richer.estimate(special)
+        self.report.finished(branch)
+        self.finished()
+
+
+def _equivalent(a: Point, b: Point, tolerance: float = 1e-8) -> bool:
+    """Whether two points agree in all that a symmetry leaves alone: load, energy and stretch."""
+    pairs = ((a.load, b.load), (a.energy, b.energy), (a.stretch, b.stretch))
+    return all(abs(p - q) <= tolerance * max(1.0, abs(p), abs(q)) for p, q in pairs)
+
+
+def _near(a: Point, b: Point, steps: float = 2.0) -> bool:
+    """Whether two points could be neighbours on one branch, seen through load and energy."""
+    reach = 0.05 * steps
+    return abs(a.load - b.load) <= reach * max(1.0, abs(a.load)) and abs(a.energy - b.energy) <= reach * max(1.0, abs(a.energy))
+
+
+def explore(follower: Follower, plan: Plan, report: Report, finished: Callable[[], None] = lambda: None) -> Sequence[Branch]:
+    """Explore a scene; see :class:`Explorer`."""
+    return Explorer(follower, plan, report, finished).run()

@@ -1,0 +1,107 @@
+"""What the terminal shows, on rank 0 only: what is solved, progress, special points as they are found, a final table."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import TextIO
+
+from mpi4py import MPI
+
+from rodfem.branch import BRANCH_POINT, END, FOLD, USER, Branch, Point, Special
+from rodfem.clock import Clock
+from rodfem.system import System
+
+LABELS = {FOLD: "LP", BRANCH_POINT: "BP", USER: "UZ", END: "EP"}
+"""AUTO's two-letter labels."""
+
+
+def number(value: float, error: float) -> str:
+    """Write a number with the digits that its error supports, and the error: ``0.3216501(2.1e-07)``."""
+    if not error < 1:
+        return f"{value:.8g} (no estimate)"
+    digits = 0
+    while 10.0 ** (-digits) > error and digits < 13:
+        digits += 1
+    return f"{value:.{digits}f} ({error:.0e})"
+
+
+class Report:
+    """Prints on rank 0; with ``quiet`` it prints nothing."""
+
+    def __init__(self, comm: MPI.Comm = MPI.COMM_WORLD, quiet: bool = False, stream: TextIO | None = None) -> None:
+        """Print to ``stream``, by default the terminal."""
+        self.on = comm.rank == 0 and not quiet
+        self.stream = stream or sys.stdout
+        self.live = self.on and self.stream.isatty()
+
+    def say(self, line: str = "", end: str = "\n") -> None:
+        """Print one line."""
+        if self.on:
+            if self.live:
+                self.stream.write("\r\033[K")
+            self.stream.write(line + end)
+            self.stream.flush()
+
+    def compiling(self) -> None:
+        """Say why the first run takes longer."""
+        self.say("Compiling the forms for the first time (some seconds; kept in ~/.cache/fenics for later runs) ...")
+
+    def system(self, system: System) -> None:
+        """Say what is solved, with how many unknowns, and what was left out."""
+        scene, f = system.scene, system.fields
+        d = f.discretization
+        self.say(f"{scene.title or scene.name}: {scene.rod} rod, {d.formulation} formulation, {d.elements} elements of degree {d.degree}, {f.unknowns} unknowns")
+        self.say(f"  unknowns: {f.describe()}, load {scene.load}")
+        for line in f.left_out():
+            self.say(f"  left out: {line}")
+
+    def branch(self, branch: Branch) -> None:
+        """Head a new branch."""
+        origin = f" from {branch.parent[0]}, special point {branch.parent[1] + 1}" if branch.parent else ""
+        self.say(f"\n{branch.name}{origin}")
+        self.say("       load           ordinate       energy    index  zero  located to")
+
+    def progress(self, branch: Branch, point: Point) -> None:
+        """Keep one line up to date while a branch is traced (on a terminal only)."""
+        if self.live:
+            self.say(f"  ... {len(branch.points)} points, load {point.load:.5f}, ordinate {point.ordinate:.5f}, index {point.negative}", end="")
+
+    def special(self, branch: Branch, special: Special) -> None:
+        """Print a special point as it is found, as AUTO does."""
+        self.say("  " + self._line(special))
+
+    @staticmethod
+    def _line(special: Special) -> str:
+        p = special.point
+        index = f"{special.negative_before}->{special.negative_after}" if special.negative_before != special.negative_after else f"{p.negative}"
+        meets = f"  meets {special.meets[0]}" if special.meets else ""
+        return f"{LABELS[special.kind]}   {p.load:<14.10f} {p.ordinate:<14.9f} {p.energy:<10.6f} {index:>5}  {p.zero:>4}  {special.located_to:.0e}{meets}"
+
+    def finished(self, branch: Branch) -> None:
+        """Close a branch: its last point and why it ended."""
+        if branch.special and branch.special[-1].kind == END:
+            self.say("  " + self._line(branch.special[-1]))
+        self.say(f"  {len(branch.points)} points; ended: {branch.ended}")
+
+    def table(self, branches: Sequence[Branch], system: System) -> None:
+        """Print the final table: every special point with its error bar."""
+        scene = system.scene
+        self.say(f"\nSpecial points (in brackets the estimated error of the discretisation; ordinate: {scene.ordinate.name})")
+        self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} index")
+        for branch in branches:
+            for s in branch.special:
+                exact = s.kind in (USER, END)
+                load = f"{s.point.load:.10g}" if exact else number(s.point.load, s.error_estimate)
+                index = f"{s.negative_before} -> {s.negative_after}" if s.negative_before != s.negative_after else f"{s.point.negative}"
+                zero = f", {s.point.zero} zero" if s.point.zero else ""
+                self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {number(s.point.ordinate, s.ordinate_error):<24} {index}{zero}")
+                if s.note:
+                    self.say(f"    {s.note}")
+
+    def timing(self, clock: Clock, points: int) -> None:
+        """Print where the time went."""
+        s = clock.seconds
+        parts = [f"{name} {s.get(name, 0.0):.2f} s" for name in ("assembly", "solve", "stability")]
+        work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
+        self.say(f"\n{', '.join(parts)}; {points} points, {1e3 * work / max(points, 1):.2f} ms each with index; {clock.total():.2f} s in all")

@@ -1,0 +1,111 @@
+"""One run of a scene from beginning to end: solve, save as it goes, draw."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from mpi4py import MPI
+
+from rodfem import compat
+from rodfem.branch import Branch
+from rodfem.clock import Clock
+from rodfem.continuation import Follower
+from rodfem.diagram import as_data, save_json, save_states
+from rodfem.errors import SceneError
+from rodfem.explore import Explorer, Plan
+from rodfem.fields import Discretization
+from rodfem.report import Report
+from rodfem.scene import Scene
+from rodfem.system import System
+
+
+def writable(folder: Path, comm: MPI.Comm) -> None:
+    """Make ``folder``; raises :class:`SceneError` on every rank where it cannot be written."""
+    trouble = ""
+    if comm.rank == 0:
+        probe = folder / f".probe-{os.getpid()}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            probe.write_text("")
+            probe.unlink()
+        except OSError as error:
+            trouble = error.strerror or str(error)
+    trouble = comm.bcast(trouble)
+    if trouble:
+        raise SceneError(f"The output folder {folder} cannot be written ({trouble}): choose another one with --output.")
+
+
+def run(
+    scene: Scene,
+    discretization: Discretization,
+    plan: Plan,
+    output: Path,
+    *,
+    figures: bool = True,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    quiet: bool = False,
+) -> list[Branch]:
+    """Explore a scene and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
+
+    Files are brought up to date after every branch, so that an interrupted run loses no finished one.
+    """
+    compat.require_real_petsc()
+    writable(output, comm)
+    report, clock = Report(comm, quiet), Clock()
+    with compat.announce_compilation(report.compiling):
+        with clock("setup"):
+            system = System(scene, discretization, comm, clock)
+            follower = Follower(system)
+        report.system(system)
+        explorer = Explorer(follower, plan, report, lambda: _save(explorer, follower, clock, output))
+        branches = explorer.run()
+    _save_diagram(explorer, follower, clock, output)
+    report.table(branches, system)
+    report.timing(clock, sum(len(b.points) for b in branches))
+    report.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
+    if figures and comm.rank == 0:
+        _draw(output, report)
+    comm.barrier()
+    return branches
+
+
+def _save(explorer: Explorer, follower: Follower, clock: Clock, output: Path) -> None:
+    with clock("files"):
+        _save_diagram(explorer, follower, clock, output)
+        save_states(explorer.branches[-1], follower, output / "states.h5", first=len(explorer.branches) == 1)
+
+
+def _save_diagram(explorer: Explorer, follower: Follower, clock: Clock, output: Path) -> None:
+    if follower.system.comm.rank == 0:
+        save_json(as_data(explorer.branches, follower.system, clock, explorer.plan.span), output / "diagram.json")
+
+
+def _draw(output: Path, report: Report) -> None:
+    """Draw the diagram, and the shape of a stable state if there is one."""
+    from rodfem.diagram import load_json
+    from rodfem.plot import draw_diagram
+    from rodfem.render import draw_shape_safely
+
+    data = load_json(output / "diagram.json")
+    draw_diagram(data, output / "diagram.png")
+    branch, row, words = typical_state(data)
+    caption = f"{data['title']}, {branch}, {data['parameter']} = {words}"
+    trouble = draw_shape_safely(output / "states.h5", branch, row, output / "shape.png", caption=caption)
+    report.say(f"Pictures in {output}{os.sep}: diagram.png" + ("" if trouble else ", shape.png"))
+    if trouble:
+        report.say(trouble)
+
+
+def typical_state(data: dict) -> tuple[str, int, str]:
+    """Branch, row and words of the state to draw: a stable one far from the first branch, or else the last one computed."""
+    best: tuple[float, str, int, str] | None = None
+    for branch in data["branches"]:
+        columns = branch["columns"]
+        for row, (load, ordinate, negative) in enumerate(zip(columns["load"], columns["ordinate"], columns["negative"], strict=True)):
+            score = abs(ordinate) + (1e6 if negative == 0 else 0.0)
+            if best is None or score > best[0]:
+                best = (score, branch["name"], row, f"{load:.4g}, {'stable' if negative == 0 else f'index {negative}'}")
+    if best is None:
+        raise SceneError("The diagram has no states to draw.")
+    return best[1], best[2], best[3]
