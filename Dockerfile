@@ -13,8 +13,8 @@ FROM debian:trixie-slim
 
 # Only packages.txt first: as long as it stays the same, a new build does not install these again.
 COPY packages.txt /tmp/
-RUN apt-get update \
-    && sed 's/#.*//' /tmp/packages.txt | DEBIAN_FRONTEND=noninteractive xargs apt-get install -y --no-install-recommends \
+RUN apt-get -qq update \
+    && sed 's/#.*//' /tmp/packages.txt | DEBIAN_FRONTEND=noninteractive xargs apt-get -qq install -y --no-install-recommends >/dev/null \
     && rm -rf /var/lib/apt/lists/* /tmp/packages.txt
 
 # The cache (compiled forms) and the results may be written by any user: see --user above.
@@ -27,6 +27,10 @@ WORKDIR /home/rodfem/rodfem
 ENV HOME=/home/rodfem \
     XDG_CACHE_HOME=/home/rodfem/.cache \
     MPLCONFIGDIR=/home/rodfem/.cache/matplotlib
+
+# Where pip cannot reach pypi.org directly: docker build --build-arg PIP_INDEX_URL=... (or PIP_CERT).
+ARG PIP_INDEX_URL
+ARG PIP_CERT
 
 # The same set-up as `make setup`; then the virtual environment's python is the python.
 COPY --chown=rodfem:rodfem . .
@@ -42,5 +46,4 @@ ENV MPLBACKEND=Agg \
     UCX_LOG_LEVEL=fatal \
     OMP_NUM_THREADS=1
 
-VOLUME /results
 CMD ["python", "-m", "pytest"]
