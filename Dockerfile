@@ -14,7 +14,8 @@ FROM debian:trixie-slim
 # Only packages.txt first: as long as it stays the same, a new build does not install these again.
 COPY packages.txt /tmp/
 RUN apt-get -qq update \
-    && sed 's/#.*//' /tmp/packages.txt | DEBIAN_FRONTEND=noninteractive xargs apt-get -qq install -y --no-install-recommends >/dev/null \
+    && sed 's/#.*//' /tmp/packages.txt \
+        | DEBIAN_FRONTEND=noninteractive xargs apt-get -qq install -y --no-install-recommends >/dev/null \
     && rm -rf /var/lib/apt/lists/* /tmp/packages.txt
 
 # The cache (compiled forms) and the results may be written by any user: see --user above.
