@@ -56,7 +56,7 @@ def scene(options: Namespace) -> Scene:
 
 
 if __name__ == "__main__":
-    parser = parser_for("hemitropic", __doc__, load="lam", span=(0.0, 0.95), elements=16, degree=4)
+    parser = parser_for("hemitropic", __doc__, load="lam", span=(0.0, 0.95), elements=8, degree=6)
     constants = parser.add_argument_group("constants of the rod")
     constants.add_argument("--coupling", type=float, default=-3.0, metavar="A", help="of stretch and twist (default -3)")
     constants.add_argument("--twisting", type=float, default=1.0, metavar="B", help="stiffness (default 1)")

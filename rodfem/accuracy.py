@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
+from scipy.optimize import newton
 
 from rodfem import compat
-from rodfem.bifurcation import WINDOW, refine
+from rodfem.bifurcation import WINDOW, refine, solve_at
 from rodfem.branch import BRANCH_POINT, FOLD, Special
 from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError
@@ -70,13 +71,15 @@ class Richer:
             special.note = f"no error estimate: {trouble}"
             return
         special.ordinate_error = max(abs(ordinate - special.point.ordinate), floor)
-        at_a_load = special.kind not in (FOLD, BRANCH_POINT)
+        at_a_load = special.kind not in (FOLD, BRANCH_POINT) and special.zero_of != "stretch"
         special.error_estimate = special.ordinate_error if at_a_load else max(abs(load - special.point.load), floor)
 
     def _again(self, special: Special) -> tuple[float, float]:
         """Load and ordinate of the special point on the richer discretisation."""
         follower, point = self.follower, special.point
         x = self.transfer(point.x, state=True)
+        if special.zero_of == "stretch" and point.tangent is not None:
+            return self._zero_stretch(x, self.transfer(point.tangent, state=False))
         if special.kind not in (FOLD, BRANCH_POINT):
             self.system.set_phase(x)
             x, outcome = follower.at_load(x, point.load, reach=1.0)
@@ -96,3 +99,18 @@ class Richer:
 
         located = refine(follower, curve, 0.0, WINDOW / 2, mode, special.zero_of)
         return located.load, follower.shape.ordinate(located.x)
+
+    def _zero_stretch(self, x: PETSc.Vec, tangent: PETSc.Vec) -> tuple[float, float]:
+        """Load and ordinate where the smallest stretch vanishes, by the secant method along the tangent."""
+
+        def solve(s: float) -> PETSc.Vec:
+            def curve(t: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+                y = x.copy()
+                y.axpy(t, tangent)
+                return y, tangent
+
+            return solve_at(self.follower, curve, s)
+
+        s = newton(lambda s: self.follower.shape.stretch(solve(s)), 0.0, x1=-1e-3, tol=1e-10, maxiter=30)
+        y = solve(float(s))
+        return self.system.scalar(y), self.follower.shape.ordinate(y)

@@ -28,6 +28,8 @@ from rodfem.stability.inertia import combine
 NODES = 6
 WINDOW = 0.02
 """Half length of the piece of a branch, in the metric, on which a special point is interpolated."""
+ROUND_OFF = 1e-12
+"""What Newton's tolerance and the conditioning near a singular point leave open in a load, relative to it or to one."""
 SHARP = 1e-11
 """Uncertainty of a load, for the given mesh, at which a special point needs no sharper interpolation."""
 COUPLED = 1e-5
@@ -122,7 +124,7 @@ def interpolate(samples: list[Sample], zero_of: str, guess: float) -> Located | 
     x, tangent = combine(states, weights), combine(states, slopes / half)
     before = [p.below for p in samples if p.s < middle + half * root] or [samples[0].below]
     after = [p.below for p in samples if p.s >= middle + half * root] or [samples[-1].below]
-    uncertainty = max(abs(load_at - other), 1e-13 * max(1.0, abs(load_at)))
+    uncertainty = max(abs(load_at - other), ROUND_OFF * max(1.0, abs(load_at)))
     return Located(middle + half * root, x, tangent, load_at, slope, uncertainty, before[-1], after[0])
 
 
@@ -184,7 +186,12 @@ def locate(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -> 
             guess = ends[0] if abs(left) < abs(right) else ends[1]
         else:
             guess = float(brentq(mu, *ends, xtol=0.1 * min(WINDOW, h)))
-    _, mode = eigenvalue(follower, solve_at(follower, curve, guess), order)
+    x = solve_at(follower, curve, guess)
+    if zero_of == "slope":
+        follower.inertia.count(x)
+        mode = follower.inertia.nearest(1, accuracy=1e-2)[1][0].copy()
+    else:
+        mode = eigenvalue(follower, x, order)[1]
     return refine(follower, curve, guess, min(WINDOW, 0.45 * h), mode, zero_of)
 
 
@@ -215,23 +222,32 @@ def coupling_of(follower: Follower, x: PETSc.Vec, null_vector: PETSc.Vec) -> flo
 
 
 def find_special(follower: Follower, a: Point, b: Point) -> list[Special]:
-    """All folds and branch points between two consecutive points of a branch, in order of arclength."""
+    """All folds and branch points between two consecutive points of a branch, in order of arclength.
+
+    Where the load turns back there is a fold, or a branch point at which this branch ends on another one.  Crossings of the index that a
+    fold does not explain are branch points, or further folds.
+    """
     found: list[Special] = []
     low, high = sorted((a.negative, b.negative))
-    order = low
-    while order < high:
-        special = _special(follower, a, b, order, "mu")
+    crossing = list(range(low, high))
+    if a.slope * b.slope < 0:
+        found.append(_special(follower, a, b, low, "slope"))
+        if found[0].kind == FOLD and crossing:
+            del crossing[: found[0].multiplicity]
+    while crossing:
+        special = _special(follower, a, b, crossing[0], "mu")
         found.append(special)
-        order += special.multiplicity
-    if a.slope * b.slope < 0 and not any(s.kind == FOLD for s in found):
-        special = _special(follower, a, b, a.negative, "slope")
-        if not any(abs(s.point.arclength - special.point.arclength) < 1e-6 for s in found):
-            found.append(special)
+        del crossing[: special.multiplicity]
     return sorted(found, key=lambda s: s.point.arclength)
 
 
 def _special(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -> Special:
     located = locate(follower, a, b, order, zero_of)
+    margin = 0.01 * (b.arclength - a.arclength)
+    if not a.arclength - margin <= located.s <= b.arclength + margin:
+        raise ConvergenceError(
+            f"A special point between loads {a.load:.8g} and {b.load:.8g} slipped out of its bracket: use smaller steps."
+        )
     special = special_at(follower, located, located.s)
     special.zero_of = zero_of
     return special
@@ -307,7 +323,7 @@ def leave(follower: Follower, special: Special, direction: PETSc.Vec, first: flo
         if outcome.converged:
             change = origin.copy()
             change.aypx(-1.0, x)
-            return follower.point(x, system.norm(change), follower.tangent(row), outcome)
+            return follower.point(x, system.norm(change), follower.tangent(row, at=x), outcome)
         amplitude /= 2
     return None
 

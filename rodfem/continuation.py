@@ -69,7 +69,7 @@ class Follower:
         """Evaluate all records of the equilibrium ``x``."""
         system = self.system
         index = self.inertia.count(x)
-        nearest = float(self.inertia.nearest(1, accuracy=1e-2)[0][0])
+        nearest = float(self.inertia.nearest(1, most=2, spare=0)[0][0])
         energy = system.comm.allreduce(fem.assemble_scalar(system.equations.energy), op=MPI.SUM)
         return Point(
             x=x,
@@ -93,8 +93,14 @@ class Follower:
         row.scale(1.0 / self.system.norm(direction))
         return row
 
-    def tangent(self, row: PETSc.Vec) -> PETSc.Vec:
-        """Unit tangent of the branch from the factors of the last correction, on the side to which ``row`` points."""
+    def tangent(self, row: PETSc.Vec, at: PETSc.Vec | None = None) -> PETSc.Vec:
+        """Unit tangent of the branch on the side to which ``row`` points.
+
+        From the factors of the last correction, which belong to a state nearby; with ``at`` from new ones at that very state.
+        """
+        if at is not None:
+            self.system.residual(at, self.system.new_vector())
+            self.system.factor(row)
         tangent = self.system.new_vector()
         self.system.solve(self.axis, tangent)
         tangent.scale(1.0 / self.system.norm(tangent))
@@ -108,8 +114,8 @@ class Follower:
         return x, outcome
 
     def load_tangent(self, x: PETSc.Vec, increasing: bool) -> PETSc.Vec:
-        """Unit tangent at a regular point after :meth:`at_load`, in the direction of in- or decreasing load."""
-        tangent = self.tangent(self.axis)
+        """Unit tangent at the regular point ``x``, in the direction of in- or decreasing load."""
+        tangent = self.tangent(self.axis, at=x)
         if not increasing:
             tangent.scale(-1.0)
         return tangent
@@ -180,6 +186,8 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
             outcome = correct(system, x, row, most=8, reach=0.5 * step)
             if outcome.converged:
                 tangent = follower.tangent(row)
+                if system.scalar(tangent) * last.slope <= 0:  # the load turns back here, or else the factors were too old
+                    tangent = follower.tangent(row, at=x)
                 turn = row.dot(tangent)
             if outcome.converged and turn > 0.9:
                 change = last.x.copy()

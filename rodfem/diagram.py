@@ -47,6 +47,7 @@ def as_data(branches: Sequence[Branch], system: System, clock: Clock, span: tupl
             "assembly_s": s.get("assembly", 0.0),
             "solve_s": s.get("solve", 0.0),
             "stability_s": s.get("stability", 0.0),
+            "location_s": s.get("location", 0.0),
             "error_bars_s": s.get("error bars", 0.0),
             "setup_s": s.get("setup", 0.0),
             "total_s": clock.total(),

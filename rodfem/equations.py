@@ -12,7 +12,7 @@ from dolfinx import fem
 from forms import inertia, lagrangian
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
-from rodfem.compat import compile_form
+from rodfem.compat import compile_forms
 from rodfem.fields import Fields
 
 
@@ -61,16 +61,14 @@ class Equations:
             integrand = lagrangian.pointwise(W, R, v, (f.r + self._lift(c)).dx(0), f.n, known)
         L = integrand * dx + lagrangian.unit_norm(f.mu, f.q) * dx_nodes
         first = ufl.derivative(L, u, test)
-        self.residual = compile_form(first)
-        self.jacobian = compile_form(ufl.derivative(first, u, trial))
-        self.energy = compile_form(W * dx)
-
+        second = ufl.derivative(first, u, trial)
         a, b = self._named(ufl.split(test)), self._named(ufl.split(trial))
         metric = inertia.rotation_metric(a.q, b.q) / scene.length
         if f.r is not None:
             metric += ufl.dot(a.r, b.r) / scene.length**3
-        self.metric = compile_form(metric * dx)
-        self.kinetic = compile_form(inertia.rotary(f.q, a.q, b.q, (1.0, 1.0, 1.0)) * dx)
+        kinetic = inertia.rotary(f.q, a.q, b.q, (1.0, 1.0, 1.0))
+        forms = [first, second, W * dx, metric * dx, kinetic * dx]
+        self.residual, self.jacobian, self.energy, self.metric, self.kinetic = compile_forms(forms)
 
     @staticmethod
     def quadrature_degree(degree: int) -> int:

@@ -130,6 +130,10 @@ class Explorer:
 
     def _between(self, branch: Branch, a: Point, b: Point) -> str:
         """Insert folds, branch points and user points between two points; a reason if the branch ends there."""
+        with self.follower.system.clock.purpose("location"):
+            return self._between_points(branch, a, b)
+
+    def _between_points(self, branch: Branch, a: Point, b: Point) -> str:
         specials = [] if a is branch.points[0] and branch.parent else find_special(self.follower, a, b)
         pieces = [a, *(s.point for s in specials), b]
         users = [u for p, q in zip(pieces, pieces[1:], strict=False) for u in self._users(branch, p, q, a, b)]
@@ -197,6 +201,7 @@ class Explorer:
         last = self.follower.point(x, s, self.follower.tangent(row))
         if not self._between(branch, a, last):
             branch.points.append(last)
+            branch.special.append(Special(END, last, last.negative, last.negative, 1e-10, zero_of="stretch"))
 
     def _closes(self, branch: Branch, a: Point, b: Point) -> bool:
         """Whether the branch passes its own beginning again between two points."""
@@ -224,13 +229,16 @@ class Explorer:
             branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
             branch.renumber()
         if self.plan.error_bars:
+            self._error_bars(branch)
+        self.report.finished(branch)
+        self.finished()
+
+    def _error_bars(self, branch: Branch) -> None:
+        with self.follower.system.clock.purpose("error bars"):
             if self.richer is None:
                 self.richer = Richer(self.follower)
             for special in branch.special:
-                with self.follower.system.clock("error bars"):
-                    self.richer.estimate(special)
-        self.report.finished(branch)
-        self.finished()
+                self.richer.estimate(special)
 
 
 def _equivalent(a: Point, b: Point, tolerance: float = 1e-8) -> bool:

@@ -39,8 +39,8 @@ class Discretization:
     """How a scene is discretised: ``formulation``, number of ``elements`` and polynomial ``degree``."""
 
     formulation: str = "reduced"
-    elements: int = 12
-    degree: int = 4
+    elements: int = 8
+    degree: int = 6
 
     def __post_init__(self) -> None:
         """Check the values; raises :class:`SceneError`."""

@@ -33,7 +33,7 @@ class Report:
         """Print to ``stream``, by default the terminal."""
         self.on = comm.rank == 0 and not quiet
         self.stream = stream or sys.stdout
-        self.live = self.on and self.stream.isatty()
+        self.live = self.on and self.stream.isatty() and comm.size == 1
 
     def say(self, line: str = "", end: str = "\n") -> None:
         """Print one line."""
@@ -102,6 +102,7 @@ class Report:
     def timing(self, clock: Clock, points: int) -> None:
         """Print where the time went."""
         s = clock.seconds
-        parts = [f"{name} {s.get(name, 0.0):.2f} s" for name in ("assembly", "solve", "stability")]
         work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
-        self.say(f"\n{', '.join(parts)}; {points} points, {1e3 * work / max(points, 1):.2f} ms each with index; {clock.total():.2f} s in all")
+        parts = [f"{name} {s.get(name, 0.0):.2f} s" for name in ("setup", "assembly", "solve", "stability", "location", "error bars", "files")]
+        self.say(f"\nTime: {', '.join(parts)}; {clock.total():.2f} s in all")
+        self.say(f"{points} points with their index, {1e3 * work / max(points, 1):.2f} ms each (assembly, solve, stability)")

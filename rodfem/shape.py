@@ -57,6 +57,8 @@ class Shape:
         self._order = np.argsort(compat.nodes(k))
         self._q_at_gauss = compat.lagrange_basis(k, self.gauss.points)
         self._v_at_gauss = compat.lagrange_basis(k - 1, self.gauss.points)
+        self._v_dense = compat.lagrange_basis(k - 1, np.linspace(0, 1, 4 * k + 1))
+        self._v_to_legendre = np.linalg.inv(legendre.legvander(2 * compat.nodes(k - 1) - 1, k - 1))
         self._probe_weights = self._position_weights(system.scene.ordinate.s)
         self._cells = cells
         self.reduced = f.discretization.formulation == "reduced"
@@ -69,13 +71,21 @@ class Shape:
         return float(of.of(r, q))
 
     def stretch(self, x: PETSc.Vec) -> float:
-        """Smallest stretch ``v3`` at the nodes; 1 for an inextensible rod."""
+        """Smallest stretch ``v3`` along the rod; 1 for an inextensible rod.
+
+        The least value at many points picks an element, and the minimum of the polynomial there is found from the roots of its slope.
+        """
         f = self.system.fields
         if 2 not in self.system.scene.free_strains:
             return 1.0
         self.system.bring(x)
-        mine = f.u.x.array[f.dofs["v"][self._cells]][:, :, -1]
-        return float(self.system.comm.allreduce(mine.min(), op=MPI.MIN))
+        nodal = f.u.x.array[f.dofs["v"][self._cells]][:, :, -1]
+        lowest = nodal[np.argmin((nodal @ self._v_dense.T).min(axis=1))]
+        polynomial = self._v_to_legendre @ lowest
+        turns = legendre.legroots(legendre.legder(polynomial)) if len(polynomial) > 2 and abs(polynomial[2:]).max() > 1e-12 else np.array([])
+        inside = np.clip(turns[abs(np.imag(turns)) < 1e-6].real, -1, 1) if len(turns) else turns
+        mine = legendre.legval(np.array([-1.0, 1.0, *inside]), polynomial).min()
+        return float(self.system.comm.allreduce(mine, op=MPI.MIN))
 
     def sample(self, x: PETSc.Vec) -> dict[str, Any]:
         """All of a state in natural order on every rank, independent of the number of ranks.

@@ -19,6 +19,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.clock import Clock
+from rodfem.errors import ConvergenceError
 from rodfem.equations import Equations
 from rodfem.fields import LOAD, Discretization, Fields
 from rodfem.pattern import bordered_pattern, new_matrix
@@ -36,7 +37,7 @@ class System:
     metric
         Symmetric matrix of the squared size of a change of state: rotations, centreline, and the load over its span.
     lu
-        KSP with the LU factors of the last Jacobian given to :meth:`factor`.
+        LU factors of the last Jacobian given to :meth:`factor`.
     """
 
     def __init__(
@@ -72,7 +73,7 @@ class System:
         self.metric = self._assemble_metric()
         self.phases: list[PETSc.Vec | None] = [None] * len(self.drifts)
         self._phase_offset = [0.0] * len(self.drifts)
-        self.lu = self._direct_solver("lu")
+        self.lu = Factorizer("lu", comm, {8: 0})  # no scaling: a third of the time; Newton's method mends what it costs
 
     # --- vectors -----------------------------------------------------------------------------------------------
 
@@ -168,14 +169,13 @@ class System:
         """Assemble and factor the Jacobian at the state last brought."""
         matrix = self.jacobian(row)
         with self.clock("solve"):
-            self.lu.setOperators(matrix)
-            self.lu.setUp()
+            self.lu(matrix)
 
     def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> bool:
         """Solve with the last factors; False where the matrix was found singular."""
         with self.clock("solve"):
-            self.lu.solve(right, out)
-            return bool(self.lu.getConvergedReason() > 0)
+            self.lu.ksp.solve(right, out)
+            return bool(self.lu.ksp.getConvergedReason() > 0)
 
     def state_matrix(self) -> PETSc.Mat:
         """Allocate a matrix for the second variation at fixed load (row and column of the load empty)."""
@@ -240,11 +240,51 @@ class System:
         metric.assemble()
         return metric
 
-    def _direct_solver(self, kind: str) -> PETSc.KSP:
-        """Make a KSP that applies MUMPS factors, ``lu`` or ``cholesky`` (LDL^t, which also counts the inertia)."""
-        solver = PETSc.KSP().create(self.comm)
-        solver.setType("preonly")
-        pc = solver.getPC()
-        pc.setType(kind)
+
+class Factorizer:
+    """MUMPS factors of a matrix whose pattern stays: ``lu``, or ``cholesky`` (LDL^t, which also counts the inertia)."""
+
+    def __init__(self, kind: str, comm: MPI.Comm, controls: dict[int, int], thresholds: dict[int, float] | None = None) -> None:
+        """Keep MUMPS's integer ``controls`` (ICNTL) and real ``thresholds`` (CNTL) for when there is a matrix."""
+        self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
+        self.room = 50
+        self.ksp = PETSc.KSP().create(comm)
+        self.factor: PETSc.Mat | None = None
+
+    def __call__(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Factor ``matrix``; raises :class:`ConvergenceError` where MUMPS gives up.
+
+        Delayed pivots may need more room than was estimated.  PETSc does not raise by itself, and what a failed factorisation counts or
+        solves is arbitrary: the factors are then made again with more room.
+        """
+        while True:
+            if self.factor is None:
+                self._prepare(matrix)
+            else:
+                self.ksp.setOperators(matrix)
+            self.ksp.setUp()
+            status = self.ksp.getPC().getFactorMatrix().getMumpsInfog(1)
+            if status not in (-8, -9, -19) or self.room > 10000:
+                break
+            self.room *= 4
+            self.factor = None
+        if status < 0 and status != -10:  # -10 is a singular matrix, which the solve reports
+            raise ConvergenceError(f"MUMPS could not factor the bordered matrix: its status INFOG(1) is {status}.")
+        return self.factor
+
+    def _prepare(self, matrix: PETSc.Mat) -> None:
+        self.ksp.reset()
+        self.ksp.setType("preonly")
+        self.ksp.setOptionsPrefix(f"rodfem_{self.kind}_")
+        pc = self.ksp.getPC()
+        pc.setType(self.kind)
         pc.setFactorSolverType("mumps")
-        return solver
+        self.ksp.setFromOptions()
+        self.ksp.setOperators(matrix)
+        pc.setFactorSetUpSolverType()
+        self.factor = pc.getFactorMatrix()
+        self.factor.setMumpsIcntl(14, self.room)
+        for control, value in self.controls.items():
+            self.factor.setMumpsIcntl(control, value)
+        for control, threshold in self.thresholds.items():
+            self.factor.setMumpsCntl(control, threshold)

@@ -21,7 +21,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.system import System
+from rodfem.system import Factorizer, System
 
 EPS = float(np.finfo(float).eps)
 
@@ -45,7 +45,7 @@ class Inertia:
         """Allocate the matrix and its LDL^t factors once."""
         self.system = system
         self.matrix = system.state_matrix()
-        self.solver = system._direct_solver("cholesky")
+        self.factors = Factorizer("cholesky", system.comm, {24: 1, 13: 1}, {3: -1e-300})
         self.constraints = system.fields.constraints()
         length = system.scene.length
         bending = np.linalg.eigvalsh(system.scene.stiffness()[-3:, -3:])[0]
@@ -76,16 +76,9 @@ class Inertia:
         """Number of eigenvalues below ``sigma`` at the state last assembled; symmetry modes not counted."""
         with self.system.clock("stability"):
             self.matrix.axpy(self.shift - sigma, self.system.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            self.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
             self.shift = sigma
-            self.solver.setOperators(self.matrix)
-            pc = self.solver.getPC()
-            pc.setFactorSetUpSolverType()
-            factor = pc.getFactorMatrix()
-            factor.setMumpsIcntl(24, 1)
-            factor.setMumpsIcntl(13, 1)
-            factor.setMumpsCntl(3, -1e-300)
-            self.solver.setUp()
-            negative, zero, _ = factor.getInertia()
+            negative, zero, _ = self.factors(self.matrix).getInertia()
         below = negative - self.constraints - self.system.active_drifts()
         if zero or below < 0:
             raise ConvergenceError(
@@ -100,13 +93,13 @@ class Inertia:
         negative = self.below(-self.tolerance)
         return Index(negative, self.below(self.tolerance) - negative + self.system.active_drifts())
 
-    def nearest(self, number: int, accuracy: float = 1e-3, most: int = 60) -> tuple[np.ndarray, list[PETSc.Vec]]:
+    def nearest(self, number: int, accuracy: float = 1e-3, most: int = 60, spare: int = 1) -> tuple[np.ndarray, list[PETSc.Vec]]:
         """Return the eigenvalues nearest zero of the matrix last factored, and their vectors (metric norm 1).
 
         Block inverse iteration from the vectors of the last call, until the ``number`` wanted values change by less than
-        ``accuracy`` relative to themselves (or by what the arithmetic resolves).  The block has one more vector.
+        ``accuracy`` relative to themselves (or by what the arithmetic resolves).  The block has ``spare`` more vectors.
         """
-        metric, block = self.system.metric, number + 1
+        metric, block = self.system.metric, number + spare
         while len(self._vectors) < block:
             self._vectors.append(self._seed(len(self._vectors)))
         del self._vectors[block:]
@@ -118,7 +111,7 @@ class Inertia:
                 images = [metric * v for v in self._vectors]
                 solved = [v.duplicate() for v in self._vectors]
                 for image, out in zip(images, solved, strict=True):
-                    self.solver.solve(image, out)
+                    self.factors.ksp.solve(image, out)
                 a = np.array([[y.dot(w) for w in images] for y in solved])
                 masses = [metric * y for y in solved]
                 b = np.array([[y.dot(w) for w in masses] for y in solved])
@@ -136,7 +129,7 @@ class Inertia:
         """Return ``1 / (mode . M S^-1 M mode)`` for a vector of metric norm 1: the eigenvalue where ``mode`` is its vector."""
         with self.system.clock("stability"):
             image = self.system.metric * mode
-            self.solver.solve(image, self.system.workspace)
+            self.factors.ksp.solve(image, self.system.workspace)
             return 1.0 / image.dot(self.system.workspace) + self.shift
 
     def _seed(self, i: int) -> PETSc.Vec:
