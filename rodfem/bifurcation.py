@@ -334,5 +334,5 @@ def start_branch(special: Special, direction: PETSc.Vec, name: str, parent: tupl
     if first is None:
         return None
     p = special.point
-    origin = Point(p.x, direction, 0.0, p.load, p.ordinate, p.energy, p.stretch, p.negative, p.zero, p.nearest, follower.system.scalar(direction), p.drift, p.error)
+    origin = Point(p.x, direction, 0.0, p.load, p.ordinate, p.energy, p.stretch, p.negative, p.zero, follower.system.scalar(direction), p.drift, p.error)
     return Branch(name, parent, depth, [origin, first])

@@ -13,7 +13,7 @@ FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
 class Point:
     """One equilibrium: state ``x``, unit ``tangent`` along its branch, ``arclength`` from the branch's start, and records.
 
-    ``slope`` is the load's component of the tangent; ``nearest`` the eigenvalue nearest zero relative to the metric;
+    ``slope`` is the load's component of the tangent, ``drift`` the largest drift scalar (zero but for round-off),
     ``error`` the last Newton correction.
     """
 
@@ -26,7 +26,6 @@ class Point:
     stretch: float
     negative: int
     zero: int
-    nearest: float
     slope: float
     drift: float
     error: float

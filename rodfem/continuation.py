@@ -22,6 +22,10 @@ from rodfem.stability.inertia import Inertia, combine
 from rodfem.system import System
 
 
+LEVEL = 0.05
+"""Where the load changes along a branch by less than this (of its span a unit of arclength), its slope is computed afresh."""
+
+
 @dataclass(frozen=True)
 class Steps:
     """Control of the step, in the metric (root mean square rotation in radian, load over its span).
@@ -69,7 +73,6 @@ class Follower:
         """Evaluate all records of the equilibrium ``x``."""
         system = self.system
         index = self.inertia.count(x)
-        nearest = float(self.inertia.nearest(1, most=2, spare=0)[0][0])
         energy = system.comm.allreduce(fem.assemble_scalar(system.equations.energy), op=MPI.SUM)
         return Point(
             x=x,
@@ -81,7 +84,6 @@ class Follower:
             stretch=self.shape.stretch(x),
             negative=index.negative,
             zero=index.zero,
-            nearest=nearest,
             slope=float("nan") if tangent is None else system.scalar(tangent),
             drift=max((abs(system.scalar(x, f"drift{i}")) for i in range(len(system.drifts))), default=0.0),
             error=outcome.error if outcome else 0.0,
@@ -186,7 +188,8 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
             outcome = correct(system, x, row, most=8, reach=0.5 * step)
             if outcome.converged:
                 tangent = follower.tangent(row)
-                if system.scalar(tangent) * last.slope <= 0:  # the load turns back here, or else the factors were too old
+                slope = system.scalar(tangent)
+                if slope * last.slope <= 0 or abs(slope) < LEVEL * abs(system.scene.span[1] - system.scene.span[0]):
                     tangent = follower.tangent(row, at=x)
                 turn = row.dot(tangent)
             if outcome.converged and turn > 0.9:

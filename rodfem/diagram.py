@@ -23,7 +23,7 @@ from rodfem.continuation import Follower
 from rodfem.errors import SceneError
 from rodfem.system import System
 
-COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "nearest", "stretch", "slope", "drift", "arclength", "error")
+COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error")
 
 
 def as_data(branches: Sequence[Branch], system: System, clock: Clock, span: tuple[float, float]) -> dict[str, Any]:
