@@ -78,5 +78,8 @@ def main(parser: Parser, scene_of: Callable[[argparse.Namespace], Any], argument
         span = tuple(options.span)
         plan = Plan(span, at=tuple(options.at), spectrum=options.spectrum)
         run(scene, discretization, plan, options.output, figures=options.figures)
+    except KeyboardInterrupt:
+        sys.stderr.write(f"\ninterrupted; the branches that were finished are in {options.output}\n")
+        sys.exit(130)
     except (SceneError, EnvironmentTrouble, SymmetryError, ConvergenceError) as trouble:
         complain(str(trouble))

@@ -16,9 +16,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.branch import Point
+from rodfem.errors import ConvergenceError
 from rodfem.newton import Outcome, correct
 from rodfem.shape import Shape
-from rodfem.stability.inertia import Inertia, combine
+from rodfem.stability.inertia import Index, Inertia, combine
+from rodfem.stability.spectrum import Spectrum
 from rodfem.system import System
 
 
@@ -47,10 +49,12 @@ class Follower:
     It owns what such a computation needs once: the Newton solver's factors (in the system), the stability matrix, the shape.
     """
 
-    def __init__(self, system: System) -> None:
-        """Allocate the stability matrix and tabulate the shape."""
+    def __init__(self, system: System, spectrum: int = 0) -> None:
+        """Allocate the stability matrix and tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
         self.system = system
         self.inertia = Inertia(system)
+        self.modes = spectrum
+        self.spectrum = Spectrum(self.inertia) if spectrum else None
         self.shape = Shape(system)
         self.axis = system.load_axis()
 
@@ -87,7 +91,21 @@ class Follower:
             slope=float("nan") if tangent is None else system.scalar(tangent),
             drift=max((abs(system.scalar(x, f"drift{i}")) for i in range(len(system.drifts))), default=0.0),
             error=outcome.error if outcome else 0.0,
+            spectrum=self._leftmost(x, index),
         )
+
+    def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:
+        """Left-most eigenvalues by SLEPc, if asked for; raises :class:`ConvergenceError` where they contradict the inertia."""
+        if self.spectrum is None:
+            return []
+        modes = self.spectrum.leftmost(x, self.modes)
+        negative = modes.negative(self.inertia.tolerance / self.system.scene.length)
+        if negative != min(index.negative, self.modes) or not modes.certified:
+            raise ConvergenceError(
+                f"SLEPc finds {negative} negative eigenvalues at {self.system.scene.load} = {self.system.scalar(x):.8g}, the inertia "
+                f"{index.negative}: ask for more eigenvalues, or use a richer discretisation."
+            )
+        return [float(value) for value in modes.values]
 
     def row(self, direction: PETSc.Vec) -> PETSc.Vec:
         """Row of the arclength equation for a direction: the metric times it, for a direction of unit size."""

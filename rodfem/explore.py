@@ -71,7 +71,12 @@ class Explorer:
 
     def _switch(self, parent: Branch, i: int, special: Special) -> None:
         special.switched = True
-        for direction in directions(self.follower, special):
+        try:
+            ways = directions(self.follower, special)
+        except ConvergenceError as trouble:
+            self.report.warn(f"No branch could be followed from {parent.name} at {special.point.load:.8g}: {trouble}")
+            return
+        for direction in ways:
             first: Point | None = None
             for sign in (1.0, -1.0):
                 way = direction.copy()
@@ -79,6 +84,7 @@ class Explorer:
                 name = self._name(parent)
                 branch = start_branch(special, way, name, (parent.name, i), parent.depth + 1, self.follower)
                 if branch is None:
+                    self.report.warn(f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}.")
                     continue
                 if first is not None and _equivalent(first, branch.points[1]):
                     continue  # the mirror image of the branch just traced
@@ -106,27 +112,34 @@ class Explorer:
         """Follow a branch to its end, insert its special points, estimate errors, hand it on as finished."""
         self.branches.append(branch)
         self.report.branch(branch)
+        try:
+            self._follow(branch)
+        except ConvergenceError as trouble:
+            branch.ended = f"no convergence: {trouble}"
+            self.report.warn(str(trouble))
+        self._finish(branch)
+
+    def _follow(self, branch: Branch) -> None:
         history = list(branch.points)
         for item in follow(self.follower, history, self.plan.steps, (self.low, self.high)):
             if isinstance(item, str):
                 branch.ended = item
-                break
+                return
             previous = history[-1]
             self._check_symmetry(item)
             if item.stretch <= 0:
                 self._end_at_zero_stretch(branch, previous, item)
-                break
+                return
             reason = self._between(branch, previous, item)
             if reason:
                 branch.ended = reason
-                break
+                return
             history.append(item)
             branch.points.append(item)
             self.report.progress(branch, item)
             if self._closes(branch, previous, item):
                 branch.ended = "closed loop"
-                break
-        self._finish(branch)
+                return
 
     def _between(self, branch: Branch, a: Point, b: Point) -> str:
         """Insert folds, branch points and user points between two points; a reason if the branch ends there."""
@@ -222,7 +235,6 @@ class Explorer:
             )
 
     def _finish(self, branch: Branch) -> None:
-        last = branch.points[-1] if branch.points else None
         branch.renumber()
         last = branch.points[-1]
         if not any(s.point is last for s in branch.special):

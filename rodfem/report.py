@@ -99,6 +99,18 @@ class Report:
                 if s.note:
                     self.say(f"    {s.note}")
 
+    def spectra(self, branches: Sequence[Branch]) -> None:
+        """Print the left-most eigenvalues of the special points, if they were asked for."""
+        rows = [(b, s) for b in branches for s in b.special if s.point.spectrum]
+        if rows:
+            self.say("\nLeft-most eigenvalues mu = omega^2 for unit rotary inertia (symmetry modes left out)")
+        for branch, s in rows:
+            self.say(f"  {branch.name:<12} {s.kind:<13} {s.point.load:<13.8g} " + "  ".join(f"{mu:.6g}" for mu in s.point.spectrum))
+
+    def warn(self, sentence: str) -> None:
+        """Say what went wrong without stopping."""
+        self.say(f"  ! {sentence}")
+
     def timing(self, clock: Clock, points: int) -> None:
         """Print where the time went."""
         s = clock.seconds

@@ -56,12 +56,13 @@ def run(
     with compat.announce_compilation(report.compiling):
         with clock("setup"):
             system = System(scene, discretization, comm, clock)
-            follower = Follower(system)
+            follower = Follower(system, plan.spectrum)
         report.system(system)
         explorer = Explorer(follower, plan, report, lambda: _save(explorer, follower, clock, output))
         branches = explorer.run()
     _save_diagram(explorer, follower, clock, output)
     report.table(branches, system)
+    report.spectra(branches)
     report.timing(clock, sum(len(b.points) for b in branches))
     report.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
     if figures and comm.rank == 0:

@@ -250,6 +250,7 @@ class Factorizer:
         self.room = 50
         self.ksp = PETSc.KSP().create(comm)
         self.factor: PETSc.Mat | None = None
+        self._matrix = 0
 
     def __call__(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Factor ``matrix``; raises :class:`ConvergenceError` where MUMPS gives up.
@@ -258,7 +259,7 @@ class Factorizer:
         solves is arbitrary: the factors are then made again with more room.
         """
         while True:
-            if self.factor is None:
+            if self.factor is None or matrix.handle != self._matrix:
                 self._prepare(matrix)
             else:
                 self.ksp.setOperators(matrix)
@@ -282,7 +283,7 @@ class Factorizer:
         self.ksp.setFromOptions()
         self.ksp.setOperators(matrix)
         pc.setFactorSetUpSolverType()
-        self.factor = pc.getFactorMatrix()
+        self.factor, self._matrix = pc.getFactorMatrix(), matrix.handle
         self.factor.setMumpsIcntl(14, self.room)
         for control, value in self.controls.items():
             self.factor.setMumpsIcntl(control, value)

@@ -34,6 +34,15 @@ class Index:
     zero: int
 
 
+def inertia_factorizer(comm: MPI.Comm) -> Factorizer:
+    """LDL^t factors that report the inertia.
+
+    ICNTL(24) = 1 is what makes MUMPS report it, ICNTL(13) = 1 what makes it do so in parallel; CNTL(3) is so small that no pivot is taken
+    for zero: the matrices are shifted off their eigenvalues.
+    """
+    return Factorizer("cholesky", comm, {24: 1, 13: 1}, {3: -1e-300})
+
+
 class Inertia:
     """Counts eigenvalues and finds the ones nearest zero, at states of one :class:`~rodfem.system.System`.
 
@@ -45,7 +54,7 @@ class Inertia:
         """Allocate the matrix and its LDL^t factors once."""
         self.system = system
         self.matrix = system.state_matrix()
-        self.factors = Factorizer("cholesky", system.comm, {24: 1, 13: 1}, {3: -1e-300})
+        self.factors = inertia_factorizer(system.comm)
         self.constraints = system.fields.constraints()
         length = system.scene.length
         bending = np.linalg.eigvalsh(system.scene.stiffness()[-3:, -3:])[0]
