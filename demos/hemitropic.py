@@ -1,17 +1,18 @@
 r"""Compression of a hemitropic rod.
 
-A hemitropic rod twists when it is stretched, as a rope or a strand of DNA does.  Its stored energy couples stretch and twist::
+A hemitropic rod twists when it is stretched, as a rope or a strand of DNA does.  Its stored energy couples
+stretch and twist::
 
     W = 5 (v3 - 1)^2 + A (v3 - 1) k3 + B/2 k3^2 + C/2 (k1^2 + k2^2)
 
-(an unshearable rod: v1 = v2 = 0).  Both ends are clamped, and pushed towards each other to r = -+ (1 - lam) l e3, l half the length.
-The straight rod is an equilibrium at every lam.  Linear theory has it buckle where, with a = A lam/(2C), Om^2 = a^2 + 10 lam (1 - lam)/C,
-p = l (a - Om) and q = l (a + Om),
+(an unshearable rod: v1 = v2 = 0).  Both ends are clamped, and pushed towards each other to r = -+ (1 - lam) l e3,
+l half the length. The straight rod is an equilibrium at every lam.  Linear theory has it buckle where, with a = A
+lam/(2C), Om^2 = a^2 + 10 lam (1 - lam)/C, p = l (a - Om) and q = l (a + Om),
 
     sin(q - p) = (q - p) sin p sin q / (p q).
 
-Nothing in the problem prefers a direction across the rod.  Hence every buckled state is one of a circle of states, its second variation has
-one zero eigenvalue, and at the straight state eigenvalues cross zero in pairs.
+Nothing in the problem prefers a direction across the rod.  Hence every buckled state is one of a circle of
+states, its second variation has one zero eigenvalue, and at the straight state eigenvalues cross zero in pairs.
 
 Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section 5.2 and figures 5 and 6.
 """
@@ -58,8 +59,12 @@ def scene(options: Namespace) -> Scene:
 if __name__ == "__main__":
     parser = parser_for("hemitropic", __doc__, load="lam", span=(0.0, 0.95), elements=8, degree=6)
     constants = parser.add_argument_group("constants of the rod")
-    constants.add_argument("--coupling", type=float, default=-3.0, metavar="A", help="of stretch and twist (default -3)")
+    constants.add_argument(
+        "--coupling", type=float, default=-3.0, metavar="A", help="of stretch and twist (default -3)"
+    )
     constants.add_argument("--twisting", type=float, default=1.0, metavar="B", help="stiffness (default 1)")
     constants.add_argument("--bending", type=float, default=1.0, metavar="C", help="stiffness (default 1)")
-    constants.add_argument("--half-length", type=float, default=3.0, metavar="L", help="half the rod's length (default 3)")
+    constants.add_argument(
+        "--half-length", type=float, default=3.0, metavar="L", help="half the rod's length (default 3)"
+    )
     main(parser, scene)

@@ -24,4 +24,9 @@ def hemitropic(v: Expr, k: Expr, *, stretching: Expr, coupling: Expr, twisting: 
     Convex where ``stretching * twisting > coupling^2`` and ``bending > 0``.
     """
     e = v[2] - 1
-    return 0.5 * stretching * e**2 + coupling * e * k[2] + 0.5 * twisting * k[2] ** 2 + 0.5 * bending * (k[0] ** 2 + k[1] ** 2)
+    return (
+        0.5 * stretching * e**2
+        + coupling * e * k[2]
+        + 0.5 * twisting * k[2] ** 2
+        + 0.5 * bending * (k[0] ** 2 + k[1] ** 2)
+    )

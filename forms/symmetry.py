@@ -1,7 +1,8 @@
 """Continuous symmetries of a rod problem, as linear generators of its fields.
 
-A hemitropic rod between clamps aligned with ``e`` is unchanged by a rotation ``a`` of space about ``e`` together with the
-inverse rotation of the directors: ``q -> a q conj(a)``, ``r -> a r``, ``n -> a n``.  To first order in the angle ::
+A hemitropic rod between clamps aligned with ``e`` is unchanged by a rotation ``a`` of space about ``e`` together
+with the inverse rotation of the directors: ``q -> a q conj(a)``, ``r -> a r``, ``n -> a n``.  To first order in
+the angle ::
 
     dq = 1/2 (e q - q e) = (0, e x vec q),   dr = e x r,   dn = e x n,
 

@@ -1,7 +1,8 @@
 """Error bars: every special point is computed again on a richer discretisation, started from the first.
 
-Same mesh, one degree more: with an error of order ``h^(2k)`` the richer result is much nearer to the truth, and the difference
-estimates the error of the first.  The state, its tangent and the null vector are interpolated, so that this costs a few solves.
+Same mesh, one degree more: with an error of order ``h^(2k)`` the richer result is much nearer to the truth, and
+the difference estimates the error of the first.  The state, its tangent and the null vector are interpolated, so
+that this costs a few solves.
 """
 
 from __future__ import annotations
@@ -13,15 +14,14 @@ from petsc4py import PETSc
 from scipy.optimize import newton
 
 from rodfem import compat
-from rodfem.bifurcation import WINDOW, refine, solve_at
 from rodfem.branch import BRANCH_POINT, FOLD, Special
 from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError
+from rodfem.locate import WINDOW, refine, solve_at
 from rodfem.system import System
 
-
 STRAIN_SAFETY = 10.0
-"""A strain converges like ``h^k`` only, so that a degree more is not much nearer to the truth: the difference is multiplied by this."""
+"""A strain converges like ``h^k`` only, and a degree more is not much nearer to the truth: multiply by this."""
 
 
 class Transfer:
@@ -31,7 +31,9 @@ class Transfer:
         """Tabulate the bases of the source at the nodes of the target."""
         self.source, self.target = source, target
         degrees = {b.name: b.degree for b in source.fields.blocks}
-        self.bases = {b.name: compat.lagrange_basis(degrees[b.name], compat.nodes(b.degree)) for b in target.fields.blocks}
+        self.bases = {
+            b.name: compat.lagrange_basis(degrees[b.name], compat.nodes(b.degree)) for b in target.fields.blocks
+        }
 
     def __call__(self, vector: PETSc.Vec, *, state: bool) -> PETSc.Vec:
         """Interpolate a state, or (``state=False``) a direction, which is zero where a state is clamped."""
@@ -57,15 +59,17 @@ class Richer:
         """Compile and allocate the richer system."""
         self.coarse, system = follower, follower.system
         d = system.fields.discretization
-        self.system = System(system.scene, replace(d, degree=d.degree + 1), system.comm, system.clock, system.fields.mesh)
+        self.system = System(
+            system.scene, replace(d, degree=d.degree + 1), system.comm, system.clock, system.fields.mesh
+        )
         self.follower = Follower(self.system)
         self.transfer = Transfer(system, self.system)
 
     def estimate(self, special: Special) -> None:
         """Set ``error_estimate`` and ``ordinate_error`` of a special point.
 
-        They are never below what the location and the arithmetic leave uncertain, and infinite where the richer discretisation
-        does not find the point.
+        They are never below what the location and the arithmetic leave uncertain, and infinite where the richer
+        discretisation does not find the point.
         """
         floor = max(special.located_to, 1e-12 * max(1.0, abs(special.point.load)))
         try:
@@ -75,7 +79,9 @@ class Richer:
             special.note = f"no error estimate: {trouble}"
             return
         factor = STRAIN_SAFETY if special.zero_of == "stretch" else 1.0
-        load, ordinate = (p + factor * (q - p) for p, q in ((special.point.load, load), (special.point.ordinate, ordinate)))
+        load, ordinate = (
+            p + factor * (q - p) for p, q in ((special.point.load, load), (special.point.ordinate, ordinate))
+        )
         special.ordinate_error = max(abs(ordinate - special.point.ordinate), floor)
         at_a_load = special.kind not in (FOLD, BRANCH_POINT) and special.zero_of != "stretch"
         special.error_estimate = special.ordinate_error if at_a_load else max(abs(load - special.point.load), floor)

@@ -11,7 +11,7 @@ FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
 
 @dataclass
 class Point:
-    """One equilibrium: state ``x``, unit ``tangent`` along its branch, ``arclength`` from the branch's start, and records.
+    """One equilibrium: state ``x``, unit ``tangent``, ``arclength`` from the start of the branch, and records.
 
     ``slope`` is the load's component of the tangent, ``drift`` the largest drift scalar (zero but for round-off),
     ``error`` the last Newton correction.
@@ -36,9 +36,10 @@ class Point:
 class Special:
     """A special point: what it is, how precisely it was located, its null vectors, and the index on either side.
 
-    ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` that of the discretisation: of the
-    load for folds and branch points, of the ordinate at user points and ends.  ``coupling`` is the cosine between the null
-    vector and the derivative of the equations in the load: zero at a branch point, not at a fold.
+    ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` that of the
+    discretisation: of the load for folds and branch points, of the ordinate at user points and ends. ``coupling``
+    is the cosine between the null vector and the derivative of the equations in the load: zero at a branch point,
+    not at a fold.
     """
 
     kind: str

@@ -37,8 +37,20 @@ def parser_for(name: str, description: str, load: str, span: tuple[float, float]
         epilog="Options for PETSc and SLEPc go after a lone --, as in: -- -log_view",
     )
     group = parser.add_argument_group("discretisation")
-    group.add_argument("--elements", type=int, default=elements, metavar="N", help=f"number of finite elements along the rod (default {elements})")
-    group.add_argument("--degree", type=int, default=degree, metavar="K", help=f"polynomial degree; the error falls as h^(2K) (default {degree})")
+    group.add_argument(
+        "--elements",
+        type=int,
+        default=elements,
+        metavar="N",
+        help=f"number of finite elements along the rod (default {elements})",
+    )
+    group.add_argument(
+        "--degree",
+        type=int,
+        default=degree,
+        metavar="K",
+        help=f"polynomial degree; the error falls as h^(2K) (default {degree})",
+    )
     group.add_argument(
         "--formulation",
         default="reduced",
@@ -46,11 +58,38 @@ def parser_for(name: str, description: str, load: str, span: tuple[float, float]
         help="reduced: no centreline, the contact force as scalars; pointwise: all fields (default reduced)",
     )
     group = parser.add_argument_group("what to compute")
-    group.add_argument("--range", dest="span", type=float, nargs=2, default=span, metavar=("A", "B"), help=f"start at {load} = A, stay between A and B (default {span[0]:g} {span[1]:g})")
-    group.add_argument("--at", type=float, nargs="+", default=[], metavar="LOAD", help=f"compute every branch also at exactly these values of {load}")
-    group.add_argument("--spectrum", type=int, default=0, metavar="K", help="also compute the K left-most eigenvalues of every state with SLEPc")
+    group.add_argument(
+        "--range",
+        dest="span",
+        type=float,
+        nargs=2,
+        default=span,
+        metavar=("A", "B"),
+        help=f"start at {load} = A, stay between A and B (default {span[0]:g} {span[1]:g})",
+    )
+    group.add_argument(
+        "--at",
+        type=float,
+        nargs="+",
+        default=[],
+        metavar="LOAD",
+        help=f"compute every branch also at exactly these values of {load}",
+    )
+    group.add_argument(
+        "--spectrum",
+        type=int,
+        default=0,
+        metavar="K",
+        help="also compute the K left-most eigenvalues of every state with SLEPc",
+    )
     group = parser.add_argument_group("output")
-    group.add_argument("--output", type=Path, default=Path("results") / name, metavar="DIR", help=f"folder for files and pictures (default results/{name})")
+    group.add_argument(
+        "--output",
+        type=Path,
+        default=Path("results") / name,
+        metavar="DIR",
+        help=f"folder for files and pictures (default results/{name})",
+    )
     group.add_argument("--no-figures", dest="figures", action="store_false", help="draw nothing")
     return parser
 

@@ -10,8 +10,8 @@ from time import perf_counter
 class Clock:
     """Accumulates wall time by name; nested measurements are charged to the innermost name.
 
-    Inside :meth:`purpose` everything is charged to that purpose instead: what locating special points costs, say, is kept apart from
-    what the points of a branch cost.
+    Inside :meth:`purpose` everything is charged to that purpose instead: what locating special points costs, say,
+    is kept apart from what the points of a branch cost.
     """
 
     def __init__(self) -> None:

@@ -23,8 +23,8 @@ try:
     from dolfinx import fem
 except ModuleNotFoundError as missing:
     raise EnvironmentTrouble(
-        f"This Python has no module {missing.name!r}: install Debian's python3-dolfinx and run with a virtual environment made by "
-        "'/usr/bin/python3 -m venv --system-site-packages .venv' ('make setup' does both)."
+        f"This Python has no module {missing.name!r}: install Debian's python3-dolfinx and run with a virtual "
+        "environment made by '/usr/bin/python3 -m venv --system-site-packages .venv' ('make setup' does both)."
     ) from missing
 
 
@@ -34,7 +34,8 @@ def require_real_petsc() -> None:
 
     if np.issubdtype(PETSc.ScalarType, np.complexfloating):
         raise EnvironmentTrouble(
-            "This PETSc was built for complex numbers, and rodfem needs the real one: unset PETSC_DIR and SLEPC_DIR, or point both at the real build."
+            "This PETSc was built for complex numbers, and rodfem needs the real one: "
+            "unset PETSC_DIR and SLEPC_DIR, or point both at the real build."
         )
 
 
@@ -42,8 +43,8 @@ def interval_mesh(comm: Any, elements: int, a: float, b: float) -> Any:
     """Uniform mesh of ``[a, b]``."""
     mesh = dolfinx.mesh.create_interval(comm, elements, [a, b])
     if hasattr(ufl, "VectorElement"):
-        # FFCx 0.5 gives the coordinate element this variant while it compiles, in place: a form signed before would differ from one
-        # signed after, and every new run would compile again what is in the cache.
+        # FFCx 0.5 gives the coordinate element this variant while it compiles, in place: a form signed before
+        # would differ from one signed after, and every new run would compile again what is in the cache.
         spaced = ufl.FiniteElement("Lagrange", mesh.ufl_cell(), 1, variant="equispaced")
         mesh.ufl_domain()._ufl_coordinate_element = ufl.VectorElement(spaced)
     return mesh
@@ -70,8 +71,12 @@ def mixed_space(mesh: Any, parts: Sequence[tuple[bool, int, int]]) -> Any:
         element = basix.ufl.mixed_element(elements)
     else:
         cell = mesh.ufl_cell()
-        single = [ufl.FiniteElement("Lagrange" if continuous else "DG", cell, degree) for continuous, degree, _ in parts]
-        element = ufl.MixedElement([ufl.VectorElement(e, dim=p[2]) if p[2] > 1 else e for e, p in zip(single, parts, strict=True)])
+        single = [
+            ufl.FiniteElement("Lagrange" if continuous else "DG", cell, degree) for continuous, degree, _ in parts
+        ]
+        element = ufl.MixedElement(
+            [ufl.VectorElement(e, dim=p[2]) if p[2] > 1 else e for e, p in zip(single, parts, strict=True)]
+        )
     return fem.functionspace(mesh, element) if hasattr(fem, "functionspace") else fem.FunctionSpace(mesh, element)
 
 
@@ -79,7 +84,9 @@ def nodes(degree: int) -> np.ndarray:
     """Reference coordinates in [0, 1] of the nodes of a Lagrange element, in the order of its degrees of freedom."""
     if degree == 0:
         return np.array([0.5])
-    element = basix.create_element(basix.ElementFamily.P, basix.CellType.interval, degree, basix.LagrangeVariant.gll_warped)
+    element = basix.create_element(
+        basix.ElementFamily.P, basix.CellType.interval, degree, basix.LagrangeVariant.gll_warped
+    )
     return np.asarray(element.points)[:, 0]
 
 
@@ -87,7 +94,9 @@ def lagrange_basis(degree: int, x: np.ndarray) -> np.ndarray:
     """Values of the Lagrange basis on :func:`nodes` at reference points ``x`` of shape (m,): (m, degree + 1)."""
     if degree == 0 or len(x) == 0:
         return np.ones((len(x), degree + 1))
-    element = basix.create_element(basix.ElementFamily.P, basix.CellType.interval, degree, basix.LagrangeVariant.gll_warped)
+    element = basix.create_element(
+        basix.ElementFamily.P, basix.CellType.interval, degree, basix.LagrangeVariant.gll_warped
+    )
     return np.asarray(element.tabulate(0, np.asarray(x, dtype=float).reshape(-1, 1)))[0].reshape(len(x), degree + 1)
 
 
@@ -121,7 +130,7 @@ def compile_forms(forms: Sequence[Any]) -> list[Any]:
 
 @contextmanager
 def announce_compilation(say: Callable[[], None]) -> Iterator[None]:
-    """Call ``say`` once if forms are compiled inside the block, and keep the compilers' own chatter off the terminal."""
+    """Call ``say`` once if forms are compiled inside the block; keep the compilers' own chatter off the terminal."""
     said: list[bool] = []
 
     def silence(record: logging.LogRecord) -> bool:

@@ -1,8 +1,9 @@
 """Pseudo-arclength continuation: following a curve of equilibria with control of the step.
 
-The predictor extrapolates the last points of the branch by a polynomial in arclength (up to cubic); the corrector is
-Newton's method on the plane through the prediction orthogonal to the predicted direction (Keller 1977).  The step is
-chosen such that the corrector moves a prediction by a set distance: small where the curve bends, large where it does not.
+The predictor extrapolates the last points of the branch by a polynomial in arclength (up to cubic); the corrector
+is Newton's method on the plane through the prediction orthogonal to the predicted direction (Keller 1977).  The
+step is chosen such that the corrector moves a prediction by a set distance: small where the curve bends, large
+where it does not.
 """
 
 from __future__ import annotations
@@ -23,9 +24,8 @@ from rodfem.stability.inertia import Index, Inertia, combine
 from rodfem.stability.spectrum import Spectrum
 from rodfem.system import System
 
-
 LEVEL = 0.05
-"""Where the load changes along a branch by less than this (of its span a unit of arclength), its slope is computed afresh."""
+"""Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Steps:
     """
 
     first: float = 0.02
-    largest: float = 0.08
+    largest: float = 0.05
     smallest: float = 1e-5
     aim: float = 2e-3
     most: int = 2000
@@ -46,11 +46,12 @@ class Steps:
 class Follower:
     """Computes equilibria of one :class:`~rodfem.system.System` with their index and records.
 
-    It owns what such a computation needs once: the Newton solver's factors (in the system), the stability matrix, the shape.
+    It owns what such a computation needs once: the Newton solver's factors (in the system), the stability matrix,
+    the shape.
     """
 
     def __init__(self, system: System, spectrum: int = 0) -> None:
-        """Allocate the stability matrix and tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
+        """Allocate matrices and tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
         self.system = system
         self.inertia = Inertia(system)
         self.modes = spectrum
@@ -95,14 +96,15 @@ class Follower:
         )
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:
-        """Left-most eigenvalues by SLEPc, if asked for; raises :class:`ConvergenceError` where they contradict the inertia."""
+        """Left-most eigenvalues by SLEPc, if asked for; :class:`ConvergenceError` where they contradict the inertia."""
         if self.spectrum is None:
             return []
         modes = self.spectrum.leftmost(x, self.modes)
         negative = modes.negative(self.inertia.tolerance / self.system.scene.length)
         if negative != min(index.negative, self.modes) or not modes.certified:
             raise ConvergenceError(
-                f"SLEPc finds {negative} negative eigenvalues at {self.system.scene.load} = {self.system.scalar(x):.8g}, the inertia "
+                f"SLEPc finds {negative} negative eigenvalues at "
+                f"{self.system.scene.load} = {self.system.scalar(x):.8g}, the inertia "
                 f"{index.negative}: ask for more eigenvalues, or use a richer discretisation."
             )
         return [float(value) for value in modes.values]
@@ -116,7 +118,8 @@ class Follower:
     def tangent(self, row: PETSc.Vec, at: PETSc.Vec | None = None) -> PETSc.Vec:
         """Unit tangent of the branch on the side to which ``row`` points.
 
-        From the factors of the last correction, which belong to a state nearby; with ``at`` from new ones at that very state.
+        From the factors of the last correction, which belong to a state nearby; with ``at`` from new ones at that
+        very state.
         """
         if at is not None:
             self.system.residual(at, self.system.new_vector())
@@ -154,7 +157,7 @@ def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def predict(points: list[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """Extrapolate a branch to arclength ``s``: state and unit-speed direction, from up to four points or one and its tangent."""
+    """Extrapolate a branch to arclength ``s``: state and direction, from up to four points or one and its tangent."""
     last = points[-1]
     if len(points) < 3:
         if last.tangent is None:
@@ -183,8 +186,8 @@ def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
 def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[float, float]) -> Iterator[Point | str]:
     """Continue a branch from its last point, yielding accepted points; a string at the end says why it ended.
 
-    ``bounds`` are the least and the greatest load; the branch ends exactly on them.  The caller appends (and may insert)
-    points in ``points``.  The direction is that of the last point's tangent.
+    ``bounds`` are the least and the greatest load; the branch ends exactly on them.  The caller appends (and may
+    insert) points in ``points``.  The direction is that of the last point's tangent.
     """
     system, step = follower.system, steps.first
     low, high = bounds

@@ -1,8 +1,8 @@
 """A bifurcation diagram as plain columnar data: made from branches, saved to ``diagram.json`` and ``states.h5``.
 
-``diagram.json`` holds for each branch its columns (one entry a row, a row being an equilibrium) and its special points, each of which is
-a row too.  ``states.h5`` holds the same rows as shapes and fields in natural order along the rod, whatever the number of ranks:
-to draw them, or to start again from one with :func:`load_state`.
+``diagram.json`` holds for each branch its columns (one entry a row, a row being an equilibrium) and its special
+points, each of which is a row too.  ``states.h5`` holds the same rows as shapes and fields in natural order along
+the rod, whatever the number of ranks: to draw them, or to start again from one with :func:`load_state`.
 """
 
 from __future__ import annotations
@@ -41,7 +41,12 @@ def as_data(branches: Sequence[Branch], system: System, clock: Clock, span: tupl
         "ordinate_label": scene.ordinate.label or scene.ordinate.name,
         "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
         "range": list(span),
-        "discretization": {"formulation": d.formulation, "elements": d.elements, "degree": d.degree, "unknowns": system.fields.unknowns},
+        "discretization": {
+            "formulation": d.formulation,
+            "elements": d.elements,
+            "degree": d.degree,
+            "unknowns": system.fields.unknowns,
+        },
         "branches": [_branch_data(b) for b in branches],
         "timing": {
             "assembly_s": s.get("assembly", 0.0),
@@ -117,8 +122,8 @@ def load_json(path: Path) -> dict[str, Any]:
 def save_states(branch: Branch, follower: Follower, path: Path, first: bool) -> None:
     """Append the states of a branch to an HDF5 file; collective, written on rank 0.
 
-    Group ``/branches/<name>`` has ``load`` (P,), ``r`` (P, m, 3), ``q`` (P, m, 4), every further field and scalar with P rows, and the
-    null vectors of its special points under ``special/<i>``.
+    Group ``/branches/<name>`` has ``load`` (P,), ``r`` (P, m, 3), ``q`` (P, m, 4), every further field and scalar
+    with P rows, and the null vectors of its special points under ``special/<i>``.
     """
     samples = [follower.shape.sample(p.x) for p in branch.points]
     modes = [[follower.shape.sample(v) for v in s.null_vectors] for s in branch.special]
@@ -155,12 +160,16 @@ def load_state(path: Path, branch: str, row: int, follower: Follower) -> PETSc.V
     try:
         with h5py.File(path, "r") as file:
             if file.attrs["formulation"] != wanted:
-                raise SceneError(f"{path} holds states of the {file.attrs['formulation']} formulation, not of the {wanted} one asked for.")
+                raise SceneError(
+                    f"{path} holds states of the {file.attrs['formulation']} formulation: choose that, not {wanted}."
+                )
             group = file[f"branches/{branch}"]
             sample = {name: value[row] for name, value in group.items() if isinstance(value, h5py.Dataset)}
             sample["s"], sample["elements"] = file["s"][:], int(file.attrs["elements"])
     except (OSError, KeyError, IndexError, ValueError) as trouble:
         if isinstance(trouble, SceneError):
             raise
-        raise SceneError(f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it.") from trouble
+        raise SceneError(
+            f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it."
+        ) from trouble
     return follower.shape.restore(sample)

@@ -16,4 +16,4 @@ class SymmetryError(RuntimeError):
 
 
 class EnvironmentTrouble(RuntimeError):
-    """A missing or unfit installation (complex PETSc, no dolfinx, a locked form cache); says what to install or clear."""
+    """A missing or unfit installation (complex PETSc, no dolfinx, a locked form cache); says what to do."""

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
 from rodfem.accuracy import Richer
-from rodfem.bifurcation import directions, find_special, solve_at, start_branch
+from rodfem.bifurcation import directions, find_special, start_branch
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
 from rodfem.continuation import Follower, Steps, follow, hermite
 from rodfem.errors import ConvergenceError, SceneError, SymmetryError
+from rodfem.locate import solve_at
 from rodfem.report import Report
 
 
@@ -23,7 +25,7 @@ class Plan:
     span: tuple[float, float]
     at: tuple[float, ...] = ()
     depth: int = 2
-    steps: Steps = Steps()
+    steps: Steps = field(default_factory=Steps)
     error_bars: bool = True
     spectrum: int = 0
 
@@ -31,7 +33,8 @@ class Plan:
 class Explorer:
     """Explores the equilibria of a scene from its start state.
 
-    ``branches`` grows as the run goes; ``finished`` is called after each branch that is complete, so that nothing is lost.
+    ``branches`` grows as the run goes; ``finished`` is called after each branch that is complete, so that nothing
+    is lost.
     """
 
     def __init__(self, follower: Follower, plan: Plan, report: Report, finished: Callable[[], None]) -> None:
@@ -43,7 +46,8 @@ class Explorer:
         for load in plan.at:
             if not self.low <= load <= self.high:
                 raise SceneError(
-                    f"The load {load:g} asked for is outside the range {self.low:g} to {self.high:g}: widen the range or leave it out."
+                    f"The load {load:g} asked for is outside the range {self.low:g} to {self.high:g}: "
+                    "widen the range or leave it out."
                 )
         self.branches: list[Branch] = []
         self.richer: Richer | None = None
@@ -64,7 +68,10 @@ class Explorer:
         follower.system.set_phase(None)
         x, outcome = follower.at_load(follower.start(start), start)
         if not outcome.converged:
-            raise ConvergenceError(f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: start at another load.")
+            raise ConvergenceError(
+                f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: "
+                "start at another load."
+            )
         follower.system.set_phase(x)
         point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
         return Branch(self.scene.states, None, 0, [point])
@@ -84,7 +91,9 @@ class Explorer:
                 name = self._name(parent)
                 branch = start_branch(special, way, name, (parent.name, i), parent.depth + 1, self.follower)
                 if branch is None:
-                    self.report.warn(f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}.")
+                    self.report.warn(
+                        f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}."
+                    )
                     continue
                 if first is not None and _equivalent(first, branch.points[1]):
                     continue  # the mirror image of the branch just traced
@@ -149,7 +158,7 @@ class Explorer:
     def _between_points(self, branch: Branch, a: Point, b: Point) -> str:
         specials = [] if a is branch.points[0] and branch.parent else find_special(self.follower, a, b)
         pieces = [a, *(s.point for s in specials), b]
-        users = [u for p, q in zip(pieces, pieces[1:], strict=False) for u in self._users(branch, p, q, a, b)]
+        users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
         for special in sorted(specials + users, key=lambda s: s.point.arclength):
             if special.kind == BRANCH_POINT:
                 reason = self._meeting(branch, special)
@@ -166,7 +175,11 @@ class Explorer:
         """User points between two neighbours among which the load is monotone."""
         found = []
         for load in self.plan.at:
-            if (p.load - load) * (q.load - load) < 0 or (load == p.load and p is branch.points[0]) or (load == q.load and q is b):
+            if (
+                (p.load - load) * (q.load - load) < 0
+                or (load == p.load and p is branch.points[0])
+                or (load == q.load and q is b)
+            ):
                 s = p.arclength + (load - p.load) / (q.load - p.load) * (q.arclength - p.arclength)
                 for _ in range(3):
                     x, direction = hermite(a, b, s)
@@ -182,7 +195,9 @@ class Explorer:
         self.follower.system.set_phase(guess)
         x, outcome = self.follower.at_load(guess, load, reach=1.0)
         if not outcome.converged:
-            raise ConvergenceError(f"No equilibrium at {self.scene.load} = {load:g} between two points of the branch: use another load.")
+            raise ConvergenceError(
+                f"No equilibrium at {self.scene.load} = {load:g} between two points of the branch: use another load."
+            )
         return self.follower.point(x, s, self.follower.load_tangent(x, increasing), outcome)
 
     def _meeting(self, branch: Branch, special: Special) -> str:
@@ -262,9 +277,13 @@ def _equivalent(a: Point, b: Point, tolerance: float = 1e-8) -> bool:
 def _near(a: Point, b: Point, steps: float = 2.0) -> bool:
     """Whether two points could be neighbours on one branch, seen through load and energy."""
     reach = 0.05 * steps
-    return abs(a.load - b.load) <= reach * max(1.0, abs(a.load)) and abs(a.energy - b.energy) <= reach * max(1.0, abs(a.energy))
+    return abs(a.load - b.load) <= reach * max(1.0, abs(a.load)) and abs(a.energy - b.energy) <= reach * max(
+        1.0, abs(a.energy)
+    )
 
 
-def explore(follower: Follower, plan: Plan, report: Report, finished: Callable[[], None] = lambda: None) -> Sequence[Branch]:
+def explore(
+    follower: Follower, plan: Plan, report: Report, finished: Callable[[], None] = lambda: None
+) -> Sequence[Branch]:
     """Explore a scene; see :class:`Explorer`."""
     return Explorer(follower, plan, report, finished).run()

@@ -53,7 +53,7 @@ class Discretization:
 
 
 def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:
-    """Fields that a scene needs: ``q`` and ``mu`` always, ``v`` where strains are free, ``r`` and ``n`` if pointwise."""
+    """Fields of a scene: ``q`` and ``mu`` always, ``v`` where strains are free, ``r`` and ``n`` if pointwise."""
     k = discretization.degree
     blocks = [Block("q", 4, k, True, False), Block("mu", 1, k, True, True)]
     if scene.free_strains:
@@ -78,11 +78,14 @@ class Fields:
         Global number of each scalar: ``n1``.. for ``forces``, ``load``, and ``drift0``.. one for each symmetry.
     """
 
-    def __init__(self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD, mesh: Any = None) -> None:
-        """Make the mesh (unless given) and number the unknowns; raises :class:`SceneError` for more ranks than elements."""
+    def __init__(
+        self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD, mesh: Any = None
+    ) -> None:
+        """Make the mesh (unless given), number the unknowns; :class:`SceneError` for more ranks than elements."""
         if comm.size > discretization.elements:
             raise SceneError(
-                f"{discretization.elements} elements cannot be shared by {comm.size} ranks: use more elements or fewer ranks."
+                f"{discretization.elements} elements cannot be shared by {comm.size} ranks: "
+                "use more elements or fewer ranks."
             )
         self.scene, self.discretization, self.comm = scene, discretization, comm
         self.blocks = blocks_of(scene, discretization)
@@ -107,7 +110,7 @@ class Fields:
         return np.stack([compat.cell_dofs(component, cells) for component in components], axis=-1)
 
     def _clamped(self) -> np.ndarray:
-        """Local degrees of freedom that an end holds: ``q`` and ``mu`` where the directors are clamped, ``r`` where held."""
+        """Local degrees of freedom that an end holds: ``q`` and ``mu`` at clamped directors, ``r`` where held."""
         found = []
         for end, s in zip(self.scene.ends, self.scene.interval, strict=True):
             for block in self.blocks:
@@ -131,7 +134,7 @@ class Fields:
         free[copies.ravel()] = False
         self.free_owned = np.flatnonzero(free[:owned])
         count = len(self.free_owned)
-        self.offset = self.comm.exscan(count) or 0
+        self.offset = sum(self.comm.allgather(count)[: self.comm.rank])
         self.field_unknowns = self.comm.allreduce(count)
         numbers = fem.Function(self.space)
         numbers.x.array[:] = -1.0
@@ -160,7 +163,13 @@ class Fields:
 
     def describe(self) -> str:
         """Fields and scalars in words, for the terminal."""
-        names = {"q": "rotation q", "mu": "unit-norm multiplier mu", "v": "strain v", "r": "centreline r", "n": "contact force n"}
+        names = {
+            "q": "rotation q",
+            "mu": "unit-norm multiplier mu",
+            "v": "strain v",
+            "r": "centreline r",
+            "n": "contact force n",
+        }
         words = [f"{names[b.name]} (P{b.degree})" for b in self.blocks]
         words += ["n" + ", n".join(str(i + 1) for i in self.forces) + " (scalar)"] if self.forces else []
         return ", ".join(words)
@@ -173,7 +182,10 @@ class Fields:
         if fixed:
             lines.append(f"strain {', '.join(f'v{i + 1}' for i in fixed)}: the rod is {scene.rod}")
         if self.discretization.formulation == "reduced":
-            lines.append("centreline r and the field of contact force: no force acts along the rod, so that the contact force is constant")
+            lines.append(
+                "centreline r and the field of contact force: no force acts along the rod, "
+                "so that the contact force is constant"
+            )
             known = [f"n{i + 1}" for i in range(3) if scene.known_force(i, c) is not None]
             if known:
                 lines.append(f"contact force {', '.join(known)}: a dead force at an end that is free to move there")

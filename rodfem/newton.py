@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from rodfem.system import System
 
 TOLERANCE = 1e-10
-"""A state is converged when the last correction is smaller: rotations in radian, load over its span, all else relative."""
+"""Size of the last correction of a converged state: rotations in radian, load over its span, all else relative."""
 ROUND_OFF = 1e-6
 """Below this a correction that no longer shrinks is round-off, not divergence; it is reported as the error."""
 
@@ -28,9 +28,9 @@ class Outcome:
 def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3) -> Outcome:
     """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
 
-    A Jacobian is factored first, and again only while corrections do not shrink tenfold from one to the next: near a
-    solution the old factors cost one solve where new ones cost five.  Fails, leaving ``x`` where it got to, after ``most``
-    iterations, at a singular matrix, or when ``x`` has moved further than ``reach``.
+    A Jacobian is factored first, and again only while corrections do not shrink tenfold from one to the next:
+    near a solution the old factors cost one solve where new ones cost five.  Fails, leaving ``x`` where it got
+    to, after ``most`` iterations, at a singular matrix, or when ``x`` has moved further than ``reach``.
     """
     equations, step, origin = system.new_vector(), system.new_vector(), x.copy()
     previous, size, refactor = float("inf"), float("inf"), True

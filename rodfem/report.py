@@ -1,4 +1,4 @@
-"""What the terminal shows, on rank 0 only: what is solved, progress, special points as they are found, a final table."""
+"""What the terminal shows, on rank 0 only: what is solved, special points as they are found, a final table."""
 
 from __future__ import annotations
 
@@ -26,6 +26,12 @@ def number(value: float, error: float) -> str:
     return f"{value:.{digits}f} ({error:.0e})"
 
 
+def _index(special: Special) -> str:
+    """Index at a special point in words: before and after if it changes."""
+    before, after = special.negative_before, special.negative_after
+    return f"{before}->{after}" if before != after else f"{special.point.negative}"
+
+
 class Report:
     """Prints on rank 0; with ``quiet`` it prints nothing."""
 
@@ -51,7 +57,10 @@ class Report:
         """Say what is solved, with how many unknowns, and what was left out."""
         scene, f = system.scene, system.fields
         d = f.discretization
-        self.say(f"{scene.title or scene.name}: {scene.rod} rod, {d.formulation} formulation, {d.elements} elements of degree {d.degree}, {f.unknowns} unknowns")
+        self.say(
+            f"{scene.title or scene.name}: {scene.rod} rod, {d.formulation} formulation, "
+            f"{d.elements} elements of degree {d.degree}, {f.unknowns} unknowns"
+        )
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
         for line in f.left_out():
             self.say(f"  left out: {line}")
@@ -65,7 +74,11 @@ class Report:
     def progress(self, branch: Branch, point: Point) -> None:
         """Keep one line up to date while a branch is traced (on a terminal only)."""
         if self.live:
-            self.say(f"  ... {len(branch.points)} points, load {point.load:.5f}, ordinate {point.ordinate:.5f}, index {point.negative}", end="")
+            self.say(
+                f"  ... {len(branch.points)} points, load {point.load:.5f}, "
+                f"ordinate {point.ordinate:.5f}, index {point.negative}",
+                end="",
+            )
 
     def special(self, branch: Branch, special: Special) -> None:
         """Print a special point as it is found, as AUTO does."""
@@ -74,9 +87,11 @@ class Report:
     @staticmethod
     def _line(special: Special) -> str:
         p = special.point
-        index = f"{special.negative_before}->{special.negative_after}" if special.negative_before != special.negative_after else f"{p.negative}"
         meets = f"  meets {special.meets[0]}" if special.meets else ""
-        return f"{LABELS[special.kind]}   {p.load:<14.10f} {p.ordinate:<14.9f} {p.energy:<10.6f} {index:>5}  {p.zero:>4}  {special.located_to:.0e}{meets}"
+        return (
+            f"{LABELS[special.kind]}   {p.load:<14.10f} {p.ordinate:<14.9f} {p.energy:<10.6f} "
+            f"{_index(special):>6} {p.zero:>5}  {special.located_to:.0e}{meets}"
+        )
 
     def finished(self, branch: Branch) -> None:
         """Close a branch: its last point and why it ended."""
@@ -87,15 +102,17 @@ class Report:
     def table(self, branches: Sequence[Branch], system: System) -> None:
         """Print the final table: every special point with its error bar."""
         scene = system.scene
-        self.say(f"\nSpecial points (in brackets the estimated error of the discretisation; ordinate: {scene.ordinate.name})")
+        self.say(
+            f"\nSpecial points (in brackets the estimated error of the discretisation; ordinate: {scene.ordinate.name})"
+        )
         self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} index")
         for branch in branches:
             for s in branch.special:
-                exact = s.kind in (USER, END)
+                exact = s.kind in (USER, END) and s.zero_of != "stretch"
                 load = f"{s.point.load:.10g}" if exact else number(s.point.load, s.error_estimate)
-                index = f"{s.negative_before} -> {s.negative_after}" if s.negative_before != s.negative_after else f"{s.point.negative}"
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
-                self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {number(s.point.ordinate, s.ordinate_error):<24} {index}{zero}")
+                ordinate = number(s.point.ordinate, s.ordinate_error)
+                self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {_index(s)}{zero}")
                 if s.note:
                     self.say(f"    {s.note}")
 
@@ -105,7 +122,10 @@ class Report:
         if rows:
             self.say("\nLeft-most eigenvalues mu = omega^2 for unit rotary inertia (symmetry modes left out)")
         for branch, s in rows:
-            self.say(f"  {branch.name:<12} {s.kind:<13} {s.point.load:<13.8g} " + "  ".join(f"{mu:.6g}" for mu in s.point.spectrum))
+            self.say(
+                f"  {branch.name:<12} {s.kind:<13} {s.point.load:<13.8g} "
+                + "  ".join(f"{mu:.6g}" for mu in s.point.spectrum)
+            )
 
     def warn(self, sentence: str) -> None:
         """Say what went wrong without stopping."""
@@ -115,6 +135,11 @@ class Report:
         """Print where the time went."""
         s = clock.seconds
         work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
-        parts = [f"{name} {s.get(name, 0.0):.2f} s" for name in ("setup", "assembly", "solve", "stability", "location", "error bars", "files")]
+        parts = [
+            f"{name} {s.get(name, 0.0):.2f} s"
+            for name in ("setup", "assembly", "solve", "stability", "location", "error bars", "files")
+        ]
         self.say(f"\nTime: {', '.join(parts)}; {clock.total():.2f} s in all")
-        self.say(f"{points} points with their index, {1e3 * work / max(points, 1):.2f} ms each (assembly, solve, stability)")
+        self.say(
+            f"{points} points with their index, {1e3 * work / max(points, 1):.2f} ms each (assembly, solve, stability)"
+        )

@@ -99,11 +99,13 @@ def _draw(output: Path, report: Report) -> None:
 
 
 def typical_state(data: dict) -> tuple[str, int, str]:
-    """Branch, row and words of the state to draw: a stable one far from the first branch, or else the last one computed."""
+    """Branch, row and words of the state to draw: the stable one with the largest ordinate, else an unstable one."""
     best: tuple[float, str, int, str] | None = None
     for branch in data["branches"]:
         columns = branch["columns"]
-        for row, (load, ordinate, negative) in enumerate(zip(columns["load"], columns["ordinate"], columns["negative"], strict=True)):
+        for row, (load, ordinate, negative) in enumerate(
+            zip(columns["load"], columns["ordinate"], columns["negative"], strict=True)
+        ):
             score = abs(ordinate) + (1e6 if negative == 0 else 0.0)
             if best is None or score > best[0]:
                 best = (score, branch["name"], row, f"{load:.4g}, {'stable' if negative == 0 else f'index {negative}'}")

@@ -140,7 +140,9 @@ class Scene:
         """Check all that can be checked before any computation; raises :class:`SceneError`."""
         a, b = self.interval
         if not (isfinite(a) and isfinite(b) and a < b):
-            raise SceneError(f"The rod's interval ({a:g}, {b:g}) is empty: give two finite ends with the left one first.")
+            raise SceneError(
+                f"The rod's interval ({a:g}, {b:g}) is empty: give two finite ends with the left one first."
+            )
         if self.rod not in RODS:
             raise SceneError(f"Unknown kind of rod {self.rod!r}: choose one of {', '.join(map(repr, RODS))}.")
         if self.load not in self.parameters:
@@ -148,7 +150,9 @@ class Scene:
         for name, parameter in self.parameters.items():
             parameter.check(name, parameter.value)
         if not a <= self.ordinate.s <= b:
-            raise SceneError(f"The ordinate's arclength {self.ordinate.s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
+            raise SceneError(
+                f"The ordinate's arclength {self.ordinate.s:g} is not on the rod: choose {a:g} <= s <= {b:g}."
+            )
         self.check_span(self.span)
         held = [[x is not None for x in end.held(self.constants())] for end in self.ends]
         if not all(left or right for left, right in zip(*held, strict=True)):
@@ -173,7 +177,7 @@ class Scene:
         return RODS[self.rod]
 
     def constants(self, load: float | None = None, s: float | None = None) -> Constants:
-        """Namespace of all parameters as numbers, with the load at ``load`` and the arclength ``s`` (default: mid-point)."""
+        """Namespace of all parameters as numbers, at ``load`` and at the arclength ``s`` (default: the mid-point)."""
         values = {name: p.value for name, p in self.parameters.items()}
         if load is not None:
             values[self.load] = load
@@ -184,7 +188,9 @@ class Scene:
         for value in span:
             self.parameters[self.load].check(self.load, value)
         if span[0] == span[1]:
-            raise SceneError(f"The range of {self.load} from {span[0]:g} to {span[1]:g} is empty: give two different loads.")
+            raise SceneError(
+                f"The range of {self.load} from {span[0]:g} to {span[1]:g} is empty: give two different loads."
+            )
 
     def known_force(self, component: int, c: Constants) -> Any | None:
         """Component of the contact force that a dead end force prescribes, or None where both ends are held there.
@@ -199,7 +205,7 @@ class Scene:
         return None
 
     def stiffness(self) -> np.ndarray:
-        """Second derivative of ``W`` in the free strains and ``k`` at the undeformed state: symmetric, (m + 3, m + 3)."""
+        """Second derivative of ``W`` in the m free strains and ``k`` at the undeformed state, (m + 3, m + 3)."""
         free_v = self.free_strains
         x = ufl.variable(ufl.as_vector([UNDEFORMED[i] for i in free_v] + [0.0] * 3))
         v = [ufl.as_ufl(value) for value in UNDEFORMED]

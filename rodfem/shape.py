@@ -1,7 +1,8 @@
 """The shape of a state: centreline, rotations, and all fields in natural order along the rod.
 
-In the reduced formulation the centreline is recovered by integrating ``r' = R v`` with the quadrature of the weak form, so that
-it closes exactly where the integral constraints say it does, and is as accurate as the pointwise one.
+In the reduced formulation the centreline is recovered by integrating ``r' = R v`` with the quadrature of the weak
+form, so that it closes exactly where the integral constraints say it does, and is as accurate as the pointwise
+one.
 """
 
 from __future__ import annotations
@@ -73,7 +74,8 @@ class Shape:
     def stretch(self, x: PETSc.Vec) -> float:
         """Smallest stretch ``v3`` along the rod; 1 for an inextensible rod.
 
-        The least value at many points picks an element, and the minimum of the polynomial there is found from the roots of its slope.
+        The least value at many points picks an element, and the minimum of the polynomial there is found from the
+        roots of its slope.
         """
         f = self.system.fields
         if 2 not in self.system.scene.free_strains:
@@ -82,7 +84,11 @@ class Shape:
         nodal = f.u.x.array[f.dofs["v"][self._cells]][:, :, -1]
         lowest = nodal[np.argmin((nodal @ self._v_dense.T).min(axis=1))]
         polynomial = self._v_to_legendre @ lowest
-        turns = legendre.legroots(legendre.legder(polynomial)) if len(polynomial) > 2 and abs(polynomial[2:]).max() > 1e-12 else np.array([])
+        turns = (
+            legendre.legroots(legendre.legder(polynomial))
+            if len(polynomial) > 2 and abs(polynomial[2:]).max() > 1e-12
+            else np.array([])
+        )
         inside = np.clip(turns[abs(np.imag(turns)) < 1e-6].real, -1, 1) if len(turns) else turns
         mine = legendre.legval(np.array([-1.0, 1.0, *inside]), polynomial).min()
         return float(self.system.comm.allreduce(mine, op=MPI.MIN))
@@ -90,8 +96,8 @@ class Shape:
     def sample(self, x: PETSc.Vec) -> dict[str, Any]:
         """All of a state in natural order on every rank, independent of the number of ranks.
 
-        ``s`` (m,), ``r`` (m, 3) and ``q`` (m, 4) at the nodes from left to right; each further field by name, continuous ones
-        (m, components), discontinuous ones (elements, nodes, components); scalars by name.
+        ``s`` (m,), ``r`` (m, 3) and ``q`` (m, 4) at the nodes from left to right; each further field by name,
+        continuous ones (m, components), discontinuous ones (elements, nodes, components); scalars by name.
         """
         system, f = self.system, self.system.fields
         system.bring(x)
@@ -143,7 +149,9 @@ class Shape:
     def _degree_of(self, sample: dict[str, Any]) -> int:
         return (len(sample["s"]) - 1) // self._elements_of(sample)
 
-    def _evaluate(self, sample: dict[str, Any], block: Any, ends: np.ndarray, x: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    def _evaluate(
+        self, sample: dict[str, Any], block: Any, ends: np.ndarray, x: np.ndarray, middle: np.ndarray
+    ) -> np.ndarray:
         degree, cell = self._degree_of(sample), np.clip(np.searchsorted(ends, middle) - 1, 0, len(ends) - 2)
         own = degree if block.continuous else degree - 1
         table = np.asarray(sample[block.name])
@@ -174,10 +182,10 @@ class Shape:
         return np.einsum("cgij,cgj->cgi", directors(q), v)
 
     def _position_weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
-        """Weights of the slopes at Gauss points in the integral up to ``s``, and of the nodal values in the value at ``s``."""
+        """Weights of the slopes at Gauss points in the integral up to ``s``, and of nodal values in the value there."""
         local = (s - self.start) / self.size
         integral = self.gauss.integrals(np.clip(local, 0, 1)) * self.size[:, None]
-        first, last = self.system.scene.interval
+        first = self.system.scene.interval[0]
         inside = (local > 0) & (local <= 1) if s > first else np.isclose(self.start, first)
         value = np.zeros((len(local), len(self.nodes)))
         value[inside] = compat.lagrange_basis(len(self.nodes) - 1, local[inside])

@@ -19,8 +19,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.clock import Clock
-from rodfem.errors import ConvergenceError
 from rodfem.equations import Equations
+from rodfem.errors import ConvergenceError
 from rodfem.fields import LOAD, Discretization, Fields
 from rodfem.pattern import bordered_pattern, new_matrix
 from rodfem.scene import Scene
@@ -244,7 +244,9 @@ class System:
 class Factorizer:
     """MUMPS factors of a matrix whose pattern stays: ``lu``, or ``cholesky`` (LDL^t, which also counts the inertia)."""
 
-    def __init__(self, kind: str, comm: MPI.Comm, controls: dict[int, int], thresholds: dict[int, float] | None = None) -> None:
+    def __init__(
+        self, kind: str, comm: MPI.Comm, controls: dict[int, int], thresholds: dict[int, float] | None = None
+    ) -> None:
         """Keep MUMPS's integer ``controls`` (ICNTL) and real ``thresholds`` (CNTL) for when there is a matrix."""
         self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
         self.room = 50
@@ -255,8 +257,8 @@ class Factorizer:
     def __call__(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Factor ``matrix``; raises :class:`ConvergenceError` where MUMPS gives up.
 
-        Delayed pivots may need more room than was estimated.  PETSc does not raise by itself, and what a failed factorisation counts or
-        solves is arbitrary: the factors are then made again with more room.
+        Delayed pivots may need more room than was estimated.  PETSc does not raise by itself, and what a failed
+        factorisation counts or solves is arbitrary: the factors are then made again with more room.
         """
         while True:
             if self.factor is None or matrix.handle != self._matrix:

@@ -1,7 +1,7 @@
 r"""The index of an equilibrium from the inertia of its saddle matrix.
 
-At fixed load the second variation and the constraints form the saddle matrix ``S = (K C; C^t 0)``.  Where ``C`` has full
-column rank, Sylvester's law of inertia gives
+At fixed load the second variation and the constraints form the saddle matrix ``S = (K C; C^t 0)``.  Where ``C``
+has full column rank, Sylvester's law of inertia gives
 
     (negative eigenvalues of S) - (number of constraints) = number of negative eigenvalues of K on the kernel of C,
 
@@ -28,7 +28,7 @@ EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Index:
-    """Number of ``negative`` and of ``zero`` eigenvalues (symmetry modes included) of the constrained second variation."""
+    """Number of negative and of zero eigenvalues (symmetry modes included) of the constrained second variation."""
 
     negative: int
     zero: int
@@ -37,8 +37,8 @@ class Index:
 def inertia_factorizer(comm: MPI.Comm) -> Factorizer:
     """LDL^t factors that report the inertia.
 
-    ICNTL(24) = 1 is what makes MUMPS report it, ICNTL(13) = 1 what makes it do so in parallel; CNTL(3) is so small that no pivot is taken
-    for zero: the matrices are shifted off their eigenvalues.
+    ICNTL(24) = 1 is what makes MUMPS report it, ICNTL(13) = 1 what makes it do so in parallel; CNTL(3) is so
+    small that no pivot is taken for zero: the matrices are shifted off their eigenvalues.
     """
     return Factorizer("cholesky", comm, {24: 1, 13: 1}, {3: -1e-300})
 
@@ -91,8 +91,8 @@ class Inertia:
         below = negative - self.constraints - self.system.active_drifts()
         if zero or below < 0:
             raise ConvergenceError(
-                f"The count of eigenvalues below {sigma:.2g} broke down ({zero} zero pivots, {negative} negative ones for "
-                f"{self.constraints} constraints): the constraints depend on each other, or the state is not an equilibrium."
+                f"The count of eigenvalues below {sigma:.2g} broke down ({zero} zero pivots, {negative} negative ones "
+                f"for {self.constraints} constraints): the constraints depend on each other."
             )
         return int(below)
 
@@ -102,11 +102,14 @@ class Inertia:
         negative = self.below(-self.tolerance)
         return Index(negative, self.below(self.tolerance) - negative + self.system.active_drifts())
 
-    def nearest(self, number: int, accuracy: float = 1e-3, most: int = 60, spare: int = 1) -> tuple[np.ndarray, list[PETSc.Vec]]:
+    def nearest(
+        self, number: int, accuracy: float = 1e-3, most: int = 60, spare: int = 1
+    ) -> tuple[np.ndarray, list[PETSc.Vec]]:
         """Return the eigenvalues nearest zero of the matrix last factored, and their vectors (metric norm 1).
 
-        Block inverse iteration from the vectors of the last call, until the ``number`` wanted values change by less than
-        ``accuracy`` relative to themselves (or by what the arithmetic resolves).  The block has ``spare`` more vectors.
+        Block inverse iteration from the vectors of the last call, until the ``number`` wanted values change by
+        less than ``accuracy`` relative to themselves (or by what the arithmetic resolves).  The block has
+        ``spare`` more vectors.
         """
         metric, block = self.system.metric, number + spare
         while len(self._vectors) < block:
@@ -125,7 +128,9 @@ class Inertia:
                 masses = [metric * y for y in solved]
                 b = np.array([[y.dot(w) for w in masses] for y in solved])
                 size = np.sqrt(np.diag(b))
-                theta, z = scipy.linalg.eigh(((a + a.T) / 2) / np.outer(size, size), ((b + b.T) / 2) / np.outer(size, size))
+                theta, z = scipy.linalg.eigh(
+                    ((a + a.T) / 2) / np.outer(size, size), ((b + b.T) / 2) / np.outer(size, size)
+                )
                 order = np.argsort(abs(theta + self.shift))
                 last, values = values, theta[order] + self.shift
                 self._vectors = [combine(solved, z[:, j] / size) for j in order]
@@ -135,7 +140,7 @@ class Inertia:
         return values[:number], self._vectors[:number]
 
     def response(self, mode: PETSc.Vec) -> float:
-        """Return ``1 / (mode . M S^-1 M mode)`` for a vector of metric norm 1: the eigenvalue where ``mode`` is its vector."""
+        """Return ``1 / (mode . M S^-1 M mode)`` for a vector of metric norm 1: that of an eigenvector."""
         with self.system.clock("stability"):
             image = self.system.metric * mode
             self.factors.ksp.solve(image, self.system.workspace)

@@ -2,12 +2,13 @@ r"""Left-most eigenvalues of an equilibrium by SLEPc, on the singular pencil of 
 
     (K C; C^t 0) x = mu (M 0; 0 0) x
 
-with ``M`` the kinetic metric: stable where all ``mu = omega^2`` are positive (Kumar & Healey 2010, (21) and (45)).  ``M`` is singular, so that only
-shift-invert is free of spurious eigenvalues: its image ``(S - sigma M)^-1 M`` is zero on all that has no inertia.  No Dirichlet row exists
-that could bring one in.  Symmetry modes are deflated: their zero eigenvalue is known and is not among those returned.
+with ``M`` the kinetic metric: stable where all ``mu = omega^2`` are positive (Kumar & Healey 2010, (21) and
+(45)).  ``M`` is singular, so that only shift-invert is free of spurious eigenvalues: its image ``(S - sigma M)^-1
+M`` is zero on all that has no inertia.  No Dirichlet row exists that could bring one in.  Symmetry modes are
+deflated: their zero eigenvalue is known and is not among those returned.
 
-The shift is put below the spectrum, which a count by inertia at the shift proves; the nearest eigenvalues to it are then the
-left-most ones, and a second count, just above the last of them, proves that none is missing.
+The shift is put below the spectrum, which a count by inertia at the shift proves; the nearest eigenvalues to it
+are then the left-most ones, and a second count, just above the last of them, proves that none is missing.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ class Modes:
 
 
 class Spectrum:
-    """Computes left-most eigenvalues at states of the system that an :class:`~rodfem.stability.inertia.Inertia` counts for."""
+    """Computes left-most eigenvalues at states of the system of an :class:`~rodfem.stability.inertia.Inertia`."""
 
     def __init__(self, inertia: Inertia) -> None:
         """Allocate the matrices of the pencil once."""
@@ -64,7 +65,9 @@ class Spectrum:
                     break
                 self.shift *= 4
             else:
-                raise ConvergenceError("The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness.")
+                raise ConvergenceError(
+                    "The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness."
+                )
             for extra in (2, 6, 14):
                 modes = self._solve(number, extra, symmetry)
                 if modes.certified:
@@ -95,7 +98,8 @@ class Spectrum:
     def _solve(self, number: int, extra: int, symmetry: list[PETSc.Vec]) -> Modes:
         """Solve for ``number`` values and some more, and count whether any is missing among the first ``number``.
 
-        A Krylov method finds the second of two equal eigenvalues late, by round-off: it is there when more are asked for.
+        A Krylov method finds the second of two equal eigenvalues late, by round-off: it is there when more are
+        asked for.
         """
         solver = self._solver(number + extra, symmetry)
         solver.solve()
@@ -103,7 +107,8 @@ class Spectrum:
         if found < number:
             solver.destroy()
             raise ConvergenceError(
-                f"SLEPc found {found} of the {number} eigenvalues asked for: ask for fewer, or give -rodfem_eps_ncv 60 after a --."
+                f"SLEPc found {found} of the {number} eigenvalues asked for: ask for fewer, "
+                "or give -rodfem_eps_ncv 60 after a --."
             )
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
         order = np.argsort(values)

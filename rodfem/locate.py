@@ -1,0 +1,202 @@
+r"""Locating where an eigenvalue or the slope of the load vanishes on a branch.
+
+Near such a point the bordered system is (nearly) singular, so no equilibrium is computed closer to it than need be: the
+branch is solved at Chebyshev nodes of a short piece around it, and the eigenvalue, the load and the state, all smooth functions
+of arclength, are interpolated at spectral accuracy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from petsc4py import PETSc
+from scipy.optimize import brentq
+
+from rodfem.branch import Point
+from rodfem.continuation import Follower, hermite
+from rodfem.errors import ConvergenceError
+from rodfem.newton import correct
+from rodfem.stability.inertia import combine
+
+NODES = 6
+WINDOW = 0.02
+"""Half length of the piece of a branch, in the metric, on which a special point is interpolated."""
+ROUND_OFF = 1e-12
+"""What Newton's tolerance and the conditioning near a singular point leave open in a load, relative to it or to one."""
+SHARP = 1e-11
+"""Uncertainty of a load, for the given mesh, at which a special point needs no sharper interpolation."""
+
+Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
+
+
+@dataclass
+class Sample:
+    """A solved point of a piece of a branch: parameter ``s``, state, load, the eigenvalue looked at, and the index."""
+
+    s: float
+    x: PETSc.Vec
+    load: float
+    mu: float
+    below: int
+
+
+def solve_at(follower: Follower, curve: Curve, s: float) -> PETSc.Vec:
+    """Equilibrium on the plane through ``curve(s)`` across its direction; raises :class:`ConvergenceError`."""
+    x, direction = curve(s)
+    follower.system.set_phase(x)
+    outcome = correct(follower.system, x, follower.row(direction))
+    if not outcome.converged:
+        raise ConvergenceError(
+            f"No equilibrium near load {follower.system.scalar(x):.8g} while locating a special point."
+        )
+    return x
+
+
+def eigenvalue(follower: Follower, x: PETSc.Vec, order: int) -> tuple[float, PETSc.Vec]:
+    """Eigenvalue number ``order`` (0 is the left-most) of the state ``x``, one of those near zero, and its vector."""
+    below = follower.inertia.count(x).negative
+    position = order - below if order >= below else below - 1 - order
+    for wanted in (position + 1, position + 3, position + 6, position + 12):
+        values, vectors = follower.inertia.nearest(wanted, accuracy=1e-4)
+        side = np.flatnonzero(
+            values >= -follower.inertia.tolerance if order >= below else values < -follower.inertia.tolerance
+        )
+        if len(side) > position:
+            chosen = side[np.argsort(abs(values[side]))[position]]
+            return float(values[chosen]), vectors[chosen].copy()
+    raise ConvergenceError(f"Eigenvalue number {order} is not among those nearest zero; use smaller steps.")
+
+
+def sample(follower: Follower, curve: Curve, s: float, mode: PETSc.Vec) -> Sample:
+    """Solve at ``s`` and evaluate ``1 / (mode . M S^-1 M mode)`` there.
+
+    For a ``mode`` near the null vector this is the eigenvalue that vanishes, up to second order in their
+    difference, but unlike the ordered eigenvalues it is smooth where others come by; its zero is where ``S`` is
+    singular.
+    """
+    x = solve_at(follower, curve, s)
+    below = follower.inertia.count(x).negative
+    return Sample(s, x, follower.system.scalar(x), follower.inertia.response(mode), below)
+
+
+@dataclass
+class Located:
+    """A zero found on a piece of a branch: parameter, state, direction, load, slope of the load, uncertainty, index."""
+
+    s: float
+    x: PETSc.Vec
+    tangent: PETSc.Vec
+    load: float
+    slope: float
+    uncertainty: float
+    before: int
+    after: int
+
+
+def interpolate(samples: list[Sample], zero_of: str, guess: float) -> Located | None:
+    """Zero of ``mu`` or of the load's slope by Chebyshev interpolation; None where it is not near the piece.
+
+    The uncertainty of the load compares the full interpolation with one that is a degree lower, and adds what the
+    solver's tolerance leaves open.
+    """
+    s = np.array([p.s for p in samples])
+    middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
+    t = (s - middle) / half
+    loads, values = np.array([p.load for p in samples]), np.array([p.mu for p in samples])
+    found = []
+    for degree in (len(s) - 1, len(s) - 2):
+        load = chebyshev.chebfit(t, loads - loads[0], degree)
+        f = chebyshev.chebfit(t, values, degree) if zero_of == "mu" else chebyshev.chebder(load)
+        roots = chebyshev.chebroots(f)
+        real = roots[abs(roots.imag) < 1e-6].real
+        real = real[abs(real) <= 1.5]
+        if not len(real):
+            return None
+        root = float(real[np.argmin(abs(real - (guess - middle) / half))])
+        found.append(
+            (
+                root,
+                float(chebyshev.chebval(root, load)) + loads[0],
+                float(chebyshev.chebval(root, chebyshev.chebder(load))) / half,
+            )
+        )
+    (root, load_at, slope), (_, other, _) = found
+    weights, slopes = _barycentric(t, root)
+    states = [p.x for p in samples]
+    x, tangent = combine(states, weights), combine(states, slopes / half)
+    before = [p.below for p in samples if p.s < middle + half * root] or [samples[0].below]
+    after = [p.below for p in samples if p.s >= middle + half * root] or [samples[-1].below]
+    uncertainty = max(abs(load_at - other), ROUND_OFF * max(1.0, abs(load_at)))
+    return Located(middle + half * root, x, tangent, load_at, slope, uncertainty, before[-1], after[0])
+
+
+def _barycentric(nodes: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of the values at nodes in the interpolating polynomial at ``t`` and in its derivative."""
+    degree = len(nodes) - 1
+    inverse = np.linalg.inv(chebyshev.chebvander(nodes, degree))
+    derivative = chebyshev.chebder(np.eye(degree + 1), axis=0)
+    return chebyshev.chebvander(np.array([t]), degree)[0] @ inverse, chebyshev.chebvander(np.array([t]), degree - 1)[
+        0
+    ] @ derivative @ inverse
+
+
+def refine(follower: Follower, curve: Curve, center: float, half: float, mode: PETSc.Vec, zero_of: str) -> Located:
+    """Solve at Chebyshev nodes around ``center``, moved until the zero lies among them, shrunk until it is sharp."""
+    best: Located | None = None
+    for _ in range(10):
+        nodes = center + half * np.cos(np.pi * (np.arange(NODES)[::-1] + 0.5) / NODES)
+        samples = [sample(follower, curve, s, mode) for s in nodes]
+        located = interpolate(samples, zero_of, center)
+        if located is not None and abs(located.s - center) <= half:
+            if located.uncertainty < SHARP or (best is not None and located.uncertainty > 0.1 * best.uncertainty):
+                return located if best is None or located.uncertainty < best.uncertainty else best
+            best, center, half = located, located.s, half / 4
+        elif located is not None:
+            center = located.s
+        elif best is not None:
+            return best
+        else:
+            mu = [samples[0].mu, samples[-1].mu] if zero_of == "mu" else _slopes(samples)
+            step = -mu[0] * (nodes[-1] - nodes[0]) / (mu[1] - mu[0]) if mu[1] != mu[0] else half
+            center = nodes[0] + float(np.clip(step, -4 * half, 6 * half))
+    if best is not None:
+        return best
+    raise ConvergenceError(f"A special point near load {samples[0].load:.8g} could not be located; use smaller steps.")
+
+
+def _slopes(samples: list[Sample]) -> list[float]:
+    """Slopes of the load at both ends of a piece."""
+    a, b, y, z = samples[0], samples[1], samples[-2], samples[-1]
+    return [(b.load - a.load) / (b.s - a.s), (z.load - y.load) / (z.s - y.s)]
+
+
+def locate(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -> Located:
+    """Locate the zero of eigenvalue ``order`` (or of the load's slope) between two points of a branch."""
+
+    def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+        return hermite(a, b, s)
+
+    h = b.arclength - a.arclength
+    if zero_of == "slope":
+        guess = a.arclength + h * a.slope / (a.slope - b.slope)
+    else:
+        ends = a.arclength + 1e-3 * h, b.arclength - 1e-3 * h
+
+        def mu(s: float) -> float:
+            return eigenvalue(follower, solve_at(follower, curve, s), order)[0]
+
+        left, right = mu(ends[0]), mu(ends[1])
+        if left * right > 0:
+            guess = ends[0] if abs(left) < abs(right) else ends[1]
+        else:
+            guess = float(brentq(mu, *ends, xtol=0.1 * min(WINDOW, h)))
+    x = solve_at(follower, curve, guess)
+    if zero_of == "slope":
+        follower.inertia.count(x)
+        mode = follower.inertia.nearest(1, accuracy=1e-2)[1][0].copy()
+    else:
+        mode = eigenvalue(follower, x, order)[1]
+    return refine(follower, curve, guess, min(WINDOW, 0.45 * h), mode, zero_of)
