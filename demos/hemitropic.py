@@ -20,15 +20,14 @@ Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section
 from argparse import Namespace
 from math import hypot, inf
 
+import rodfem.cli as cli
 from forms.energy import hemitropic
 from forms.symmetry import axial
-from rodfem.cli import main, parser_for
 from rodfem.scene import Ordinate, Parameter, Scene, clamped
 
 
 def scene(options: Namespace) -> Scene:
     """State the problem: what the rod is made of, how its ends are held, and what to look at."""
-    half = options.half_length
 
     def energy(v, k, c):
         return hemitropic(v, k, stretching=10.0, coupling=c.A, twisting=c.B, bending=c.C)
@@ -36,7 +35,7 @@ def scene(options: Namespace) -> Scene:
     return Scene(
         name="hemitropic",
         title="Compressed hemitropic rod",
-        interval=(-half, half),
+        interval=(-options.half_length, options.half_length),
         rod="unshearable",
         energy=energy,
         parameters={
@@ -44,11 +43,12 @@ def scene(options: Namespace) -> Scene:
             "A": Parameter(options.coupling),
             "B": Parameter(options.twisting),
             "C": Parameter(options.bending),
+            "l": Parameter(options.half_length),
         },
         load="lam",
         ends=(
-            clamped(lambda c: (0.0, 0.0, -half * (1 - c.lam))),
-            clamped(lambda c: (0.0, 0.0, +half * (1 - c.lam))),
+            clamped(lambda c: (0.0, 0.0, -c.l * (1 - c.lam))),
+            clamped(lambda c: (0.0, 0.0, +c.l * (1 - c.lam))),
         ),
         symmetries=(axial((0.0, 0.0, 1.0)),),
         ordinate=Ordinate("transverse displacement of the mid point", s=0.0, of=lambda r, q: hypot(r[0], r[1])),
@@ -57,7 +57,7 @@ def scene(options: Namespace) -> Scene:
 
 
 if __name__ == "__main__":
-    parser = parser_for("hemitropic", __doc__, load="lam", span=(0.0, 0.95), elements=8, degree=6)
+    parser = cli.parser_for("hemitropic", __doc__, load="lam", span=(0.0, 0.95), elements=8, degree=6)
     constants = parser.add_argument_group("constants of the rod")
     constants.add_argument(
         "--coupling", type=float, default=-3.0, metavar="A", help="of stretch and twist (default -3)"
@@ -67,4 +67,4 @@ if __name__ == "__main__":
     constants.add_argument(
         "--half-length", type=float, default=3.0, metavar="L", help="half the rod's length (default 3)"
     )
-    main(parser, scene)
+    cli.main(parser, scene)

@@ -1,8 +1,9 @@
 r"""Special points: finding folds and branch points, telling them apart, and switching branches.
 
-Between two points of a branch with different indices an eigenvalue of the second variation crosses zero; where the load turns
-back, its slope does.  With ``phi`` the null vector (left and right, as the saddle matrix ``S`` is symmetric) and ``F_lam`` the
-derivative of the equations in the load, ``phi . F_lam != 0`` at a fold and ``= 0`` at a branch point (Keller 1977).
+Between two points of a branch with different indices an eigenvalue of the second variation crosses zero; where the
+load turns back, its slope does.  With ``phi`` the null vector (left and right, as the saddle matrix ``S`` is symmetric)
+and ``F_lam`` the derivative of the equations in the load, ``phi . F_lam != 0`` at a fold and ``= 0`` at a branch point
+(Keller 1977).
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 from petsc4py import PETSc
 
 from rodfem.branch import BRANCH_POINT, FOLD, Branch, Point, Special
-from rodfem.continuation import Follower
+from rodfem.continuation import Follower, distance
 from rodfem.errors import ConvergenceError
 from rodfem.locate import Located, locate
 from rodfem.newton import correct
@@ -148,9 +149,7 @@ def leave(follower: Follower, special: Special, direction: PETSc.Vec, first: flo
         system.set_phase(x)
         outcome = correct(system, x, row, reach=0.5 * amplitude)
         if outcome.converged:
-            change = origin.copy()
-            change.aypx(-1.0, x)
-            return follower.point(x, system.norm(change), follower.tangent(row, at=x), outcome)
+            return follower.point(x, distance(system, origin, x), follower.tangent(row, at=x), outcome)
         amplitude /= 2
     return None
 

@@ -1,12 +1,33 @@
-"""The command line that all demos share."""
+"""The command line that all demos share.
+
+Importing this module checks the installation first: a script gets one sentence, and leaves with status 2, where a
+module is missing.
+"""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
+
+NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
+
+
+def check_installation() -> None:
+    """Leave with one sentence and status 2 where this Python lacks a module."""
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        sys.stderr.write(
+            f"error: {sys.executable} has no module {', '.join(missing)}: run 'make setup', which installs what is "
+            "missing, and use .venv/bin/python (or any Python that sees Debian's python3-dolfinx).\n"
+        )
+        sys.exit(2)
+
+
+check_installation()
 
 
 class Parser(argparse.ArgumentParser):
@@ -102,17 +123,18 @@ def main(parser: Parser, scene_of: Callable[[argparse.Namespace], Any], argument
     from rodfem.errors import ConvergenceError, EnvironmentTrouble, SceneError, SymmetryError
 
     try:
+        import petsc4py
+
+        petsc4py.init(["rodfem", *petsc])  # before PETSc is loaded, for options that it reads only then (-log_view)
         from petsc4py import PETSc
 
         from rodfem.explore import Plan
         from rodfem.fields import Discretization
         from rodfem.run import run
 
-        if petsc:
+        if petsc:  # once more, for a PETSc that was running already
             PETSc.Options().insertString(" ".join(petsc))
         discretization = Discretization(options.formulation, options.elements, options.degree)
-        if options.spectrum < 0:
-            raise SceneError(f"--spectrum {options.spectrum} is not a number of eigenvalues: give 0 or more.")
         scene = scene_of(options)
         span = tuple(options.span)
         plan = Plan(span, at=tuple(options.at), spectrum=options.spectrum)

@@ -190,57 +190,59 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
     insert) points in ``points``.  The direction is that of the last point's tangent.
     """
     system, step = follower.system, steps.first
+    span = abs(system.scene.span[1] - system.scene.span[0])
     low, high = bounds
     while len(points) < steps.most:
         last = points[-1]
         x, direction = predict(points, last.arclength + step)
-        load = system.scalar(x)
-        if not low <= load <= high:
-            end = low if load < low else high
-            point = _to_load(follower, points, x, end, step)
-            if point is not None:
-                yield point
-                yield "end of range"
-                return
-            step /= 2
-        else:
+        load, outcome, tangent = system.scalar(x), None, None
+        if low <= load <= high:
             row = follower.row(direction)
             system.set_phase(x)
             outcome = correct(system, x, row, most=8, reach=0.5 * step)
             if outcome.converged:
+                load = system.scalar(x)
                 tangent = follower.tangent(row)
                 slope = system.scalar(tangent)
-                if slope * last.slope <= 0 or abs(slope) < LEVEL * abs(system.scene.span[1] - system.scene.span[0]):
+                if slope * last.slope <= 0 or abs(slope) < LEVEL * span:
                     tangent = follower.tangent(row, at=x)
-                turn = row.dot(tangent)
-            if outcome.converged and turn > 0.9:
-                change = last.x.copy()
-                change.aypx(-1.0, x)
-                yield follower.point(x, last.arclength + system.norm(change), tangent, outcome)
-                order = min(len(points) - 1, 3) + 1
-                factor = (steps.aim / max(outcome.moved, 1e-12)) ** (1 / order)
-                step = min(step * min(max(factor, 0.4), 1.6), steps.largest)
-                continue
-            step /= 2
+        if not low <= load <= high:
+            point = _to_load(follower, points, load, low if load < low else high, step)
+            if point is not None:
+                yield point
+                yield "end of range"
+                return
+        elif outcome is not None and tangent is not None and row.dot(tangent) > 0.9:
+            yield follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome)
+            order = min(len(points) - 1, 3) + 1
+            factor = (steps.aim / max(outcome.moved, 1e-12)) ** (1 / order)
+            step = min(step * min(max(factor, 0.4), 1.6), steps.largest)
+            continue
+        step /= 2
         if step < steps.smallest:
             yield f"no convergence at {system.scene.load} = {last.load:.6g} (steps below {steps.smallest:g})"
             return
     yield f"{steps.most} points reached"
 
 
-def _to_load(follower: Follower, points: list[Point], guess: PETSc.Vec, load: float, step: float) -> Point | None:
-    """Last point of a branch, exactly at ``load``; None where Newton's method does not get there within the step."""
+def distance(system: System, a: PETSc.Vec, b: PETSc.Vec) -> float:
+    """Distance of two states in the metric."""
+    change = a.copy()
+    change.aypx(-1.0, b)
+    return system.norm(change)
+
+
+def _to_load(follower: Follower, points: list[Point], beyond: float, load: float, step: float) -> Point | None:
+    """Last point of a branch, exactly at ``load``; None where Newton's method does not get there within the step.
+
+    ``beyond`` is the load that a whole step leads to.
+    """
     last, system = points[-1], follower.system
-    guessed = system.scalar(guess)
-    fraction = (load - last.load) / (guessed - last.load) if guessed != last.load else 0.0
-    if fraction <= 0:
-        return None
+    fraction = (load - last.load) / (beyond - last.load)
     x, _ = predict(points, last.arclength + fraction * step)
     system.set_phase(x)
     x, outcome = follower.at_load(x, load, reach=0.5 * step)
     if not outcome.converged:
         return None
-    change = last.x.copy()
-    change.aypx(-1.0, x)
     tangent = follower.load_tangent(x, load > last.load)
-    return follower.point(x, last.arclength + system.norm(change), tangent, outcome)
+    return follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome)

@@ -19,8 +19,8 @@ from rodfem.fields import Fields
 class Equations:
     """Compiled forms of one scene on one :class:`~rodfem.fields.Fields`.
 
-    Every parameter of the scene is ``p = base + direction * load`` with two dolfinx Constants and the scalar unknown
-    ``load``: any of them (or a combination) can be varied, and nothing is ever compiled again.
+    All numbers of a scene are dolfinx Constants, so that nothing is compiled again for other values.  Every
+    parameter is ``p = base + direction * load`` with the scalar unknown ``load``: any of them can be varied.
 
     Attributes
     ----------
@@ -42,6 +42,8 @@ class Equations:
         self.base = fem.Constant(mesh, np.array([p.value for p in scene.parameters.values()]))
         self.direction = fem.Constant(mesh, np.zeros(len(self.names)))
         self.vary(scene.load)
+        self.ends = fem.Constant(mesh, np.array(scene.interval, dtype=float))
+        length = self.ends[1] - self.ends[0]
 
         u, test, trial = fields.u, ufl.TestFunction(fields.space), ufl.TrialFunction(fields.space)
         dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": self.quadrature_degree(k)})
@@ -55,7 +57,7 @@ class Equations:
             force = [scene.known_force(i, c) for i in range(3)]
             for position, i in enumerate(fields.forces):
                 force[i] = f.scalars[position]
-            integrand = lagrangian.reduced(W, R, v, ufl.as_vector(force), self._chord(c) / scene.length)
+            integrand = lagrangian.reduced(W, R, v, ufl.as_vector(force), self._chord(c) / length)
         else:
             known = ufl.as_vector([scene.known_force(i, c) or 0.0 for i in range(3)])
             integrand = lagrangian.pointwise(W, R, v, (f.r + self._lift(c)).dx(0), f.n, known)
@@ -63,9 +65,9 @@ class Equations:
         first = ufl.derivative(L, u, test)
         second = ufl.derivative(first, u, trial)
         a, b = self._named(ufl.split(test)), self._named(ufl.split(trial))
-        metric = inertia.rotation_metric(a.q, b.q) / scene.length
+        metric = inertia.rotation_metric(a.q, b.q) / length
         if f.r is not None:
-            metric += ufl.dot(a.r, b.r) / scene.length**3
+            metric += ufl.dot(a.r, b.r) / length**3
         kinetic = inertia.rotary(f.q, a.q, b.q, (1.0, 1.0, 1.0))
         forms = [first, second, W * dx, metric * dx, kinetic * dx]
         self.residual, self.jacobian, self.energy, self.metric, self.kinetic = compile_forms(forms)
@@ -105,8 +107,7 @@ class Equations:
 
     def _lift(self, c: SimpleNamespace) -> Any:
         """Linear in s and equal to the ends' positions: the unknown ``r`` is what comes on top, zero where held."""
-        start, stop = self.fields.scene.interval
-        x = (c.s - start) / (stop - start)
+        x = (c.s - self.ends[0]) / (self.ends[1] - self.ends[0])
         left, right = (end.held(c) for end in self.fields.scene.ends)
         lift = [b if a is None else a if b is None else (1 - x) * a + x * b for a, b in zip(left, right, strict=True)]
         return ufl.as_vector([value + 0 * x for value in lift])

@@ -16,6 +16,7 @@ from rodfem.continuation import Follower, Steps, follow, hermite
 from rodfem.errors import ConvergenceError, SceneError, SymmetryError
 from rodfem.locate import solve_at
 from rodfem.report import Report
+from rodfem.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,18 @@ class Plan:
     error_bars: bool = True
     spectrum: int = 0
 
+    def check(self, scene: Scene) -> None:
+        """Raise :class:`SceneError` for a range that the scene does not admit, or a load outside the range."""
+        scene.check_span(self.span)
+        low, high = sorted(self.span)
+        for load in self.at:
+            if not low <= load <= high:
+                raise SceneError(
+                    f"The load {load:g} asked for is outside the range {low:g} to {high:g}: widen the range or leave it out."
+                )
+        if self.spectrum < 0:
+            raise SceneError(f"{self.spectrum} is not a number of eigenvalues: give 0 or more to --spectrum.")
+
 
 class Explorer:
     """Explores the equilibria of a scene from its start state.
@@ -38,17 +51,10 @@ class Explorer:
     """
 
     def __init__(self, follower: Follower, plan: Plan, report: Report, finished: Callable[[], None]) -> None:
-        """Check the plan; raises :class:`SceneError` for a load outside the range."""
+        """Start with no branch; the plan must have passed its :meth:`Plan.check`."""
         self.follower, self.plan, self.report, self.finished = follower, plan, report, finished
         self.scene = follower.system.scene
-        self.scene.check_span(plan.span)
         self.low, self.high = sorted(plan.span)
-        for load in plan.at:
-            if not self.low <= load <= self.high:
-                raise SceneError(
-                    f"The load {load:g} asked for is outside the range {self.low:g} to {self.high:g}: "
-                    "widen the range or leave it out."
-                )
         self.branches: list[Branch] = []
         self.richer: Richer | None = None
 

@@ -1,8 +1,8 @@
 r"""Locating where an eigenvalue or the slope of the load vanishes on a branch.
 
-Near such a point the bordered system is (nearly) singular, so no equilibrium is computed closer to it than need be: the
-branch is solved at Chebyshev nodes of a short piece around it, and the eigenvalue, the load and the state, all smooth functions
-of arclength, are interpolated at spectral accuracy.
+Near such a point the bordered system is (nearly) singular, so no equilibrium is computed closer to it than need be:
+the branch is solved at Chebyshev nodes of a short piece around it, and the eigenvalue, the load and the state, all
+smooth functions of arclength, are interpolated at spectral accuracy.
 """
 
 from __future__ import annotations

@@ -19,6 +19,9 @@ from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.system import System
 
+GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
+"""What a picture's caption shows for TeX names."""
+
 
 def writable(folder: Path, comm: MPI.Comm) -> None:
     """Make ``folder``; raises :class:`SceneError` on every rank where it cannot be written."""
@@ -51,6 +54,7 @@ def run(
     Files are brought up to date after every branch, so that an interrupted run loses no finished one.
     """
     compat.require_real_petsc()
+    plan.check(scene)
     writable(output, comm)
     report, clock = Report(comm, quiet), Clock()
     with compat.announce_compilation(report.compiling):
@@ -91,7 +95,7 @@ def _draw(output: Path, report: Report) -> None:
     data = load_json(output / "diagram.json")
     draw_diagram(data, output / "diagram.png")
     branch, row, words = typical_state(data)
-    caption = f"{data['title']}, {branch}, {data['parameter']} = {words}"
+    caption = f"{data['title']}, {branch}, {GREEK.get(data['parameter_label'], data['parameter'])} = {words}"
     trouble = draw_shape_safely(output / "states.h5", branch, row, output / "shape.png", caption=caption)
     report.say(f"Pictures in {output}{os.sep}: diagram.png" + ("" if trouble else ", shape.png"))
     if trouble:

@@ -41,7 +41,9 @@ class Parameter:
     def check(self, name: str, value: float) -> None:
         """Raise :class:`SceneError` unless ``value`` is a finite number inside the admissible interval."""
         low, high = self.admissible
-        if not (isfinite(value) and low < value < high):
+        if not isfinite(value):
+            raise SceneError(f"{name} = {value:g} is not a finite number: give one.")
+        if not low < value < high:
             raise SceneError(f"{name} = {value:g} is outside its admissible range: choose {low:g} < {name} < {high:g}.")
 
 
