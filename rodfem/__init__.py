@@ -1,14 +1,14 @@
 """Stability of the equilibria of elastic rods: which are stable, and where they stop being so.
 
 A person states a :class:`~rodfem.scene.Scene` (rod, ends, load, symmetry, what to record), chooses a
-:class:`~rodfem.fields.Discretization` and a :class:`~rodfem.explore.Plan`, and calls :func:`~rodfem.run.run`, which
+:class:`~rodfem.fields.Discretization` and a :class:`~rodfem.explore.Plan`, and calls :func:`~rodfem.runner.run`, which
 traces the equilibria, decides the stability of each, finds and classifies the points where it is lost, and follows what
 branches off.
 ``demos/hemitropic.py`` is a whole example.
 
 Data flows, and imports go, one way: ``scene`` -> ``fields`` -> ``equations`` -> ``system`` (the bordered saddle
 point) -> ``newton``, ``stability`` -> ``continuation`` -> ``locate``, ``bifurcation`` -> ``accuracy`` ->
-``explore`` -> ``diagram``, ``run`` -> ``cli``. ``plot`` and ``render`` draw from saved files alone. The
+``explore`` -> ``diagram``, ``runner`` -> ``cli``. ``plot`` and ``render`` draw from saved files alone. The
 mathematics is in the package ``forms``.
 
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
@@ -29,7 +29,7 @@ _HOMES = {
     "Discretization": "fields",
     "Plan": "explore",
     "Steps": "continuation",
-    "run": "run",
+    "run": "runner",
     "load_json": "diagram",
     "load_state": "diagram",
 }

@@ -130,7 +130,7 @@ def main(parser: Parser, scene_of: Callable[[argparse.Namespace], Any], argument
 
         from rodfem.explore import Plan
         from rodfem.fields import Discretization
-        from rodfem.run import run
+        from rodfem.runner import run
 
         if petsc:  # once more, for a PETSc that was running already
             PETSc.Options().insertString(" ".join(petsc))

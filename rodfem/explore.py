@@ -37,7 +37,8 @@ class Plan:
         for load in self.at:
             if not low <= load <= high:
                 raise SceneError(
-                    f"The load {load:g} asked for is outside the range {low:g} to {high:g}: widen the range or leave it out."
+                    f"The load {load:g} asked for is outside the range {low:g} to {high:g}: "
+                    "widen the range or leave it out."
                 )
         if self.spectrum < 0:
             raise SceneError(f"{self.spectrum} is not a number of eigenvalues: give 0 or more to --spectrum.")
