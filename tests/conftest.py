@@ -1,0 +1,28 @@
+"""Fixtures; every test is collective: all ranks run all tests in the same order."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+gc.disable()  # destroying PETSc objects is collective: it must not happen on one rank earlier than on another
+
+
+@pytest.fixture(autouse=True, scope="module")
+def collect_garbage() -> Iterator[None]:
+    """Destroy what a module has left behind, on all ranks together."""
+    yield
+    MPI.COMM_WORLD.barrier()
+    gc.collect()
+    MPI.COMM_WORLD.barrier()
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
+    """Empty folder that all ranks share."""
+    yield Path(MPI.COMM_WORLD.bcast(str(tmp_path)))
+    MPI.COMM_WORLD.barrier()

@@ -1,0 +1,78 @@
+"""Rods that several tests share: the hemitropic demo with any constants, each discretisation of it set up once."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+from rodfem.branch import Branch, Point, Special
+from rodfem.continuation import Follower
+from rodfem.explore import Explorer, Plan
+from rodfem.fields import Discretization
+from rodfem.report import Report
+from rodfem.scene import Scene
+from rodfem.system import System
+
+DEMO = Path(__file__).parents[1] / "demos" / "hemitropic.py"
+SPAN = (0.0, 0.95)
+
+Constants = tuple[float, float, float, float]
+"""Coupling A, twisting B, bending C, half length l."""
+DEFAULT: Constants = (-3.0, 1.0, 1.0, 3.0)
+
+
+@cache
+def demo() -> ModuleType:
+    """The demo as a module (it is a script, in no package)."""
+    spec = spec_from_file_location("hemitropic_demo", DEMO)
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@cache
+def scene(constants: Constants = DEFAULT, span: tuple[float, float] = SPAN) -> Scene:
+    """The demo's scene with these constants."""
+    coupling, twisting, bending, half = constants
+    return demo().scene(Namespace(coupling=coupling, twisting=twisting, bending=bending, half_length=half, span=span))
+
+
+@cache
+def follower(
+    formulation: str = "reduced", elements: int = 8, degree: int = 6, constants: Constants = DEFAULT
+) -> Follower:
+    """The demo on one discretisation."""
+    return Follower(System(scene(constants), Discretization(formulation, elements, degree)))
+
+
+@cache
+def explored(
+    formulation: str = "reduced",
+    elements: int = 8,
+    degree: int = 6,
+    constants: Constants = DEFAULT,
+    *,
+    span: tuple[float, float] = SPAN,
+    at: tuple[float, ...] = (),
+    depth: int = 2,
+    error_bars: bool = False,
+) -> list[Branch]:
+    """Branches of the demo."""
+    plan = Plan(span, at=at, depth=depth, error_bars=error_bars)
+    return Explorer(follower(formulation, elements, degree, constants), plan, Report(quiet=True), lambda: None).run()
+
+
+def specials(branch: Branch, kind: str) -> list[Special]:
+    """Special points of one kind, in order along the branch."""
+    return [s for s in branch.special if s.kind == kind]
+
+
+def user_points(branch: Branch, load: float) -> list[Point]:
+    """Points of a branch at exactly ``load``, in order along it."""
+    return [s.point for s in branch.special if s.kind == "user" and s.point.load == load]

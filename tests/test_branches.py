@@ -1,0 +1,169 @@
+"""Buckled branches against solutions of the boundary value problem by multiple shooting (see shooting.py)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shooting
+from rods import DEFAULT, Constants, explored, specials, user_points
+
+from rodfem.branch import Branch
+
+AT = (0.2, 0.325, 0.5, 0.7, 0.9)
+RICH, PLAIN = (16, 8), (8, 6)
+
+
+def branches(
+    formulation: str = "reduced", elements: int = 16, degree: int = 8, constants: Constants = DEFAULT
+) -> list[Branch]:
+    return explored(formulation, elements, degree, constants, at=AT, error_bars=(elements, degree) != RICH)
+
+
+def from_point(all_branches: list[Branch], parent: str, number: int) -> Branch:
+    """Branch that leaves the branch point of that number, from 0, on a parent."""
+    origin = next(b for b in all_branches if b.name == parent)
+    special = origin.special.index(specials(origin, "branch point")[number])
+    (found,) = [b for b in all_branches if b.parent == (parent, special)]
+    return found
+
+
+def interior(branch: Branch) -> list:
+    """Points of a branch that are no special points."""
+    singular = [id(s.point) for s in branch.special if s.kind != "user"]
+    return [p for p in branch.points[1:] if id(p) not in singular]
+
+
+def test_first_branch() -> None:
+    first = from_point(branches(), "straight", 0)
+    for load in AT:
+        (p,) = user_points(first, load)
+        if load in shooting.FIRST:
+            assert (p.ordinate, p.energy) == pytest.approx(shooting.FIRST[load], abs=2e-11)
+    last = first.points[-1]
+    assert first.ended == "end of range"
+    assert last.load == 0.95
+    assert (last.ordinate, last.energy) == pytest.approx(shooting.FIRST[0.95], abs=2e-11)
+    assert {(p.negative, p.zero) for p in first.points[1:]} == {(0, 1)}
+
+
+def test_second_branch() -> None:
+    second = from_point(branches(), "straight", 1)
+    (fold,) = specials(second, "fold")
+    assert fold.point.load == pytest.approx(shooting.FOLD[0], abs=2e-11)
+    assert (fold.point.ordinate, fold.point.energy) == pytest.approx(shooting.FOLD[1:], abs=1e-9)
+    assert (fold.negative_before, fold.negative_after, fold.multiplicity) == (3, 2, 1)
+    for p in interior(second):
+        assert (p.negative, p.zero) == (3 if p.arclength < fold.point.arclength else 2, 1)
+    for load, ordinates in shooting.AROUND_FOLD.items():
+        assert [p.ordinate for p in user_points(second, load)] == pytest.approx(ordinates, abs=2e-11)
+    for load, expected in shooting.SECOND.items():
+        (p,) = user_points(second, load)
+        assert (p.ordinate, p.energy) == pytest.approx(expected, abs=2e-11)
+
+
+def test_second_branch_ends_where_the_stretch_vanishes() -> None:
+    second = from_point(branches(), "straight", 1)
+    last = second.points[-1]
+    assert second.ended == "stretch reaches zero"
+    assert (last.load, last.ordinate) == pytest.approx(shooting.ZERO_STRETCH, abs=2e-7)  # v3 is of order h^k, not h^2k
+    assert abs(last.stretch) < 1e-9
+    assert min(p.stretch for p in second.points[:-1]) > 0
+
+
+def test_secondary_pitchfork() -> None:
+    found = branches(constants=(0.0, 1.0, 1.0, 3.0))
+    first = from_point(found, "straight", 0)
+    (pitchfork,) = specials(first, "branch point")
+    assert (pitchfork.point.load, pitchfork.point.ordinate) == pytest.approx(shooting.PITCHFORK, abs=1e-10)
+    assert (pitchfork.negative_before, pitchfork.negative_after, pitchfork.multiplicity) == (0, 1, 1)
+    leaving = from_point(found, first.name, 0)
+    assert {p.negative for p in leaving.points[1:]} == {0}
+    for load, ordinate in shooting.BEYOND_PITCHFORK.items():
+        assert [p.ordinate for p in user_points(leaving, load)] == pytest.approx([ordinate], abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("constants", "number", "load", "before", "after"),
+    [
+        ((-2.0, 1.0, 1.0, 3.0), 1, shooting.FOLD_OF_SECOND, 3, 2),
+        ((-3.0, 1.0, 1.0, 4.0), 2, shooting.FOLD_OF_THIRD, 5, 4),
+    ],
+)
+def test_folds_of_other_rods(constants: Constants, number: int, load: float, before: int, after: int) -> None:
+    (fold,) = specials(from_point(branches(constants=constants), "straight", number), "fold")
+    assert fold.point.load == pytest.approx(load, abs=5e-11)
+    assert (fold.negative_before, fold.negative_after) == (before, after)
+
+
+def test_third_branch_of_another_rod() -> None:
+    third = from_point(branches(constants=(-2.0, 1.0, 1.0, 3.0)), "straight", 2)
+    assert third.ended == "stretch reaches zero"
+    assert third.points[-1].load == pytest.approx(shooting.ZERO_STRETCH_OF_THIRD, abs=1e-7)
+
+
+@pytest.mark.parametrize("constants", [DEFAULT, (0.0, 1.0, 1.0, 3.0), (-2.0, 1.0, 1.0, 3.0)])
+def test_symmetry_leaves_no_drift(constants: Constants) -> None:
+    for branch in branches(constants=constants):
+        assert max(p.drift for p in branch.points) < 1e-12
+        if branch.depth:
+            assert min(p.zero for p in branch.points[1:]) == 1  # the circle of states that each belongs to
+
+
+def test_coupling_tells_folds_from_branch_points() -> None:
+    both = [
+        s for constants in (DEFAULT, (0.0, 1.0, 1.0, 3.0)) for b in branches(constants=constants) for s in b.special
+    ]
+    assert min(s.coupling for s in both if s.kind == "fold") > 1e-2
+    assert max(s.coupling for s in both if s.kind == "branch point") < 1e-8
+
+
+def errors(found: list[Branch]) -> list[tuple[str, float, float]]:
+    """Name, true error and estimate of all that is known of the special points of the default rod."""
+    first, second = from_point(found, "straight", 0), from_point(found, "straight", 1)
+    out = []
+    for load, (ordinate, _) in shooting.FIRST.items():
+        (s,) = [s for s in first.special if s.point.load == load]
+        out.append((f"first branch at {load}", abs(s.point.ordinate - ordinate), s.error_estimate))
+    (fold,) = specials(second, "fold")
+    out.append(("load of fold", abs(fold.point.load - shooting.FOLD[0]), fold.error_estimate))
+    out.append(("ordinate of fold", abs(fold.point.ordinate - shooting.FOLD[1]), fold.ordinate_error))
+    for load, ordinates in shooting.AROUND_FOLD.items():
+        near = [s for s in second.special if s.kind == "user" and s.point.load == load]
+        if fold.point.load < load:  # on the coarsest mesh the fold is beyond this load
+            for s, ordinate in zip(near, ordinates, strict=True):
+                out.append((f"second branch at {load}", abs(s.point.ordinate - ordinate), s.error_estimate))
+    end = second.special[-1]
+    out.append(("load of zero stretch", abs(end.point.load - shooting.ZERO_STRETCH[0]), end.error_estimate))
+    out.append(("ordinate of zero stretch", abs(end.point.ordinate - shooting.ZERO_STRETCH[1]), end.ordinate_error))
+    for s, load in zip(specials(found[0], "branch point"), [0.114304214520030, 0.332039079723330], strict=True):
+        out.append(("buckling load", abs(s.point.load - load), s.error_estimate))
+    return out
+
+
+@pytest.mark.parametrize(
+    ("formulation", "elements", "degree"),
+    [("reduced", 24, 1), ("reduced", 16, 2), ("pointwise", 12, 2), ("reduced", 8, 4), ("reduced", 8, 6)],
+)
+def test_error_estimates_bound_the_error(formulation: str, elements: int, degree: int) -> None:
+    for name, true, estimate in errors(branches(formulation, elements, degree)):
+        assert true <= 3 * estimate, name
+        assert estimate <= 30 * true + 2e-11, name  # no scaremongering either
+
+
+def test_formulations_agree_within_their_estimates() -> None:
+    both = [branches(formulation, *PLAIN) for formulation in ("reduced", "pointwise")]
+    for a, b in zip(*both, strict=True):
+        assert (a.name, a.ended) == (b.name, b.ended)
+        for s, t in zip(a.special, b.special, strict=True):
+            assert s.kind == t.kind
+            assert abs(s.point.load - t.point.load) <= s.error_estimate + t.error_estimate
+            assert abs(s.point.ordinate - t.point.ordinate) <= s.ordinate_error + t.ordinate_error
+            assert (s.negative_before, s.negative_after, s.multiplicity) == (
+                t.negative_before,
+                t.negative_after,
+                t.multiplicity,
+            )
+    assert sum(len(b.special) for b in both[0]) > 15
+    np.testing.assert_allclose(
+        [b.points[-1].energy for b in both[0]], [b.points[-1].energy for b in both[1]], rtol=1e-9
+    )
