@@ -8,6 +8,7 @@ What is below is a small stock of them; any other function of this form serves a
 
 from __future__ import annotations
 
+import ufl
 from ufl.core.expr import Expr
 
 
@@ -30,3 +31,8 @@ def hemitropic(v: Expr, k: Expr, *, stretching: Expr, coupling: Expr, twisting: 
         + 0.5 * twisting * k[2] ** 2
         + 0.5 * bending * (k[0] ** 2 + k[1] ** 2)
     )
+
+
+def logarithmic_stretch(v: Expr, stiffness: Expr) -> Expr:
+    """Energy ``stiffness (v3 log v3 - v3 + 1)`` of stretch, which keeps ``v3`` positive: ``n3 = stiffness log v3``."""
+    return stiffness * (v[2] * ufl.ln(v[2]) - v[2] + 1)

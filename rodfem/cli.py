@@ -13,6 +13,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
+from rodfem.errors import ConvergenceError, EnvironmentTrouble, SceneError, SymmetryError
+
 NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
 
 
@@ -120,8 +122,6 @@ def main(parser: Parser, scene_of: Callable[[argparse.Namespace], Any], argument
     given = list(sys.argv[1:] if arguments is None else arguments)
     ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
     options = parser.parse_args(ours)
-    from rodfem.errors import ConvergenceError, EnvironmentTrouble, SceneError, SymmetryError
-
     try:
         import petsc4py
 

@@ -1,0 +1,55 @@
+r"""Perversion of a telephone cord.
+
+A telephone cord is a rod that would like to be coiled: its intrinsic curvature is k0 = 2 pi N about d2, N turns
+over its length. Pulled straight, and let go, it does not coil back: clamped at both ends it can only form coils
+of both hands, with a perversion between them.  The rod is unshearable and inextensible, with
+
+    W = 1/2 [k1^2 + (k2 - k0)^2 + k3^2],     r(0) = 0,   R(0) = R(1) = I,   r1(1) = r2(1) = 0,
+
+and is pulled along e3 at s = 1 by a dead tension lam.  The straight rod is an equilibrium at every tension, with
+the constant moment m2 = -k0; it loses stability where lam = k0^2 - w^2 with w = 2 pi n or tan(w/2) = w/2.
+
+No force acts along the rod, so the contact force is constant; n3 = lam is known, n1 and n2 are two scalar unknowns.
+
+Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section 5.1 and figures 2 and 3.
+"""
+
+from argparse import Namespace
+from math import pi
+
+import rodfem.cli as cli
+from forms.energy import bending
+from rodfem.scene import End, Ordinate, Parameter, Scene, clamped
+
+
+def scene(options: Namespace) -> Scene:
+    """State the problem: what the rod is made of, how its ends are held, and what to look at."""
+
+    def energy(v, k, c):
+        return bending((k[0], k[1] - c.k0, k[2]), (1.0, 1.0, 1.0))
+
+    return Scene(
+        name="cord",
+        title="Telephone cord",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=energy,
+        parameters={
+            "lam": Parameter(60.0, r"\lambda"),
+            "k0": Parameter(2 * pi * options.turns),
+        },
+        load="lam",
+        ends=(
+            clamped(),
+            End(position=lambda c: (0.0, 0.0, None), rotation=(1.0, 0.0, 0.0, 0.0), force=lambda c: (0.0, 0.0, c.lam)),
+        ),
+        ordinate=Ordinate("shortening 1 - r3(1)", s=1.0, of=lambda r, q: 1 - r[2], label="$1 - r_3(1)$"),
+        span=tuple(options.span),
+    )
+
+
+if __name__ == "__main__":
+    parser = cli.parser_for("cord", __doc__, load="lam", span=(60.0, 0.0), elements=8, degree=6)
+    constants = parser.add_argument_group("constants of the rod")
+    constants.add_argument("--turns", type=float, default=1.5, metavar="N", help="k0 = 2 pi N (default 1.5)")
+    cli.main(parser, scene)

@@ -1,0 +1,67 @@
+r"""Lateral load on a ruler.
+
+A ruler bends easily about one axis and hardly about the other.  It is clamped at s = 0 and pushed sideways at its
+free end by a dead force lam along e1 (or e2).  It is unshearable, and hard to stretch:
+
+    n3 = 20 log v3,   m1 = k1,   m2 = 10 k2,   m3 = k3.
+
+A force along e1 bends the ruler in the plane of e1 and e3, the way it resists.  It stays in that plane only up to
+a load at which it twists and falls to the side: lateral buckling, with the bending and stretching before it taken
+into account.  A force along e2 bends it the easy way, and nothing else happens.
+
+The contact force is the dead force everywhere along the ruler: no force is unknown, and the centreline follows from the
+rotation.  What is left are the rotation q, its multiplier mu and the stretch v3.
+
+Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section 5.3 and figures 8 and 9.
+"""
+
+from argparse import Namespace
+
+import rodfem.cli as cli
+from forms.energy import bending, logarithmic_stretch
+from rodfem.errors import SceneError
+from rodfem.scene import Ordinate, Parameter, Scene, clamped, free
+
+DIRECTIONS = {"e1": (1.0, 0.0), "e2": (0.0, 1.0)}
+
+
+def scene(options: Namespace) -> Scene:
+    """State the problem: what the rod is made of, how its ends are held, and what to look at."""
+    if options.direction not in DIRECTIONS:
+        raise SceneError(f"Unknown direction {options.direction!r}: choose e1 or e2.")
+    x, y = DIRECTIONS[options.direction]
+
+    def energy(v, k, c):
+        return logarithmic_stretch(v, c.E) + bending(k, (c.B1, c.B2, c.B3))
+
+    return Scene(
+        name="ruler",
+        title="Lateral load on a ruler",
+        states="plane",
+        interval=(0.0, 1.0),
+        rod="unshearable",
+        energy=energy,
+        parameters={
+            "lam": Parameter(0.0, r"\lambda"),
+            "E": Parameter(options.stretching, admissible=(0.0, float("inf"))),
+            "B1": Parameter(options.bending[0]),
+            "B2": Parameter(options.bending[1]),
+            "B3": Parameter(options.twisting),
+        },
+        load="lam",
+        ends=(clamped(), free(force=lambda c: (x * c.lam, y * c.lam, 0.0))),
+        ordinate=Ordinate("tip displacement out of the plane", s=1.0, of=lambda r, q: abs(y * r[0] - x * r[1])),
+        span=tuple(options.span),
+    )
+
+
+if __name__ == "__main__":
+    parser = cli.parser_for("ruler", __doc__, load="lam", span=(0.0, 12.0), elements=8, degree=6)
+    constants = parser.add_argument_group("constants of the rod")
+    constants.add_argument("--direction", default="e1", metavar="{e1,e2}", help="of the force (default e1)")
+    constants.add_argument("--stretching", type=float, default=20.0, metavar="E", help="stiffness (default 20)")
+    constants.add_argument(
+        "--bending", type=float, nargs=2, default=(1.0, 10.0), metavar=("B1", "B2"), help="stiffnesses (default 1 10)"
+    )
+    constants.add_argument("--twisting", type=float, default=1.0, metavar="B3", help="stiffness (default 1)")
+    cli.main(parser, scene)
