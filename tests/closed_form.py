@@ -11,6 +11,8 @@ for all theta that vanish at the clamps and have int theta ds = 0, so that the e
 from __future__ import annotations
 
 import numpy as np
+from numpy.polynomial import legendre
+from scipy.linalg import eigh, null_space
 from scipy.optimize import brentq
 
 
@@ -40,18 +42,24 @@ def loads(A: float, B: float, C: float, half: float, below: float = 0.95) -> lis
     ]
 
 
-def index(lam: float, A: float, B: float, C: float, half: float, modes: int = 40) -> int:
-    """Negative eigenvalues of the second variation of the straight rod, by Ritz's method with sines.
+def spectrum(lam: float, A: float, B: float, C: float, half: float, degree: int = 30) -> np.ndarray:
+    """Eigenvalues of the second variation of the straight rod relative to the integral of its squared rotation.
 
-    The rest of the second variation, in stretch and twist, is positive where 10 B > A^2.
+    Those of rotations across the axis, each twice, by Ritz's method with the polynomials (1 - x^2) P_j(x); those of twist
+    with the stretch that follows it are known: (B - A^2/10) (m pi/(2 half))^2.
     """
-    m = np.arange(1, modes + 1)
-    k = m * np.pi / (2 * half)
-    odd = (m[:, None] + m) % 2 == 1
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # 1/half int sin(k_m x) (sin(k_n x))' dx over the rod's length 2 half
-        gradient = np.where(odd, 4 * m[:, None] * m / (m[:, None] ** 2 - m**2) / (2 * half), 0.0)
-    energy = np.diag(C * k**2 - 10 * lam * (1 - lam)) - 1j * A * lam * gradient
-    mean = np.where(m % 2 == 1, 1.0 / m, 0.0)
-    kernel = np.linalg.svd(mean[None, :])[2][1:].T
-    return 2 * int((np.linalg.eigvalsh(kernel.T @ energy @ kernel) < 0).sum())
+    x, weights = legendre.leggauss(degree + 4)
+    shapes = [legendre.legmul([2 / 3, 0, -2 / 3], row) for row in np.eye(degree)]
+    f = np.array([legendre.legval(x, c) for c in shapes])
+    df = np.array([legendre.legval(x, legendre.legder(c)) for c in shapes])
+    mass = half * (f * weights) @ f.T
+    energy = C / half * (df * weights) @ df.T - 10 * lam * (1 - lam) * mass - 1j * A * lam * (f * weights) @ df.T
+    kernel = null_space((f @ weights)[None, :])
+    across = eigh(kernel.T @ (energy + energy.conj().T) / 2 @ kernel, kernel.T @ mass @ kernel, eigvals_only=True)
+    twist = (B - A**2 / 10) * (np.arange(1, degree) * np.pi / (2 * half)) ** 2
+    return np.sort(np.concatenate([across, across, twist]))
+
+
+def index(lam: float, A: float, B: float, C: float, half: float) -> int:
+    """Negative eigenvalues of the second variation of the straight rod."""
+    return int((spectrum(lam, A, B, C, half) < 0).sum())
