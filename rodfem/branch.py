@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from petsc4py import PETSc
+
+if TYPE_CHECKING:
+    from rodfem.pitchfork import Law
 
 FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
 
@@ -56,6 +60,7 @@ class Special:
     row: int = -1
     zero_of: str = "mu"
     note: str = ""
+    law: Law | None = None
 
     @property
     def multiplicity(self) -> int:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +93,7 @@ def _special_data(s: Special) -> dict[str, Any]:
         "located_to": s.located_to,
         "coupling": s.coupling,
         "meets": list(s.meets) if s.meets else None,
+        "law": None if s.law is None else asdict(s.law),
         "note": s.note,
     }
 

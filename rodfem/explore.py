@@ -15,6 +15,7 @@ from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
 from rodfem.continuation import Follower, Steps, follow, hermite
 from rodfem.errors import ConvergenceError, SceneError, SymmetryError
 from rodfem.locate import solve_at
+from rodfem.pitchfork import law_of
 from rodfem.report import Report
 from rodfem.scene import Scene
 
@@ -90,7 +91,9 @@ class Explorer:
         except ConvergenceError as trouble:
             self.report.warn(f"No branch could be followed from {parent.name} at {special.point.load:.8g}: {trouble}")
             return
+        before = len(self.branches)
         for direction in ways:
+            self._law(special, direction)
             first: Point | None = None
             for sign in (1.0, -1.0):
                 way = direction.copy()
@@ -108,6 +111,26 @@ class Explorer:
                 if special.meets is None and self._traced_already(branch, special):
                     continue
                 self.trace(branch)
+        self._judge_from_the_side(special, self.branches[before:])
+
+    def _law(self, special: Special, direction: PETSc.Vec) -> None:
+        """Find the local law at a branch point: of what leaves, or of this branch where it ends on another."""
+        if special.law is not None:
+            return
+        from_the_side = special.zero_of == "slope"
+        with self.follower.system.clock.purpose("location"):
+            special.law = law_of(self.follower, special, special.null_vectors[0] if from_the_side else direction)
+        if special.law is not None and not from_the_side:
+            indices = special.negative_before, special.negative_after
+            special.law.judge(*(indices if special.point.slope > 0 else reversed(indices)))
+            self.report.law(special)
+
+    def _judge_from_the_side(self, special: Special, trunk: Sequence[Branch]) -> None:
+        """Name a pitchfork that was reached along its side branch, from the branch that it ends on, now traced."""
+        index = {branch.points[1].load > special.point.load: branch.points[1].negative for branch in trunk}
+        if special.law is not None and special.zero_of == "slope" and len(index) == 2:
+            special.law.judge(index[False], index[True])
+            self.report.law(special)
 
     def _name(self, parent: Branch) -> str:
         siblings = sum(b.parent is not None and b.parent[0] == parent.name for b in self.branches)

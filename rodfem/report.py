@@ -93,6 +93,10 @@ class Report:
             f"{_index(special):>6} {p.zero:>5}  {special.located_to:.0e}{meets}"
         )
 
+    def law(self, special: Special) -> None:
+        """Print the local law of a branch point."""
+        self.say(f"\nAt load {special.point.load:.8g}: {special.law} (x: change of the ordinate)")
+
     def finished(self, branch: Branch) -> None:
         """Close a branch: its last point and why it ended."""
         if branch.special and branch.special[-1].kind == END:
