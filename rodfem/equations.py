@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import dolfinx.mesh
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -29,7 +30,7 @@ class Equations:
     metric
         ``(4/l) int dq.dq + (1/l^3) int dr.dr``, the squared size of a change of state (about the mean square rotation).
     kinetic
-        Kinetic metric of the spectrum, ``int w . w`` with the spin ``w`` (unit rotary inertia).
+        Kinetic metric of the spectrum, ``int rho_A dr.dr + w . rho_I w`` with the spin ``w``.
     energy
         Stored energy ``int W ds``.
     """
@@ -62,13 +63,18 @@ class Equations:
             known = ufl.as_vector([scene.known_force(i, c) or 0.0 for i in range(3)])
             integrand = lagrangian.pointwise(W, R, v, (f.r + self._lift(c)).dx(0), f.n, known)
         L = integrand * dx + lagrangian.unit_norm(f.mu, f.q) * dx_nodes
-        first = ufl.derivative(L, u, test)
-        second = ufl.derivative(first, u, trial)
         a, b = self._named(ufl.split(test)), self._named(ufl.split(trial))
+        first = ufl.derivative(L, u, test)
+        for end, ds in zip(scene.ends, end_measures(mesh, scene.interval), strict=True):
+            if end.follower is not None:  # no potential: its virtual work enters the weak form
+                first -= ufl.dot(ufl.dot(R, ufl.as_vector(end.follower(c))), a.r) * ds
+        second = ufl.derivative(first, u, trial)
         metric = inertia.rotation_metric(a.q, b.q) / length
         if f.r is not None:
             metric += ufl.dot(a.r, b.r) / length**3
-        kinetic = inertia.rotary(f.q, a.q, b.q, (1.0, 1.0, 1.0))
+        kinetic = inertia.rotary(f.q, a.q, b.q, tuple(scene.inertia.rho_I(c)))
+        if f.r is not None:
+            kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c))
         forms = [first, second, W * dx, metric * dx, kinetic * dx]
         self.residual, self.jacobian, self.energy, self.metric, self.kinetic = compile_forms(forms)
 
@@ -111,3 +117,13 @@ class Equations:
         left, right = (end.held(c) for end in self.fields.scene.ends)
         lift = [b if a is None else a if b is None else (1 - x) * a + x * b for a, b in zip(left, right, strict=True)]
         return ufl.as_vector([value + 0 * x for value in lift])
+
+
+def end_measures(mesh: Any, interval: tuple[float, float]) -> list[Any]:
+    """Measures of the left and of the right end of the rod."""
+    found = [dolfinx.mesh.locate_entities_boundary(mesh, 0, lambda x, s=s: np.isclose(x[0], s)) for s in interval]
+    values = np.repeat(np.array([1, 2], dtype=np.int32), [len(points) for points in found])
+    points = np.concatenate(found).astype(np.int32)
+    order = np.argsort(points)
+    tags = dolfinx.mesh.meshtags(mesh, 0, points[order], values[order])
+    return [ufl.Measure("ds", domain=mesh, subdomain_data=tags)(tag) for tag in (1, 2)]

@@ -90,6 +90,11 @@ class Fields:
         self.scene, self.discretization, self.comm = scene, discretization, comm
         self.blocks = blocks_of(scene, discretization)
         reduced = discretization.formulation == "reduced"
+        if reduced and not scene.conservative:
+            raise SceneError(
+                "The reduced formulation has no centreline, which the mass of a rod under a follower force needs: "
+                "use --formulation pointwise."
+            )
         c = scene.constants()
         self.forces = [i for i in range(3) if reduced and scene.known_force(i, c) is None]
         names = [f"n{i + 1}" for i in self.forces] + [LOAD]

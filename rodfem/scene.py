@@ -53,12 +53,14 @@ class End:
 
     ``position(c)`` gives three components, each an expression (held there) or None (free to move in that direction);
     ``position = None`` leaves all three free.  ``force(c)`` is the dead force on the end, used in the free directions.
-    ``rotation`` is the quaternion at which the directors are clamped, None leaves them free.
+    ``follower(c)`` is a force on a free end given by its components along the directors, with which it turns: it has no
+    potential.  ``rotation`` is the quaternion at which the directors are clamped, None leaves them free.
     """
 
     position: Callable[[Constants], Vector] | None = None
     rotation: tuple[float, float, float, float] | None = None
     force: Callable[[Constants], Vector] | None = None
+    follower: Callable[[Constants], Vector] | None = None
 
     def held(self, c: Constants) -> list[Any]:
         """Position of the end: three expressions, None where the end is free."""
@@ -77,9 +79,22 @@ def clamped(
     return End(position=position, rotation=rotation)
 
 
-def free(force: Callable[[Constants], Vector] | None = None) -> End:
-    """Return an end without support, loaded by a dead force (none by default)."""
-    return End(force=force)
+def free(
+    force: Callable[[Constants], Vector] | None = None, follower: Callable[[Constants], Vector] | None = None
+) -> End:
+    """Return an end without support, loaded by a dead force, a follower force, or none."""
+    return End(force=force, follower=follower)
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Mass ``rho_A(c)`` and rotary inertia ``rho_I(c)`` about the directors, both per unit length.
+
+    Only frequencies need them, and the stability of states under loads without a potential.
+    """
+
+    rho_A: Callable[[Constants], Any] = lambda c: 0.0
+    rho_I: Callable[[Constants], Vector] = lambda c: (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -116,6 +131,8 @@ class Scene:
         Left and right :class:`End`.
     ordinate
         What to record beside the load.
+    inertia
+        Kinetic metric of the spectrum; unit rotary inertia by default, which serves to count.
     symmetries
         Generators from :mod:`forms.symmetry` of the continuous symmetries that all states of the scene share.
     start
@@ -134,6 +151,7 @@ class Scene:
     ordinate: Ordinate
     span: tuple[float, float]
     title: str = ""
+    inertia: Inertia = Inertia()
     symmetries: tuple[Mapping[str, Matrix], ...] = ()
     start: Callable[[np.ndarray], np.ndarray] | None = None
     states: str = field(default="straight")
@@ -161,6 +179,9 @@ class Scene:
             raise SceneError("The rod can drift away: hold each component of the position at one end at least.")
         if all(end.rotation is None for end in self.ends):
             raise SceneError("The rod can rotate freely: clamp the rotation at one end at least.")
+        for end in self.ends:
+            if end.follower is not None and any(x is not None for x in end.held(self.constants())):
+                raise SceneError("A follower force acts on an end that is held: leave its position free.")
         stiffness = self.stiffness()
         if stiffness.size and np.linalg.eigvalsh(stiffness)[0] <= 1e-12 * abs(stiffness).max():
             raise SceneError(
@@ -172,6 +193,11 @@ class Scene:
     def length(self) -> float:
         """Reference length of the rod."""
         return self.interval[1] - self.interval[0]
+
+    @property
+    def conservative(self) -> bool:
+        """Whether all loads have a potential, so that stability is a matter of the second variation alone."""
+        return all(end.follower is None for end in self.ends)
 
     @property
     def free_strains(self) -> tuple[int, ...]:

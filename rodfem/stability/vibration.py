@@ -1,0 +1,155 @@
+r"""Eigenvalues of a rod under loads without a potential: a non-symmetric pencil, ``S x = mu M x`` with ``mu = omega^2``.
+
+A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low rank (the linearised end load
+couples the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real
+axis: flutter.
+
+Eigenvalues are found by shift-invert.  A complex shift ``a + i b`` needs no complex PETSc: with vectors written
+as pairs of their real and imaginary parts, ``S - (a + i b) M`` is the real matrix ::
+
+    ( S - a M     b M   )
+    (  -b M     S - a M )
+
+whose pencil with ``diag(M, M)`` has the eigenvalues ``mu - (a + i b)`` and their conjugates; those with vectors
+of the form ``(x, -i x)`` belong to the first kind.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+from slepc4py import SLEPc
+
+from rodfem.errors import ConvergenceError
+from rodfem.system import System
+
+
+@dataclass(frozen=True)
+class Frequencies:
+    """Eigenvalues ``mu = omega^2`` in ascending order of their real parts, and their backward errors."""
+
+    values: np.ndarray
+    errors: np.ndarray
+
+    def unstable(self, tolerance: float) -> int:
+        """Number of eigenvalues with a negative real part or a non-zero imaginary part."""
+        return int(((self.values.real < -tolerance) | (abs(self.values.imag) > tolerance)).sum())
+
+
+class Vibration:
+    """Computes eigenvalues near a shift, at states of one :class:`~rodfem.system.System`."""
+
+    def __init__(self, system: System) -> None:
+        """Allocate the matrices of the pencil once."""
+        self.system = system
+        self.matrix, self.mass = system.state_matrix(), system.state_matrix()
+
+    def assemble(self, x: PETSc.Vec) -> None:
+        """Assemble the pencil at the state ``x``."""
+        system = self.system
+        with system.clock("assembly"):
+            system.bring(x)
+            for matrix, form in ((self.matrix, system.equations.jacobian), (self.mass, system.equations.kinetic)):
+                matrix.zeroEntries()
+                fem.petsc.assemble_matrix(matrix, form)
+            if system.has_scalars:
+                for index in (system.load_index, *system.drifts):  # no part of the pencil: an infinite eigenvalue each
+                    self.matrix.setValue(index, index, 1.0, addv=True)
+            self.matrix.assemble()
+            self.mass.assemble()
+
+    def asymmetry(self) -> tuple[int, float]:
+        """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
+        transposed = self.matrix.copy()
+        transposed.transpose()
+        transposed.axpy(-1.0, self.matrix, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        begin, end = transposed.getOwnershipRange()
+        rows = [(i, *transposed.getRow(i)) for i in range(begin, end)]
+        size = self.matrix.norm(PETSc.NormType.INFINITY)
+        mine = [
+            (i, j, v)
+            for i, columns, values in rows
+            for j, v in zip(columns, values, strict=True)
+            if abs(v) > 1e-12 * size
+        ]
+        entries = [e for part in self.system.comm.allgather(mine) for e in part]
+        used = sorted({i for i, _, _ in entries})
+        small = np.zeros((len(used), len(used)))
+        for i, j, v in entries:
+            small[used.index(i), used.index(j)] = v
+        return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if used else (0, 0.0)
+
+    def near(self, number: int, target: complex) -> Frequencies:
+        """Return ``number`` (or one more, to keep conjugates together) eigenvalues nearest to ``target`` at the state assembled."""
+        with self.system.clock("stability"):
+            values, errors = self._real(number, target.real) if target.imag == 0 else self._complex(number, target)
+        order = np.lexsort((values.imag, np.round(values.real, 9)))
+        return Frequencies(values[order], errors[order])
+
+    def _real(self, number: int, target: float) -> tuple[np.ndarray, np.ndarray]:
+        solver = self._solver(self.matrix, self.mass, number, target)
+        solver.solve()
+        found = self._enough(solver, number)
+        values = np.array([solver.getEigenvalue(i) for i in range(found)])
+        errors = np.array([solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD) for i in range(found)])
+        solver.destroy()
+        return values, errors
+
+    def _complex(self, number: int, target: complex) -> tuple[np.ndarray, np.ndarray]:
+        a, b = target.real, target.imag
+        shifted, upper = self.matrix.copy(), self.mass.copy()
+        shifted.axpy(-a, self.mass, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        upper.scale(b)
+        lower = upper.copy()
+        lower.scale(-1.0)
+        pencil = PETSc.Mat().createNest([[shifted, upper], [lower, shifted]], comm=self.system.comm).convert("aij")
+        mass = PETSc.Mat().createNest([[self.mass, None], [None, self.mass]], comm=self.system.comm).convert("aij")
+        solver = self._solver(pencil, mass, 2 * number, 0.0)
+        solver.solve()
+        found = self._enough(solver, number)
+        re, im = pencil.createVecRight(), pencil.createVecRight()
+        kept: list[tuple[complex, float]] = []
+        for i in range(found):
+            shift = solver.getEigenpair(i, re, im)
+            n = re.getLocalSize() // 2  # each rank holds its part of x, then its part of y
+            x, y = re.array_r[:n] + 1j * im.array_r[:n], re.array_r[n:] + 1j * im.array_r[n:]
+            first, second = self.system.comm.allreduce(
+                np.array([np.linalg.norm(x + 1j * y) ** 2, np.linalg.norm(x - 1j * y) ** 2])
+            )
+            if first >= second:
+                kept.append((target + shift, solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)))
+        solver.destroy()
+        for matrix in (shifted, upper, lower, pencil, mass):
+            matrix.destroy()
+        kept = kept[:number]
+        return np.array([value for value, _ in kept]), np.array([error for _, error in kept])
+
+    def _enough(self, solver: SLEPc.EPS, number: int) -> int:
+        found = solver.getConverged()
+        if found < number:
+            solver.destroy()
+            raise ConvergenceError(
+                f"SLEPc found {found} of {number} eigenvalues: ask for fewer, or give -rodfem_eps_ncv 60 after a --."
+            )
+        return int(found)
+
+    def _solver(self, matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: float) -> SLEPc.EPS:
+        solver = SLEPc.EPS().create(self.system.comm)
+        solver.setOptionsPrefix("rodfem_")
+        solver.setOperators(matrix, mass)
+        solver.setProblemType(SLEPc.EPS.ProblemType.GNHEP)
+        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+        solver.setTarget(target)
+        solver.setTolerances(tol=1e-13, max_it=300)
+        solver.setDimensions(number, 2 * number + 20)
+        transform = solver.getST()
+        transform.setType(SLEPc.ST.Type.SINVERT)
+        ksp = transform.getKSP()
+        ksp.setType("preonly")
+        ksp.getPC().setType("lu")
+        ksp.getPC().setFactorSolverType("mumps")
+        solver.setFromOptions()
+        return solver
