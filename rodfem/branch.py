@@ -10,7 +10,7 @@ from petsc4py import PETSc
 if TYPE_CHECKING:
     from rodfem.pitchfork import Law
 
-FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
+FOLD, BRANCH_POINT, FLUTTER, USER, END = "fold", "branch point", "flutter", "user", "end"
 
 
 @dataclass
@@ -34,6 +34,7 @@ class Point:
     drift: float
     error: float
     spectrum: list[float] = field(default_factory=list)
+    omega2: list[list[float]] = field(default_factory=list)
 
 
 @dataclass
@@ -61,6 +62,8 @@ class Special:
     zero_of: str = "mu"
     note: str = ""
     law: Law | None = None
+    omega2: float = float("nan")
+    omega2_error: float = float("nan")
 
     @property
     def multiplicity(self) -> int:

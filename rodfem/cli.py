@@ -51,7 +51,15 @@ def complain(sentence: str) -> NoReturn:
     sys.exit(2)
 
 
-def parser_for(name: str, description: str, load: str, span: tuple[float, float], elements: int, degree: int) -> Parser:
+def parser_for(
+    name: str,
+    description: str,
+    load: str,
+    span: tuple[float, float],
+    elements: int,
+    degree: int,
+    formulation: str = "reduced",
+) -> Parser:
     """Return the options that every demo has; a demo adds its own constants."""
     parser = Parser(
         prog=f"{name}.py",
@@ -76,9 +84,9 @@ def parser_for(name: str, description: str, load: str, span: tuple[float, float]
     )
     group.add_argument(
         "--formulation",
-        default="reduced",
+        default=formulation,
         metavar="{reduced,pointwise}",
-        help="reduced: no centreline, the contact force as scalars; pointwise: all fields (default reduced)",
+        help=f"reduced: no centreline, the contact force as scalars; pointwise: all fields (default {formulation})",
     )
     group = parser.add_argument_group("what to compute")
     group.add_argument(

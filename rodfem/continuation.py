@@ -43,19 +43,12 @@ class Steps:
     most: int = 2000
 
 
-class Follower:
-    """Computes equilibria of one :class:`~rodfem.system.System` with their index and records.
+class Equilibria:
+    """Computes equilibria of one :class:`~rodfem.system.System` at given loads, and their shapes."""
 
-    It owns what such a computation needs once: the Newton solver's factors (in the system), the stability matrix,
-    the shape.
-    """
-
-    def __init__(self, system: System, spectrum: int = 0) -> None:
-        """Allocate matrices and tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
+    def __init__(self, system: System) -> None:
+        """Tabulate the shape."""
         self.system = system
-        self.inertia = Inertia(system)
-        self.modes = spectrum
-        self.spectrum = Spectrum(self.inertia) if spectrum else None
         self.shape = Shape(system)
         self.axis = system.load_axis()
 
@@ -73,6 +66,27 @@ class Follower:
         out = system.take()
         system.set_load(out, load)
         return out
+
+    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, Outcome]:
+        """Equilibrium at exactly ``load`` by Newton's method from ``guess``; the phase reference must be set."""
+        x = guess.copy()
+        self.system.set_load(x, load)
+        outcome = correct(self.system, x, self.axis, reach=reach)
+        return x, outcome
+
+
+class Follower(Equilibria):
+    """Computes equilibria along branches, with their index and records.
+
+    It owns what such a computation needs once: Newton's factors (in the system), the stability matrix, the shape.
+    """
+
+    def __init__(self, system: System, spectrum: int = 0) -> None:
+        """Allocate matrices and tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
+        super().__init__(system)
+        self.inertia = Inertia(system)
+        self.modes = spectrum
+        self.spectrum = Spectrum(self.inertia) if spectrum else None
 
     def point(self, x: PETSc.Vec, arclength: float, tangent: PETSc.Vec | None, outcome: Outcome | None = None) -> Point:
         """Evaluate all records of the equilibrium ``x``."""
@@ -128,13 +142,6 @@ class Follower:
         self.system.solve(self.axis, tangent)
         tangent.scale(1.0 / self.system.norm(tangent))
         return tangent
-
-    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, Outcome]:
-        """Equilibrium at exactly ``load`` by Newton's method from ``guess``; the phase reference must be set."""
-        x = guess.copy()
-        self.system.set_load(x, load)
-        outcome = correct(self.system, x, self.axis, reach=reach)
-        return x, outcome
 
     def load_tangent(self, x: PETSc.Vec, increasing: bool) -> PETSc.Vec:
         """Unit tangent at the regular point ``x``, in the direction of in- or decreasing load."""

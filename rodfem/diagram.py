@@ -20,7 +20,7 @@ from petsc4py import PETSc
 
 from rodfem.branch import Branch, Special
 from rodfem.clock import Clock
-from rodfem.continuation import Follower
+from rodfem.continuation import Equilibria
 from rodfem.errors import SceneError
 from rodfem.system import System
 
@@ -68,6 +68,9 @@ def _branch_data(branch: Branch) -> dict[str, Any]:
     columns: dict[str, list[Any]] = {name: [_plain(getattr(p, name)) for p in branch.points] for name in COLUMNS}
     if any(p.spectrum for p in branch.points):
         columns["spectrum"] = [p.spectrum for p in branch.points]
+    if any(p.omega2 for p in branch.points):
+        columns["omega2"] = [p.omega2 for p in branch.points]
+        columns["unstable"] = [p.negative for p in branch.points]
     return {
         "name": branch.name,
         "parent": list(branch.parent) if branch.parent else None,
@@ -93,6 +96,7 @@ def _special_data(s: Special) -> dict[str, Any]:
         "located_to": s.located_to,
         "coupling": s.coupling,
         "meets": list(s.meets) if s.meets else None,
+        "omega2": _plain(s.omega2),
         "law": None if s.law is None else asdict(s.law),
         "note": s.note,
     }
@@ -121,7 +125,7 @@ def load_json(path: Path) -> dict[str, Any]:
     return data
 
 
-def save_states(branch: Branch, follower: Follower, path: Path, first: bool) -> None:
+def save_states(branch: Branch, follower: Equilibria, path: Path, first: bool) -> None:
     """Append the states of a branch to an HDF5 file; collective, written on rank 0.
 
     Group ``/branches/<name>`` has ``load`` (P,), ``r`` (P, m, 3), ``q`` (P, m, 4), every further field and scalar
@@ -153,7 +157,7 @@ def save_states(branch: Branch, follower: Follower, path: Path, first: bool) -> 
                     target[name] = mode[name]
 
 
-def load_state(path: Path, branch: str, row: int, follower: Follower) -> PETSc.Vec:
+def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc.Vec:
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
     Raises :class:`SceneError` where the file has no such row, or has it in the other formulation.

@@ -8,11 +8,11 @@ from typing import TextIO
 
 from mpi4py import MPI
 
-from rodfem.branch import BRANCH_POINT, END, FOLD, USER, Branch, Point, Special
+from rodfem.branch import BRANCH_POINT, END, FLUTTER, FOLD, USER, Branch, Point, Special
 from rodfem.clock import Clock
 from rodfem.system import System
 
-LABELS = {FOLD: "LP", BRANCH_POINT: "BP", USER: "UZ", END: "EP"}
+LABELS = {FOLD: "LP", BRANCH_POINT: "BP", FLUTTER: "HB", USER: "UZ", END: "EP"}
 """AUTO's two-letter labels."""
 
 
@@ -117,6 +117,8 @@ class Report:
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
                 ordinate = number(s.point.ordinate, s.ordinate_error)
                 self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {_index(s)}{zero}")
+                if s.kind == FLUTTER:
+                    self.say(f"    double eigenvalue omega^2 = {number(s.omega2, s.omega2_error)}")
                 if s.note:
                     self.say(f"    {s.note}")
 
@@ -130,6 +132,17 @@ class Report:
                 f"  {branch.name:<12} {s.kind:<13} {s.point.load:<13.8g} "
                 + "  ".join(f"{mu:.6g}" for mu in s.point.spectrum)
             )
+
+    def frequencies(self, branches: Sequence[Branch], load: str, rows: int = 11) -> None:
+        """Print the square roots of the left-most eigenvalues against the load, if the scene has them."""
+        points = [p for b in branches for p in b.points if p.omega2]
+        if not points:
+            return
+        self.say(f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load}")
+        for p in points[:: max(1, (len(points) - 1) // (rows - 1))]:
+            roots = [complex(*v) ** 0.5 for v in p.omega2]
+            words = "  ".join(f"{w.real:8.4f}" + (f"{w.imag:+8.4f}i" if w.imag else " " * 9) for w in roots)
+            self.say(f"  {p.load:10.4f}  {words}")
 
     def warn(self, sentence: str) -> None:
         """Say what went wrong without stopping."""

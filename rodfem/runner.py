@@ -10,13 +10,14 @@ from mpi4py import MPI
 from rodfem import compat
 from rodfem.branch import Branch
 from rodfem.clock import Clock
-from rodfem.continuation import Follower
+from rodfem.continuation import Equilibria, Follower
 from rodfem.diagram import as_data, save_json, save_states
 from rodfem.errors import SceneError
 from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization
 from rodfem.report import Report
 from rodfem.scene import Scene
+from rodfem.sweep import Sweep
 from rodfem.system import System
 
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
@@ -60,13 +61,18 @@ def run(
     with compat.announce_compilation(report.compiling):
         with clock("setup"):
             system = System(scene, discretization, comm, clock)
-            follower = Follower(system, plan.spectrum)
+            follower = Follower(system, plan.spectrum) if scene.conservative else Equilibria(system)
         report.system(system)
-        explorer = Explorer(follower, plan, report, lambda: _save(explorer, follower, clock, output))
+        explorer: Explorer | Sweep
+        if isinstance(follower, Follower):
+            explorer = Explorer(follower, plan, report, lambda: _save(explorer, follower, clock, output))
+        else:
+            explorer = Sweep(follower, plan, report, lambda: _save(explorer, follower, clock, output))
         branches = explorer.run()
     _save_diagram(explorer, follower, clock, output)
     report.table(branches, system)
     report.spectra(branches)
+    report.frequencies(branches, scene.load)
     report.timing(clock, sum(len(b.points) for b in branches))
     report.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
     if figures and comm.rank == 0:
@@ -75,13 +81,13 @@ def run(
     return branches
 
 
-def _save(explorer: Explorer, follower: Follower, clock: Clock, output: Path) -> None:
+def _save(explorer: Explorer | Sweep, follower: Equilibria, clock: Clock, output: Path) -> None:
     with clock("files"):
         _save_diagram(explorer, follower, clock, output)
         save_states(explorer.branches[-1], follower, output / "states.h5", first=len(explorer.branches) == 1)
 
 
-def _save_diagram(explorer: Explorer, follower: Follower, clock: Clock, output: Path) -> None:
+def _save_diagram(explorer: Explorer | Sweep, follower: Equilibria, clock: Clock, output: Path) -> None:
     if follower.system.comm.rank == 0:
         save_json(as_data(explorer.branches, follower.system, clock, explorer.plan.span), output / "diagram.json")
 
@@ -90,9 +96,14 @@ def _draw(output: Path, report: Report) -> None:
     """Draw the diagram, and the shape of a stable state if there is one."""
     from rodfem.diagram import load_json
     from rodfem.plot import draw_diagram
+    from rodfem.plot_frequencies import draw_frequencies
     from rodfem.render import draw_shape_safely
 
     data = load_json(output / "diagram.json")
+    if any("omega2" in branch["columns"] for branch in data["branches"]):
+        draw_frequencies(data, output / "diagram.png")
+        report.say(f"Picture in {output}{os.sep}: diagram.png")
+        return
     draw_diagram(data, output / "diagram.png")
     branch, row, words = typical_state(data)
     caption = f"{data['title']}, {branch}, {GREEK.get(data['parameter_label'], data['parameter'])} = {words}"

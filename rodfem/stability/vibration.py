@@ -1,4 +1,4 @@
-r"""Eigenvalues of a rod under loads without a potential: a non-symmetric pencil, ``S x = mu M x`` with ``mu = omega^2``.
+r"""Eigenvalues ``mu = omega^2`` of a rod under loads without a potential: a non-symmetric pencil ``S x = mu M x``.
 
 A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low rank (the linearised end load
 couples the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real
@@ -83,7 +83,7 @@ class Vibration:
         return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if used else (0, 0.0)
 
     def near(self, number: int, target: complex) -> Frequencies:
-        """Return ``number`` (or one more, to keep conjugates together) eigenvalues nearest to ``target`` at the state assembled."""
+        """Return the ``number`` (or more) eigenvalues nearest to ``target`` at the state last assembled."""
         with self.system.clock("stability"):
             values, errors = self._real(number, target.real) if target.imag == 0 else self._complex(number, target)
         order = np.lexsort((values.imag, np.round(values.real, 9)))

@@ -1,0 +1,227 @@
+"""Frequencies against the load for a rod under loads without a potential, and the loads at which it flutters.
+
+At each load the equilibrium is solved for, and the left-most eigenvalues ``mu = omega^2`` of its pencil are
+found.  Where two real ones collide and become a complex pair, the square of half their difference ``D = ((mu1 -
+mu2)/2)^2`` passes through zero.  Unlike the eigenvalues, which have a square root there, ``D`` is a smooth
+function of the load: the discriminant of the pencil projected on the two of them.  Its zero is found by Chebyshev
+interpolation, at spectral accuracy and without ever solving at the double eigenvalue.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.polynomial import chebyshev
+from petsc4py import PETSc
+
+from rodfem.branch import END, FLUTTER, USER, Branch, Point, Special
+from rodfem.continuation import Equilibria
+from rodfem.errors import ConvergenceError
+from rodfem.explore import Plan
+from rodfem.report import Report
+from rodfem.stability.vibration import Frequencies, Vibration
+from rodfem.system import System
+
+LOADS = 101
+"""Number of loads at which a range is sampled."""
+REAL = 1e-7
+"""An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
+
+
+class Sweep:
+    """Sweeps the load of a scene over a range from its start state; used like the explorer of conservative scenes."""
+
+    def __init__(self, solver: Equilibria, plan: Plan, report: Report, finished: Callable[[], None]) -> None:
+        """Allocate the pencil; the plan must have passed its check."""
+        self.solver, self.plan, self.report, self.finished = solver, plan, report, finished
+        self.vibration = Vibration(solver.system)
+        self.number = plan.spectrum or 6
+        self.branches: list[Branch] = []
+
+    def run(self) -> list[Branch]:
+        """Sweep, locate flutter, estimate errors."""
+        scene = self.solver.system.scene
+        branch = Branch(scene.states, None, 0)
+        self.branches.append(branch)
+        self.report.branch(branch)
+        a, b = self.plan.span
+        loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
+        x = self.solver.start(a)
+        for load in loads if a < b else loads[::-1]:
+            x = self._state(x, float(load))
+            point = self._point(x, branch.points[-1] if branch.points else None)
+            if branch.points:
+                self._between(branch, branch.points[-1], point)
+            branch.points.append(point)
+            if load in self.plan.at:
+                self._special(branch, Special(USER, point, point.negative, point.negative, 1e-12 * max(1.0, abs(load))))
+            self.report.progress(branch, point)
+        branch.ended = "end of range"
+        last = branch.points[-1]
+        branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
+        branch.renumber()
+        if self.plan.error_bars:
+            self._error_bars(branch)
+        self.report.finished(branch)
+        rank, size = self.vibration.asymmetry()
+        self.report.say(
+            f"  the load makes the tangent matrix non-symmetric by a matrix of rank {rank} "
+            f"(largest entry {size:.1e} of |S|)"
+        )
+        self.finished()
+        return self.branches
+
+    def _state(self, guess: PETSc.Vec, load: float) -> PETSc.Vec:
+        self.solver.system.set_phase(None)
+        x, outcome = self.solver.at_load(guess, load)
+        if not outcome.converged:
+            raise ConvergenceError(
+                f"No equilibrium at {self.solver.system.scene.load} = {load:g}: use a smaller range."
+            )
+        return x
+
+    def _point(self, x: PETSc.Vec, last: Point | None) -> Point:
+        solver, system = self.solver, self.solver.system
+        values = self._leftmost(x, last)
+        energy = system.comm.allreduce(fem.assemble_scalar(system.equations.energy), op=MPI.SUM)
+        unstable = Frequencies(values, np.zeros(0)).unstable(REAL * max(1.0, float(abs(values).min())))
+        load = system.scalar(x)
+        return Point(
+            x=x,
+            tangent=None,
+            arclength=abs(load - self.plan.span[0]),
+            load=load,
+            ordinate=solver.shape.ordinate(x),
+            energy=float(energy),
+            stretch=solver.shape.stretch(x),
+            negative=unstable,
+            zero=int((abs(values) < REAL).sum()),
+            slope=float("nan"),
+            drift=0.0,
+            error=0.0,
+            omega2=[[float(v.real), float(v.imag)] for v in values],
+        )
+
+    def _leftmost(self, x: PETSc.Vec, last: Point | None) -> np.ndarray:
+        """Left-most eigenvalues: those near the origin and, by a complex shift, those near the complex ones before."""
+        self.vibration.assemble(x)
+        found = self.vibration.near(self.number + 4, 0.0 - 1e-3).values
+        for re, im in last.omega2 if last else []:
+            if im > 0:
+                more = self.vibration.near(2, complex(re, im) * (1 + 1e-4)).values
+                found = np.concatenate([found, more, more.conj()])
+        found = np.where(abs(found.imag) < REAL * abs(found), found.real, found)
+        kept: list[complex] = []
+        for value in sorted(found, key=lambda v: (round(v.real, 6), v.imag)):
+            if all(abs(value - other) > 1e-8 * max(1.0, abs(value)) for other in kept):
+                kept.append(value)
+        return np.array(kept[: self.number])
+
+    def _between(self, branch: Branch, a: Point, b: Point) -> None:
+        """Locate flutter between two loads, where the number of complex pairs changes."""
+        pairs = [[complex(*v) for v in p.omega2 if v[1] > 0] for p in (a, b)]
+        if len(pairs[0]) == len(pairs[1]):
+            return
+        with self.solver.system.clock.purpose("location"):
+            few, many = sorted(pairs, key=len)
+            new = max(many, key=lambda v: min((abs(v - w) for w in few), default=np.inf))
+            located = locate_flutter(self._discriminant, (a.load + b.load) / 2, abs(b.load - a.load), new.real)
+            load, uncertainty, mu = located
+            x = self._state(a.x, load)
+            point = self._point(x, None)
+        special = Special(FLUTTER, point, a.negative, b.negative, uncertainty, omega2=mu)
+        branch.points.append(point)
+        self._special(branch, special)
+
+    def _special(self, branch: Branch, special: Special) -> None:
+        branch.special.append(special)
+        self.report.special(branch, special)
+
+    def _discriminant(self, load: float, center: float) -> tuple[float, float]:
+        return discriminant(self.solver, self.vibration, load, center)
+
+    def _error_bars(self, branch: Branch) -> None:
+        with self.solver.system.clock.purpose("error bars"):
+            system = self.solver.system
+            d = system.fields.discretization
+            richer = Equilibria(
+                System(system.scene, replace(d, degree=d.degree + 1), system.comm, system.clock, system.fields.mesh)
+            )
+            vibration = Vibration(richer.system)
+            for s in branch.special:
+                floor = max(s.located_to, 1e-12 * max(1.0, abs(s.point.load)))
+                s.error_estimate = s.ordinate_error = floor
+                if s.kind == FLUTTER:
+                    load, _, mu = locate_flutter(
+                        lambda p, m: discriminant(richer, vibration, p, m),
+                        s.point.load,
+                        0.05 * abs(s.point.load),
+                        s.omega2,
+                    )
+                    s.error_estimate = max(abs(load - s.point.load), floor)
+                    s.omega2_error = max(abs(mu - s.omega2), 1e-12 * abs(mu))
+
+
+def discriminant(solver: Equilibria, vibration: Vibration, load: float, center: float) -> tuple[float, float]:
+    """Discriminant ``((mu1 - mu2)/2)^2`` of the two eigenvalues nearest to ``center`` at ``load``, and their mean."""
+    solver.system.set_phase(None)
+    x, outcome = solver.at_load(solver.start(load), load)
+    if not outcome.converged:
+        raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g} while locating flutter.")
+    vibration.assemble(x)
+    values = vibration.near(4, 0.97 * center).values
+    best: tuple[float, complex, complex] | None = None
+    for i, p in enumerate(values):
+        for q in values[i + 1 :]:
+            both_real = abs(p.imag) + abs(q.imag) < REAL * abs(p)
+            conjugate = abs(p - q.conjugate()) < REAL * abs(p)
+            if both_real or conjugate:
+                distance = abs((p + q) / 2 - center) + 0.1 * abs(p - q)
+                if best is None or distance < best[0]:
+                    best = (distance, p, q)
+    if best is None:
+        raise ConvergenceError(f"No pair of eigenvalues near {center:.6g} at load {load:.8g}: use a smaller range.")
+    p, q = best[1], best[2]
+    return float((((p - q) / 2) ** 2).real), float(((p + q) / 2).real)
+
+
+def locate_flutter(
+    f: Callable[[float, float], tuple[float, float]], load: float, width: float, center: float
+) -> tuple[float, float, float]:
+    """Load at which the discriminant ``f(load, center)`` vanishes, its uncertainty, and the double eigenvalue there.
+
+    Chebyshev interpolation on a piece that is moved to the zero and shrunk until two degrees agree.
+    """
+    half, best = width, (load, np.inf, center)
+    for _ in range(12):
+        t = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
+        values = []
+        for node in load + half * t:
+            values.append(f(float(node), center))
+        d, mean = np.array([v[0] for v in values]), np.array([v[1] for v in values])
+        roots = []
+        for degree in (5, 4):
+            r = chebyshev.chebroots(chebyshev.chebfit(t, d, degree))
+            r = r[abs(r.imag) < 1e-6].real
+            roots.append(float(r[np.argmin(abs(r))]) if len(r) else np.nan)
+        if not np.isfinite(roots[0]) or abs(roots[0]) > 2:
+            slope = (d[-1] - d[0]) / (2 * half)
+            load += float(np.clip(-(d[0] + d[-1]) / 2 / slope, -2 * half, 2 * half))
+            continue
+        load += half * roots[0]
+        center = float(chebyshev.chebval(roots[0], chebyshev.chebfit(t, mean, 5)))
+        uncertainty = max(half * abs(roots[0] - roots[1]) if np.isfinite(roots[1]) else np.inf, 1e-12 * abs(load))
+        if abs(roots[0]) < 1 and uncertainty < best[1]:
+            best = (load, uncertainty, center)
+        elif best[1] < np.inf:
+            break
+        if best[1] < 1e-11 * abs(load):
+            break
+        half /= 4
+    if not np.isfinite(best[1]):
+        raise ConvergenceError(f"The flutter load near {load:.6g} could not be located: use a smaller range.")
+    return best
