@@ -22,6 +22,7 @@ from rodfem.branch import Branch, Special
 from rodfem.clock import Clock
 from rodfem.continuation import Equilibria
 from rodfem.errors import SceneError
+from rodfem.scene import Scene
 from rodfem.system import System
 
 COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error")
@@ -42,6 +43,7 @@ def as_data(branches: Sequence[Branch], system: System, clock: Clock, span: tupl
         "ordinate_label": scene.ordinate.label or scene.ordinate.name,
         "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
         "range": list(span),
+        "clamped": _clamped(scene),
         "discretization": {
             "formulation": d.formulation,
             "elements": d.elements,
@@ -62,6 +64,12 @@ def as_data(branches: Sequence[Branch], system: System, clock: Clock, span: tupl
             "ranks": system.comm.size,
         },
     }
+
+
+def _clamped(scene: Scene) -> str:
+    """Say which ends hold the directors, for the picture: both, start, end or none."""
+    left, right = (end.rotation is not None for end in scene.ends)
+    return {(True, True): "both", (True, False): "start", (False, True): "end"}.get((left, right), "none")
 
 
 def _branch_data(branch: Branch) -> dict[str, Any]:

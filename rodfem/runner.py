@@ -107,21 +107,24 @@ def _draw(output: Path, report: Report) -> None:
     draw_diagram(data, output / "diagram.png")
     branch, row, words = typical_state(data)
     caption = f"{data['title']}, {branch}, {GREEK.get(data['parameter_label'], data['parameter'])} = {words}"
-    trouble = draw_shape_safely(output / "states.h5", branch, row, output / "shape.png", caption=caption)
+    picture = output / "shape.png"
+    trouble = draw_shape_safely(output / "states.h5", branch, row, picture, caption=caption, clamped=data["clamped"])
     report.say(f"Pictures in {output}{os.sep}: diagram.png" + ("" if trouble else ", shape.png"))
     if trouble:
         report.say(trouble)
 
 
 def typical_state(data: dict) -> tuple[str, int, str]:
-    """Branch, row and words of the state to draw: the stable one with the largest ordinate, else an unstable one."""
-    best: tuple[float, str, int, str] | None = None
+    """Branch, row and words of the state to draw: stable, on a branch that leaves the first, of large ordinate."""
+    first = data["branches"][0]["name"]
+    best: tuple[tuple[bool, bool, float], str, int, str] | None = None
     for branch in data["branches"]:
         columns = branch["columns"]
-        for row, (load, ordinate, negative) in enumerate(
+        near = branch["parent"] is not None and branch["parent"][0] == first
+        for row, (load, x, negative) in enumerate(
             zip(columns["load"], columns["ordinate"], columns["negative"], strict=True)
         ):
-            score = abs(ordinate) + (1e6 if negative == 0 else 0.0)
+            score = (negative == 0, near, abs(x))
             if best is None or score > best[0]:
                 best = (score, branch["name"], row, f"{load:.4g}, {'stable' if negative == 0 else f'index {negative}'}")
     if best is None:
