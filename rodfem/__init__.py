@@ -26,6 +26,7 @@ _HOMES = {
     "Ordinate": "scene",
     "clamped": "scene",
     "free": "scene",
+    "Inertia": "scene",
     "Discretization": "fields",
     "Plan": "explore",
     "Steps": "continuation",

@@ -115,16 +115,17 @@ def _draw(output: Path, report: Report) -> None:
 
 
 def typical_state(data: dict) -> tuple[str, int, str]:
-    """Branch, row and words of the state to draw: stable, on a branch that leaves the first, of large ordinate."""
+    """Branch, row and words of the state to draw: stable, on a branch that leaves the first, well away from it."""
     first = data["branches"][0]["name"]
     best: tuple[tuple[bool, bool, float], str, int, str] | None = None
     for branch in data["branches"]:
         columns = branch["columns"]
         near = branch["parent"] is not None and branch["parent"][0] == first
+        typical = 0.7 * max(map(abs, columns["ordinate"]))
         for row, (load, x, negative) in enumerate(
             zip(columns["load"], columns["ordinate"], columns["negative"], strict=True)
         ):
-            score = (negative == 0, near, abs(x))
+            score = (negative == 0, near, -abs(abs(x) - typical) / max(typical, 1e-12))
             if best is None or score > best[0]:
                 best = (score, branch["name"], row, f"{load:.4g}, {'stable' if negative == 0 else f'index {negative}'}")
     if best is None:
