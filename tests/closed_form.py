@@ -45,8 +45,8 @@ def loads(A: float, B: float, C: float, half: float, below: float = 0.95) -> lis
 def spectrum(lam: float, A: float, B: float, C: float, half: float, degree: int = 30) -> np.ndarray:
     """Eigenvalues of the second variation of the straight rod relative to the integral of its squared rotation.
 
-    Those of rotations across the axis, each twice, by Ritz's method with the polynomials (1 - x^2) P_j(x); those of twist
-    with the stretch that follows it are known: (B - A^2/10) (m pi/(2 half))^2.
+    Those of rotations across the axis, each twice, by Ritz's method with the polynomials (1 - x^2) P_j(x); those of
+    twist with the stretch that follows it are known: (B - A^2/10) (m pi/(2 half))^2.
     """
     x, weights = legendre.leggauss(degree + 4)
     shapes = [legendre.legmul([2 / 3, 0, -2 / 3], row) for row in np.eye(degree)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 import sys
 from argparse import Namespace
 from functools import cache
@@ -34,6 +35,15 @@ def demo() -> ModuleType:
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
+
+
+def run_demo(*arguments: str) -> None:
+    """Run the demo as its command line does, in this process and on all ranks."""
+    given, sys.argv = sys.argv, [str(DEMO), *arguments]
+    try:
+        runpy.run_path(str(DEMO), run_name="__main__")
+    finally:
+        sys.argv = given
 
 
 @cache
