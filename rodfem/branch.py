@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from petsc4py import PETSc
-
-if TYPE_CHECKING:
-    from rodfem.pitchfork import Law
 
 FOLD, BRANCH_POINT, FLUTTER, USER, END = "fold", "branch point", "flutter", "user", "end"
 
@@ -35,6 +31,31 @@ class Point:
     error: float
     spectrum: list[float] = field(default_factory=list)
     omega2: list[list[float]] = field(default_factory=list)
+
+
+@dataclass
+class Law:
+    """``load = load_b + coefficient x^power + ...``, the uncertainty of the coefficient, and the kind of bifurcation.
+
+    ``side`` is the sign of the load's change on the bifurcating branch.
+    """
+
+    kind: str
+    coefficient: float
+    power: int
+    uncertainty: float
+    side: int
+
+    def __str__(self) -> str:
+        """Return the law in words."""
+        x = "x" if self.power == 1 else f"x^{self.power}"
+        return f"{self.kind}, load = load_b {self.coefficient:+.6g} {x} + ... (+-{self.uncertainty:.0e})"
+
+    def judge(self, index_below: int, index_above: int) -> None:
+        """Name a pitchfork by the index of the branch that it leaves at loads just below and just above."""
+        if self.kind == "pitchfork":
+            there, here = (index_above, index_below) if self.side > 0 else (index_below, index_above)
+            self.kind = "supercritical pitchfork" if there > here else "subcritical pitchfork"
 
 
 @dataclass

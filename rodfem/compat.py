@@ -19,6 +19,7 @@ try:
     import dolfinx
     import dolfinx.fem.petsc
     import dolfinx.mesh
+    import ffcx.compiler
     import ufl
     from dolfinx import fem
 except ModuleNotFoundError as missing:
@@ -131,22 +132,25 @@ def compile_forms(forms: Sequence[Any]) -> list[Any]:
 @contextmanager
 def announce_compilation(say: Callable[[], None]) -> Iterator[None]:
     """Call ``say`` once if forms are compiled inside the block; keep the compilers' own chatter off the terminal."""
+    compile_objects = ffcx.compiler.compile_ufl_objects
     said: list[bool] = []
 
-    def silence(record: logging.LogRecord) -> bool:
-        if "Compiler stage 1" in record.getMessage() and not said:
+    def compile_aloud(*arguments: Any, **options: Any) -> Any:
+        if not said:
             said.append(True)
             say()
-        return False
+        return compile_objects(*arguments, **options)
 
-    loggers = [logging.getLogger("ffcx"), logging.getLogger()]
-    levels = [log.level for log in loggers]
-    loggers[0].setLevel(logging.INFO)
-    for log in loggers:
-        log.addFilter(silence)
+    def silent(record: logging.LogRecord) -> bool:
+        return record.levelno > logging.INFO
+
+    root = logging.getLogger()
+    level = root.level
+    root.addFilter(silent)
+    ffcx.compiler.compile_ufl_objects = compile_aloud
     try:
         yield
     finally:
-        for log, level in zip(loggers, levels, strict=True):
-            log.removeFilter(silence)
-            log.setLevel(level)
+        ffcx.compiler.compile_ufl_objects = compile_objects
+        root.removeFilter(silent)
+        root.setLevel(level)

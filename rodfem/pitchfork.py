@@ -8,42 +8,15 @@ that it leaves is higher, else subcritical.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.branch import Special
+from rodfem.branch import Law, Special
 from rodfem.continuation import Follower
 from rodfem.newton import correct
 
 AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 """Amplitudes, in the metric, at which the branch is solved: the positive half of eight Chebyshev nodes."""
-
-
-@dataclass
-class Law:
-    """``load = load_b + coefficient x^power + ...``, the uncertainty of the coefficient, and the kind of bifurcation.
-
-    ``side`` is the sign of the load's change on the bifurcating branch.
-    """
-
-    kind: str
-    coefficient: float
-    power: int
-    uncertainty: float
-    side: int
-
-    def __str__(self) -> str:
-        """Return the law in words."""
-        x = "x" if self.power == 1 else f"x^{self.power}"
-        return f"{self.kind}, load = load_b {self.coefficient:+.6g} {x} + ... (+-{self.uncertainty:.0e})"
-
-    def judge(self, index_below: int, index_above: int) -> None:
-        """Name a pitchfork by the index of the branch that it leaves at loads just below and just above."""
-        if self.kind == "pitchfork":
-            there, here = (index_above, index_below) if self.side > 0 else (index_below, index_above)
-            self.kind = "supercritical pitchfork" if there > here else "subcritical pitchfork"
 
 
 def law_of(follower: Follower, special: Special, direction: PETSc.Vec) -> Law | None:
