@@ -106,7 +106,6 @@ def test_newton_converges_quadratically() -> None:
     assert np.log(sizes[3] / sizes[2]) / np.log(sizes[2] / sizes[1]) == pytest.approx(2, abs=0.2)
 
 
-@pytest.mark.short
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_restart_on_another_discretisation(formulation: str, folder: Path) -> None:
     """A saved state starts Newton's method on other elements of another degree, and it lands on the exact state."""
