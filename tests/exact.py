@@ -1,0 +1,68 @@
+"""Closed forms for the cord and for the rod under a follower load."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+from scipy.optimize import brentq, fsolve
+
+
+def waves(number: int = 6) -> list[float]:
+    """Zeros of sin(w/2) (tan(w/2) - w/2) in ascending order, without 0."""
+    across = [brentq(lambda x: x * np.cos(x) - np.sin(x), n * pi, (n + 0.5) * pi) for n in range(1, number)]
+    return sorted([2 * pi * n for n in range(1, number)] + [2 * x for x in across])
+
+
+def tensions(turns: float) -> list[float]:
+    """Loads at which the straight state bifurcates: into space, and (compressed only) in the plane of the coil."""
+    return sorted([(2 * pi * turns) ** 2 - w**2 for w in waves()] + [-(w**2) for w in waves()], reverse=True)
+
+
+def coil(lam: float, turns: float = 1.5, loops: int = 2) -> tuple[float, float, float]:
+    """Ordinate, energy and k2(0) of the planar state in which the rod makes so many loops about d2: a pendulum."""
+    k0 = 2 * pi * turns
+    angle = 2 * pi * np.arange(4000) / 4000
+    weight = 2 * pi / 4000
+
+    def speed(c: float) -> np.ndarray:  # theta'^2 / 2 + lam cos theta is constant
+        return np.sqrt(c + 2 * abs(lam) - 2 * lam * np.cos(angle))
+
+    c = brentq(lambda c: (weight / speed(c)).sum() - 1 / loops, 1e-3, 1e5, xtol=1e-12, rtol=1e-14)
+    k = speed(c)
+    energy = loops * weight * k.sum() / 2 - k0 * 2 * pi * loops + k0**2 / 2
+    return 1 - loops * weight * (np.cos(angle) / k).sum(), float(energy), float(k[0])
+
+
+def beck(mu: complex, P: float, EI: float = 1.0, J: float = 0.0) -> complex:
+    """Zero at the eigenvalues: ``EI w'''' + (P + J mu) w'' = mu w``, ``w'' = EI w''' + J mu w' = 0`` at s = 1."""
+    half = (P + J * mu) / (2 * EI)
+    root = np.sqrt(half**2 + mu / EI + 0j)
+    a, b = np.sqrt(root - half), np.sqrt(root + half)
+    # w = A (cosh as - cos bs) + B (sinh(as)/a - sin(bs)/b) is clamped at s = 0
+    bending = a * a * np.cosh(a) + b * b * np.cos(b), a * np.sinh(a) + b * np.sin(b)
+    slope = a * np.sinh(a) + b * np.sin(b), np.cosh(a) - np.cos(b)
+    shear = a**3 * np.sinh(a) - b**3 * np.sin(b), a * a * np.cosh(a) + b * b * np.cos(b)
+    force = [EI * s + J * mu * t for s, t in zip(shear, slope, strict=True)]
+    return complex(bending[0] * force[1] - bending[1] * force[0])
+
+
+def column(near: complex, P: float, EI: float = 1.0, J: float = 0.0) -> complex:
+    """Eigenvalue of Beck's column close to ``near``, nan where the secant method finds none."""
+    a, b = complex(near), complex(near) * (1 + 1e-5) + 1e-6
+    fa, fb = beck(a, P, EI, J), beck(b, P, EI, J)
+    for _ in range(40):
+        if fa == fb or abs(b - a) < 1e-13 * abs(b):
+            return b
+        a, b, fa = b, b - fb * (b - a) / (fb - fa), fb
+        fb = beck(b, P, EI, J)
+    return complex("nan")
+
+
+def double(P: float, mu: float, J: float = 0.0) -> np.ndarray:
+    """Load and eigenvalue at which two eigenvalues of the column meet."""
+
+    def equations(z: np.ndarray) -> list[float]:
+        return [beck(z[1], z[0], 1.0, J).real, beck(complex(z[1], 1e-20), z[0], 1.0, J).imag / 1e-20]
+
+    return fsolve(equations, [P, mu], xtol=1e-13)

@@ -1,0 +1,84 @@
+"""The other demos' scenes with any constants, explored once for each discretisation."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from rodfem.branch import Branch, Point
+from rodfem.continuation import Follower
+from rodfem.explore import Explorer, Plan
+from rodfem.fields import Discretization
+from rodfem.report import Report
+from rodfem.scene import Scene
+from rodfem.system import System
+
+DEFAULTS: dict[str, dict[str, Any]] = {
+    "cord": {"turns": 1.5, "span": (60.0, 0.0)},
+    "ruler": {
+        "direction": "e1",
+        "stretching": 20.0,
+        "bending": (1.0, 10.0),
+        "twisting": 1.0,
+        "span": (0.0, 12.0),
+    },
+    "follower": {"stiffness": (1.0, 10.0, 1.0), "mass": 1.0, "rotary_inertia": (0.0, 0.0, 0.0), "span": (0.0, 25.0)},
+}
+
+
+@cache
+def module(name: str) -> ModuleType:
+    """A demo as a module (it is a script, in no package)."""
+    spec = spec_from_file_location(f"{name}_demo", Path(__file__).parents[1] / "demos" / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    found = module_from_spec(spec)
+    spec.loader.exec_module(found)
+    return found
+
+
+def scene(name: str, **constants: Any) -> Scene:
+    """The scene of a demo with its default constants, or others."""
+    return module(name).scene(Namespace(**DEFAULTS[name] | constants))
+
+
+class Found:
+    """Branches of a demo, their follower and scene."""
+
+    def __init__(self, scene: Scene, discretization: Discretization, depth: int, at: tuple[float, ...]) -> None:
+        """Explore the scene over its own span."""
+        self.scene, self.follower = scene, Follower(System(scene, discretization))
+        plan = Plan(scene.span, at=at, depth=depth)
+        self.branches = Explorer(self.follower, plan, Report(quiet=True), lambda: None).run()
+
+    def __getitem__(self, name: str) -> Branch:
+        """Branch of that name."""
+        (branch,) = [b for b in self.branches if b.name == name]
+        return branch
+
+    def start_of_rod(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
+        """Contact force (nan where it is known) and strains ``k`` at s = 0, where the directors are e1, e2, e3."""
+        sample = self.follower.shape.sample(point.x)
+        nodes = self.follower.system.fields.discretization.degree + 1
+        s, q = sample["s"][:nodes], sample["q"][:nodes]
+        k = [2 * np.polyder(np.polyfit(s, q[:, i], nodes - 1))[-1] for i in (1, 2, 3)]
+        return np.array([sample.get(f"n{i}", np.nan) for i in (1, 2, 3)]), np.array(k)
+
+
+@cache
+def explored(
+    name: str,
+    formulation: str = "reduced",
+    elements: int = 8,
+    degree: int = 6,
+    depth: int = 2,
+    at: tuple[float, ...] = (),
+    **constants: Any,
+) -> Found:
+    """Explore a demo, once for each set of arguments."""
+    return Found(scene(name, **constants), Discretization(formulation, elements, degree), depth, at)
