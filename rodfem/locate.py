@@ -99,38 +99,43 @@ class Located:
 def interpolate(samples: list[Sample], zero_of: str, guess: float) -> Located | None:
     """Zero of ``mu`` or of the load's slope by Chebyshev interpolation; None where it is not near the piece.
 
-    The uncertainty of the load compares the full interpolation with one that is a degree lower, and adds what the
-    solver's tolerance leaves open.
+    The uncertainty of the load is what the last coefficients of the two interpolants can contribute at the zero, and at
+    least what the solver's tolerance leaves open.
     """
     s = np.array([p.s for p in samples])
     middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
     t = (s - middle) / half
     loads, values = np.array([p.load for p in samples]), np.array([p.mu for p in samples])
-    found = []
-    for degree in (len(s) - 1, len(s) - 2):
-        load = chebyshev.chebfit(t, loads - loads[0], degree)
-        f = chebyshev.chebfit(t, values, degree) if zero_of == "mu" else chebyshev.chebder(load)
-        roots = chebyshev.chebroots(f)
-        real = roots[abs(roots.imag) < 1e-6].real
-        real = real[abs(real) <= 1.5]
-        if not len(real):
-            return None
-        root = float(real[np.argmin(abs(real - (guess - middle) / half))])
-        found.append(
-            (
-                root,
-                float(chebyshev.chebval(root, load)) + loads[0],
-                float(chebyshev.chebval(root, chebyshev.chebder(load))) / half,
-            )
-        )
-    (root, load_at, slope), (_, other, _) = found
+    load = chebyshev.chebfit(t, loads - loads[0], len(t) - 1)
+    slope = chebyshev.chebder(load)
+    f = chebyshev.chebfit(t, values, len(t) - 1) if zero_of == "mu" else slope
+    root = real_root(f, (guess - middle) / half)
+    if root is None:
+        return None
+    load_at = float(chebyshev.chebval(root, load)) + loads[0]
+    slope_at = float(chebyshev.chebval(root, slope))
+    tail = abs(load[-1]) + abs(slope_at) * zero_uncertainty(f, root)
+    uncertainty = max(tail, ROUND_OFF * max(1.0, abs(load_at)))
     weights, slopes = _barycentric(t, root)
     states = [p.x for p in samples]
     x, tangent = combine(states, weights), combine(states, slopes / half)
     before = [p.below for p in samples if p.s < middle + half * root] or [samples[0].below]
     after = [p.below for p in samples if p.s >= middle + half * root] or [samples[-1].below]
-    uncertainty = max(abs(load_at - other), ROUND_OFF * max(1.0, abs(load_at)))
-    return Located(middle + half * root, x, tangent, load_at, slope, uncertainty, before[-1], after[0])
+    return Located(middle + half * root, x, tangent, load_at, slope_at / half, uncertainty, before[-1], after[0])
+
+
+def real_root(series: np.ndarray, guess: float) -> float | None:
+    """Real zero nearest to ``guess`` of a Chebyshev series on [-1, 1], or a little outside; None without one."""
+    roots = chebyshev.chebroots(series)
+    real = roots[abs(roots.imag) < 1e-6].real
+    real = real[abs(real) <= 1.5]
+    return float(real[np.argmin(abs(real - guess))]) if len(real) else None
+
+
+def zero_uncertainty(series: np.ndarray, root: float) -> float:
+    """How far the last coefficient of a Chebyshev series can move its ``root``."""
+    slope = float(chebyshev.chebval(root, chebyshev.chebder(series)))
+    return float(abs(series[-1] / slope)) if slope else float("inf")
 
 
 def _barycentric(nodes: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
@@ -138,9 +143,8 @@ def _barycentric(nodes: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
     degree = len(nodes) - 1
     inverse = np.linalg.inv(chebyshev.chebvander(nodes, degree))
     derivative = chebyshev.chebder(np.eye(degree + 1), axis=0)
-    return chebyshev.chebvander(np.array([t]), degree)[0] @ inverse, chebyshev.chebvander(np.array([t]), degree - 1)[
-        0
-    ] @ derivative @ inverse
+    value, slope = (chebyshev.chebvander(np.array([t]), d)[0] for d in (degree, degree - 1))
+    return value @ inverse, slope @ derivative @ inverse
 
 
 def refine(follower: Follower, curve: Curve, center: float, half: float, mode: PETSc.Vec, zero_of: str) -> Located:

@@ -22,6 +22,7 @@ from rodfem.branch import END, FLUTTER, USER, Branch, Point, Special
 from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError
 from rodfem.explore import Plan
+from rodfem.locate import real_root, zero_uncertainty
 from rodfem.report import Report
 from rodfem.stability.vibration import Frequencies, Vibration
 from rodfem.system import System
@@ -194,7 +195,8 @@ def locate_flutter(
 ) -> tuple[float, float, float]:
     """Load at which the discriminant ``f(load, center)`` vanishes, its uncertainty, and the double eigenvalue there.
 
-    Chebyshev interpolation on a piece that is moved to the zero and shrunk until two degrees agree.
+    Chebyshev interpolation on a piece that is moved to the zero and shrunk until the last coefficient says that
+    it is sharp.
     """
     half, best = width, (load, np.inf, center)
     for _ in range(12):
@@ -203,19 +205,16 @@ def locate_flutter(
         for node in load + half * t:
             values.append(f(float(node), center))
         d, mean = np.array([v[0] for v in values]), np.array([v[1] for v in values])
-        roots = []
-        for degree in (5, 4):
-            r = chebyshev.chebroots(chebyshev.chebfit(t, d, degree))
-            r = r[abs(r.imag) < 1e-6].real
-            roots.append(float(r[np.argmin(abs(r))]) if len(r) else np.nan)
-        if not np.isfinite(roots[0]) or abs(roots[0]) > 2:
+        series = chebyshev.chebfit(t, d, 5)
+        root = real_root(series, 0.0)
+        if root is None:
             slope = (d[-1] - d[0]) / (2 * half)
             load += float(np.clip(-(d[0] + d[-1]) / 2 / slope, -2 * half, 2 * half))
             continue
-        load += half * roots[0]
-        center = float(chebyshev.chebval(roots[0], chebyshev.chebfit(t, mean, 5)))
-        uncertainty = max(half * abs(roots[0] - roots[1]) if np.isfinite(roots[1]) else np.inf, 1e-12 * abs(load))
-        if abs(roots[0]) < 1 and uncertainty < best[1]:
+        load += half * root
+        center = float(chebyshev.chebval(root, chebyshev.chebfit(t, mean, 5)))
+        uncertainty = max(half * zero_uncertainty(series, root), 1e-12 * abs(load))
+        if abs(root) < 1 and uncertainty < best[1]:
             best = (load, uncertainty, center)
         elif best[1] < np.inf:
             break
