@@ -13,13 +13,10 @@ from rodfem.fields import Discretization
 from rodfem.report import Report
 from rodfem.system import System
 
-pytestmark = [
-    pytest.mark.short,
-    pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one"),
-]
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one")
 
 
-@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+@pytest.mark.parametrize("formulation", [pytest.param("reduced", marks=pytest.mark.short), "pointwise"])
 def test_ranks_change_nothing(formulation: str) -> None:
     together = explored(formulation, 7, 3)
     shared = follower(formulation, 7, 3)
