@@ -8,6 +8,8 @@ and ``F_lam`` the derivative of the equations in the load, ``phi . F_lam != 0`` 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from petsc4py import PETSc
 
 from rodfem.branch import BRANCH_POINT, FOLD, Branch, Point, Special
@@ -161,19 +163,5 @@ def start_branch(
     first = leave(follower, special, direction, 0.05)
     if first is None:
         return None
-    p = special.point
-    origin = Point(
-        p.x,
-        direction,
-        0.0,
-        p.load,
-        p.ordinate,
-        p.energy,
-        p.stretch,
-        p.negative,
-        p.zero,
-        follower.system.scalar(direction),
-        p.drift,
-        p.error,
-    )
+    origin = replace(special.point, tangent=direction, arclength=0.0, slope=follower.system.scalar(direction))
     return Branch(name, parent, depth, [origin, first])

@@ -54,6 +54,10 @@ class Inertia:
         """Allocate the matrix and its LDL^t factors once."""
         self.system = system
         self.matrix = system.state_matrix()
+        self.metric = system.metric.copy()
+        if system.has_scalars:  # the load is no part of a perturbation
+            self.metric.setValue(system.load_index, system.load_index, 0.0)
+        self.metric.assemble()
         self.factors = inertia_factorizer(system.comm)
         self.constraints = system.fields.constraints()
         length = system.scene.length
@@ -84,7 +88,7 @@ class Inertia:
     def below(self, sigma: float) -> int:
         """Number of eigenvalues below ``sigma`` at the state last assembled; symmetry modes not counted."""
         with self.system.clock("stability"):
-            self.matrix.axpy(self.shift - sigma, self.system.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            self.matrix.axpy(self.shift - sigma, self.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
             self.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
             self.shift = sigma
             negative, zero, _ = self.factors(self.matrix).getInertia()
@@ -111,7 +115,7 @@ class Inertia:
         less than ``accuracy`` relative to themselves (or by what the arithmetic resolves).  The block has
         ``spare`` more vectors.
         """
-        metric, block = self.system.metric, number + spare
+        metric, block = self.metric, number + spare
         while len(self._vectors) < block:
             self._vectors.append(self._seed(len(self._vectors)))
         del self._vectors[block:]
@@ -142,7 +146,7 @@ class Inertia:
     def response(self, mode: PETSc.Vec) -> float:
         """Return ``1 / (mode . M S^-1 M mode)`` for a vector of metric norm 1: that of an eigenvector."""
         with self.system.clock("stability"):
-            image = self.system.metric * mode
+            image = self.metric * mode
             self.factors.ksp.solve(image, self.system.workspace)
             return 1.0 / image.dot(self.system.workspace) + self.shift
 
