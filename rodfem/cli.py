@@ -148,7 +148,10 @@ def main(parser: Parser, scene_of: Callable[[argparse.Namespace], Any], argument
         plan = Plan(span, at=tuple(options.at), spectrum=options.spectrum)
         run(scene, discretization, plan, options.output, figures=options.figures)
     except KeyboardInterrupt:
-        sys.stderr.write(f"\ninterrupted; the branches that were finished are in {options.output}\n")
+        from mpi4py import MPI
+
+        if MPI.COMM_WORLD.rank == 0:
+            sys.stderr.write(f"\ninterrupted; the branches that were finished are in {options.output}\n")
         sys.exit(130)
     except (SceneError, EnvironmentTrouble, SymmetryError, ConvergenceError) as trouble:
         complain(str(trouble))

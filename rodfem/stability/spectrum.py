@@ -107,8 +107,7 @@ class Spectrum:
         if found < number:
             solver.destroy()
             raise ConvergenceError(
-                f"SLEPc found {found} of the {number} eigenvalues asked for: ask for fewer, "
-                "or give -rodfem_eps_ncv 60 after a --."
+                f"SLEPc found {found} of the {number} eigenvalues asked for: ask for at most {found} at this discretisation."
             )
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
         order = np.argsort(values)

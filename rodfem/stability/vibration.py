@@ -132,7 +132,7 @@ class Vibration:
         if found < number:
             solver.destroy()
             raise ConvergenceError(
-                f"SLEPc found {found} of {number} eigenvalues: ask for fewer, or give -rodfem_eps_ncv 60 after a --."
+                f"SLEPc found {found} of {number} eigenvalues: ask for at most {found} at this discretisation."
             )
         return int(found)
 
