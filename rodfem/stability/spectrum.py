@@ -107,7 +107,8 @@ class Spectrum:
         if found < number:
             solver.destroy()
             raise ConvergenceError(
-                f"SLEPc found {found} of the {number} eigenvalues asked for: ask for at most {found} at this discretisation."
+                f"SLEPc found {found} of the {number} eigenvalues asked for: "
+                f"ask for at most {found} at this discretisation."
             )
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
         order = np.argsort(values)
