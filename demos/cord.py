@@ -15,7 +15,7 @@ Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section
 """
 
 from argparse import Namespace
-from math import pi
+from math import ceil, isfinite, pi
 
 import rodfem.cli as cli
 from forms.energy import bending
@@ -48,8 +48,15 @@ def scene(options: Namespace) -> Scene:
     )
 
 
+def elements(options: Namespace) -> int:
+    """Six elements for each turn that the cord would like to make."""
+    return max(ceil(6 * options.turns), 6) if isfinite(options.turns) else 6
+
+
 if __name__ == "__main__":
-    parser = cli.parser_for("cord", __doc__, load="lam", span=(60.0, 0.0), elements=8, degree=6)
+    parser = cli.parser_for("cord", __doc__, load="lam", span=(60.0, 0.0), elements=9, degree=6)
     constants = parser.add_argument_group("constants of the rod")
-    constants.add_argument("--turns", type=float, default=1.5, metavar="N", help="k0 = 2 pi N (default 1.5)")
-    cli.main(parser, scene)
+    constants.add_argument(
+        "--turns", type=float, default=1.5, metavar="N", help="k0 = 2 pi N (default 1.5); six elements for each turn"
+    )
+    cli.main(parser, scene, elements=elements)

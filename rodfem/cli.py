@@ -125,11 +125,21 @@ def parser_for(
     return parser
 
 
-def main(parser: Parser, scene_of: Callable[[argparse.Namespace], Any], arguments: Sequence[str] | None = None) -> None:
-    """Parse the command line, build the scene, run it; bad input ends with one sentence and status 2."""
+def main(
+    parser: Parser,
+    scene_of: Callable[[argparse.Namespace], Any],
+    arguments: Sequence[str] | None = None,
+    elements: Callable[[argparse.Namespace], int] | None = None,
+) -> None:
+    """Parse the command line, build the scene, run it; bad input ends with one sentence and status 2.
+
+    ``elements`` gives the number of elements that the other options call for, where the user gives none.
+    """
     given = list(sys.argv[1:] if arguments is None else arguments)
     ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
     options = parser.parse_args(ours)
+    if elements is not None and not any(word.startswith("--elements") for word in ours):
+        options.elements = elements(options)
     try:
         import petsc4py
 

@@ -23,7 +23,7 @@ def number(value: float, error: float) -> str:
     digits = 0
     while 10.0 ** (-digits) > error and digits < 13:
         digits += 1
-    return f"{value:.{digits}f} ({error:.0e})"
+    return f"{round(value, digits) + 0.0:.{digits}f} ({error:.0e})"
 
 
 def _index(special: Special) -> str:
