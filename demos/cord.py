@@ -50,7 +50,7 @@ def scene(options: Namespace) -> Scene:
 
 def elements(options: Namespace) -> int:
     """Six elements for each turn that the cord would like to make."""
-    return max(ceil(6 * options.turns), 6) if isfinite(options.turns) else 6
+    return min(max(ceil(6 * abs(options.turns)), 6), 600) if isfinite(options.turns) else 6
 
 
 if __name__ == "__main__":

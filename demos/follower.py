@@ -15,10 +15,11 @@ Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section
 """
 
 from argparse import Namespace
-from math import hypot
+from math import hypot, inf
 
 import rodfem.cli as cli
 from forms.energy import bending
+from rodfem.errors import SceneError
 from rodfem.scene import Inertia, Ordinate, Parameter, Scene, clamped, free
 
 
@@ -26,6 +27,8 @@ def scene(options: Namespace) -> Scene:
     """State the problem: what the rod is made of, how its ends are held, how it moves, and what to look at."""
     b1, b2, b3 = options.stiffness
     j1, j2, j3 = options.rotary_inertia
+    if min(j1, j2, j3) < 0:
+        raise SceneError(f"A rotary inertia of {min(j1, j2, j3):g} is negative: give zero or more.")
 
     def energy(v, k, c):
         return bending(k, (c.B1, c.B2, c.B3))
@@ -41,7 +44,7 @@ def scene(options: Namespace) -> Scene:
             "B1": Parameter(b1),
             "B2": Parameter(b2),
             "B3": Parameter(b3),
-            "m": Parameter(options.mass),
+            "m": Parameter(options.mass, admissible=(0.0, inf)),
             "J1": Parameter(j1),
             "J2": Parameter(j2),
             "J3": Parameter(j3),

@@ -57,17 +57,25 @@ def find_special(follower: Follower, a: Point, b: Point) -> list[Special]:
     Crossings of the index that a fold does not explain are branch points, or further folds.
     """
     found: list[Special] = []
-    low, high = sorted((a.negative, b.negative))
-    crossing = list(range(low, high))
+    crossing = _crossing(follower, a, b)
+    low = min(a.negative, b.negative)
     if a.slope * b.slope < 0:
         found.append(_special(follower, a, b, low, "slope"))
-        if found[0].kind == FOLD and crossing:
-            del crossing[: found[0].multiplicity]
+        if found[0].kind == FOLD:
+            own = min(found[0].negative_before, found[0].negative_after)
+            crossing = [order for order in crossing if order != own]
     while crossing:
         special = _special(follower, a, b, crossing[0], "mu")
         found.append(special)
         del crossing[: special.multiplicity]
     return sorted(found, key=lambda s: s.point.arclength)
+
+
+def _crossing(follower: Follower, a: Point, b: Point) -> list[int]:
+    """Numbers of the eigenvalues that have changed sign from ``a`` to ``b``; one that is zero at either has not."""
+    drifts = follower.system.active_drifts()
+    (low_a, high_a), (low_b, high_b) = ((p.negative, p.negative + max(p.zero - drifts, 0)) for p in (a, b))
+    return list(range(high_a, low_b)) or list(range(high_b, low_a))
 
 
 def _special(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -> Special:
@@ -76,7 +84,7 @@ def _special(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -
     if not a.arclength - margin <= located.s <= b.arclength + margin:
         raise ConvergenceError(
             f"A special point between loads {a.load:.8g} and {b.load:.8g} slipped out of its bracket: "
-            "use smaller steps."
+            "use smaller steps (--step)."
         )
     special = special_at(follower, located, located.s)
     special.zero_of = zero_of
@@ -149,7 +157,7 @@ def leave(follower: Follower, special: Special, direction: PETSc.Vec, first: flo
         x = origin.copy()
         x.axpy(amplitude, direction)
         system.set_phase(x)
-        outcome = correct(system, x, row, reach=0.5 * amplitude)
+        outcome = correct(system, x, row, reach=2.0 * amplitude)
         if outcome.converged:
             return follower.point(x, distance(system, origin, x), follower.tangent(row, at=x), outcome)
         amplitude /= 2

@@ -107,6 +107,13 @@ def parser_for(
         help=f"compute every branch also at exactly these values of {load}",
     )
     group.add_argument(
+        "--step",
+        type=float,
+        default=0.05,
+        metavar="S",
+        help="largest step along a branch, in radian of rotation (root mean square; default 0.05)",
+    )
+    group.add_argument(
         "--spectrum",
         type=int,
         default=0,
@@ -140,12 +147,13 @@ def main(
     options = parser.parse_args(ours)
     if elements is not None and not any(word.startswith("--elements") for word in ours):
         options.elements = elements(options)
+    import petsc4py
+
+    petsc4py.init(["rodfem", *petsc])  # before PETSc is loaded, for options that it reads only then (-log_view)
+    from petsc4py import PETSc
+
     try:
-        import petsc4py
-
-        petsc4py.init(["rodfem", *petsc])  # before PETSc is loaded, for options that it reads only then (-log_view)
-        from petsc4py import PETSc
-
+        from rodfem.continuation import Steps
         from rodfem.explore import Plan
         from rodfem.fields import Discretization
         from rodfem.runner import run
@@ -155,7 +163,7 @@ def main(
         discretization = Discretization(options.formulation, options.elements, options.degree)
         scene = scene_of(options)
         span = tuple(options.span)
-        plan = Plan(span, at=tuple(options.at), spectrum=options.spectrum)
+        plan = Plan(span, at=tuple(options.at), spectrum=options.spectrum, steps=Steps(largest=options.step))
         run(scene, discretization, plan, options.output, figures=options.figures)
     except KeyboardInterrupt:
         from mpi4py import MPI
@@ -165,3 +173,5 @@ def main(
         sys.exit(130)
     except (SceneError, EnvironmentTrouble, SymmetryError, ConvergenceError) as trouble:
         complain(str(trouble))
+    except PETSc.Error as trouble:
+        complain(f"PETSc gave up ({str(trouble).splitlines()[0]}): try other constants or another discretisation.")

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.branch import Point
-from rodfem.errors import ConvergenceError
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.newton import Outcome, correct
 from rodfem.shape import Shape
 from rodfem.stability.inertia import Index, Inertia, combine
@@ -41,6 +41,13 @@ class Steps:
     smallest: float = 1e-5
     aim: float = 2e-3
     most: int = 2000
+
+    def __post_init__(self) -> None:
+        """Check the largest step; raises :class:`SceneError`."""
+        if not self.smallest < self.largest <= 1:
+            raise SceneError(
+                f"A step of {self.largest:g} is out of bounds: choose more than {self.smallest:g}, at most 1."
+            )
 
 
 class Equilibria:
@@ -196,7 +203,7 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
     ``bounds`` are the least and the greatest load; the branch ends exactly on them.  The caller appends (and may
     insert) points in ``points``.  The direction is that of the last point's tangent.
     """
-    system, step = follower.system, steps.first
+    system, step = follower.system, min(steps.first, steps.largest)
     span = abs(system.scene.span[1] - system.scene.span[0])
     low, high = bounds
     while len(points) < steps.most:

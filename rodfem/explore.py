@@ -239,6 +239,8 @@ class Explorer:
                     special.switched = known.switched = True
                     if branch.parent == special.meets:
                         return "closed loop"
+                    if special.zero_of == "mu" and known.zero_of == "slope":
+                        return ""  # the branch on which the known one ended: it goes on
                     return f"meets {other.name} at {self.scene.load} = {special.point.load:.8g}"
         if special.zero_of == "slope":
             return f"meets another branch at {self.scene.load} = {special.point.load:.8g}"

@@ -55,6 +55,14 @@ def solve_at(follower: Follower, curve: Curve, s: float) -> PETSc.Vec:
     return x
 
 
+def solve_beside(follower: Follower, curve: Curve, s: float, aside: float) -> tuple[PETSc.Vec, float]:
+    """Solve at ``s``, or ``aside`` of it where ``s`` is the very point at which the bordered matrix is singular."""
+    try:
+        return solve_at(follower, curve, s), s
+    except ConvergenceError:
+        return solve_at(follower, curve, s + aside), s + aside
+
+
 def eigenvalue(follower: Follower, x: PETSc.Vec, order: int) -> tuple[float, PETSc.Vec]:
     """Eigenvalue number ``order`` (0 is the left-most) of the state ``x``, one of those near zero, and its vector."""
     below = follower.inertia.count(x).negative
@@ -67,7 +75,7 @@ def eigenvalue(follower: Follower, x: PETSc.Vec, order: int) -> tuple[float, PET
         if len(side) > position:
             chosen = side[np.argsort(abs(values[side]))[position]]
             return float(values[chosen]), vectors[chosen].copy()
-    raise ConvergenceError(f"Eigenvalue number {order} is not among those nearest zero; use smaller steps.")
+    raise ConvergenceError(f"Eigenvalue number {order} is not among those nearest zero; use smaller steps (--step).")
 
 
 def sample(follower: Follower, curve: Curve, s: float, mode: PETSc.Vec) -> Sample:
@@ -168,7 +176,9 @@ def refine(follower: Follower, curve: Curve, center: float, half: float, mode: P
             center = nodes[0] + float(np.clip(step, -4 * half, 6 * half))
     if best is not None:
         return best
-    raise ConvergenceError(f"A special point near load {samples[0].load:.8g} could not be located; use smaller steps.")
+    raise ConvergenceError(
+        f"A special point near load {samples[0].load:.8g} could not be located; use smaller steps (--step)."
+    )
 
 
 def _slopes(samples: list[Sample]) -> list[float]:
@@ -190,14 +200,14 @@ def locate(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -> 
         ends = a.arclength + 1e-3 * h, b.arclength - 1e-3 * h
 
         def mu(s: float) -> float:
-            return eigenvalue(follower, solve_at(follower, curve, s), order)[0]
+            return eigenvalue(follower, solve_beside(follower, curve, s, 1e-3 * h)[0], order)[0]
 
         left, right = mu(ends[0]), mu(ends[1])
         if left * right > 0:
             guess = ends[0] if abs(left) < abs(right) else ends[1]
         else:
             guess = float(brentq(mu, *ends, xtol=0.1 * min(WINDOW, h)))
-    x = solve_at(follower, curve, guess)
+    x, guess = solve_beside(follower, curve, guess, 1e-3 * h)
     if zero_of == "slope":
         follower.inertia.count(x)
         mode = follower.inertia.nearest(1, accuracy=1e-2)[1][0].copy()

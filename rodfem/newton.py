@@ -37,6 +37,8 @@ def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach:
     iteration = 0
     for iteration in range(1, most + 1):
         system.residual(x, equations)
+        if not isfinite(equations.norm()):  # outside of where the stored energy is defined
+            break
         fresh = refactor
         if fresh:
             system.factor(row)

@@ -53,7 +53,7 @@ def _near(
     x = p.x.copy()
     x.axpy(amplitude, direction)
     system.set_phase(x)
-    if not correct(system, x, row, reach=0.5 * abs(amplitude)).converged:
+    if not correct(system, x, row, reach=2.0 * abs(amplitude)).converged:
         return None
     return system.scalar(x) - p.load, follower.shape.ordinate(x) - p.ordinate
 

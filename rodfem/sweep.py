@@ -41,6 +41,7 @@ class Sweep:
         self.solver, self.plan, self.report, self.finished = solver, plan, report, finished
         self.vibration = Vibration(solver.system)
         self.number = plan.spectrum or 6
+        self.pairs: list[complex] = []
         self.branches: list[Branch] = []
 
     def run(self) -> list[Branch]:
@@ -54,9 +55,10 @@ class Sweep:
         x = self.solver.start(a)
         for load in loads if a < b else loads[::-1]:
             x = self._state(x, float(load))
-            point = self._point(x, branch.points[-1] if branch.points else None)
+            before = self.pairs
+            point = self._point(x)
             if branch.points:
-                self._between(branch, branch.points[-1], point)
+                self._between(branch, branch.points[-1], point, before, self.pairs)
             branch.points.append(point)
             if load in self.plan.at:
                 self._special(branch, Special(USER, point, point.negative, point.negative, 1e-12 * max(1.0, abs(load))))
@@ -85,9 +87,10 @@ class Sweep:
             )
         return x
 
-    def _point(self, x: PETSc.Vec, last: Point | None) -> Point:
+    def _point(self, x: PETSc.Vec) -> Point:
         solver, system = self.solver, self.solver.system
-        values = self._leftmost(x, last)
+        values = self._leftmost(x)
+        self.pairs = [complex(v) for v in values if v.imag > 0]
         energy = system.comm.allreduce(fem.assemble_scalar(system.equations.energy), op=MPI.SUM)
         unstable = Frequencies(values, np.zeros(0)).unstable(REAL * max(1.0, float(abs(values).min())))
         load = system.scalar(x)
@@ -104,28 +107,25 @@ class Sweep:
             slope=float("nan"),
             drift=0.0,
             error=0.0,
-            omega2=[[float(v.real), float(v.imag)] for v in values],
+            omega2=[[float(v.real), float(v.imag)] for v in values[: self.number]],
         )
 
-    def _leftmost(self, x: PETSc.Vec, last: Point | None) -> np.ndarray:
+    def _leftmost(self, x: PETSc.Vec) -> np.ndarray:
         """Left-most eigenvalues: those near the origin and, by a complex shift, those near the complex ones before."""
         self.vibration.assemble(x)
-        found = self.vibration.near(self.number + 4, 0.0 - 1e-3).values
-        for re, im in last.omega2 if last else []:
-            if im > 0:
-                more = self.vibration.near(2, complex(re, im) * (1 + 1e-4)).values
-                found = np.concatenate([found, more, more.conj()])
-        found = np.where(abs(found.imag) < REAL * abs(found), found.real, found)
-        kept: list[complex] = []
-        for value in sorted(found, key=lambda v: (round(v.real, 6), v.imag)):
-            if all(abs(value - other) > 1e-8 * max(1.0, abs(value)) for other in kept):
-                kept.append(value)
-        return np.array(kept[: self.number])
+        found = list(self.vibration.near(max(self.number, 6) + 6, 0.0 - 1e-3).values)
+        for pair in self.pairs:
+            for value in self.vibration.near(2, pair * (1 + 1e-4)).values:
+                for v in (value, value.conjugate()) if abs(value.imag) > REAL * abs(value) else (value,):
+                    if all(abs(v - other) > 1e-7 * max(1.0, abs(v)) for other in found):
+                        found.append(v)
+        real = [complex(v.real) if abs(v.imag) < REAL * abs(v) else complex(v) for v in found]
+        return np.array(sorted(real, key=lambda v: (round(v.real, 6), v.imag)))
 
-    def _between(self, branch: Branch, a: Point, b: Point) -> None:
+    def _between(self, branch: Branch, a: Point, b: Point, before: list[complex], after: list[complex]) -> None:
         """Locate flutter between two loads, where the number of complex pairs changes."""
-        pairs = [[complex(*v) for v in p.omega2 if v[1] > 0] for p in (a, b)]
-        if len(pairs[0]) == len(pairs[1]):
+        pairs = [before, after]
+        if len(before) == len(after):
             return
         with self.solver.system.clock.purpose("location"):
             few, many = sorted(pairs, key=len)
@@ -133,7 +133,8 @@ class Sweep:
             located = locate_flutter(self._discriminant, (a.load + b.load) / 2, abs(b.load - a.load), new.real)
             load, uncertainty, mu = located
             x = self._state(a.x, load)
-            point = self._point(x, None)
+            point = self._point(x)
+            self.pairs = after
         special = Special(FLUTTER, point, a.negative, b.negative, uncertainty, omega2=mu)
         branch.points.append(point)
         self._special(branch, special)
@@ -216,7 +217,7 @@ def locate_flutter(
         uncertainty = max(half * zero_uncertainty(series, root), 1e-12 * abs(load))
         if abs(root) < 1 and uncertainty < best[1]:
             best = (load, uncertainty, center)
-        elif best[1] < np.inf:
+        elif best[1] < 1e-8 * abs(load):
             break
         if best[1] < 1e-11 * abs(load):
             break

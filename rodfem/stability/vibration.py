@@ -91,7 +91,7 @@ class Vibration:
 
     def _real(self, number: int, target: float) -> tuple[np.ndarray, np.ndarray]:
         solver = self._solver(self.matrix, self.mass, number, target)
-        solver.solve()
+        self._run(solver)
         found = self._enough(solver, number)
         values = np.array([solver.getEigenvalue(i) for i in range(found)])
         errors = np.array([solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD) for i in range(found)])
@@ -108,7 +108,7 @@ class Vibration:
         pencil = PETSc.Mat().createNest([[shifted, upper], [lower, shifted]], comm=self.system.comm).convert("aij")
         mass = PETSc.Mat().createNest([[self.mass, None], [None, self.mass]], comm=self.system.comm).convert("aij")
         solver = self._solver(pencil, mass, 2 * number, 0.0)
-        solver.solve()
+        self._run(solver)
         found = self._enough(solver, number)
         re, im = pencil.createVecRight(), pencil.createVecRight()
         kept: list[tuple[complex, float]] = []
@@ -126,6 +126,15 @@ class Vibration:
             matrix.destroy()
         kept = kept[:number]
         return np.array([value for value, _ in kept]), np.array([error for _, error in kept])
+
+    @staticmethod
+    def _run(solver: SLEPc.EPS) -> None:
+        try:
+            solver.solve()
+        except PETSc.Error as trouble:
+            raise ConvergenceError(
+                f"SLEPc gave up on the frequencies ({str(trouble).splitlines()[0]}): use a richer discretisation."
+            ) from trouble
 
     def _enough(self, solver: SLEPc.EPS, number: int) -> int:
         found = solver.getConverged()
