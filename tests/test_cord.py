@@ -30,7 +30,8 @@ def default(formulation: str = "reduced") -> Found:
 
 
 @pytest.mark.parametrize(
-    ("turns", "span"), [(1, (30, -30)), (1.5, (60, 0)), (1.7, (90, 0)), (2, (140, 3)), (2.5, (250, 0))]
+    ("turns", "span"),
+    [(1, (30, -30)), (1.2, (60, -60)), (1.5, (60, 0)), (1.7, (90, 0)), (2, (140, 3)), (2.5, (250, 0))],
 )
 def test_straight_state(turns: float, span: tuple[float, float]) -> None:
     straight = (explored("cord", turns=turns, span=span, depth=0) if turns != 1.5 else default())["straight"]

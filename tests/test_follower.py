@@ -50,6 +50,15 @@ def test_where_eigenvalues_meet() -> None:
     assert double(20.0, 120.0, J=1e-3)[0] == pytest.approx(19.8391305740585, rel=1e-9)
 
 
+def test_two_flutters_in_a_coarse_sweep() -> None:
+    """A step of two in the load, within which an eigenvalue of the strong plane passes by the pair that meets."""
+    found = specials(swept((0.0, 200.0)), "flutter")
+    assert len(found) == 2
+    for s, expected in zip(found, (double(20.0, 120.0), double(128.0, 1370.0)), strict=True):
+        assert abs(s.point.load - expected[0]) <= 3 * s.error_estimate <= 1e-4
+    assert found[0].error_estimate < 1e-9
+
+
 @pytest.mark.parametrize(("span", "J"), [((0.0, 25.0), 0.0), ((25.0, 15.0), 1e-3)])
 def test_flutter(span: tuple[float, float], J: float) -> None:
     branch = swept(span, (J, 0.0, 0.0))
