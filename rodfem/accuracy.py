@@ -7,21 +7,19 @@ that this costs a few solves.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.optimize import newton
+from scipy.optimize import brentq
 
 from rodfem import compat
-from rodfem.branch import BRANCH_POINT, FOLD, Special
-from rodfem.continuation import Follower
+from rodfem.branch import BRANCH_POINT, END, FOLD, Point, Special
+from rodfem.continuation import Equilibria, Follower
 from rodfem.errors import ConvergenceError
-from rodfem.locate import WINDOW, refine, solve_at
+from rodfem.locate import WINDOW, refine
 from rodfem.system import System
-
-STRAIN_SAFETY = 10.0
-"""A strain converges like ``h^k`` only, and a degree more is not much nearer to the truth: multiply by this."""
 
 
 class Transfer:
@@ -71,6 +69,8 @@ class Richer:
         They are never below what the location and the arithmetic leave uncertain, and infinite where the richer
         discretisation does not find the point.
         """
+        if special.zero_of == "stretch":
+            return  # it has its own estimate: see zero_stretch
         floor = max(special.located_to, 1e-12 * max(1.0, abs(special.point.load)))
         try:
             load, ordinate = self._again(special)
@@ -78,20 +78,14 @@ class Richer:
             special.error_estimate = special.ordinate_error = float("inf")
             special.note = f"no error estimate: {trouble}"
             return
-        factor = STRAIN_SAFETY if special.zero_of == "stretch" else 1.0
-        load, ordinate = (
-            p + factor * (q - p) for p, q in ((special.point.load, load), (special.point.ordinate, ordinate))
-        )
         special.ordinate_error = max(abs(ordinate - special.point.ordinate), floor)
-        at_a_load = special.kind not in (FOLD, BRANCH_POINT) and special.zero_of != "stretch"
+        at_a_load = special.kind not in (FOLD, BRANCH_POINT)
         special.error_estimate = special.ordinate_error if at_a_load else max(abs(load - special.point.load), floor)
 
     def _again(self, special: Special) -> tuple[float, float]:
         """Load and ordinate of the special point on the richer discretisation."""
         follower, point = self.follower, special.point
         x = self.transfer(point.x, state=True)
-        if special.zero_of == "stretch" and point.tangent is not None:
-            return self._zero_stretch(x, self.transfer(point.tangent, state=False))
         if special.kind not in (FOLD, BRANCH_POINT):
             self.system.set_phase(x)
             x, outcome = follower.at_load(x, point.load, reach=1.0)
@@ -112,17 +106,55 @@ class Richer:
         located = refine(follower, curve, 0.0, WINDOW / 2, mode, special.zero_of)
         return located.load, follower.shape.ordinate(located.x)
 
-    def _zero_stretch(self, x: PETSc.Vec, tangent: PETSc.Vec) -> tuple[float, float]:
-        """Load and ordinate where the smallest stretch vanishes, by the secant method along the tangent."""
 
-        def solve(s: float) -> PETSc.Vec:
-            def curve(t: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-                y = x.copy()
-                y.axpy(t, tangent)
-                return y, tangent
+def zero_stretch(follower: Follower, coarse: Point) -> Special:
+    """Sharpen the point at which the smallest stretch vanishes; raises :class:`ConvergenceError` where that fails.
 
-            return solve_at(self.follower, curve, s)
+    A strain converges like ``h^k`` only, far slower than a load does.  The point is computed on meshes two and
+    four times as fine, one degree richer (the forms of :class:`Richer` serve); the finer one is kept, and their
+    difference is its error.
+    """
+    system, d = follower.system, follower.system.fields.discretization
+    sample = follower.shape.sample(coarse.x)
+    found: list[tuple[float, float, float, float]] = []
+    for factor in (2, 4):
+        fine = Equilibria(
+            System(
+                system.scene, replace(d, elements=factor * d.elements, degree=d.degree + 1), system.comm, system.clock
+            )
+        )
+        state = fine.shape.restore(sample)
 
-        s = newton(lambda s: self.follower.shape.stretch(solve(s)), 0.0, x1=-1e-3, tol=1e-10, maxiter=30)
-        y = solve(float(s))
-        return self.system.scalar(y), self.follower.shape.ordinate(y)
+        def stretch(load: float, fine: Equilibria = fine, guess: PETSc.Vec = state) -> float:
+            fine.system.set_phase(guess)
+            x, outcome = fine.at_load(guess, load, reach=1.0)
+            if not outcome.converged:
+                raise ConvergenceError(f"no equilibrium near load {load:.8g} on the finer mesh")
+            x.copy(guess)
+            return fine.shape.stretch(guess)
+
+        load = _bracketed_zero(stretch, coarse, abs(system.scene.span[1] - system.scene.span[0]))
+        last = stretch(load)
+        found.append((load, fine.shape.ordinate(state), fine.energy(state), last))
+        sample = fine.shape.sample(state)
+    (load2, ordinate2, *_), (load, ordinate, energy, last) = found
+    x = follower.shape.restore(sample)
+    point = replace(coarse, x=x, load=load, ordinate=ordinate, energy=energy, stretch=last)
+    special = Special(END, point, point.negative, point.negative, 1e-10 * max(1.0, abs(load)), zero_of="stretch")
+    left = 1.0 if d.degree == 1 else 0.25
+    special.error_estimate = max(left * abs(load - load2), special.located_to)
+    special.ordinate_error = max(left * abs(ordinate - ordinate2), special.located_to)
+    special.note = f"computed with {4 * d.elements} elements of degree {d.degree + 1}"
+    return special
+
+
+def _bracketed_zero(stretch: Callable[[float], float], coarse: Point, span: float) -> float:
+    """Load at which ``stretch`` vanishes: bracketed by steps from the coarse load along the branch, then solved for."""
+    a, value = coarse.load, stretch(coarse.load)
+    step = np.copysign(2e-4 * span, coarse.slope if value > 0 else -coarse.slope)
+    for _ in range(14):
+        b, other = a + step, stretch(a + step)
+        if value * other <= 0:
+            return float(brentq(stretch, a, b, xtol=1e-12 * span))
+        a, value, step = b, other, 1.7 * step
+    raise ConvergenceError("the zero of the stretch was not found on the finer mesh")

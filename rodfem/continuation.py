@@ -81,6 +81,12 @@ class Equilibria:
         outcome = correct(self.system, x, self.axis, reach=reach)
         return x, outcome
 
+    def energy(self, x: PETSc.Vec) -> float:
+        """Stored energy of the state ``x``."""
+        self.system.bring(x)
+        mine = fem.assemble_scalar(self.system.equations.energy)
+        return float(self.system.comm.allreduce(mine, op=MPI.SUM))
+
 
 class Follower(Equilibria):
     """Computes equilibria along branches, with their index and records.
@@ -99,14 +105,13 @@ class Follower(Equilibria):
         """Evaluate all records of the equilibrium ``x``."""
         system = self.system
         index = self.inertia.count(x)
-        energy = system.comm.allreduce(fem.assemble_scalar(system.equations.energy), op=MPI.SUM)
         return Point(
             x=x,
             tangent=tangent,
             arclength=arclength,
             load=system.scalar(x),
             ordinate=self.shape.ordinate(x),
-            energy=float(energy),
+            energy=self.energy(x),
             stretch=self.shape.stretch(x),
             negative=index.negative,
             zero=index.zero,

@@ -9,7 +9,7 @@ from itertools import pairwise
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.accuracy import Richer
+from rodfem.accuracy import Richer, zero_stretch
 from rodfem.bifurcation import directions, find_special, start_branch
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
 from rodfem.continuation import Follower, Steps, follow, hermite
@@ -259,9 +259,17 @@ class Explorer:
         x = solve_at(self.follower, lambda t: hermite(a, b, t), s)
         row = self.follower.row(hermite(a, b, s)[1])
         last = self.follower.point(x, s, self.follower.tangent(row))
-        if not self._between(branch, a, last):
-            branch.points.append(last)
-            branch.special.append(Special(END, last, last.negative, last.negative, 1e-10, zero_of="stretch"))
+        if self._between(branch, a, last):
+            return
+        special = Special(END, last, last.negative, last.negative, 1e-10, zero_of="stretch")
+        if self.plan.error_bars:
+            try:
+                with self.follower.system.clock.purpose("error bars"):
+                    special = zero_stretch(self.follower, last)
+            except ConvergenceError as trouble:
+                special.note = f"no error estimate: {trouble}"
+        branch.points.append(special.point)
+        branch.special.append(special)
 
     def _closes(self, branch: Branch, a: Point, b: Point) -> bool:
         """Whether the branch passes its own beginning again between two points."""

@@ -131,13 +131,16 @@ class Shape:
         """State vector of a :meth:`sample`, taken with the same formulation but any number of elements and degree."""
         f = self.system.fields
         ends = np.append(sample["s"][:: self._degree_of(sample)], sample["s"][-1])[: self._elements_of(sample) + 1]
+        held = f.number < 0
+        clamped = f.u.x.array[held]
         for block in f.blocks:
             x = f.coordinates(block.degree)
-            middle = x.mean(axis=1, keepdims=True)
-            values = self._evaluate(sample, block, ends, x, np.broadcast_to(middle, x.shape))
+            inwards = x + 1e-9 * (x.mean(axis=1, keepdims=True) - x)  # the end of a cell belongs to that cell
+            values = self._evaluate(sample, block, ends, x, inwards)
             f.u.x.array[f.dofs[block.name]] = values
         for position, name in enumerate(name for name in self.system.scalars if not name.startswith("drift")):
             f.u.x.array[f.copies[:, position]] = sample[name]
+        f.u.x.array[held] = clamped
         return self.system.take()
 
     # --- inside ------------------------------------------------------------------------------------------------
@@ -150,9 +153,9 @@ class Shape:
         return (len(sample["s"]) - 1) // self._elements_of(sample)
 
     def _evaluate(
-        self, sample: dict[str, Any], block: Any, ends: np.ndarray, x: np.ndarray, middle: np.ndarray
+        self, sample: dict[str, Any], block: Any, ends: np.ndarray, x: np.ndarray, inwards: np.ndarray
     ) -> np.ndarray:
-        degree, cell = self._degree_of(sample), np.clip(np.searchsorted(ends, middle) - 1, 0, len(ends) - 2)
+        degree, cell = self._degree_of(sample), np.clip(np.searchsorted(ends, inwards) - 1, 0, len(ends) - 2)
         own = degree if block.continuous else degree - 1
         table = np.asarray(sample[block.name])
         if block.name == "r":

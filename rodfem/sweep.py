@@ -13,8 +13,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from dolfinx import fem
-from mpi4py import MPI
 from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 
@@ -91,7 +89,6 @@ class Sweep:
         solver, system = self.solver, self.solver.system
         values = self._leftmost(x)
         self.pairs = [complex(v) for v in values if v.imag > 0]
-        energy = system.comm.allreduce(fem.assemble_scalar(system.equations.energy), op=MPI.SUM)
         unstable = Frequencies(values, np.zeros(0)).unstable(REAL * max(1.0, float(abs(values).min())))
         load = system.scalar(x)
         return Point(
@@ -100,7 +97,7 @@ class Sweep:
             arclength=abs(load - self.plan.span[0]),
             load=load,
             ordinate=solver.shape.ordinate(x),
-            energy=float(energy),
+            energy=solver.energy(x),
             stretch=solver.shape.stretch(x),
             negative=unstable,
             zero=int((abs(values) < REAL).sum()),
