@@ -123,6 +123,16 @@ def test_restart_on_another_discretisation(formulation: str, folder: Path) -> No
     assert other.shape.ordinate(y) == pytest.approx(shooting.FIRST[0.5][0], abs=1e-10)
 
 
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_polynomials_survive_a_finer_mesh_and_back(formulation: str) -> None:
+    """A finer mesh of a higher degree holds every state of a coarse one, so that nothing is lost on the way back."""
+    coarse, fine = follower(formulation, 8, 6), follower(formulation, 16, 8)
+    (p,) = user_points(explored(formulation, 8, 6, at=AT if formulation == "reduced" else (0.5,), depth=1)[1], 0.5)
+    back = coarse.shape.restore(fine.shape.sample(fine.shape.restore(coarse.shape.sample(p.x))))
+    back.axpy(-1.0, p.x)
+    assert back.norm() < 1e-11 * p.x.norm()
+
+
 @pytest.mark.short
 def test_restart_from_what_is_not_there(folder: Path) -> None:
     branch = explored(at=AT)[0]
