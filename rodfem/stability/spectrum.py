@@ -16,12 +16,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dolfinx import fem
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import ConvergenceError
 from rodfem.stability.inertia import Inertia, inertia_factorizer
+from rodfem.stability.pencil import assemble_pencil, shift_invert
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Spectrum:
         system = self.system
         symmetry = [system.generator(x, i) for i, phase in enumerate(system.phases) if phase is not None]
         with system.clock("assembly"):
-            self._assemble(x)
+            assemble_pencil(system, x, self.matrix, self.mass)
         with system.clock("stability"):
             for _ in range(40):
                 if self._below(self.shift) == 0:
@@ -76,18 +76,6 @@ class Spectrum:
             self.shift = min(2 * modes.values[0], -self.inertia.scale)
         return modes
 
-    def _assemble(self, x: PETSc.Vec) -> None:
-        system = self.system
-        system.bring(x)
-        for matrix, form in ((self.matrix, system.equations.jacobian), (self.mass, system.equations.kinetic)):
-            matrix.zeroEntries()
-            fem.petsc.assemble_matrix(matrix, form)
-        if system.has_scalars:
-            for index in (system.load_index, *system.drifts):  # no part of the pencil: an infinite eigenvalue each
-                self.matrix.setValue(index, index, 1.0, addv=True)
-        self.matrix.assemble()
-        self.mass.assemble()
-
     def _below(self, sigma: float) -> int:
         """Number of eigenvalues of the pencil below ``sigma``, symmetry modes included."""
         self.matrix.copy(self._shifted, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
@@ -101,7 +89,9 @@ class Spectrum:
         A Krylov method finds the second of two equal eigenvalues late, by round-off: it is there when more are
         asked for.
         """
-        solver = self._solver(number + extra, symmetry)
+        solver = shift_invert(self.matrix, self.mass, number + extra, self.shift, symmetric=True)
+        if symmetry:
+            solver.setDeflationSpace(symmetry)
         solver.solve()
         found = solver.getConverged()
         if found < number:
@@ -122,23 +112,3 @@ class Spectrum:
             solver.getEigenvector(i, vector)
         solver.destroy()
         return Modes(values[order], vectors, errors, self._below(cut) == known)
-
-    def _solver(self, number: int, symmetry: list[PETSc.Vec]) -> SLEPc.EPS:
-        solver = SLEPc.EPS().create(self.system.comm)
-        solver.setOptionsPrefix("rodfem_")
-        solver.setOperators(self.matrix, self.mass)
-        solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        solver.setTarget(self.shift)
-        solver.setTolerances(tol=1e-12, max_it=200)
-        solver.setDimensions(number, 2 * number + 16)
-        transform = solver.getST()
-        transform.setType(SLEPc.ST.Type.SINVERT)
-        ksp = transform.getKSP()
-        ksp.setType("preonly")
-        ksp.getPC().setType("lu")
-        ksp.getPC().setFactorSolverType("mumps")
-        if symmetry:
-            solver.setDeflationSpace(symmetry)
-        solver.setFromOptions()
-        return solver

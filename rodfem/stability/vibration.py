@@ -19,11 +19,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dolfinx import fem
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import ConvergenceError
+from rodfem.stability.pencil import assemble_pencil, shift_invert
 from rodfem.system import System
 
 
@@ -49,17 +49,8 @@ class Vibration:
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Assemble the pencil at the state ``x``."""
-        system = self.system
-        with system.clock("assembly"):
-            system.bring(x)
-            for matrix, form in ((self.matrix, system.equations.jacobian), (self.mass, system.equations.kinetic)):
-                matrix.zeroEntries()
-                fem.petsc.assemble_matrix(matrix, form)
-            if system.has_scalars:
-                for index in (system.load_index, *system.drifts):  # no part of the pencil: an infinite eigenvalue each
-                    self.matrix.setValue(index, index, 1.0, addv=True)
-            self.matrix.assemble()
-            self.mass.assemble()
+        with self.system.clock("assembly"):
+            assemble_pencil(self.system, x, self.matrix, self.mass)
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
@@ -90,7 +81,7 @@ class Vibration:
         return Frequencies(values[order], errors[order])
 
     def _real(self, number: int, target: float) -> tuple[np.ndarray, np.ndarray]:
-        solver = self._solver(self.matrix, self.mass, number, target)
+        solver = shift_invert(self.matrix, self.mass, number, target, symmetric=False)
         self._run(solver)
         found = self._enough(solver, number)
         values = np.array([solver.getEigenvalue(i) for i in range(found)])
@@ -107,7 +98,7 @@ class Vibration:
         lower.scale(-1.0)
         pencil = PETSc.Mat().createNest([[shifted, upper], [lower, shifted]], comm=self.system.comm).convert("aij")
         mass = PETSc.Mat().createNest([[self.mass, None], [None, self.mass]], comm=self.system.comm).convert("aij")
-        solver = self._solver(pencil, mass, 2 * number, 0.0)
+        solver = shift_invert(pencil, mass, 2 * number, 0.0, symmetric=False)
         self._run(solver)
         found = self._enough(solver, number)
         re, im = pencil.createVecRight(), pencil.createVecRight()
@@ -144,21 +135,3 @@ class Vibration:
                 f"SLEPc found {found} of {number} eigenvalues: ask for at most {found} at this discretisation."
             )
         return int(found)
-
-    def _solver(self, matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: float) -> SLEPc.EPS:
-        solver = SLEPc.EPS().create(self.system.comm)
-        solver.setOptionsPrefix("rodfem_")
-        solver.setOperators(matrix, mass)
-        solver.setProblemType(SLEPc.EPS.ProblemType.GNHEP)
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        solver.setTarget(target)
-        solver.setTolerances(tol=1e-13, max_it=300)
-        solver.setDimensions(number, 2 * number + 20)
-        transform = solver.getST()
-        transform.setType(SLEPc.ST.Type.SINVERT)
-        ksp = transform.getKSP()
-        ksp.setType("preonly")
-        ksp.getPC().setType("lu")
-        ksp.getPC().setFactorSolverType("mumps")
-        solver.setFromOptions()
-        return solver
