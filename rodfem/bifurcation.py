@@ -20,6 +20,10 @@ from rodfem.newton import correct
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
+ROUND_OFF = 1e-10
+"""A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
+VERTICAL = 1e-8
+"""A branch along which the load changes by less than this (of its span a unit of arclength) is one of equal loads."""
 
 
 def special_at(follower: Follower, located: Located, arclength: float) -> Special:
@@ -44,10 +48,12 @@ def coupling_of(follower: Follower, x: PETSc.Vec, null_vector: PETSc.Vec) -> flo
     """Cosine between a null vector and ``F_lam``, the derivative of the equations in the load at ``x``."""
     system = follower.system
     system.residual(x, system.new_vector())
-    derivative = system.jacobian(follower.axis) * follower.axis
+    matrix = system.jacobian(follower.axis)
+    derivative = matrix * follower.axis
     system.set_load(derivative, 0.0)
-    size = derivative.norm() * null_vector.norm()
-    return abs(derivative.dot(null_vector)) / size if size else 0.0
+    if derivative.norm() < ROUND_OFF * matrix.norm():  # a trivial state: its equations do not feel the load
+        return 0.0
+    return float(abs(derivative.dot(null_vector)) / (derivative.norm() * null_vector.norm()))
 
 
 def find_special(follower: Follower, a: Point, b: Point) -> list[Special]:
@@ -59,7 +65,8 @@ def find_special(follower: Follower, a: Point, b: Point) -> list[Special]:
     found: list[Special] = []
     crossing = _crossing(follower, a, b)
     low = min(a.negative, b.negative)
-    if a.slope * b.slope < 0:
+    level = VERTICAL * abs(follower.system.scene.span[1] - follower.system.scene.span[0])
+    if a.slope * b.slope < 0 and max(abs(a.slope), abs(b.slope)) > level:
         found.append(_special(follower, a, b, low, "slope"))
         if found[0].kind == FOLD:
             own = min(found[0].negative_before, found[0].negative_after)

@@ -31,6 +31,7 @@ class Point:
     error: float
     spectrum: list[float] = field(default_factory=list)
     omega2: list[list[float]] = field(default_factory=list)
+    motion: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -48,6 +49,8 @@ class Law:
 
     def __str__(self) -> str:
         """Return the law in words."""
+        if self.side == 0:
+            return f"{self.kind}: a family of equilibria at one and the same load"
         x = "x" if self.power == 1 else f"x^{self.power}"
         return f"{self.kind}, load = load_b {self.coefficient:+.6g} {x} + ... (+-{self.uncertainty:.0e})"
 

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from rodfem.errors import EnvironmentTrouble
 
@@ -22,6 +23,7 @@ try:
     import ffcx.compiler
     import ufl
     from dolfinx import fem
+    from petsc4py import PETSc
 except ModuleNotFoundError as missing:
     raise EnvironmentTrouble(
         f"This Python has no module {missing.name!r}: install Debian's python3-dolfinx and run with a virtual "
@@ -29,14 +31,16 @@ except ModuleNotFoundError as missing:
     ) from missing
 
 
+COMPLEX = bool(np.issubdtype(PETSc.ScalarType, np.complexfloating))
+"""Whether this PETSc was built for complex numbers: forms and states are real all the same."""
+
+
 def require_real_petsc() -> None:
     """Raise :class:`EnvironmentTrouble` on a PETSc with complex numbers, where a saddle matrix has no inertia."""
-    from petsc4py import PETSc
-
-    if np.issubdtype(PETSc.ScalarType, np.complexfloating):
+    if COMPLEX:
         raise EnvironmentTrouble(
-            "This PETSc was built for complex numbers, and rodfem needs the real one: "
-            "unset PETSC_DIR and SLEPC_DIR, or point both at the real build."
+            "This PETSc was built for complex numbers, where MUMPS counts no inertia: under a load with a potential "
+            "rodfem needs the real one; unset PETSC_DIR and SLEPC_DIR, or point both at the real build."
         )
 
 
@@ -121,12 +125,39 @@ def cell_vertices(mesh: Any, cells: int) -> np.ndarray:
 def compile_forms(forms: Sequence[Any]) -> list[Any]:
     """Compile UFL forms; raises :class:`EnvironmentTrouble` where the form cache is locked by a killed run."""
     try:
-        return [fem.form(form) for form in forms]
+        return [fem.form(form, dtype=np.float64) for form in forms]
     except TimeoutError as locked:
         raise EnvironmentTrouble(
             "A compiled form never became ready, most likely because an earlier run was killed while compiling: "
             "delete the folder ~/.cache/fenics (or $XDG_CACHE_HOME/fenics) and run again."
         ) from locked
+
+
+def assemble_matrix(matrix: PETSc.Mat, form: Any, rows: np.ndarray, columns: np.ndarray) -> None:
+    """Add a real form to a PETSc matrix, without the final exchange between ranks.
+
+    ``rows`` and ``columns`` are the global numbers of the local degrees of freedom, -1 for what is left out; the
+    matrix has them as its maps too.  Where PETSc's numbers are complex the form is assembled by dolfinx alone first.
+    """
+    if not COMPLEX:
+        fem.petsc.assemble_matrix(matrix, form)
+        return
+    local = fem.assemble_matrix(form)  # this rank's cells only: PETSc brings the parts of other ranks' rows there
+    shape = (len(rows), len(columns))
+    size = int(np.asarray(local.indptr)[-1])
+    table = sp.csr_matrix((local.data[:size], local.indices[:size], local.indptr), shape=(len(local.indptr) - 1,) * 2)
+    entries = table[: shape[0], : shape[1]].tocoo()
+    row, column = rows[entries.row], columns[entries.col]
+    kept = (row >= 0) & (column >= 0)
+    used, row = np.unique(row[kept], return_inverse=True)
+    summed = sp.csr_matrix((entries.data[kept], (row, column[kept])), shape=(len(used), matrix.getSize()[1]))
+    matrix.setValuesIJV(
+        summed.indptr.astype(PETSc.IntType),
+        summed.indices.astype(PETSc.IntType),
+        summed.data.astype(PETSc.ScalarType),
+        addv=True,
+        rowmap=used.astype(PETSc.IntType),
+    )
 
 
 @contextmanager

@@ -26,6 +26,8 @@ from rodfem.system import System
 
 LEVEL = 0.05
 """Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh."""
+ON_BOUND = 1e-8
+"""A load beyond a bound by less than this, of the span, is on it: branches of equal loads may lie there."""
 
 
 @dataclass(frozen=True)
@@ -210,7 +212,7 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
     """
     system, step = follower.system, min(steps.first, steps.largest)
     span = abs(system.scene.span[1] - system.scene.span[0])
-    low, high = bounds
+    low, high = (bound + sign * ON_BOUND * span for bound, sign in zip(bounds, (-1, 1), strict=True))
     while len(points) < steps.most:
         last = points[-1]
         x, direction = predict(points, last.arclength + step)
@@ -226,7 +228,7 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
                 if slope * last.slope <= 0 or abs(slope) < LEVEL * span:
                     tangent = follower.tangent(row, at=x)
         if not low <= load <= high:
-            point = _to_load(follower, points, load, low if load < low else high, step)
+            point = _to_load(follower, points, load, bounds[0] if load < low else bounds[1], step)
             if point is not None:
                 yield point
                 yield "end of range"
@@ -239,7 +241,10 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
             continue
         step /= 2
         if step < steps.smallest:
-            yield f"no convergence at {system.scene.load} = {last.load:.6g} (steps below {steps.smallest:g})"
+            why = f"steps below {steps.smallest:g}"
+            if last.zero > system.active_drifts():
+                why += f"; {last.zero - system.active_drifts()} eigenvalues vanish there to working accuracy"
+            yield f"no convergence at {system.scene.load} = {last.load:.6g} ({why})"
             return
     yield f"{steps.most} points reached"
 

@@ -78,6 +78,7 @@ def _branch_data(branch: Branch) -> dict[str, Any]:
         columns["spectrum"] = [p.spectrum for p in branch.points]
     if any(p.omega2 for p in branch.points):
         columns["omega2"] = [p.omega2 for p in branch.points]
+        columns["motion"] = [p.motion for p in branch.points]
         columns["unstable"] = [p.negative for p in branch.points]
     return {
         "name": branch.name,

@@ -10,14 +10,17 @@ from petsc4py import PETSc
 from scipy.optimize import brentq
 
 from rodfem.accuracy import Richer, zero_stretch
-from rodfem.bifurcation import directions, find_special, start_branch
+from rodfem.bifurcation import VERTICAL, directions, find_special, start_branch
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
-from rodfem.continuation import Follower, Steps, follow, hermite
+from rodfem.continuation import Follower, Steps, distance, follow, hermite
 from rodfem.errors import ConvergenceError, SceneError, SymmetryError
 from rodfem.locate import solve_at
 from rodfem.pitchfork import law_of
 from rodfem.report import Report
 from rodfem.scene import Scene
+
+BEYOND = 0.02
+"""How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
 
 
 @dataclass(frozen=True)
@@ -271,11 +274,39 @@ class Explorer:
         branch.points.append(special.point)
         branch.special.append(special)
 
+    def _singular_end(self, branch: Branch, last: Point) -> None:
+        """Report a branch point on the very end of the range: it is located on a piece of the branch that goes past it."""
+        parameter, load = self.scene.parameters[self.scene.load], last.load
+        beyond = load + BEYOND * (load - sum(self.plan.span) / 2)
+        previous = branch.points[-2]
+        if not parameter.admissible[0] < beyond < parameter.admissible[1] or previous.x is last.x:
+            return
+        try:
+            with self.follower.system.clock.purpose("location"):
+                guess = hermite(previous, last, last.arclength)[0]
+                point = self._user(guess, beyond, 2 * last.arclength - previous.arclength, beyond > load)
+                point.arclength = last.arclength + distance(self.follower.system, last.x, point.x)
+                found = [s for s in find_special(self.follower, previous, point) if s.kind == BRANCH_POINT]
+        except ConvergenceError as trouble:
+            self.report.warn(
+                f"The last state, at {self.scene.load} = {load:g}, is singular, and was not resolved: {trouble}"
+            )
+            return
+        for special in found:
+            if abs(special.point.load - load) < 1e-6 * abs(self.high - self.low):
+                branch.points[-1] = special.point
+                branch.special.append(special)
+                branch.renumber()
+                self.report.special(branch, special)
+                return
+
     def _closes(self, branch: Branch, a: Point, b: Point) -> bool:
         """Whether the branch passes its own beginning again between two points."""
         if len(branch.points) < 12:
             return False
         first = branch.points[1]
+        if max(abs(a.slope), abs(b.slope)) < VERTICAL * (self.high - self.low):  # equal loads: compare the states
+            return distance(self.follower.system, b.x, branch.points[0].x) < b.arclength - a.arclength
         if (a.load - first.load) * (b.load - first.load) > 0 or not _near(first, a, 4) or a.slope * first.slope <= 0:
             return False
         s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
@@ -292,6 +323,9 @@ class Explorer:
     def _finish(self, branch: Branch) -> None:
         branch.renumber()
         last = branch.points[-1]
+        if branch.ended == "end of range" and last.zero > self.follower.system.active_drifts():
+            self._singular_end(branch, last)
+            last = branch.points[-1]
         if not any(s.point is last for s in branch.special):
             branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
             branch.renumber()

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.bifurcation import VERTICAL
 from rodfem.branch import Law, Special
 from rodfem.continuation import Follower
 from rodfem.newton import correct
@@ -34,6 +35,9 @@ def law_of(follower: Follower, special: Special, direction: PETSc.Vec) -> Law | 
         loads.append(near[0])
         ordinates.append(near[1])
     plus, minus = loads[-2], loads[-1]
+    span = follower.system.scene.span
+    if max(map(abs, loads)) < VERTICAL * abs(span[1] - span[0]):
+        return Law("vertical branch", 0.0, 1, max(map(abs, loads)) / max(map(abs, ordinates)), 0)
     if abs(plus - minus) > 0.1 * (abs(plus) + abs(minus)):
         slopes = [(p - loads[-1]) / (q - ordinates[-1]) for p, q in zip(loads[:-1], ordinates[:-1], strict=True)]
         return Law("transcritical", slopes[-1], 1, abs(slopes[-1] - slopes[-2]), int(np.sign(plus)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from math import isfinite
 from collections.abc import Sequence
 from typing import TextIO
 
@@ -18,7 +19,7 @@ LABELS = {FOLD: "LP", BRANCH_POINT: "BP", FLUTTER: "HB", USER: "UZ", END: "EP"}
 
 def number(value: float, error: float) -> str:
     """Write a number with the digits that its error supports, and the error: ``0.3216501(2.1e-07)``."""
-    if not error < 1:
+    if not isfinite(error):
         return f"{value:.8g} (no estimate)"
     digits = 0
     while 10.0 ** (-digits) > error and digits < 13:
@@ -30,6 +31,17 @@ def _index(special: Special) -> str:
     """Index at a special point in words: before and after if it changes."""
     before, after = special.negative_before, special.negative_after
     return f"{before}->{after}" if before != after else f"{special.point.negative}"
+
+
+def _roots(point: Point) -> dict[str, str]:
+    """Frequencies of a point in words for each kind of motion; a complex pair of them once, with +-."""
+    words: dict[str, list[str]] = {}
+    for value, kind in zip(point.omega2, point.motion, strict=True):
+        w = complex(*value) ** 0.5
+        if value[1] >= 0:
+            text = f"{w.real:.4f}" if value[1] == 0 and w.real else f"{abs(w.imag):.4f}i"
+            words.setdefault(kind, []).append(text if value[1] == 0 else f"{w.real:.4f}+-{abs(w.imag):.4f}i")
+    return {kind: "  ".join(texts[:4]) + (" ..." if len(texts) > 4 else "") for kind, texts in words.items()}
 
 
 class Report:
@@ -89,7 +101,8 @@ class Report:
         p = special.point
         meets = f"  meets {special.meets[0]}" if special.meets else ""
         return (
-            f"{LABELS[special.kind]}   {p.load:<14.10f} {p.ordinate:<14.9f} {p.energy:<10.6f} "
+            f"{LABELS[special.kind]}   {round(p.load, 10) + 0.0:<14.10f} {round(p.ordinate, 9) + 0.0:<14.9f} "
+            f"{p.energy:<10.6f} "
             f"{_index(special):>6} {p.zero:>5}  {special.located_to:.0e}{meets}"
         )
 
@@ -139,10 +152,18 @@ class Report:
         if not points:
             return
         self.say(f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load}")
-        for p in points[:: max(1, (len(points) - 1) // (rows - 1))]:
-            roots = [complex(*v) ** 0.5 for v in p.omega2]
-            words = "  ".join(f"{w.real:8.4f}" + (f"{w.imag:+8.4f}i" if w.imag else " " * 9) for w in roots)
-            self.say(f"  {p.load:10.4f}  {words}")
+        shown = points[:: max(1, (len(points) - 1) // (rows - 1))]
+        columns = [_roots(p) for p in shown]
+        widths = {
+            kind: max(len(c.get(kind, "")) for c in [*columns, {kind: kind}])
+            for kind in sorted({k for c in columns for k in c})
+        }
+        self.say(f"  {load:>10}  " + "   ".join(f"{kind:<{width}}" for kind, width in widths.items()))
+        for p, column in zip(shown, columns, strict=True):
+            words = "   ".join(f"{column.get(kind, ''):<{width}}" for kind, width in widths.items())
+            self.say(f"  {p.load:10.4f}  {words}".rstrip())
+        if "torsion" not in widths:
+            self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
 
     def warn(self, sentence: str) -> None:
         """Say what went wrong without stopping."""

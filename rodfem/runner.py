@@ -54,7 +54,8 @@ def run(
 
     Files are brought up to date after every branch, so that an interrupted run loses no finished one.
     """
-    compat.require_real_petsc()
+    if scene.conservative:
+        compat.require_real_petsc()
     plan.check(scene)
     writable(output, comm)
     report, clock = Report(comm, quiet), Clock()

@@ -27,6 +27,8 @@ from rodfem.system import System
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
+SEEN = 0.5
+"""A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
 REAL = 1e-7
 """An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
 
@@ -87,9 +89,10 @@ class Sweep:
 
     def _point(self, x: PETSc.Vec) -> Point:
         solver, system = self.solver, self.solver.system
-        values = self._leftmost(x)
+        found = self._leftmost(x)
+        values = found.values
         self.pairs = [complex(v) for v in values if v.imag > 0]
-        unstable = Frequencies(values, np.zeros(0)).unstable(REAL * max(1.0, float(abs(values).min())))
+        unstable = found.unstable(REAL * max(1.0, float(abs(values).min())))
         load = system.scalar(x)
         return Point(
             x=x,
@@ -105,19 +108,27 @@ class Sweep:
             drift=0.0,
             error=0.0,
             omega2=[[float(v.real), float(v.imag)] for v in values[: self.number]],
+            motion=list(found.kinds[: self.number]),
         )
 
-    def _leftmost(self, x: PETSc.Vec) -> np.ndarray:
-        """Left-most eigenvalues: those near the origin and, by a complex shift, those near the complex ones before."""
+    def _leftmost(self, x: PETSc.Vec) -> Frequencies:
+        """Left-most eigenvalues: those near the origin, and what became of the complex ones before.
+
+        A complex shift looks for a pair that may be farther from the origin than all that the real shift found.
+        """
         self.vibration.assemble(x)
-        found = list(self.vibration.near(max(self.number, 6) + 6, 0.0 - 1e-3).values)
-        for pair in self.pairs:
-            for value in self.vibration.near(2, pair * (1 + 1e-4)).values:
+        near = self.vibration.near(max(self.number, 6) + 6, -1e-3)
+        reach = SEEN * abs(near.values).max()
+        found = list(zip(near.values, near.errors, near.kinds, strict=True))
+        for pair in (p for p in self.pairs if abs(p) > reach):
+            beside = self.vibration.near(2, pair * (1 + 1e-4))
+            for value, error, kind in zip(beside.values, beside.errors, beside.kinds, strict=True):
                 for v in (value, value.conjugate()) if abs(value.imag) > REAL * abs(value) else (value,):
-                    if all(abs(v - other) > 1e-7 * max(1.0, abs(v)) for other in found):
-                        found.append(v)
-        real = [complex(v.real) if abs(v.imag) < REAL * abs(v) else complex(v) for v in found]
-        return np.array(sorted(real, key=lambda v: (round(v.real, 6), v.imag)))
+                    if all(abs(v - other) > 1e-7 * max(1.0, abs(v)) for other, _, _ in found):
+                        found.append((v, error, kind))
+        real = [(complex(v.real) if abs(v.imag) < REAL * abs(v) else complex(v), *rest) for v, *rest in found]
+        values, errors, kinds = zip(*sorted(real, key=lambda f: (round(f[0].real, 6), f[0].imag)), strict=True)
+        return Frequencies(np.array(values), np.array(errors), kinds)
 
     def _between(self, branch: Branch, a: Point, b: Point, before: list[complex], after: list[complex]) -> None:
         """Locate flutter between two loads, where the number of complex pairs changes."""
@@ -127,7 +138,13 @@ class Sweep:
         with self.solver.system.clock.purpose("location"):
             few, many = sorted(pairs, key=len)
             new = max(many, key=lambda v: min((abs(v - w) for w in few), default=np.inf))
-            located = locate_flutter(self._discriminant, (a.load + b.load) / 2, abs(b.load - a.load), new.real)
+            middle = (a.load + b.load) / 2
+            try:
+                located = locate_flutter(self._discriminant, middle, abs(b.load - a.load), new.real)
+            except ConvergenceError as trouble:
+                self.report.warn(f"{len(few)} complex pairs become {len(many)} near {middle:.6g}: {trouble}")
+                self.pairs = after
+                return
             load, uncertainty, mu = located
             x = self._state(a.x, load)
             point = self._point(x)

@@ -18,6 +18,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from rodfem import compat
 from rodfem.clock import Clock
 from rodfem.equations import Equations
 from rodfem.errors import ConvergenceError
@@ -58,7 +59,8 @@ class System:
         self.drifts = [self.scalars[f"drift{i}"] for i in range(len(scene.symmetries))]
         self.has_scalars = comm.rank == comm.size - 1
         without_load = np.where(number == self.load_index, -1, number).astype(PETSc.IntType)
-        all_map = PETSc.LGMap().create(number.astype(PETSc.IntType), comm=comm)
+        self._columns = {True: number.astype(PETSc.IntType), False: without_load}
+        all_map = PETSc.LGMap().create(self._columns[True], comm=comm)
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
         self._equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self._pattern = bordered_pattern(self.fields)
@@ -85,7 +87,7 @@ class System:
 
     def scalar(self, x: PETSc.Vec, name: str = LOAD) -> float:
         """Value of a scalar unknown, the same on all ranks."""
-        value = x.getValue(self.scalars[name]) if self.has_scalars else 0.0
+        value = float(np.real(x.getValue(self.scalars[name]))) if self.has_scalars else 0.0
         return self.comm.bcast(value, root=self.comm.size - 1) if self.comm.size > 1 else value
 
     def set_load(self, x: PETSc.Vec, value: float) -> None:
@@ -103,12 +105,12 @@ class System:
     def norm(self, d: PETSc.Vec) -> float:
         """Size of a change of state in the metric."""
         self.metric.mult(d, self.workspace)
-        return max(self.workspace.dot(d), 0.0) ** 0.5
+        return float(max(np.real(self.workspace.dot(d)), 0.0)) ** 0.5
 
     def bring(self, x: PETSc.Vec) -> None:
         """Put ``x`` into the dolfinx function on which the forms are assembled."""
         self._gather.scatter(x, self.x_local, addv=PETSc.InsertMode.INSERT_VALUES)
-        self.fields.u.x.array[self._numbered] = self.x_local.array_r
+        self.fields.u.x.array[self._numbered] = self.x_local.array_r.real
 
     def take(self) -> PETSc.Vec:
         """Vector of the values that the dolfinx function holds; drift scalars are zero."""
@@ -146,12 +148,19 @@ class System:
         """Jacobian at the state last brought by :meth:`residual`, with ``row`` as the row of the load."""
         with self.clock("assembly"):
             self.matrix.zeroEntries()
-            fem.petsc.assemble_matrix(self.matrix, self.equations.jacobian)
+            self.assemble_into(self.matrix, self.equations.jacobian, load=True)
             self.add_drifts(self.matrix)
             begin, end = row.getOwnershipRange()
             self.matrix.setValues([self.load_index], np.arange(begin, end, dtype=PETSc.IntType), row.array_r, addv=True)
             self.matrix.assemble()
         return self.matrix
+
+    def assemble_into(self, matrix: PETSc.Mat, form: Any, *, load: bool = False) -> None:
+        """Add a bilinear form at the state last brought to a matrix of this system, with or without the load's column.
+
+        The caller assembles the matrix (``matrix.assemble()``) when all is added.
+        """
+        compat.assemble_matrix(matrix, form, self._columns[False], self._columns[load])
 
     def add_drifts(self, matrix: PETSc.Mat) -> None:
         """Add rows and columns of the drift scalars: the generators, or a one where a drift is switched off."""
@@ -233,7 +242,7 @@ class System:
 
     def _assemble_metric(self) -> PETSc.Mat:
         metric = new_matrix(self.fields, self._pattern, self._no_load, self._no_load)
-        fem.petsc.assemble_matrix(metric, self.equations.metric)
+        self.assemble_into(metric, self.equations.metric)
         if self.has_scalars:
             a, b = self.scene.span
             metric.setValue(self.load_index, self.load_index, 1.0 / (b - a) ** 2, addv=True)

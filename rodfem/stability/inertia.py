@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -73,7 +72,7 @@ class Inertia:
         with system.clock("assembly"):
             system.bring(x)
             self.matrix.zeroEntries()
-            fem.petsc.assemble_matrix(self.matrix, system.equations.jacobian)
+            system.assemble_into(self.matrix, system.equations.jacobian)
             if system.has_scalars:
                 self.matrix.setValue(system.load_index, system.load_index, 1.0, addv=True)
             system.add_drifts(self.matrix)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dolfinx import fem
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
@@ -14,7 +13,7 @@ def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc
     system.bring(x)
     for target, form in ((matrix, system.equations.jacobian), (mass, system.equations.kinetic)):
         target.zeroEntries()
-        fem.petsc.assemble_matrix(target, form)
+        system.assemble_into(target, form)
     if system.has_scalars:
         for index in (system.load_index, *system.drifts):  # no part of the pencil: an infinite eigenvalue each
             matrix.setValue(index, index, 1.0, addv=True)
@@ -22,7 +21,7 @@ def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc
     mass.assemble()
 
 
-def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: float, *, symmetric: bool) -> SLEPc.EPS:
+def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex, *, symmetric: bool) -> SLEPc.EPS:
     """Set up Krylov-Schur with shift-invert (MUMPS) for the ``number`` eigenvalues nearest to ``target``."""
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_")

@@ -1,0 +1,253 @@
+r"""The pencil of a state as named blocks, in the coordinates of one's choice.
+
+The eigenproblem of a state is the singular pencil ``(K C; C^t 0) x = mu (M 0; 0 0) x``.  ``K`` (m, m) is the second
+derivative of the whole Lagrangian in rotation, strain and centreline, ``C`` (m, p) its derivative in those and the
+multipliers (each column the gradient of one constraint), ``M`` (m, m) the kinetic metric.  Three sets of coordinates:
+
+* ``full``: the unknowns as they are, four components of ``q`` at each node and the multiplier ``mu`` of its norm;
+* ``tangent``: a spin ``theta`` in the space frame at each node, ``dq = 1/2 theta q``.  The sparse map ``T`` takes it to
+  the full coordinates and fulfils the collocated norm conditions, ``C_mu^t T = 0``, so that ``mu`` goes with them.  The
+  blocks are ``T^t K T``, ``T^t C``, ``T^t M T``.  ``K`` contains ``mu`` times the second derivative of the norm
+  condition: at an equilibrium ``T^t K T`` is then the second derivative of the energy along ``exp(eps theta / 2) q`` (see
+  :mod:`forms.paper`), without it, it is not;
+* ``compatible``: tangent coordinates, and the free strains follow from the motion through the kinematics ``r' = R v``
+  (pointwise formulation only).  In each cell the gradients of its constraints in its own strains are a block ``C_v`` of
+  full column rank; ``dv = -(C_v^t)^+ C_u^t (theta, dr)`` and an orthonormal ``N`` with ``C_v N = 0`` leave ``C_u N``.
+
+Sizes for ``N`` elements of degree ``k``, ``f`` free strains, one end clamped (``e = 1``) or both (``e = 2``), ``h``
+held components of the centreline's ends, ``g`` scalar contact forces (reduced formulation):
+
+    coordinates              rows of K and C                                 columns of C
+    full, pointwise          4 (kN + 1 - e) + f kN + 3 (kN + 1) - h          kN + 1 - e + 3 kN
+    full, reduced            4 (kN + 1 - e) + f kN                           kN + 1 - e + g
+    tangent, pointwise       3 (kN + 1 - e) + f kN + 3 (kN + 1) - h          3 kN
+    tangent, reduced         3 (kN + 1 - e) + f kN                           g
+    compatible, pointwise    3 (kN + 1 - e) + 3 (kN + 1) - h                 (3 - f) kN
+
+For ``k = 1`` these are the sizes of Kumar & Healey (2010) with ``n = N`` but for what discontinuous fields change.
+Cord: ``(6n - 5) x (6n - 5)`` and ``3n`` columns.  A continuous multiplier has ``3n + 3`` components less the known ``n3``
+at the end, ``3n + 2``; a discontinuous one has three in each cell, and dead forces enter the load instead.  Hemitropic,
+compatible: ``6 (n - 1)`` and ``2n`` columns.  Hemitropic, reduced: ``4n - 3`` rows and 3 columns, where a continuous
+stretch would have one value more, ``4n - 2``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.errors import SceneError
+from rodfem.stability.pencil import assemble_pencil
+from rodfem.system import System
+
+COORDINATES = ("full", "tangent", "compatible")
+
+
+@dataclass(frozen=True)
+class Pencil:
+    """Blocks ``K`` (m, m), ``C`` (m, p), ``M`` (m, m) of a state.
+
+    Attributes
+    ----------
+    T
+        Map from these coordinates to the full ones, (full m, m); None if they are the full ones.
+    where
+        For each field this rank's global rows in ``K`` and ``C`` (``theta``, ``q``, ``v``, ``r``), or columns of ``C``
+        (``mu``, ``n``, ``scalars``: the components of a constant contact force).
+    place
+        Arclength (the middle of a cell) by which the constraints of all ranks are in order along the rod, (p,); nan for
+        one that involves the whole rod.
+    symmetric
+        Whether ``K`` is: not under a follower load.
+    """
+
+    K: PETSc.Mat
+    C: PETSc.Mat
+    M: PETSc.Mat
+    T: PETSc.Mat | None
+    where: dict[str, np.ndarray]
+    place: np.ndarray
+    symmetric: bool
+
+    def block(self, matrix: str, row: str, column: str) -> PETSc.Mat:
+        """Part of ``K``, ``C`` or ``M`` that couples two fields, for example ``block("C", "theta", "n")``."""
+        comm = self.K.comm
+        sets = [PETSc.IS().createGeneral(self.where[name].astype(PETSc.IntType), comm=comm) for name in (row, column)]
+        return getattr(self, matrix).createSubMatrix(*sets)
+
+
+class Blocks:
+    """Makes the :class:`Pencil` of states of one :class:`~rodfem.system.System`, in one set of coordinates."""
+
+    def __init__(self, system: System, coordinates: str = "tangent") -> None:
+        """Number rows and columns; raises :class:`SceneError` for coordinates that the formulation does not have."""
+        if coordinates not in COORDINATES:
+            raise SceneError(f"Unknown coordinates {coordinates!r}: choose one of {', '.join(COORDINATES)}.")
+        if coordinates == "compatible" and system.fields.discretization.formulation != "pointwise":
+            raise SceneError("Compatible coordinates need the centreline: use --formulation pointwise.")
+        self.system, self.coordinates = system, coordinates
+        self.matrix, self.mass = system.state_matrix(), system.state_matrix()
+        fields = system.fields
+        primal = {b.name: self._owned(b.name) for b in fields.blocks if not b.multiplier}
+        dual = {b.name: self._owned(b.name) for b in fields.blocks if b.multiplier}
+        dual["scalars"] = np.array(
+            [fields.scalars[f"n{i + 1}"] for i in fields.forces if system.has_scalars], dtype=int
+        )
+        if coordinates != "full":
+            del dual["mu"]
+        self.rows, self.columns = (np.sort(np.concatenate(list(d.values()))) for d in (primal, dual))
+        self._numbers = primal | dual
+        self._first_row, self._first_column = (system.comm.scan(len(x)) - len(x) for x in (self.rows, self.columns))
+        self._quaternions()
+        self.place = self._places()
+
+    def assemble(self, x: PETSc.Vec) -> Pencil:
+        """Blocks at the state ``x``."""
+        comm = self.system.comm
+        assemble_pencil(self.system, x, self.matrix, self.mass)
+        rows, columns = (
+            PETSc.IS().createGeneral(n.astype(PETSc.IntType), comm=comm) for n in (self.rows, self.columns)
+        )
+        K, C = self.matrix.createSubMatrix(rows, rows), self.matrix.createSubMatrix(rows, columns)
+        M = self.mass.createSubMatrix(rows, rows)
+        symmetric = self.system.scene.conservative
+        where = {
+            name: np.searchsorted(self.rows, n) + self._first_row
+            if np.isin(n, self.rows).all()
+            else np.searchsorted(self.columns, n) + self._first_column
+            for name, n in self._numbers.items()
+        }
+        if self.coordinates == "full":
+            return Pencil(K, C, M, None, where, self.place, symmetric)
+        T = self._tangent_map()
+        spins = np.zeros(len(self.rows), dtype=bool)
+        spins[self._quads[:, 1:].ravel()] = True
+        kept = np.delete(np.arange(len(self.rows)), self._quads[:, 0])
+        first = comm.scan(len(kept)) - len(kept)
+        where |= {
+            name: np.searchsorted(kept, where[name] - self._first_row) + first for name in ("v", "r") if name in where
+        }
+        where["theta"] = np.flatnonzero(spins[kept]) + first
+        del where["q"]
+        pencil = Pencil(K.ptap(T), T.transposeMatMult(C), M.ptap(T), T, where, self.place, symmetric)
+        if self.coordinates == "tangent" or "v" not in where:
+            return pencil
+        return self._compatible(pencil)
+
+    # --- numbering ---------------------------------------------------------------------------------------------
+
+    def _owned(self, name: str) -> np.ndarray:
+        """Global numbers of this rank's free unknowns of a field, ascending."""
+        f = self.system.fields
+        numbers = np.unique(f.number[f.dofs[name]])
+        return numbers[(numbers >= f.offset) & (numbers < f.offset + len(f.free_owned))].astype(int)
+
+    def _quaternions(self) -> None:
+        """Positions in ``rows`` of the four components of each free quaternion (nodes, 4), and their local dofs."""
+        f = self.system.fields
+        dofs = f.dofs["q"].reshape(-1, 4)
+        first = f.number[dofs[:, 0]]
+        mine = np.flatnonzero((first >= f.offset) & (first < f.offset + len(f.free_owned)))
+        mine = mine[np.unique(first[mine], return_index=True)[1]]
+        self._dofs = dofs[mine]
+        self._quads = np.searchsorted(self.rows, f.number[self._dofs])
+
+    def _places(self) -> np.ndarray:
+        """Arclength of the middle of the first cell of each constraint, nan for a scalar force; of all ranks, (p,)."""
+        f = self.system.fields
+        place = np.full(len(self.columns), np.nan)
+        middle = f.vertices.mean(axis=1)
+        for cell in np.argsort(-middle):
+            for block in f.blocks:
+                if block.multiplier:
+                    numbers = f.number[f.dofs[block.name][cell]].ravel()
+                    place[np.isin(self.columns, numbers[numbers >= 0])] = middle[cell]
+        return np.concatenate(self.system.comm.allgather(place))
+
+    # --- maps --------------------------------------------------------------------------------------------------
+
+    def _tangent_map(self) -> PETSc.Mat:
+        """``T``: columns of a spin in the places of q1, q2, q3, and one for each strain and centreline unknown."""
+        quads = self._quads
+        a, b, c, d = self.system.fields.u.x.array[self._dofs].real.T / 2
+        values = np.array([[-b, -c, -d], [a, d, -c], [-d, a, b], [c, -b, a]])  # of 1/2 (0, theta) q
+        rows = np.broadcast_to(quads.T[:, None, :], values.shape)
+        columns = np.broadcast_to(quads.T[None, 1:, :], values.shape)
+        same = np.setdiff1d(np.arange(len(self.rows)), quads)
+        full = sp.csr_matrix(
+            (
+                np.append(values.ravel(), np.ones(len(same))),
+                (np.append(rows.ravel(), same), np.append(columns.ravel(), same)),
+            ),
+            shape=(len(self.rows),) * 2,
+        )
+        return petsc_matrix(self.system.comm, full[:, np.delete(np.arange(len(self.rows)), quads[:, 0])])
+
+    def _compatible(self, pencil: Pencil) -> Pencil:
+        """Let the strains of ``pencil`` (tangent coordinates) follow from the motion."""
+        f, comm = self.system.fields, self.system.comm
+        first_row, first_column = pencil.C.getOwnershipRange()[0], pencil.C.getOwnershipRangeColumn()[0]
+        strain, force = (
+            np.searchsorted(np.sort(self._numbers[name]), f.number[f.dofs[name][: f.owned_cells]])
+            for name in ("v", "n")
+        )
+        rows = pencil.where["v"][strain.reshape(f.owned_cells, -1)] - first_row
+        columns = pencil.where["n"][force.reshape(f.owned_cells, -1)] - first_column
+        starts, indices, values = pencil.C.getValuesCSR()
+        C = sp.csr_matrix((values, indices, starts), shape=(len(starts) - 1, pencil.C.getSize()[1]))
+        C_v = C[rows.ravel()][:, columns.ravel() + first_column]
+        C_v.eliminate_zeros()
+        (cells, a), b = rows.shape, columns.shape[1]
+        blocks = C_v.tobsr((a, b)).data  # in the order of the cells: other blocks are zero
+        Q, R = np.linalg.qr(np.swapaxes(blocks, 1, 2), mode="complete")
+        E = -np.linalg.solve(R[:, :a, :], np.swapaxes(Q[:, :, :a], 1, 2))
+        local_rows, local_columns = pencil.C.getLocalSize()
+        kept = np.delete(np.arange(local_rows), rows.ravel())
+        rest = np.arange(cells * (b - a)).reshape(cells, b - a)
+        follow = petsc_matrix(comm, block_matrix(E, rows, columns, (local_rows, local_columns)))
+        select = petsc_matrix(comm, sp.identity(local_rows, format="csr")[:, kept])
+        N = petsc_matrix(comm, block_matrix(Q[:, :, a:], columns, rest, (local_columns, rest.size)))
+        T = follow.matMult(pencil.C.transposeMatMult(select))
+        T.axpy(1.0, select, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        begin = comm.scan(len(kept)) - len(kept)
+        where = {name: np.searchsorted(kept, pencil.where[name] - first_row) + begin for name in ("theta", "r")}
+        where["n"] = rest.ravel() + comm.scan(rest.size) - rest.size
+        middle = np.repeat(f.vertices[:cells].mean(axis=1), b - a)
+        return Pencil(
+            pencil.K.ptap(T),
+            T.transposeMatMult(pencil.C).matMult(N),
+            pencil.M.ptap(T),
+            pencil.T.matMult(T) if pencil.T is not None else T,
+            where,
+            np.concatenate(comm.allgather(middle)),
+            pencil.symmetric,
+        )
+
+
+def block_matrix(blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -> sp.csr_matrix:
+    """Sparse matrix with dense ``blocks`` (b, r, c) at ``rows`` (b, r) and ``columns`` (b, c)."""
+    i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
+    return sp.csr_matrix((blocks.ravel(), (i.ravel(), j.ravel())), shape=shape)
+
+
+def petsc_matrix(comm: MPI.Comm, local: sp.spmatrix) -> PETSc.Mat:
+    """Block diagonal PETSc matrix, one block a rank."""
+    local = local.tocsr()
+    n = local.shape[1]
+    first = comm.scan(n) - n
+    size = ((local.shape[0], PETSc.DETERMINE), (n, PETSc.DETERMINE))
+    csr = (local.indptr.astype(PETSc.IntType), (local.indices + first).astype(PETSc.IntType), local.data)
+    return PETSc.Mat().createAIJ(size, csr=csr, comm=comm)
+
+
+def gathered(matrix: PETSc.Mat) -> sp.csr_matrix:
+    """All of a matrix on every rank, as scipy's."""
+    parts = [
+        sp.csr_matrix((values, columns, starts), shape=(len(starts) - 1, matrix.getSize()[1]))
+        for starts, columns, values in matrix.comm.tompi4py().allgather(matrix.getValuesCSR())
+    ]
+    return sp.vstack(parts).tocsr()

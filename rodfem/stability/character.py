@@ -1,0 +1,48 @@
+"""What a mode of vibration does: bending about one director or the other, torsion, or a mixture."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.system import System
+
+PURE = 0.99
+"""Share of the mean square rotation above which a mode is named after one kind of motion."""
+KINDS = ("bending about d1", "bending about d2", "torsion")
+
+
+def shares(system: System, q: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
+    """Shares of the rotations about the three directors in a mode, (3,), summing to one; collective.
+
+    ``q`` (cells, nodes, 4) are the nodal quaternions of the state, ``parts`` the real and the imaginary part of the
+    mode as values of this rank's unknowns.  The rotation is the spin ``w = 2 vec(conj(q) dq)`` at the nodes.
+    """
+    f = system.fields
+    cells = slice(0, f.owned_cells)
+    size = (f.vertices[cells, 1] - f.vertices[cells, 0])[:, None, None]
+    square = np.zeros(3)
+    vector = system.new_vector()
+    for part in parts:
+        vector.array[:] = part
+        system.bring(vector)
+        dq = np.where(f.number[f.dofs["q"][cells]] < 0, 0.0, f.u.x.array[f.dofs["q"][cells]])
+        scalar, v = q[cells][..., :1], q[cells][..., 1:]
+        w = scalar * dq[..., 1:] - dq[..., :1] * v - np.cross(v, dq[..., 1:])
+        square += (w**2 * size).sum(axis=(0, 1))
+    square = system.comm.allreduce(square)
+    return np.asarray(square / max(square.sum(), 1e-300))
+
+
+def name(share: np.ndarray) -> str:
+    """Name of a motion by its shares: one of :data:`KINDS`, ``bending`` (about both), or ``mixed``."""
+    for kind, part in zip(KINDS, share, strict=True):
+        if part > PURE:
+            return kind
+    return "bending" if share[0] + share[1] > PURE else "mixed"
+
+
+def halves(vector: PETSc.Vec) -> list[np.ndarray]:
+    """Real and imaginary part of this rank's values of a vector of a complex PETSc; the one part of a real one."""
+    values = vector.array_r
+    return [values.real.copy(), values.imag.copy()] if np.iscomplexobj(values) else [values.copy()]
