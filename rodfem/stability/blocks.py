@@ -6,10 +6,10 @@ multipliers (each column the gradient of one constraint), ``M`` (m, m) the kinet
 
 * ``full``: the unknowns as they are, four components of ``q`` at each node and the multiplier ``mu`` of its norm;
 * ``tangent``: a spin ``theta`` in the space frame at each node, ``dq = 1/2 theta q``.  The sparse map ``T`` takes it to
-  the full coordinates and fulfils the collocated norm conditions, ``C_mu^t T = 0``, so that ``mu`` goes with them.  The
-  blocks are ``T^t K T``, ``T^t C``, ``T^t M T``.  ``K`` contains ``mu`` times the second derivative of the norm
-  condition: at an equilibrium ``T^t K T`` is then the second derivative of the energy along ``exp(eps theta / 2) q`` (see
-  :mod:`forms.paper`), without it, it is not;
+  the full coordinates and fulfils the collocated norm conditions, ``C_mu^t T = 0``, so that ``mu`` goes with them.
+  The blocks are ``T^t K T``, ``T^t C``, ``T^t M T``.  ``K`` contains ``mu`` times the second derivative of the norm
+  condition: at an equilibrium ``T^t K T`` is then the second derivative of the energy along
+  ``exp(eps theta / 2) q`` (see :mod:`forms.paper`), without it, it is not;
 * ``compatible``: tangent coordinates, and the free strains follow from the motion through the kinematics ``r' = R v``
   (pointwise formulation only).  In each cell the gradients of its constraints in its own strains are a block ``C_v`` of
   full column rank; ``dv = -(C_v^t)^+ C_u^t (theta, dr)`` and an orthonormal ``N`` with ``C_v N = 0`` leave ``C_u N``.
@@ -25,10 +25,10 @@ held components of the centreline's ends, ``g`` scalar contact forces (reduced f
     compatible, pointwise    3 (kN + 1 - e) + 3 (kN + 1) - h                 (3 - f) kN
 
 For ``k = 1`` these are the sizes of Kumar & Healey (2010) with ``n = N`` but for what discontinuous fields change.
-Cord: ``(6n - 5) x (6n - 5)`` and ``3n`` columns.  A continuous multiplier has ``3n + 3`` components less the known ``n3``
-at the end, ``3n + 2``; a discontinuous one has three in each cell, and dead forces enter the load instead.  Hemitropic,
-compatible: ``6 (n - 1)`` and ``2n`` columns.  Hemitropic, reduced: ``4n - 3`` rows and 3 columns, where a continuous
-stretch would have one value more, ``4n - 2``.
+Cord: ``(6n - 5) x (6n - 5)`` and ``3n`` columns.  A continuous multiplier has ``3n + 3`` components less the known
+``n3`` at the end, ``3n + 2``; a discontinuous one has three in each cell, and dead forces enter the load instead.
+Hemitropic, compatible: ``6 (n - 1)`` and ``2n`` columns.  Hemitropic, reduced: ``4n - 3`` rows and 3 columns, where a
+continuous stretch would have one value more, ``4n - 2``.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import SceneError
+from rodfem.stability.matrices import block_matrix, first_of, local_rows, petsc_matrix
 from rodfem.stability.pencil import assemble_pencil
 from rodfem.system import System
 
@@ -101,7 +101,7 @@ class Blocks:
             del dual["mu"]
         self.rows, self.columns = (np.sort(np.concatenate(list(d.values()))) for d in (primal, dual))
         self._numbers = primal | dual
-        self._first_row, self._first_column = (system.comm.scan(len(x)) - len(x) for x in (self.rows, self.columns))
+        self._first_row, self._first_column = (first_of(system.comm, len(x)) for x in (self.rows, self.columns))
         self._quaternions()
         self.place = self._places()
 
@@ -127,7 +127,7 @@ class Blocks:
         spins = np.zeros(len(self.rows), dtype=bool)
         spins[self._quads[:, 1:].ravel()] = True
         kept = np.delete(np.arange(len(self.rows)), self._quads[:, 0])
-        first = comm.scan(len(kept)) - len(kept)
+        first = first_of(comm, len(kept))
         where |= {
             name: np.searchsorted(kept, where[name] - self._first_row) + first for name in ("v", "r") if name in where
         }
@@ -159,13 +159,13 @@ class Blocks:
     def _places(self) -> np.ndarray:
         """Arclength of the middle of the first cell of each constraint, nan for a scalar force; of all ranks, (p,)."""
         f = self.system.fields
-        place = np.full(len(self.columns), np.nan)
-        middle = f.vertices.mean(axis=1)
-        for cell in np.argsort(-middle):
-            for block in f.blocks:
-                if block.multiplier:
-                    numbers = f.number[f.dofs[block.name][cell]].ravel()
-                    place[np.isin(self.columns, numbers[numbers >= 0])] = middle[cell]
+        place = np.full(len(self.columns), np.inf)
+        for name in (b.name for b in f.blocks if b.multiplier):
+            numbers = f.number[f.dofs[name]]
+            middle = np.broadcast_to(f.vertices.mean(axis=1)[:, None, None], numbers.shape)
+            mine = np.isin(numbers, self.columns)
+            np.minimum.at(place, np.searchsorted(self.columns, numbers[mine]), middle[mine])
+        place[np.isinf(place)] = np.nan
         return np.concatenate(self.system.comm.allgather(place))
 
     # --- maps --------------------------------------------------------------------------------------------------
@@ -197,25 +197,23 @@ class Blocks:
         )
         rows = pencil.where["v"][strain.reshape(f.owned_cells, -1)] - first_row
         columns = pencil.where["n"][force.reshape(f.owned_cells, -1)] - first_column
-        starts, indices, values = pencil.C.getValuesCSR()
-        C = sp.csr_matrix((values, indices, starts), shape=(len(starts) - 1, pencil.C.getSize()[1]))
-        C_v = C[rows.ravel()][:, columns.ravel() + first_column]
+        C_v = local_rows(pencil.C)[rows.ravel()][:, columns.ravel() + first_column]
         C_v.eliminate_zeros()
         (cells, a), b = rows.shape, columns.shape[1]
         blocks = C_v.tobsr((a, b)).data  # in the order of the cells: other blocks are zero
         Q, R = np.linalg.qr(np.swapaxes(blocks, 1, 2), mode="complete")
         E = -np.linalg.solve(R[:, :a, :], np.swapaxes(Q[:, :, :a], 1, 2))
-        local_rows, local_columns = pencil.C.getLocalSize()
-        kept = np.delete(np.arange(local_rows), rows.ravel())
+        m, p = pencil.C.getLocalSize()
+        kept = np.delete(np.arange(m), rows.ravel())
         rest = np.arange(cells * (b - a)).reshape(cells, b - a)
-        follow = petsc_matrix(comm, block_matrix(E, rows, columns, (local_rows, local_columns)))
-        select = petsc_matrix(comm, sp.identity(local_rows, format="csr")[:, kept])
-        N = petsc_matrix(comm, block_matrix(Q[:, :, a:], columns, rest, (local_columns, rest.size)))
+        follow = petsc_matrix(comm, block_matrix(E, rows, columns, (m, p)))
+        select = petsc_matrix(comm, sp.identity(m, format="csr")[:, kept])
+        N = petsc_matrix(comm, block_matrix(Q[:, :, a:], columns, rest, (p, rest.size)))
         T = follow.matMult(pencil.C.transposeMatMult(select))
         T.axpy(1.0, select, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        begin = comm.scan(len(kept)) - len(kept)
+        begin = first_of(comm, len(kept))
         where = {name: np.searchsorted(kept, pencil.where[name] - first_row) + begin for name in ("theta", "r")}
-        where["n"] = rest.ravel() + comm.scan(rest.size) - rest.size
+        where["n"] = rest.ravel() + first_of(comm, rest.size)
         middle = np.repeat(f.vertices[:cells].mean(axis=1), b - a)
         return Pencil(
             pencil.K.ptap(T),
@@ -226,28 +224,3 @@ class Blocks:
             np.concatenate(comm.allgather(middle)),
             pencil.symmetric,
         )
-
-
-def block_matrix(blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -> sp.csr_matrix:
-    """Sparse matrix with dense ``blocks`` (b, r, c) at ``rows`` (b, r) and ``columns`` (b, c)."""
-    i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
-    return sp.csr_matrix((blocks.ravel(), (i.ravel(), j.ravel())), shape=shape)
-
-
-def petsc_matrix(comm: MPI.Comm, local: sp.spmatrix) -> PETSc.Mat:
-    """Block diagonal PETSc matrix, one block a rank."""
-    local = local.tocsr()
-    n = local.shape[1]
-    first = comm.scan(n) - n
-    size = ((local.shape[0], PETSc.DETERMINE), (n, PETSc.DETERMINE))
-    csr = (local.indptr.astype(PETSc.IntType), (local.indices + first).astype(PETSc.IntType), local.data)
-    return PETSc.Mat().createAIJ(size, csr=csr, comm=comm)
-
-
-def gathered(matrix: PETSc.Mat) -> sp.csr_matrix:
-    """All of a matrix on every rank, as scipy's."""
-    parts = [
-        sp.csr_matrix((values, columns, starts), shape=(len(starts) - 1, matrix.getSize()[1]))
-        for starts, columns, values in matrix.comm.tompi4py().allgather(matrix.getValuesCSR())
-    ]
-    return sp.vstack(parts).tocsr()

@@ -1,13 +1,13 @@
 r"""Orthonormal bases of what constraints leave free, in factored form.
 
 A full Q-R factorisation ``C = (Q1 Q2) (R; 0)`` of the constraints' gradients ``C`` (m, p) gives in ``Q2`` (m, m - p) an
-orthonormal basis of the kernel of ``C^t``.  It is kept as Householder reflections in blocks ``I - V T V^t`` (compact WY
-form, Schreiber & Van Loan, SIAM J. Sci. Stat. Comput. 10 (1989)), and no matrix of size m x m is ever made.
+orthonormal basis of the kernel of ``C^t``.  It is kept as Householder reflections, see
+:mod:`rodfem.stability.reflections`, and no matrix of size m x m is ever made.
 
 * Dense columns (integral constraints): one block of reflections over all rows, products in O(m p).
 * Sparse columns (pointwise constraints), in groups along the rod such that a row couples two neighbouring groups at
-  most: cyclic reduction.  The rows between two groups, compressed to as many as they couple columns, are a *link*.  Every
-  second group is eliminated from its two links by a Q-R factorisation of their rows; what is left of them is
+  most: cyclic reduction.  The rows between two groups, compressed to as many as they couple columns, are a *link*.
+  Every second group is eliminated from its two links by a Q-R factorisation of their rows; what is left of them is
   compressed, and is the link between the groups that remain.  Each level halves their number, all its small
   factorisations are one call, the sum over levels is O(m).  A chain of Givens rotations along the rod would do the same
   work in m steps one after the other.  Rows that couple nothing any more belong to ``Q2``.
@@ -23,40 +23,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from rodfem.errors import SceneError
+from rodfem.stability.reflections import Reflections, factor
 
 DEPENDENT = 1e-12
 """A column whose part orthogonal to the others is smaller than this, relative to the largest entry, depends on them."""
 ROUND_OFF = 1e-14
 """Entries of ``C`` below this, relative to the largest, are zero."""
-
-
-@dataclass(frozen=True)
-class Reflections:
-    """A stack of b orthogonal matrices ``I - V T V^t``, each on its own rows: rows (b, r), V (b, r, c), T (b, c, c)."""
-
-    rows: np.ndarray
-    V: np.ndarray
-    T: np.ndarray
-
-    def apply(self, x: np.ndarray, *, transposed: bool) -> None:
-        """Multiply ``x`` (m,) or (m, w) by all of them, in place."""
-        part = x[self.rows].reshape(*self.rows.shape, -1)
-        T = np.swapaxes(self.T, 1, 2) if transposed else self.T
-        part -= self.V @ (T @ (np.swapaxes(self.V, 1, 2) @ part))
-        x[self.rows] = part.reshape(*self.rows.shape, *x.shape[1:])
-
-
-def factor(rows: np.ndarray, blocks: np.ndarray) -> tuple[Reflections, np.ndarray]:
-    """Q-R factorisations of a stack of matrices (b, r, c): the reflections and the factors R (b, min(r, c), c)."""
-    h, tau = np.linalg.qr(blocks, mode="raw")
-    h = np.swapaxes(h, 1, 2)
-    size = tau.shape[1]
-    V = np.tril(h[:, :, :size], -1)
-    V[:, np.arange(size), np.arange(size)] = 1.0
-    V *= (tau != 0)[:, None, :]
-    inverse = np.triu(np.swapaxes(V, 1, 2) @ V, 1)
-    inverse[:, np.arange(size), np.arange(size)] = 1.0 / np.where(tau != 0, tau, 1.0)
-    return Reflections(rows, V, np.linalg.inv(inverse)), np.triu(h[:, :size, :])
 
 
 @dataclass
@@ -145,8 +117,8 @@ def require_independent(R: np.ndarray, scale: float, columns: np.ndarray) -> Non
 class Chain:
     """Cyclic reduction of sparse columns in groups along the rod; fills a :class:`Kernel`.
 
-    Every row has a part for the group on its left and one for the group on its right.  Link ``i`` is the rows between the
-    groups at positions ``i - 1`` and ``i`` of those that remain; the first and the last have one neighbour only.
+    Every row has a part for the group on its left and one for the group on its right.  Link ``i`` is the rows between
+    the groups at positions ``i - 1`` and ``i`` of those that remain; the first and the last have one neighbour only.
     """
 
     def __init__(self, C: sp.csr_matrix, group: np.ndarray, scale: float, found: Kernel) -> None:

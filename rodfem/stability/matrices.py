@@ -1,0 +1,40 @@
+"""Matrices that a rank makes for its own unknowns, as PETSc's and back."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from mpi4py import MPI
+from petsc4py import PETSc
+
+
+def first_of(comm: MPI.Comm, count: int) -> int:
+    """Number of things on the ranks before this one, of which it has ``count``."""
+    return sum(comm.allgather(count)[: comm.rank])
+
+
+def block_matrix(blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -> sp.csr_matrix:
+    """Sparse matrix with dense ``blocks`` (b, r, c) at ``rows`` (b, r) and ``columns`` (b, c)."""
+    i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
+    return sp.csr_matrix((blocks.ravel(), (i.ravel(), j.ravel())), shape=shape)
+
+
+def petsc_matrix(comm: MPI.Comm, local: sp.spmatrix) -> PETSc.Mat:
+    """Block diagonal PETSc matrix, one block a rank."""
+    local = local.tocsr()
+    local.sort_indices()
+    n = local.shape[1]
+    size = ((local.shape[0], PETSc.DETERMINE), (n, PETSc.DETERMINE))
+    columns = (local.indices + first_of(comm, n)).astype(PETSc.IntType)
+    return PETSc.Mat().createAIJ(size, csr=(local.indptr.astype(PETSc.IntType), columns, local.data), comm=comm)
+
+
+def local_rows(matrix: PETSc.Mat) -> sp.csr_matrix:
+    """Rows of this rank, with the columns of all ranks."""
+    starts, columns, values = matrix.getValuesCSR()
+    return sp.csr_matrix((values, columns, starts), shape=(len(starts) - 1, matrix.getSize()[1]))
+
+
+def gathered(matrix: PETSc.Mat) -> sp.csr_matrix:
+    """All of a matrix on every rank."""
+    return sp.vstack(matrix.comm.tompi4py().allgather(local_rows(matrix))).tocsr()
