@@ -48,15 +48,23 @@ def scene(options: Namespace) -> Scene:
     )
 
 
-def elements(options: Namespace) -> int:
-    """Six elements for each turn that the cord would like to make."""
-    return min(max(ceil(6 * abs(options.turns)), 6), 600) if isfinite(options.turns) else 6
+def defaults(options: Namespace) -> dict:
+    """Six elements for each turn that the cord would like to make; a first tension at which it is stable."""
+    turns = abs(options.turns) if isfinite(options.turns) else 0.0
+    return {
+        "elements": min(max(ceil(6 * turns), 6), 600),
+        "span": (max(60.0, 10.0 * ceil((2 * pi * turns) ** 2 / 10)), 0.0),
+    }
 
 
 if __name__ == "__main__":
     parser = cli.parser_for("cord", __doc__, load="lam", span=(60.0, 0.0), elements=9, degree=6)
     constants = parser.add_argument_group("constants of the rod")
     constants.add_argument(
-        "--turns", type=float, default=1.5, metavar="N", help="k0 = 2 pi N (default 1.5); six elements for each turn"
+        "--turns",
+        type=float,
+        default=1.5,
+        metavar="N",
+        help="k0 = 2 pi N, more elements and tension for more (default 1.5)",
     )
-    cli.main(parser, scene, elements=elements)
+    cli.main(parser, scene, defaults)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
@@ -34,6 +34,11 @@ check_installation()
 
 class Parser(argparse.ArgumentParser):
     """Argument parser whose complaints are one sentence, printed once under MPI."""
+
+    def flags(self, name: str) -> list[str]:
+        """Return the words that set an option, abbreviations included."""
+        full = next(action.option_strings[0] for action in self._actions if action.dest == name)
+        return [full[:end] for end in range(3, len(full) + 1)]
 
     def error(self, message: str) -> NoReturn:
         """Print ``message`` and leave with status 2."""
@@ -135,18 +140,19 @@ def parser_for(
 def main(
     parser: Parser,
     scene_of: Callable[[argparse.Namespace], Any],
+    defaults: Callable[[argparse.Namespace], Mapping[str, Any]] | None = None,
     arguments: Sequence[str] | None = None,
-    elements: Callable[[argparse.Namespace], int] | None = None,
 ) -> None:
     """Parse the command line, build the scene, run it; bad input ends with one sentence and status 2.
 
-    ``elements`` gives the number of elements that the other options call for, where the user gives none.
+    ``defaults`` gives values that the other options call for, by name, for options that the user does not give.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
     options = parser.parse_args(ours)
-    if elements is not None and not any(word.startswith("--elements") for word in ours):
-        options.elements = elements(options)
+    for name, value in defaults(options).items() if defaults else ():
+        if not any(word.split("=")[0] in parser.flags(name) for word in ours):
+            setattr(options, name, value)
     import petsc4py
 
     petsc4py.init(["rodfem", *petsc])  # before PETSc is loaded, for options that it reads only then (-log_view)

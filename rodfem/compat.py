@@ -31,6 +31,8 @@ except ModuleNotFoundError as missing:
     ) from missing
 
 
+REAL: Any = np.float64
+"""Numbers of states and forms, whatever those of PETSc."""
 COMPLEX = bool(np.issubdtype(PETSc.ScalarType, np.complexfloating))
 """Whether this PETSc was built for complex numbers: forms and states are real all the same."""
 
@@ -125,7 +127,7 @@ def cell_vertices(mesh: Any, cells: int) -> np.ndarray:
 def compile_forms(forms: Sequence[Any]) -> list[Any]:
     """Compile UFL forms; raises :class:`EnvironmentTrouble` where the form cache is locked by a killed run."""
     try:
-        return [fem.form(form, dtype=np.float64) for form in forms]
+        return [fem.form(form, dtype=REAL) for form in forms]
     except TimeoutError as locked:
         raise EnvironmentTrouble(
             "A compiled form never became ready, most likely because an earlier run was killed while compiling: "

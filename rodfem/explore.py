@@ -275,7 +275,7 @@ class Explorer:
         branch.special.append(special)
 
     def _singular_end(self, branch: Branch, last: Point) -> None:
-        """Report a branch point on the very end of the range: it is located on a piece of the branch that goes past it."""
+        """Report a branch point on the very end of the range, located on a piece of the branch that goes past it."""
         parameter, load = self.scene.parameters[self.scene.load], last.load
         beyond = load + BEYOND * (load - sum(self.plan.span) / 2)
         previous = branch.points[-2]

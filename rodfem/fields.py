@@ -101,7 +101,7 @@ class Fields:
         self.mesh = mesh or compat.interval_mesh(comm, discretization.elements, *scene.interval)
         parts = [(b.continuous, b.degree, b.size) for b in self.blocks] + [(False, 0, len(names))]
         self.space = compat.mixed_space(self.mesh, parts)
-        self.u = fem.Function(self.space, dtype=np.float64)
+        self.u = fem.Function(self.space, dtype=compat.REAL)
         cells = self.mesh.topology.index_map(1)
         self.owned_cells, local_cells = cells.size_local, cells.size_local + cells.num_ghosts
         self.vertices = compat.cell_vertices(self.mesh, local_cells)
@@ -141,7 +141,7 @@ class Fields:
         count = len(self.free_owned)
         self.offset = sum(self.comm.allgather(count)[: self.comm.rank])
         self.field_unknowns = self.comm.allreduce(count)
-        numbers = fem.Function(self.space, dtype=np.float64)
+        numbers = fem.Function(self.space, dtype=compat.REAL)
         numbers.x.array[:] = -1.0
         numbers.x.array[self.free_owned] = self.offset + np.arange(count)
         numbers.x.scatter_forward()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from math import isfinite
 from collections.abc import Sequence
+from math import isfinite
 from typing import TextIO
 
 from mpi4py import MPI

@@ -48,6 +48,30 @@ def test_straight_state(turns: float, span: tuple[float, float]) -> None:
         assert (p.ordinate, p.energy) == pytest.approx((0, (2 * pi * turns) ** 2 / 2), rel=1e-12, abs=1e-12)
 
 
+def test_range_that_ends_on_a_branch_point() -> None:
+    """With whole turns the straight rod is singular at lam = 0, where a family of equal tension and energy leaves."""
+    found = explored("cord", turns=1, span=(30, 0), elements=6, depth=1)
+    assert [b.name for b in found.branches] == ["straight", "branch 1"]
+    (s,) = specials(found["straight"], "branch point")
+    assert abs(s.point.load) <= 3 * s.error_estimate <= 1e-9
+    assert (s.negative_before, s.negative_after, s.law.kind) == (0, 1, "vertical branch")
+    family = found["branch 1"]
+    assert family.ended == "closed loop"
+    assert [q.kind for q in family.special] == ["end"]
+    assert max(p.ordinate for p in family.points) == pytest.approx(1, abs=1e-3)  # the closed ring
+    for p in family.points:
+        assert (p.load, p.energy) == pytest.approx((0, 2 * pi**2), abs=1e-8)
+
+
+def test_euler_buckling_out_of_the_plane_of_curvature() -> None:
+    """At -4 pi^2 the straight rod buckles about d2, which its curvature does not feel; its load enters no equation."""
+    found = explored("cord", turns=1, span=(20, -60), elements=6)
+    euler = specials(found["straight"], "branch point")[1]
+    assert euler.point.load == pytest.approx(-4 * pi**2, abs=1e-9)
+    met = [s for b in found.branches for s in b.special if s.meets == ("straight", 1)]
+    assert [s.kind for s in met] == ["branch point"]
+
+
 @pytest.mark.parametrize("name", ["branch 1", "branch 2"])
 def test_perversions(name: str) -> None:
     (p,) = user_points(default()[name], 40.0)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import os
 import runpy
+import subprocess
 import sys
 from functools import cache
 from pathlib import Path
@@ -27,9 +30,9 @@ DEMO = Path(__file__).parents[1] / "demos" / "follower.py"
 
 
 @cache
-def vibration(P: float, elements: int = 8, **constants: float) -> Vibration:
+def vibration(P: float, elements: int = 8, degree: int = 6, **constants: object) -> Vibration:
     """The pencil of the demo at one load."""
-    solver = Equilibria(System(scene("follower", **constants), Discretization("pointwise", elements, 6)))
+    solver = Equilibria(System(scene("follower", **constants), Discretization("pointwise", elements, degree)))
     x, outcome = solver.at_load(solver.start(P), P)
     assert outcome.converged
     found = Vibration(solver.system)
@@ -110,6 +113,63 @@ def test_mass_and_inertia() -> None:
     assert abs(heavy - 26.7885149853 / 2).min() < 1e-9
     twist = (np.pi / 2) ** 2 / 1e-3  # clamped and free, with B3 = 1
     assert abs(vibration(10.0, rotary_inertia=(0.0, 0.0, 1e-3)).near(2, 2400.0).values - twist).min() < 1e-9 * twist
+
+
+def test_motions_have_names() -> None:
+    """Bending about d1 is the weak plane, about d2 the strong one, and torsion has a closed form."""
+    found = vibration(10.0, rotary_inertia=(1e-3, 1e-3, 2e-3)).near(5, 1.0)
+    assert {"bending about d1", "bending about d2", "torsion"} == set(found.kinds)
+    for mu, kind in zip(found.values, found.kinds, strict=True):
+        EI = {"bending about d1": 1, "bending about d2": 10}.get(kind)
+        torsion = (np.pi / 2 * np.arange(1, 10, 2)) ** 2 / 2e-3
+        expected = torsion if EI is None else column(mu, 10.0, EI, 1e-3)
+        assert np.min(abs(mu - expected)) < 1e-8 * abs(mu)
+
+
+@pytest.mark.parametrize(("elements", "degree"), [(1, 2), (1, 4), (8, 1), (4, 6)])
+@pytest.mark.parametrize("P", [1.8, 30.0])
+def test_no_spurious_eigenvalue_on_crude_meshes(elements: int, degree: int, P: float) -> None:
+    """Infinite eigenvalues come in Jordan blocks, which round-off brings near: none is among those returned."""
+    values = vibration(P, elements, degree).near(40, -1e-3).values
+    assert len(values) <= 2 * elements * degree
+    assert values.real.min() > -1e3
+    assert abs(values).max() < 1e10
+    if P < 20:  # beyond, the crude ones have not fluttered yet
+        for mu in values[:2]:
+            exact = [column(mu, P), column(mu, P, EI=10)]
+            assert np.nanmin([abs(mu - e) for e in exact]) < (1e-6 if elements * degree > 8 else 0.1) * abs(mu)
+
+
+def test_dense_reductions_find_what_slepc_finds() -> None:
+    dense, krylov = (vibration(15.0, elements).near(4, 1.0) for elements in (1, 8))
+    assert dense.values[:3] == pytest.approx(krylov.values[:3], rel=2e-4)
+    assert dense.kinds[:3] == krylov.kinds[:3]
+
+
+@pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts a process of its own")
+def test_complex_petsc(tmp_path: Path) -> None:
+    """With the complex build, where it is installed beside the real one, the demo gives the same numbers."""
+    builds = [sorted(Path("/usr/lib").glob(f"{x}dir/{x}*/*-complex")) for x in ("petsc", "slepc")]
+    if not all(builds) or not _complex_works(builds):
+        pytest.skip("no complex build of dolfinx, petsc4py and slepc4py")
+    environment = os.environ | {"PETSC_DIR": str(builds[0][-1]), "SLEPC_DIR": str(builds[1][-1])}
+    command = [sys.executable, str(DEMO), "--no-figures", "--output", str(tmp_path)]
+    subprocess.run(command, env=environment, check=True, timeout=300, capture_output=True)
+    branch = json.loads((tmp_path / "diagram.json").read_text())["branches"][0]
+    (flutter,) = [s for s in branch["special"] if s["kind"] == "flutter"]
+    assert flutter["load"] == pytest.approx(20.0509536189738, abs=1e-9)
+    (p,) = [p for p in swept((0.0, 25.0)).points if p.load == 25.0]
+    np.testing.assert_allclose(branch["columns"]["omega2"][-1], p.omega2, rtol=1e-9, atol=1e-6)
+    hemitropic = [sys.executable, str(DEMO.with_name("hemitropic.py")), "--output", str(tmp_path)]
+    refused = subprocess.run(hemitropic, env=environment, timeout=300, capture_output=True, text=True)
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("error: This PETSc was built for complex numbers")
+
+
+def _complex_works(builds: list[list[Path]]) -> bool:
+    environment = os.environ | {"PETSC_DIR": str(builds[0][-1]), "SLEPC_DIR": str(builds[1][-1])}
+    check = "from petsc4py import PETSc; import dolfinx, slepc4py.SLEPc; assert PETSc.ScalarType(1j)"
+    return subprocess.run([sys.executable, "-c", check], env=environment, capture_output=True).returncode == 0
 
 
 def test_asymmetry_has_low_rank() -> None:

@@ -203,6 +203,6 @@ class Vibration:
 
 
 def dense_rows(matrix: PETSc.Mat) -> np.ndarray:
-    """This rank's rows of a matrix as a dense array, (local rows, columns)."""
+    """Rows of a matrix that are on this rank, as a dense array (local rows, columns)."""
     dense = matrix.copy().convert("dense")
     return np.array(dense.getDenseArray())

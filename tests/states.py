@@ -1,0 +1,70 @@
+"""Equilibria on small discretisations, each computed once: on the first branch, and buckled along its lowest mode."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import rods
+import scenes
+from petsc4py import PETSc
+
+from rodfem.continuation import Equilibria
+from rodfem.fields import Discretization
+from rodfem.scene import Scene
+from rodfem.stability.blocks import Blocks
+from rodfem.stability.matrices import gathered
+from rodfem.stability.reduction import Reduction
+from rodfem.system import System
+
+
+def scene(name: str) -> Scene:
+    return rods.scene() if name == "hemitropic" else scenes.scene(name)
+
+
+@cache
+def solver(name: str, formulation: str, elements: int, degree: int) -> Equilibria:
+    return Equilibria(System(scene(name), Discretization(formulation, elements, degree)))
+
+
+@cache
+def plain(name: str, formulation: str, elements: int, degree: int, load: float) -> tuple[System, PETSc.Vec]:
+    """State on the branch that starts at the undeformed rod."""
+    found = solver(name, formulation, elements, degree)
+    found.system.set_phase(None)
+    x = found.start(0.0)
+    for part in np.linspace(0.0, load, 5)[1:] if name == "ruler" else [load]:
+        x, outcome = found.at_load(x, part)
+        assert outcome.converged
+    return found.system, x
+
+
+@cache
+def buckled(name: str, formulation: str, elements: int, degree: int, load: float) -> tuple[System, PETSc.Vec]:
+    """State that Newton's method finds from the former, moved along its left-most mode."""
+    system, x = plain(name, formulation, elements, degree, load)
+    blocks = Blocks(system)
+    mode = unit_mode(system, blocks, x)
+    for amplitude in (0.6, 0.9, 1.2, 0.4):
+        guess = x.copy()
+        guess.axpy(amplitude, mode)
+        system.set_phase(guess)
+        y, outcome = solver(name, formulation, elements, degree).at_load(guess, load)
+        change = y - x
+        if outcome.converged and system.norm(change) > 0.1:
+            return system, y
+    raise AssertionError(f"no buckled state of {name} was found at {load}")
+
+
+def unit_mode(system: System, blocks: Blocks, x: PETSc.Vec) -> PETSc.Vec:
+    """Left-most mode of the state ``x`` as a vector of the system, of norm 1."""
+    pencil = blocks.assemble(x)
+    reduced = Reduction(pencil).near(1, -1e4).vectors[:, 0]
+    full: Any = gathered(pencil.T) @ reduced
+    first, last = pencil.K.createVecRight().getOwnershipRange() if pencil.T is None else pencil.T.getOwnershipRange()
+    mode = system.new_vector()
+    mode.array[blocks.rows - system.fields.offset] = full[first:last]
+    mode.assemble()
+    mode.scale(1.0 / system.norm(mode))
+    return mode
