@@ -81,7 +81,15 @@ class Pencil:
 
 
 class Blocks:
-    """Makes the :class:`Pencil` of states of one :class:`~rodfem.system.System`, in one set of coordinates."""
+    """Makes the :class:`Pencil` of states of one :class:`~rodfem.system.System`, in one set of coordinates.
+
+    Attributes
+    ----------
+    rows, columns
+        Global numbers of this rank's unknowns and multipliers that are rows and columns in full coordinates, ascending.
+    quaternions
+        Global numbers of the four components of ``q`` at each of this rank's free nodes, (nodes, 4).
+    """
 
     def __init__(self, system: System, coordinates: str = "tangent") -> None:
         """Number rows and columns; raises :class:`SceneError` for coordinates that the formulation does not have."""
@@ -102,7 +110,7 @@ class Blocks:
         self.rows, self.columns = (np.sort(np.concatenate(list(d.values()))) for d in (primal, dual))
         self._numbers = primal | dual
         self._first_row, self._first_column = (first_of(system.comm, len(x)) for x in (self.rows, self.columns))
-        self._quaternions()
+        self._find_quaternions()
         self.place = self._places()
 
     def assemble(self, x: PETSc.Vec) -> Pencil:
@@ -146,7 +154,7 @@ class Blocks:
         numbers = np.unique(f.number[f.dofs[name]])
         return numbers[(numbers >= f.offset) & (numbers < f.offset + len(f.free_owned))].astype(int)
 
-    def _quaternions(self) -> None:
+    def _find_quaternions(self) -> None:
         """Positions in ``rows`` of the four components of each free quaternion (nodes, 4), and their local dofs."""
         f = self.system.fields
         dofs = f.dofs["q"].reshape(-1, 4)
@@ -154,7 +162,8 @@ class Blocks:
         mine = np.flatnonzero((first >= f.offset) & (first < f.offset + len(f.free_owned)))
         mine = mine[np.unique(first[mine], return_index=True)[1]]
         self._dofs = dofs[mine]
-        self._quads = np.searchsorted(self.rows, f.number[self._dofs])
+        self.quaternions = f.number[self._dofs]
+        self._quads = np.searchsorted(self.rows, self.quaternions)
 
     def _places(self) -> np.ndarray:
         """Arclength of the middle of the first cell of each constraint, nan for a scalar force; of all ranks, (p,)."""

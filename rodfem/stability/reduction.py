@@ -34,13 +34,15 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
+from mpi4py import MPI
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.stability.blocks import Pencil
+from rodfem.stability.inertia import inertia_factorizer
 from rodfem.stability.kernel import kernel
-from rodfem.stability.matrices import gathered
+from rodfem.stability.matrices import gathered, petsc_matrix
 
 TRANSFORMS = ("shift-invert", "cayley")
 INVERSES = ("saddle", "elimination")
@@ -64,11 +66,13 @@ class Reduced:
     """Eigenvalues in ascending order of their real parts (k,), vectors ``Q2 z`` in the pencil's coordinates (m, k).
 
     ``errors`` are backward errors ``|Q2^t (K - mu M) x| / ((|K| + |mu| |M|) |x|)``; real arrays for a symmetric pencil.
+    ``certified`` says that a count by inertia found no other eigenvalue as near to the target (symmetric pencils only).
     """
 
     values: np.ndarray
     vectors: np.ndarray
     errors: np.ndarray
+    certified: bool
 
 
 class Reduction:
@@ -98,11 +102,46 @@ class Reduction:
         if number > n:
             raise SceneError(f"{number} eigenvalues of a reduced pencil of size {n}: ask for at most {n}.")
         shifted = ShiftedInverse(self, target)
+        found = Reduced(np.array([]), np.array([]), np.array([]), False)
+        for extra in (2, 6, 14) if self.symmetric else (0,):
+            found = self._solve(shifted, min(number + extra, n), target, transform, antishift)
+            if self.symmetric:
+                found = self._certified(found, number, target)
+            if found.certified:
+                break
+        return found
+
+    def below(self, sigma: float) -> int:
+        """Number of eigenvalues of a symmetric pencil below ``sigma``, by the inertia of the saddle matrix."""
+        factors = inertia_factorizer(MPI.COMM_SELF)
+        return int(factors(petsc_matrix(MPI.COMM_SELF, self.saddle(sigma))).getInertia()[0]) - self.C.shape[1]
+
+    def saddle(self, sigma: float) -> sp.csr_matrix:
+        """``(K - sigma M, C; C^t, 0)``."""
+        shifted = self.K - sigma * self.M
+        return (sp.bmat([[shifted, self.C], [self.C.T, None]]) if self.C.shape[1] else shifted).tocsr()
+
+    def _certified(self, found: Reduced, number: int, target: float) -> Reduced:
+        """Keep the ``number`` nearest to ``target``, and count whether any is missing among them."""
+        distance = abs(found.values - target)
+        nearest = np.argsort(distance)[:number]
+        radius = distance[nearest[-1]] * (1 + 1e-6)
+        count = self.below(target + radius) - self.below(target - radius)
+        keep = np.sort(nearest)
+        return Reduced(
+            found.values[keep], found.vectors[:, keep], found.errors[keep], count == int((distance < radius).sum())
+        )
+
+    def _solve(
+        self, shifted: ShiftedInverse, number: int, target: float, transform: str, antishift: float | None
+    ) -> Reduced:
+        n = self.kernel.dimension
         solver = SLEPc.EPS().create(PETSc.COMM_SELF)
         solver.setOptionsPrefix("rodfem_reduced_")
         solver.setOperators(self._operator(self.K), self._operator(self.M))
-        semi_definite = self.symmetric and transform == "shift-invert"
-        solver.setProblemType(SLEPc.EPS.ProblemType.GHEP if semi_definite else SLEPc.EPS.ProblemType.GNHEP)
+        # Not GHEP: where strains have no mass M is semidefinite, and in the coordinates of the kernel only up to
+        # round-off.  At a breakdown, which double eigenvalues bring about early, SLEPc would find it indefinite.
+        solver.setProblemType(SLEPc.EPS.ProblemType.GNHEP)
         solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
         solver.setTarget(target)
         solver.setTolerances(tol=TOLERANCE, max_it=300)
@@ -121,19 +160,27 @@ class Reduction:
         ksp.getPC().setType("python")
         ksp.getPC().setPythonContext(shifted)
         start = self._operator(self.K).createVecRight()
-        start.array[:] = np.sin(1.0 + 0.731 * np.arange(n)) + 0.3
+        start.array[:] = shifted(self._times(self.M, np.sin(1.0 + 0.731 * np.arange(n)) + 0.3))  # no massless part
         solver.setInitialSpace([start])
         solver.setFromOptions()
-        solver.solve()
+        try:
+            solver.solve()
+        except PETSc.Error as trouble:
+            raise ConvergenceError(
+                f"SLEPc gave up on eigenvalues near {target:g} ({str(trouble).splitlines()[-1]}): change the target."
+            ) from trouble
         found = solver.getConverged()
         if found < number:
             solver.destroy()
             raise ConvergenceError(f"SLEPc found {found} of {number} eigenvalues near {target:g}: change the target.")
         return self._collect(solver, number)
 
+    def _times(self, matrix: sp.csr_matrix, z: np.ndarray) -> np.ndarray:
+        return self.kernel.project(matrix @ self.kernel.expand(z))
+
     def _operator(self, matrix: sp.csr_matrix) -> PETSc.Mat:
         n = self.kernel.dimension
-        context = Product(lambda z: self.kernel.project(matrix @ self.kernel.expand(z)))
+        context = Product(lambda z: self._times(matrix, z))
         out = PETSc.Mat().createPython((n, n), context, comm=PETSc.COMM_SELF)
         out.setUp()
         return out
@@ -148,12 +195,13 @@ class Reduction:
         solver.destroy()
         order = np.lexsort((values.imag, values.real))
         values, vectors = values[order], vectors[:, order]
-        if self.symmetric:
-            values, vectors = values.real, vectors.real
+        if self.symmetric:  # round-off may make a complex pair of a double eigenvalue: its parts span the same plane
+            second = np.append(False, (values.imag[1:] > 0) & (values.imag[:-1] < 0))
+            values, vectors = values.real, np.where(second, vectors.imag, vectors.real)
         residuals = self.kernel.project(self.K @ vectors - (self.M @ vectors) * values)
         size = abs(self.K).sum(axis=1).max() + abs(values) * abs(self.M).sum(axis=1).max()
         errors = np.linalg.norm(residuals, axis=0) / (size * np.linalg.norm(vectors, axis=0))
-        return Reduced(values, vectors, errors)
+        return Reduced(values, vectors, errors, False)
 
 
 class Product:
@@ -176,7 +224,7 @@ class ShiftedInverse:
         r = self.reduction = reduction
         shifted, p = r.K - sigma * r.M, r.C.shape[1]
         if r.inverse == "saddle":
-            self.solve = factored(sp.bmat([[shifted, r.C], [r.C.T, None]]) if p else shifted)
+            self.solve = factored(r.saddle(sigma))
             return
         self.solve = factored(shifted)
         self.border = np.zeros((r.C.shape[0], 0))
@@ -209,11 +257,7 @@ class ShiftedInverse:
 
 def factored(matrix: sp.spmatrix) -> Callable[[np.ndarray], np.ndarray]:
     """Solver with the LU factors of a matrix (MUMPS); raises :class:`ConvergenceError` where there are none."""
-    matrix = matrix.tocsr()
-    matrix.sort_indices()
-    n = matrix.shape[0]
-    csr = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data)
-    petsc = PETSc.Mat().createAIJ((n, n), csr=csr, comm=PETSc.COMM_SELF)
+    petsc = petsc_matrix(MPI.COMM_SELF, matrix)
     ksp = PETSc.KSP().create(PETSc.COMM_SELF)
     ksp.setOptionsPrefix("rodfem_reduced_inverse_")
     ksp.setType("preonly")
