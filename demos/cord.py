@@ -49,11 +49,12 @@ def scene(options: Namespace) -> Scene:
 
 
 def defaults(options: Namespace) -> dict:
-    """Six elements for each turn that the cord would like to make; a first tension at which it is stable."""
+    """Six elements a turn, of higher degree where many turns make tight loops; a first tension that is stable."""
     turns = abs(options.turns) if isfinite(options.turns) else 0.0
     return {
         "elements": min(max(ceil(6 * turns), 6), 600),
-        "span": (max(60.0, 10.0 * ceil((2 * pi * turns) ** 2 / 10)), 0.0),
+        "degree": 8 if turns > 2 else 6,
+        "span": (max(60.0, 10.0 * ceil(0.11 * (2 * pi) ** 2 * (turns**2 - 1))), 0.0),
     }
 
 

@@ -13,9 +13,9 @@ from dataclasses import replace
 from petsc4py import PETSc
 
 from rodfem.branch import BRANCH_POINT, FOLD, Branch, Point, Special
-from rodfem.continuation import Follower, distance
+from rodfem.continuation import Follower, distance, hermite
 from rodfem.errors import ConvergenceError
-from rodfem.locate import Located, locate
+from rodfem.locate import Located, locate, solve_at
 from rodfem.newton import correct
 
 COUPLED = 1e-5
@@ -76,6 +76,19 @@ def find_special(follower: Follower, a: Point, b: Point) -> list[Special]:
         found.append(special)
         del crossing[: special.multiplicity]
     return sorted(found, key=lambda s: s.point.arclength)
+
+
+def midpoint(follower: Follower, a: Point, b: Point) -> Point | None:
+    """Point half-way between two points of a branch; None where it is not between them."""
+    s = (a.arclength + b.arclength) / 2
+    try:
+        x = solve_at(follower, lambda t: hermite(a, b, t), s)
+    except ConvergenceError:
+        return None
+    whole = distance(follower.system, a.x, b.x)
+    if max(distance(follower.system, a.x, x), distance(follower.system, x, b.x)) > whole:
+        return None
+    return follower.point(x, s, follower.tangent(follower.row(hermite(a, b, s)[1]), at=x))
 
 
 def _crossing(follower: Follower, a: Point, b: Point) -> list[int]:

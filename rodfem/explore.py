@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from scipy.optimize import brentq
 
 from rodfem.accuracy import Richer, zero_stretch
-from rodfem.bifurcation import VERTICAL, directions, find_special, start_branch
+from rodfem.bifurcation import VERTICAL, directions, find_special, midpoint, start_branch
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
 from rodfem.continuation import Follower, Steps, distance, follow, hermite
 from rodfem.errors import ConvergenceError, SceneError, SymmetryError
@@ -189,7 +189,7 @@ class Explorer:
             return self._between_points(branch, a, b)
 
     def _between_points(self, branch: Branch, a: Point, b: Point) -> str:
-        specials = [] if a is branch.points[0] and branch.parent else find_special(self.follower, a, b)
+        specials = [] if a is branch.points[0] and branch.parent else self._special_between(a, b)
         pieces = [a, *(s.point for s in specials), b]
         users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
         for special in sorted(specials + users, key=lambda s: s.point.arclength):
@@ -203,6 +203,17 @@ class Explorer:
                 branch.insert(special)
                 self.report.special(branch, special)
         return ""
+
+    def _special_between(self, a: Point, b: Point, halvings: int = 3) -> list[Special]:
+        """Folds and branch points between two points, on halves of the piece where a whole one is not resolved."""
+        try:
+            return find_special(self.follower, a, b)
+        except ConvergenceError as trouble:
+            middle = midpoint(self.follower, a, b) if halvings else None
+            if middle is None:
+                self.report.warn(f"A special point between loads {a.load:.8g} and {b.load:.8g} is missing: {trouble}")
+                return []
+        return self._special_between(a, middle, halvings - 1) + self._special_between(middle, b, halvings - 1)
 
     def _users(self, branch: Branch, p: Point, q: Point, a: Point, b: Point) -> list[Special]:
         """User points between two neighbours among which the load is monotone."""

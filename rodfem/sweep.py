@@ -73,7 +73,8 @@ class Sweep:
         rank, size = self.vibration.asymmetry()
         self.report.say(
             f"  the load makes the tangent matrix non-symmetric by a matrix of rank {rank} "
-            f"(largest entry {size:.1e} of |S|)"
+            f"(largest entry {size:.1e} of |S|):\n"
+            f"  factors of the symmetric part and {rank} more solves would do for it (Sherman-Morrison-Woodbury)"
         )
         self.finished()
         return self.branches

@@ -126,7 +126,7 @@ def test_motions_have_names() -> None:
         assert np.min(abs(mu - expected)) < 1e-8 * abs(mu)
 
 
-@pytest.mark.parametrize(("elements", "degree"), [(1, 2), (1, 4), (8, 1), (4, 6)])
+@pytest.mark.parametrize(("elements", "degree"), [(2, 2), (2, 3), (8, 1), (4, 6)])
 @pytest.mark.parametrize("P", [1.8, 30.0])
 def test_no_spurious_eigenvalue_on_crude_meshes(elements: int, degree: int, P: float) -> None:
     """Infinite eigenvalues come in Jordan blocks, which round-off brings near: none is among those returned."""
@@ -141,7 +141,7 @@ def test_no_spurious_eigenvalue_on_crude_meshes(elements: int, degree: int, P: f
 
 
 def test_dense_reductions_find_what_slepc_finds() -> None:
-    dense, krylov = (vibration(15.0, elements).near(4, 1.0) for elements in (1, 8))
+    dense, krylov = (vibration(15.0, elements).near(4, 1.0) for elements in (2, 8))
     assert dense.values[:3] == pytest.approx(krylov.values[:3], rel=2e-4)
     assert dense.kinds[:3] == krylov.kinds[:3]
 
