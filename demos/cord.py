@@ -19,7 +19,8 @@ from math import ceil, isfinite, pi
 
 import rodfem.cli as cli
 from forms.energy import bending
-from rodfem.scene import End, Ordinate, Parameter, Scene, clamped
+from rodfem.ends import clamped, sliding
+from rodfem.scene import Ordinate, Parameter, Scene
 
 
 def scene(options: Namespace) -> Scene:
@@ -41,7 +42,7 @@ def scene(options: Namespace) -> Scene:
         load="lam",
         ends=(
             clamped(),
-            End(position=lambda c: (0.0, 0.0, None), rotation=(1.0, 0.0, 0.0, 0.0), force=lambda c: (0.0, 0.0, c.lam)),
+            sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, c.lam)),
         ),
         ordinate=Ordinate("shortening 1 - r3(1)", s=1.0, of=lambda r, q: 1 - r[2], label="$1 - r_3(1)$"),
         span=tuple(options.span),

@@ -20,7 +20,8 @@ from math import hypot, inf
 import rodfem.cli as cli
 from forms.energy import bending
 from rodfem.errors import SceneError
-from rodfem.scene import Inertia, Ordinate, Parameter, Scene, clamped, free
+from rodfem.ends import clamped, free
+from rodfem.scene import Inertia, Ordinate, Parameter, Scene
 
 
 def scene(options: Namespace) -> Scene:

@@ -22,8 +22,8 @@ from math import hypot, inf
 
 import rodfem.cli as cli
 from forms.energy import hemitropic
-from forms.symmetry import axial
-from rodfem.scene import Ordinate, Parameter, Scene, clamped
+from rodfem.ends import clamped
+from rodfem.scene import Ordinate, Parameter, Scene
 
 
 def scene(options: Namespace) -> Scene:
@@ -50,7 +50,6 @@ def scene(options: Namespace) -> Scene:
             clamped(lambda c: (0.0, 0.0, -c.l * (1 - c.lam))),
             clamped(lambda c: (0.0, 0.0, +c.l * (1 - c.lam))),
         ),
-        symmetries=(axial((0.0, 0.0, 1.0)),),
         ordinate=Ordinate("transverse displacement of the mid point", s=0.0, of=lambda r, q: hypot(r[0], r[1])),
         span=tuple(options.span),
     )

@@ -20,7 +20,8 @@ from argparse import Namespace
 import rodfem.cli as cli
 from forms.energy import bending, logarithmic_stretch
 from rodfem.errors import SceneError
-from rodfem.scene import Ordinate, Parameter, Scene, clamped, free
+from rodfem.ends import clamped, free
+from rodfem.scene import Ordinate, Parameter, Scene
 
 DIRECTIONS = {"e1": (1.0, 0.0), "e2": (0.0, 1.0)}
 

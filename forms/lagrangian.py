@@ -23,14 +23,12 @@ import ufl
 from ufl.core.expr import Expr
 
 
-def pointwise(W: Expr, R: Expr, v: Expr, dr: Expr, n: Expr, known: Expr) -> Expr:
-    """Integrand of ``L`` with the centreline as a field, without the unit-norm term.
+def pointwise(W: Expr, R: Expr, v: Expr, dr: Expr, n: Expr) -> Expr:
+    """Integrand of ``L`` with the centreline as a field, without loads and the unit-norm term.
 
-    ``dr = r'`` and the field ``n`` have shape (3,), as has ``known``: the contact force that dead end forces
-    prescribe, zero in the components in which both ends are held.  Its potential is ``-known . (r(l) - r(0))``,
-    up to what does not depend on the unknowns.
+    ``dr = r'`` and the field ``n`` have shape (3,).
     """
-    return W + ufl.dot(n, dr - ufl.dot(R, v)) - ufl.dot(known, dr)
+    return W + ufl.dot(n, dr - ufl.dot(R, v))
 
 
 def reduced(W: Expr, R: Expr, v: Expr, n: Expr, chord_per_length: Expr) -> Expr:

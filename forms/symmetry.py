@@ -1,23 +1,41 @@
-"""Continuous symmetries of a rod problem, as linear generators of its fields.
+"""Elementary rigid motions, as linear generators of a rod's fields.
 
-A hemitropic rod between clamps aligned with ``e`` is unchanged by a rotation ``a`` of space about ``e`` together
-with the inverse rotation of the directors: ``q -> a q conj(a)``, ``r -> a r``, ``n -> a n``.  To first order in
-the angle ::
+A rotation of space by a small angle about the axis ``e`` changes the centreline, the directors and the contact force ::
 
-    dq = 1/2 (e q - q e) = (0, e x vec q),   dr = e x r,   dn = e x n,
+    dr = e x r,   dq = 1/2 (0, e) q,   dn = e x n,
 
-and ``v``, ``mu`` do not change.  The generator gives the phase condition that picks one member of a circle of
-equilibria, the deflation vector, and the reason for the one zero eigenvalue of a state that breaks the symmetry.
+and a rotation of the cross-sections about a body axis changes ``dq = 1/2 q (0, e)`` alone.  The continuous symmetries of
+a rod problem are those combinations of these that leave its functional as it is: a hemitropic rod between clamps aligned
+with ``e3`` is unchanged by a rotation of space together with the opposite one of the cross-sections, ``q -> a q conj(a)``;
+a ring by all motions of space.  A generator gives the phase condition that picks one member of a family of equivalent
+equilibria, and the reason for the zero eigenvalue of a state that breaks the symmetry.
 """
 
 from __future__ import annotations
 
 Matrix = tuple[tuple[float, ...], ...]
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def axial(axis: tuple[float, float, float]) -> dict[str, Matrix]:
-    """Generator of the rotations about ``axis`` (a unit vector): a matrix for each field that it moves."""
+def cross(axis: tuple[float, float, float]) -> Matrix:
+    """Matrix of ``e x``, (3, 3)."""
     x, y, z = axis
-    cross: Matrix = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
-    quaternion: Matrix = ((0.0,) * 4, *((0.0, *row) for row in cross))
-    return {"q": quaternion, "r": cross, "n": cross}
+    return ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
+
+
+def left(axis: tuple[float, float, float]) -> Matrix:
+    """Matrix of ``q -> 1/2 (0, e) q``, (4, 4): a rotation of space."""
+    return _quaternion(axis, 1.0)
+
+
+def right(axis: tuple[float, float, float]) -> Matrix:
+    """Matrix of ``q -> 1/2 q (0, e)``, (4, 4): a rotation of the cross-sections."""
+    return _quaternion(axis, -1.0)
+
+
+def _quaternion(axis: tuple[float, float, float], sign: float) -> Matrix:
+    x, y, z = (0.5 * a for a in axis)
+    rows = [(0.0, -x, -y, -z)]
+    for i, row in enumerate(cross((x, y, z))):
+        rows.append(((x, y, z)[i], *(sign * value for value in row)))
+    return tuple(rows)

@@ -20,6 +20,7 @@ from importlib import import_module
 from typing import Any
 
 _HOMES = {
+    'End': 'ends',
     "Scene": "scene",
     "Parameter": "scene",
     "End": "scene",

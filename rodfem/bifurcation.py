@@ -120,7 +120,6 @@ def directions(follower: Follower, special: Special) -> list[PETSc.Vec]:
     system, tangent = follower.system, special.point.tangent
     known = [] if tangent is None else [tangent.copy()]
     system.set_phase(special.point.x)
-    broken = system.active_drifts()
     out: list[PETSc.Vec] = []
     candidates = list(special.null_vectors)
     if abs(special.point.slope) < 1e-3 * abs(system.scene.span[1] - system.scene.span[0]):
@@ -136,12 +135,10 @@ def directions(follower: Follower, special: Special) -> list[PETSc.Vec]:
         d.scale(1.0 / size)
         out.append(d)
         known.append(d)
-        if broken == 0:
-            for i in range(len(system.drifts)):
-                image = system.generator(_sum(special.point.x, d), i)
-                if system.norm(image) > 1e-6:
-                    image.scale(1.0 / system.norm(image))
-                    known.append(image)
+        for image in system.equivalent_directions(special.point.x, d):
+            if system.norm(image) > 1e-6:
+                image.scale(1.0 / system.norm(image))
+                known.append(image)
     return out
 
 

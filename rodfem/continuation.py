@@ -20,9 +20,9 @@ from rodfem.branch import Point
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.newton import Outcome, correct
 from rodfem.shape import Shape
-from rodfem.stability.inertia import Index, Inertia, combine
+from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.spectrum import Spectrum
-from rodfem.system import System
+from rodfem.system import System, combine
 
 LEVEL = 0.05
 """Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh."""

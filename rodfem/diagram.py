@@ -68,7 +68,7 @@ def as_data(branches: Sequence[Branch], system: System, clock: Clock, span: tupl
 
 def _clamped(scene: Scene) -> str:
     """Say which ends hold the directors, for the picture: both, start, end or none."""
-    left, right = (end.rotation is not None for end in scene.ends)
+    left, right = (end.rotation is not None for end in scene.sides)
     return {(True, True): "both", (True, False): "start", (False, True): "end"}.get((left, right), "none")
 
 

@@ -10,11 +10,13 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from forms import inertia, lagrangian
+from forms import inertia, lagrangian, loads
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
-from rodfem.compat import compile_forms
+from rodfem import compat
+from rodfem.ends import Place, Ring
 from rodfem.fields import Fields
+from rodfem.places import place
 
 
 class Equations:
@@ -44,39 +46,169 @@ class Equations:
         self.direction = fem.Constant(mesh, np.zeros(len(self.names)))
         self.vary(scene.load)
         self.ends = fem.Constant(mesh, np.array(scene.interval, dtype=float))
-        length = self.ends[1] - self.ends[0]
+        length = self.length = self.ends[1] - self.ends[0]
 
         u, test, trial = fields.u, ufl.TestFunction(fields.space), ufl.TrialFunction(fields.space)
         dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": self.quadrature_degree(k)})
         dx_nodes = ufl.dx(domain=mesh, metadata={"quadrature_degree": 2 * k - 1, "quadrature_rule": "GLL"})
+        self.measures = point_measures(mesh, [*scene.interval, *scene.joints])
 
         f = self._named(ufl.split(u))
-        c = self._constants(f.scalars)
+        c = self.constants = self._constants(f.load)
         v = strain(scene.free_strains, self._components(f.v, len(scene.free_strains)))
-        W, R = scene.energy(v, curvature(f.q, f.q.dx(0)), c), rotation(f.q)
-        if fields.discretization.formulation == "reduced":
-            force = [scene.known_force(i, c) for i in range(3)]
-            for position, i in enumerate(fields.forces):
-                force[i] = f.scalars[position]
-            integrand = lagrangian.reduced(W, R, v, ufl.as_vector(force), self._chord(c) / length)
-        else:
-            known = ufl.as_vector([scene.known_force(i, c) or 0.0 for i in range(3)])
-            integrand = lagrangian.pointwise(W, R, v, (f.r + self._lift(c)).dx(0), f.n, known)
-        L = integrand * dx + lagrangian.unit_norm(f.mu, f.q) * dx_nodes
+        along = self._along(f, c, v)
+        W = scene.energy(v, along.k, c)
+        L = (self._rod(f, c, W, along) + self._along_loads(f, c, along)) * dx
+        L += lagrangian.unit_norm(f.mu, f.q) * dx_nodes
+        for i, constraint in enumerate(x for x in scene.constraints if x.kind == "pointwise"):
+            L += f.fields[f"p{i}"] * constraint.of(along, c) * (dx_nodes if constraint.continuous else dx)
+        L += self._points(f)
+
         a, b = self._named(ufl.split(test)), self._named(ufl.split(trial))
-        first = ufl.derivative(L, u, test)
-        for end, ds in zip(scene.ends, end_measures(mesh, scene.interval), strict=True):
-            if end.follower is not None:  # no potential: its virtual work enters the weak form
-                first -= ufl.dot(ufl.dot(R, ufl.as_vector(end.follower(c))), a.r) * ds
+        first = ufl.derivative(L, u, test) - self._virtual_work(f, a, c, dx)
         second = ufl.derivative(first, u, trial)
         metric = inertia.rotation_metric(a.q, b.q) / length
         if f.r is not None:
             metric += ufl.dot(a.r, b.r) / length**3
-        kinetic = inertia.rotary(f.q, a.q, b.q, tuple(scene.inertia.rho_I(c)))
+        kinetic = inertia.rotary(f.q, a.q, b.q, tuple(scene.inertia.rho_I(c))) * dx
         if f.r is not None:
-            kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c))
-        forms = [first, second, W * dx, metric * dx, kinetic * dx]
-        self.residual, self.jacobian, self.energy, self.metric, self.kinetic = compile_forms(forms)
+            kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c)) * dx
+        kinetic += self._attached_inertia(f, a, b)
+        forms = [first, second, W * dx, metric * dx, kinetic]
+        self.residual, self.jacobian, self.energy, self.metric, self.kinetic = compat.compile_forms(forms)
+
+    # --- the functional --------------------------------------------------------------------------------------------
+
+    def _along(self, f: Any, c: Any, v: Any) -> Place:
+        """Place of the functions that hold all along the rod."""
+        k, R = curvature(f.q, f.q.dx(0)), rotation(f.q)
+        more = {"v": v, "k": k, "length": self.fields.scene.length}
+        if f.r is None:
+            return place(f.q, R, c.s, **more)
+        r = f.r + self._lift(c)
+        return place(f.q, R, c.s, r, dr=r.dx(0), **more)
+
+    def _rod(self, f: Any, c: Any, W: Any, along: Place) -> Any:
+        """Integrand of the rod itself: see :mod:`forms.lagrangian`."""
+        if f.r is not None:
+            return lagrangian.pointwise(W, along.R, along.v, along.dr, f.n)
+        scene = self.fields.scene
+        force = [f.scalars.get(f"n{i + 1}", scene.known_force(i, c)) for i in range(3)]
+        left, right = self._ends(f, c)
+        chord = [0.0 if x is None or y is None else y - x for x, y in zip(left, right, strict=True)]
+        return lagrangian.reduced(W, along.R, along.v, ufl.as_vector(force), ufl.as_vector(chord) / self.length)
+
+    def _ends(self, f: Any, c: Any) -> list[list[Any]]:
+        """Positions of the ends in the reduced formulation: held, a scalar unknown, or None (known force there)."""
+        return [
+            [f.scalars.get(f"{letter}{i + 1}") if x is None else x for i, x in enumerate(end.held(c))]
+            for letter, end in zip("ab", self.fields.scene.sides, strict=True)
+        ]
+
+    def _along_loads(self, f: Any, c: Any, along: Place) -> Any:
+        """Potential of what acts along the rod, and integral constraints with their multipliers."""
+        scene = self.fields.scene
+        out = 0.0 * c.s
+        if scene.distributed is not None:
+            out += loads.dead(along.r, scene.distributed(c))
+        if scene.potential is not None:
+            out += scene.potential(along, c)
+        for name, constraint in self._scalar_constraints():
+            if constraint.kind == "integral":
+                out += f.scalars[name] * constraint.of(along, c)
+        return out
+
+    def _scalar_constraints(self) -> list[tuple[str, Any]]:
+        scalar = [x for x in self.fields.scene.constraints if x.kind != "pointwise"]
+        return [(f"g{i + 1}", x) for i, x in enumerate(scalar)]
+
+    def _points(self, f: Any) -> Any:
+        """What acts at points: ends, attachments, constraints; each with the measure of its point."""
+        scene, out = self.fields.scene, 0
+        for side, (letter, end) in enumerate(zip("ab", scene.sides, strict=True)):
+            s = scene.interval[side]
+            x, c, _, ds = self._at(f, s)
+            free = [i for i, p in enumerate(end.held(c)) if p is None]
+            if end.force is not None and (f.r is not None or not scene.plain(side)):
+                out += -sum(end.applied(c)[i] * x.r[i] for i in free) * ds
+            if end.energy is not None:
+                out += end.energy(x, c) * ds
+            if end.turned is not None:
+                g = loads.misalignment(x.q, end.turned(c))
+                for i, direction in enumerate(_across(end.hinge)):
+                    out += f.scalars[f"m{letter}{i + 1}"] * ufl.dot(g, ufl.as_vector(direction)) * ds
+        for attachment in scene.attachments:
+            x, c, _, measure = self._at(f, attachment.s)
+            if attachment.force is not None:
+                out += loads.dead(x.r, attachment.force(c)) * measure
+            if attachment.energy is not None:
+                out += attachment.energy(x, c) * measure
+        for name, constraint in self._scalar_constraints():
+            if constraint.kind == "point":
+                x, c, at, measure = self._at(f, constraint.s)
+                out += at(f.scalars[name]) * constraint.of(x, c) * measure
+        if isinstance(scene.ends, Ring):
+            out += self._closure(f, scene.ends.sign)
+        return out
+
+    def _closure(self, f: Any, sign: float) -> Any:
+        """Both ends of a ring joined: ``q(l) = +-q(0)`` and, with a centreline, ``r(l) = r(0)``."""
+        out = 0
+        for s, weights in zip(self.fields.scene.interval, ((-sign, -1.0), (1.0, 1.0)), strict=True):
+            ds = self.measures(s)[0]
+            out += weights[0] * sum(f.scalars[f"t{i + 1}"] * f.q[i] for i in range(4)) * ds
+            if f.r is not None:
+                out += weights[1] * sum(f.scalars[f"f{i + 1}"] * f.r[i] for i in range(3)) * ds
+        return out
+
+    def _at(self, f: Any, s: float) -> tuple[Place, Any, Any, Any]:
+        """Place at arclength ``s``, the constants there, what restricts a field to it, and its measure."""
+        scene = self.fields.scene
+        measure, inside = self.measures(s)
+
+        def at(expression: Any) -> Any:
+            return expression("+") if inside else expression
+
+        q, c = at(f.q), self._constants(at(f.load), s)
+        if f.r is not None:
+            return place(q, rotation(q), s, at(f.r) + self._lift(c), length=scene.length), c, at, measure
+        if not inside:
+            r = self._ends(f, c)[int(abs(s - scene.interval[1]) < abs(s - scene.interval[0]))]
+            if None not in r:
+                return place(q, rotation(q), s, ufl.as_vector(r), length=scene.length), c, at, measure
+        return place(q, rotation(q), s, length=scene.length), c, at, measure
+
+    def _virtual_work(self, f: Any, a: Any, c: Any, dx: Any) -> Any:
+        """Virtual work of the loads that have no potential, in the variation ``a``."""
+        scene, work = self.fields.scene, 0
+        if scene.follower is not None:
+            work += loads.follower_work(rotation(f.q), scene.follower(c), a.r) * dx
+        for end, s in zip(scene.sides, scene.interval, strict=True):
+            _, c, _, ds = self._at(f, s)
+            if end.follower is not None:
+                work += loads.follower_work(rotation(f.q), end.follower(c), a.r) * ds
+            if end.moment is not None:
+                work += loads.moment_work(f.q, end.moment(c), a.q) * ds
+            if end.follower_moment is not None:
+                work += loads.follower_moment_work(f.q, end.follower_moment(c), a.q) * ds
+        for attachment in scene.attachments:
+            if attachment.follower is not None:
+                x, c, at, measure = self._at(f, attachment.s)
+                work += loads.follower_work(x.R, attachment.follower(c), at(a.r)) * measure
+        return work
+
+    def _attached_inertia(self, f: Any, a: Any, b: Any) -> Any:
+        """Kinetic metric of masses at points."""
+        out = 0
+        for attachment in self.fields.scene.attachments:
+            x, c, at, measure = self._at(f, attachment.s)
+            if attachment.mass is not None and f.r is not None:
+                out += inertia.translational(at(a.r), at(b.r), attachment.mass(c)) * measure
+            if attachment.rotary_inertia is not None:
+                out += inertia.rotary(x.q, at(a.q), at(b.q), tuple(attachment.rotary_inertia(c))) * measure
+        return out
+
+    # --- names -----------------------------------------------------------------------------------------------------
 
     @staticmethod
     def quadrature_degree(degree: int) -> int:
@@ -91,39 +223,64 @@ class Equations:
         self.direction.value[:] = chosen
 
     def _named(self, parts: Any) -> SimpleNamespace:
-        found = SimpleNamespace(q=None, mu=None, v=None, r=None, n=None, scalars=parts[-1])
-        for block, part in zip(self.fields.blocks, parts, strict=False):
-            setattr(found, block.name, part)
-        found.scalars = self._components(parts[-1], len(self.fields.forces) + 1)
-        return found
+        """Fields and scalars of a mixed function by name; ``r`` and ``n`` are None where there are none."""
+        fields = {block.name: part for block, part in zip(self.fields.blocks, parts, strict=False)}
+        values = self._components(parts[-1], len(self.fields.unknown_scalars) + 1)
+        scalars = {x.name: value for x, value in zip(self.fields.unknown_scalars, values, strict=False)}
+        named = {name: fields.get(name) for name in ("q", "mu", "v", "r", "n")}
+        return SimpleNamespace(**named, fields=fields, scalars=scalars, load=values[-1])
 
     @staticmethod
     def _components(part: Any, size: int) -> list[Any]:
         return [] if part is None else [part] if size == 1 else [part[i] for i in range(size)]
 
-    def _constants(self, scalars: list[Any]) -> SimpleNamespace:
-        load = scalars[-1]
+    def _constants(self, load: Any, s: float | None = None) -> SimpleNamespace:
+        """Named constants as functions of the load, along the rod or at arclength ``s``."""
         values = {name: self.base[i] + self.direction[i] * load for i, name in enumerate(self.names)}
-        return SimpleNamespace(s=ufl.SpatialCoordinate(self.fields.mesh)[0], **values)
-
-    def _chord(self, c: SimpleNamespace) -> Any:
-        """Difference of the ends' positions where both are held, zero elsewhere."""
-        left, right = (end.held(c) for end in self.fields.scene.ends)
-        return ufl.as_vector([0.0 if a is None or b is None else b - a for a, b in zip(left, right, strict=True)])
+        return SimpleNamespace(s=ufl.SpatialCoordinate(self.fields.mesh)[0] if s is None else s, **values)
 
     def _lift(self, c: SimpleNamespace) -> Any:
         """Linear in s and equal to the ends' positions: the unknown ``r`` is what comes on top, zero where held."""
-        x = (c.s - self.ends[0]) / (self.ends[1] - self.ends[0])
-        left, right = (end.held(c) for end in self.fields.scene.ends)
-        lift = [b if a is None else a if b is None else (1 - x) * a + x * b for a, b in zip(left, right, strict=True)]
+        x = (c.s - self.ends[0]) / self.length
+        left, right = (end.held(c) for end in self.fields.scene.sides)
+        lift = []
+        for a, b in zip(left, right, strict=True):
+            pair = (b, b) if a is None else (a, a) if b is None else (a, b)
+            lift.append(0.0 if pair == (None, None) else (1 - x) * pair[0] + x * pair[1])
         return ufl.as_vector([value + 0 * x for value in lift])
 
 
-def end_measures(mesh: Any, interval: tuple[float, float]) -> list[Any]:
-    """Measures of the left and of the right end of the rod."""
-    found = [dolfinx.mesh.locate_entities_boundary(mesh, 0, lambda x, s=s: np.isclose(x[0], s)) for s in interval]
-    values = np.repeat(np.array([1, 2], dtype=np.int32), [len(points) for points in found])
-    points = np.concatenate(found).astype(np.int32)
-    order = np.argsort(points)
-    tags = dolfinx.mesh.meshtags(mesh, 0, points[order], values[order])
-    return [ufl.Measure("ds", domain=mesh, subdomain_data=tags)(tag) for tag in (1, 2)]
+def _across(axis: tuple[float, float, float] | None) -> list[list[float]]:
+    """Unit vectors across ``axis``, all three without one: the directions about which an end does not turn."""
+    if axis is None:
+        return [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    return [[float(x) for x in row] for row in np.linalg.svd(np.array([axis], dtype=float))[2][1:]]
+
+
+def point_measures(mesh: Any, points: list[float]) -> Any:
+    """Measures of points: ``measures(s)`` gives that of the vertex at ``s`` and whether it is inside the rod.
+
+    The first two points are the ends.
+    """
+    tolerance = 1e-9 * abs(points[1] - points[0])
+    mesh.topology.create_connectivity(0, 1)
+
+    def tagged(chosen: list[tuple[int, float]]) -> Any:
+        found = [
+            dolfinx.mesh.locate_entities(mesh, 0, lambda x, s=s: np.isclose(x[0], s, rtol=0, atol=tolerance))
+            for _, s in chosen
+        ]
+        values = np.repeat(np.array([tag for tag, _ in chosen], dtype=np.int32), [len(v) for v in found])
+        vertices = np.concatenate(found).astype(np.int32)
+        order = np.argsort(vertices)
+        return dolfinx.mesh.meshtags(mesh, 0, vertices[order], values[order])
+
+    numbered = list(enumerate(points, start=1))
+    ds = ufl.Measure("ds", domain=mesh, subdomain_data=tagged(numbered[:2]))
+    dS = ufl.Measure("dS", domain=mesh, subdomain_data=tagged(numbered[2:])) if len(points) > 2 else None
+
+    def measures(s: float) -> tuple[Any, bool]:
+        tag, _ = min(numbered, key=lambda p: abs(p[1] - s))
+        return (ds(tag), False) if tag <= 2 or dS is None else (dS(tag), True)
+
+    return measures

@@ -327,8 +327,8 @@ class Explorer:
     def _check_symmetry(self, point: Point) -> None:
         if point.drift > 1e-6 * self.follower.inertia.scale:
             raise SymmetryError(
-                f"The scene states a symmetry that its equations do not have: the drift is {point.drift:.2g} at "
-                f"{self.scene.load} = {point.load:.6g} where it should vanish; leave the symmetry out of the scene."
+                f"A symmetry of the scene is not one of its equations: the drift is {point.drift:.2g} at "
+                f"{self.scene.load} = {point.load:.6g} where it should vanish; use a richer discretisation."
             )
 
     def _finish(self, branch: Branch) -> None:

@@ -8,7 +8,7 @@ no number at all: PETSc drops what is added to number -1, and no Dirichlet row e
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,12 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from rodfem import compat
+from rodfem.ends import Ring
 from rodfem.errors import SceneError
+from rodfem.places import needs_centreline
 from rodfem.scene import Scene
 
-FORMULATIONS = ("reduced", "pointwise")
+FORMULATIONS = ("auto", "reduced", "pointwise")
 LOAD = "load"
 
 
@@ -36,9 +38,13 @@ class Block:
 
 @dataclass(frozen=True)
 class Discretization:
-    """How a scene is discretised: ``formulation``, number of ``elements`` and polynomial ``degree``."""
+    """How a scene is discretised: ``formulation``, number of ``elements`` and polynomial ``degree``.
 
-    formulation: str = "reduced"
+    ``reduced`` has no centreline, and the contact force as scalars; ``pointwise`` has all fields; ``auto`` is the first
+    where the scene allows it.
+    """
+
+    formulation: str = "auto"
     elements: int = 8
     degree: int = 6
 
@@ -52,15 +58,54 @@ class Discretization:
             raise SceneError(f"Degree {self.degree} is not available: choose 1 to 12.")
 
 
+@dataclass(frozen=True)
+class Unknown:
+    """One scalar unknown: its name, the group that it belongs to with its place there, and whether it is a multiplier."""
+
+    name: str
+    group: str
+    component: int
+    multiplier: bool
+
+
 def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:
-    """Fields of a scene: ``q`` and ``mu`` always, ``v`` where strains are free, ``r`` and ``n`` if pointwise."""
+    """Fields of a scene: ``q``, ``mu``, ``v`` where strains are free, ``r`` and ``n`` if pointwise, multipliers ``p0``.."""
     k = discretization.degree
     blocks = [Block("q", 4, k, True, False), Block("mu", 1, k, True, True)]
     if scene.free_strains:
         blocks.append(Block("v", len(scene.free_strains), k - 1, False, False))
     if discretization.formulation == "pointwise":
         blocks += [Block("r", 3, k, True, False), Block("n", 3, k - 1, False, True)]
+    for i, constraint in enumerate(c for c in scene.constraints if c.kind == "pointwise"):
+        blocks.append(Block(f"p{i}", 1, k if constraint.continuous else k - 1, constraint.continuous, True))
     return blocks
+
+
+def scalars_of(scene: Scene, discretization: Discretization) -> list[Unknown]:
+    """Scalar unknowns of a scene, without the load.
+
+    Reduced: components ``n1``.. of a constant contact force, positions ``a1``.., ``b1``.. of the left and right end
+    where other than dead forces act on it.  Always: moments ``m`` of moving clamps and hinges, multipliers ``g`` of
+    integral and point constraints, forces ``f`` and moments ``t`` that close a ring.
+    """
+    out, c = [], scene.constants()
+    if discretization.formulation == "reduced":
+        out += [Unknown(f"n{i + 1}", "n", i, True) for i in range(3) if scene.known_force(i, c) is None]
+        for side, (letter, end) in enumerate(zip("ab", scene.sides, strict=True)):
+            if not scene.plain(side):
+                free = [i for i in range(3) if end.held(c)[i] is None]
+                out += [Unknown(f"{letter}{i + 1}", letter, i, False) for i in free]
+    for letter, end in zip("ab", scene.sides, strict=True):
+        if end.turned is not None:
+            size = 3 if end.hinge is None else 2
+            out += [Unknown(f"m{letter}{i + 1}", f"m{letter}", i, True) for i in range(size)]
+    count = sum(x.kind != "pointwise" for x in scene.constraints)
+    out += [Unknown(f"g{i + 1}", "g", i, True) for i in range(count)]
+    if isinstance(scene.ends, Ring):
+        out += [Unknown(f"t{i + 1}", "t", i, True) for i in range(4)]
+        if discretization.formulation == "pointwise":
+            out += [Unknown(f"f{i + 1}", "f", i, True) for i in range(3)]
+    return out
 
 
 class Fields:
@@ -72,8 +117,8 @@ class Fields:
         For each field the local degrees of freedom, (cells incl. ghosts, nodes per cell, components).
     number
         Global number of each local degree of freedom, -1 where clamped; (local size,) int32.
-    forces
-        Components of the contact force that are scalar unknowns (reduced formulation).
+    unknown_scalars, forces
+        Scalar unknowns without load and drifts; components of the contact force among them (reduced formulation).
     scalars
         Global number of each scalar: ``n1``.. for ``forces``, ``load``, and ``drift0``.. one for each symmetry.
     """
@@ -87,18 +132,19 @@ class Fields:
                 f"{discretization.elements} elements cannot be shared by {comm.size} ranks: "
                 "use more elements or fewer ranks."
             )
+        reason = needs_centreline(scene)
+        if discretization.formulation == "auto":
+            discretization = replace(discretization, formulation="pointwise" if reason else "reduced")
+        if discretization.formulation == "reduced" and reason:
+            raise SceneError(
+                f"The reduced formulation has no centreline, which {reason} needs: use --formulation pointwise."
+            )
         self.scene, self.discretization, self.comm = scene, discretization, comm
         self.blocks = blocks_of(scene, discretization)
-        reduced = discretization.formulation == "reduced"
-        if reduced and not scene.conservative:
-            raise SceneError(
-                "The reduced formulation has no centreline, which the mass of a rod under a follower force needs: "
-                "use --formulation pointwise."
-            )
-        c = scene.constants()
-        self.forces = [i for i in range(3) if reduced and scene.known_force(i, c) is None]
-        names = [f"n{i + 1}" for i in self.forces] + [LOAD]
-        self.mesh = mesh or compat.interval_mesh(comm, discretization.elements, *scene.interval)
+        self.unknown_scalars = scalars_of(scene, discretization)
+        self.forces = [x.component for x in self.unknown_scalars if x.group == "n"]
+        names = [x.name for x in self.unknown_scalars] + [LOAD]
+        self.mesh = mesh or self._mesh()
         parts = [(b.continuous, b.degree, b.size) for b in self.blocks] + [(False, 0, len(names))]
         self.space = compat.mixed_space(self.mesh, parts)
         self.u = fem.Function(self.space, dtype=compat.REAL)
@@ -109,6 +155,27 @@ class Fields:
         copies = self._block_dofs(len(self.blocks), len(names), local_cells)[:, 0, :]
         self._number(copies, names)
 
+    def _mesh(self) -> Any:
+        """Mesh of elements of nearly equal size with boundaries at the scene's joints."""
+        scene, elements = self.scene, self.discretization.elements
+        pieces = np.array([scene.interval[0], *scene.joints, scene.interval[1]])
+        if elements < len(pieces) - 1:
+            raise SceneError(
+                f"The rod has {len(pieces) - 1} pieces between joints, and needs an element for each: use more than "
+                f"{elements} elements."
+            )
+        shares = np.diff(pieces) / scene.length * elements
+        counts = np.maximum(np.floor(shares).astype(int), 1)
+        while counts.sum() > elements:
+            counts[np.argmax(np.where(counts > 1, counts / shares, 0))] -= 1
+        while counts.sum() < elements:
+            counts[np.argmax(shares / counts)] += 1
+        vertices = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
+        mesh = compat.interval_mesh(self.comm, elements, *scene.interval)
+        if len(pieces) > 2:
+            compat.move_vertices(mesh, np.linspace(*scene.interval, elements + 1), np.append(np.concatenate(vertices), pieces[-1]))
+        return mesh
+
     def _block_dofs(self, part: int, size: int, cells: int) -> np.ndarray:
         sub = self.space.sub(part)
         components = [sub.sub(i) for i in range(size)] if size > 1 else [sub]
@@ -117,7 +184,8 @@ class Fields:
     def _clamped(self) -> np.ndarray:
         """Local degrees of freedom that an end holds: ``q`` and ``mu`` at clamped directors, ``r`` where held."""
         found = []
-        for end, s in zip(self.scene.ends, self.scene.interval, strict=True):
+        ring = isinstance(self.scene.ends, Ring)
+        for end, s in zip(self.scene.sides, self.scene.interval, strict=True):
             for block in self.blocks:
                 if not block.continuous:
                     continue
@@ -126,8 +194,10 @@ class Fields:
                 if block.name == "r":
                     held = [x is not None for x in end.held(self.scene.constants())]
                     found.append(at_end[:, held].ravel())
-                elif end.rotation is not None:
+                elif end.fixed_rotation is not None and block.name in ("q", "mu"):
                     found.append(at_end.ravel())
+                elif ring and block.name != "q" and s == self.scene.interval[1]:
+                    found.append(at_end.ravel())  # the norm of q(l) = +-q(0), or any other equation, is that of q(0)
         return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
 
     def _number(self, copies: np.ndarray, names: list[str]) -> None:
@@ -146,13 +216,32 @@ class Fields:
         numbers.x.array[self.free_owned] = self.offset + np.arange(count)
         numbers.x.scatter_forward()
         self.number = np.rint(numbers.x.array).astype(np.int32)
-        all_names = names + [f"drift{i}" for i in range(len(self.scene.symmetries))]
-        self.scalars = {name: self.field_unknowns + i for i, name in enumerate(all_names)}
+        self.scalars: dict[str, int] = {}
+        self.unknowns, self.local_unknowns = self.field_unknowns, count
+        self._append(names)
         for i, name in enumerate(names):
             self.number[copies[:, i]] = self.scalars[name]
-        self.unknowns = self.field_unknowns + len(all_names)
-        self.local_unknowns = count + (len(all_names) if self.comm.rank == self.comm.size - 1 else 0)
         self.copies = copies
+
+    def _append(self, names: list[str]) -> None:
+        """Give scalars the next numbers; all are on the last rank."""
+        self.scalars |= {name: self.unknowns + i for i, name in enumerate(names)}
+        self.unknowns += len(names)
+        self.local_unknowns += len(names) if self.comm.rank == self.comm.size - 1 else 0
+
+    def add_drifts(self, count: int) -> None:
+        """Add a drift scalar for each symmetry; before any matrix is made."""
+        self._append([f"drift{i}" for i in range(count)])
+
+    def lift(self, s: np.ndarray, load: float) -> np.ndarray:
+        """Linear function of the ends' positions that the centreline field is measured from, (..., 3) for (...,)."""
+        start, stop = self.scene.interval
+        x = ((np.asarray(s) - start) / (stop - start))[..., None]
+        c = self.scene.constants(load)
+        left, right = ([None if p is None else float(p) for p in end.held(c)] for end in self.scene.sides)
+        a = np.array([p if p is not None else q or 0.0 for p, q in zip(left, right, strict=True)])
+        b = np.array([q if q is not None else p or 0.0 for p, q in zip(left, right, strict=True)])
+        return np.asarray((1 - x) * a + x * b)
 
     def coordinates(self, degree: int) -> np.ndarray:
         """Arclengths of the nodes of a field of that degree in each local cell, (cells, degree + 1)."""
@@ -160,11 +249,11 @@ class Fields:
         return a + (b - a) * compat.nodes(degree)
 
     def constraints(self) -> int:
-        """Number of constraint equations: free multipliers and scalar contact forces (drift scalars not counted)."""
+        """Number of constraint equations: free multipliers, fields and scalars (drift scalars not counted)."""
         multipliers = [self.dofs[b.name].ravel() for b in self.blocks if b.multiplier]
         mine = np.unique(np.concatenate(multipliers))
         owned = mine[(mine < self.space.dofmap.index_map.size_local) & (self.number[mine] >= 0)]
-        return self.comm.allreduce(len(owned)) + len(self.forces)
+        return self.comm.allreduce(len(owned)) + sum(x.multiplier for x in self.unknown_scalars)
 
     def describe(self) -> str:
         """Fields and scalars in words, for the terminal."""
@@ -175,8 +264,20 @@ class Fields:
             "r": "centreline r",
             "n": "contact force n",
         }
-        words = [f"{names[b.name]} (P{b.degree})" for b in self.blocks]
-        words += ["n" + ", n".join(str(i + 1) for i in self.forces) + " (scalar)"] if self.forces else []
+        words = [f"{names.get(b.name, f'multiplier {b.name}')} (P{b.degree})" for b in self.blocks]
+        groups = {
+            "n": "contact force",
+            "a": "position of the left end",
+            "b": "position of the right end",
+            "ma": "moment at the left end",
+            "mb": "moment at the right end",
+            "g": "multipliers of constraints",
+            "t": "closing moment",
+            "f": "closing force",
+        }
+        for group, name in groups.items():
+            members = [x.name for x in self.unknown_scalars if x.group == group]
+            words += [f"{name} {', '.join(members)} (scalar)"] if members else []
         return ", ".join(words)
 
     def left_out(self) -> list[str]:

@@ -19,7 +19,7 @@ from rodfem.branch import Point
 from rodfem.continuation import Follower, hermite
 from rodfem.errors import ConvergenceError
 from rodfem.newton import correct
-from rodfem.stability.inertia import combine
+from rodfem.system import combine
 
 NODES = 6
 WINDOW = 0.02

@@ -6,7 +6,7 @@ named constants (``c.lam``, ``c.C``, ...; ``c.s`` is the arclength) and work on 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import inf, isfinite
 from types import SimpleNamespace
@@ -18,12 +18,8 @@ from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from forms.kinematics import RODS, UNDEFORMED
-from forms.rotation import IDENTITY
-from forms.symmetry import Matrix
+from rodfem.ends import Attachment, Constants, Constraint, End, OfConstants, OfPlace, Ring, Vector, check_vector
 from rodfem.errors import SceneError
-
-Constants = SimpleNamespace
-Vector = Sequence[Any]
 
 
 @dataclass(frozen=True)
@@ -45,45 +41,6 @@ class Parameter:
             raise SceneError(f"{name} = {value:g} is not a finite number: give one.")
         if not low < value < high:
             raise SceneError(f"{name} = {value:g} is outside its admissible range: choose {low:g} < {name} < {high:g}.")
-
-
-@dataclass(frozen=True)
-class End:
-    """What holds one end of the rod.
-
-    ``position(c)`` gives three components, each an expression (held there) or None (free to move in that direction);
-    ``position = None`` leaves all three free.  ``force(c)`` is the dead force on the end, used in the free directions.
-    ``follower(c)`` is a force on a free end given by its components along the directors, with which it turns: it has no
-    potential.  ``rotation`` is the quaternion at which the directors are clamped, None leaves them free.
-    """
-
-    position: Callable[[Constants], Vector] | None = None
-    rotation: tuple[float, float, float, float] | None = None
-    force: Callable[[Constants], Vector] | None = None
-    follower: Callable[[Constants], Vector] | None = None
-
-    def held(self, c: Constants) -> list[Any]:
-        """Position of the end: three expressions, None where the end is free."""
-        return [None] * 3 if self.position is None else list(self.position(c))
-
-    def applied(self, c: Constants) -> list[Any]:
-        """Dead force on the end, three expressions."""
-        return [0.0] * 3 if self.force is None else list(self.force(c))
-
-
-def clamped(
-    position: Callable[[Constants], Vector] = lambda c: (0.0, 0.0, 0.0),
-    rotation: tuple[float, float, float, float] = IDENTITY,
-) -> End:
-    """Return an end whose position and directors are given."""
-    return End(position=position, rotation=rotation)
-
-
-def free(
-    force: Callable[[Constants], Vector] | None = None, follower: Callable[[Constants], Vector] | None = None
-) -> End:
-    """Return an end without support, loaded by a dead force, a follower force, or none."""
-    return End(force=force, follower=follower)
 
 
 @dataclass(frozen=True)
@@ -128,13 +85,22 @@ class Scene:
     parameters
         Named constants; ``load`` names the one that is varied unless another is asked for.
     ends
-        Left and right :class:`End`.
+        Left and right :class:`~rodfem.ends.End`, or a :class:`~rodfem.ends.Ring`.
     ordinate
         What to record beside the load.
     inertia
         Kinetic metric of the spectrum; unit rotary inertia by default, which serves to count.
-    symmetries
-        Generators from :mod:`forms.symmetry` of the continuous symmetries that all states of the scene share.
+    distributed
+        ``distributed(c)``, dead force per unit length (3,), a function of ``c.s`` if wanted; gravity, say.
+    follower
+        ``follower(c)``, force per unit length by its components along the directors.  Not conservative.
+    potential
+        ``potential(x, c)``, potential energy per unit length of what else acts along the rod: an elastic foundation, a
+        pressure.
+    attachments, constraints
+        What is attached along the rod, and equations that it must fulfil: see :mod:`rodfem.ends`.
+    breaks
+        Arclengths at which the material or the loads jump: element boundaries are put there.
     start
         Quaternion(s) of a first guess, ``start(s)`` of shape (m,) -> (m, 4); by default the identity (a straight rod).
     span
@@ -147,12 +113,17 @@ class Scene:
     energy: Callable[[Any, Any, Constants], Any]
     parameters: Mapping[str, Parameter]
     load: str
-    ends: tuple[End, End]
+    ends: tuple[End, End] | Ring
     ordinate: Ordinate
     span: tuple[float, float]
     title: str = ""
     inertia: Inertia = Inertia()
-    symmetries: tuple[Mapping[str, Matrix], ...] = ()
+    distributed: OfConstants | None = None
+    follower: OfConstants | None = None
+    potential: OfPlace | None = None
+    attachments: tuple[Attachment, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
+    breaks: tuple[float, ...] = ()
     start: Callable[[np.ndarray], np.ndarray] | None = None
     states: str = field(default="straight")
 
@@ -174,20 +145,105 @@ class Scene:
                 f"The ordinate's arclength {self.ordinate.s:g} is not on the rod: choose {a:g} <= s <= {b:g}."
             )
         self.check_span(self.span)
-        held = [[x is not None for x in end.held(self.constants())] for end in self.ends]
-        if not all(left or right for left, right in zip(*held, strict=True)):
-            raise SceneError("The rod can drift away: hold each component of the position at one end at least.")
-        if all(end.rotation is None for end in self.ends):
-            raise SceneError("The rod can rotate freely: clamp the rotation at one end at least.")
-        for end in self.ends:
+        self._check_supports()
+        self._check_places()
+        for s in self.samples():
+            stiffness = self.stiffness(s)
+            if stiffness.size and np.linalg.eigvalsh(stiffness)[0] <= 1e-12 * abs(stiffness).max():
+                raise SceneError(
+                    f"The stored energy is not convex at s = {s:g}: its second derivative at the undeformed state has the "
+                    f"eigenvalue {np.linalg.eigvalsh(stiffness)[0]:.3g}; choose constants for which all are positive."
+                )
+
+    def _check_supports(self) -> None:
+        """Check shapes, whether anything holds the rod, and whether the ends can be where they are asked to be."""
+        for side, end in zip(("left", "right"), self.sides, strict=True):
+            for load in self.span:
+                c = self.constants(load)
+                check_vector(f"position of the {side} end", end.held(c), 3)
+                check_vector(f"force on the {side} end", end.applied(c), 3)
+                rotation = end.rotation(c) if callable(end.rotation) else end.rotation
+                if rotation is not None:
+                    check_vector(f"rotation of the {side} end", rotation, 4)
+                    if not sum(float(x) ** 2 for x in rotation) > 0:
+                        raise SceneError(f"The rotation of the {side} end is the zero quaternion: give one of size one.")
+            if end.hinge is not None and end.rotation is None:
+                raise SceneError(f"The {side} end has a hinge but no rotation: say which directors the hinge holds.")
+            if end.hinge is not None and not np.linalg.norm(end.hinge) > 0:
+                raise SceneError(f"The hinge of the {side} end has no axis: give three components, not all zero.")
             if end.follower is not None and any(x is not None for x in end.held(self.constants())):
-                raise SceneError("A follower force acts on an end that is held: leave its position free.")
-        stiffness = self.stiffness()
-        if stiffness.size and np.linalg.eigvalsh(stiffness)[0] <= 1e-12 * abs(stiffness).max():
-            raise SceneError(
-                f"The stored energy is not convex: its second derivative at the undeformed state has the eigenvalue "
-                f"{np.linalg.eigvalsh(stiffness)[0]:.3g}; choose constants for which all are positive."
-            )
+                raise SceneError(
+                    f"A follower force acts on the {side} end, which is held: leave its position free, or use a force."
+                )
+        self._check_drift()
+        self._check_reach()
+
+    def _check_drift(self) -> None:
+        """Raise unless something holds the rod, or what acts on it is in balance whatever its shape."""
+        c = self.constants()
+        if isinstance(self.ends, Ring) or self.potential is not None or self.constraints:
+            return
+        if any(end.energy is not None for end in self.sides) or any(a.energy is not None for a in self.attachments):
+            return
+        held = [[x is not None for x in end.held(c)] for end in self.sides]
+        for i, (left, right) in enumerate(zip(*held, strict=True)):
+            if not (left or right):
+                raise SceneError(
+                    f"The rod can drift away along e{i + 1}: hold that component of the position at one end at least, "
+                    "or attach a spring."
+                )
+
+    def _check_reach(self) -> None:
+        """Raise where a rod that cannot stretch is held at ends that are farther apart than it is long."""
+        if 2 in self.free_strains or 0 in self.free_strains:
+            return
+        for load in self.span:
+            left, right = (end.held(self.constants(load)) for end in self.sides)
+            if None not in left and None not in right:
+                distance = sum((float(b) - float(a)) ** 2 for a, b in zip(left, right, strict=True)) ** 0.5
+                if distance > self.length * (1 + 1e-12):
+                    raise SceneError(
+                        f"At {self.load} = {load:g} the ends are {distance:.6g} apart, but the rod is inextensible and only "
+                        f"{self.length:.6g} long: let it stretch, or move the ends together."
+                    )
+
+    def _check_places(self) -> None:
+        """Raise for attachments, constraints and breaks that are not on the rod."""
+        a, b = self.interval
+        places = [("attachment", x.s) for x in self.attachments] + [("break", s) for s in self.breaks]
+        places += [("constraint", x.s) for x in self.constraints if x.s is not None]
+        for what, s in places:
+            if not a <= s <= b:
+                raise SceneError(f"The {what} at s = {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
+        c = self.constants()
+        for what, values in (
+            ("distributed force", self.distributed and self.distributed(c)),
+            ("distributed follower force", self.follower and self.follower(c)),
+            *(("force of an attachment", x.force(c)) for x in self.attachments if x.force),
+            *(("moment on an end", end.moment(c)) for end in self.sides if end.moment),
+            *(("follower force on an end", end.follower(c)) for end in self.sides if end.follower),
+        ):
+            if values is not None:
+                check_vector(what, values, 3)
+
+    @property
+    def sides(self) -> tuple[End, End]:
+        """The two ends; those of a ring hold nothing."""
+        return (End(), End()) if isinstance(self.ends, Ring) else self.ends
+
+    @property
+    def joints(self) -> tuple[float, ...]:
+        """Arclengths inside the rod that must be element boundaries, in ascending order."""
+        places = {*self.breaks, *(x.s for x in self.attachments)}
+        places |= {x.s for x in self.constraints if x.s is not None}
+        close = 1e-9 * self.length
+        return tuple(sorted(s for s in places if self.interval[0] + close < s < self.interval[1] - close))
+
+    def samples(self) -> list[float]:
+        """Arclengths at which the material is checked: ends, middle, and both sides of all breaks."""
+        a, b = self.interval
+        eps = 1e-6 * self.length
+        return sorted({a + eps, (a + b) / 2, b - eps, *(s + d for s in self.joints for d in (-eps, eps))})
 
     @property
     def length(self) -> float:
@@ -197,7 +253,8 @@ class Scene:
     @property
     def conservative(self) -> bool:
         """Whether all loads have a potential, so that stability is a matter of the second variation alone."""
-        return all(end.follower is None for end in self.ends)
+        ends = all(end.conservative for end in self.sides)
+        return ends and self.follower is None and all(x.follower is None for x in self.attachments)
 
     @property
     def free_strains(self) -> tuple[int, ...]:
@@ -220,19 +277,28 @@ class Scene:
                 f"The range of {self.load} from {span[0]:g} to {span[1]:g} is empty: give two different loads."
             )
 
+    def plain(self, side: int) -> bool:
+        """Whether dead forces are all that loads an end (0: left, 1: right), so that they are the contact force there."""
+        at_end = [x.s for x in self.attachments] + [x.s for x in self.constraints if x.s is not None]
+        return self.sides[side].energy is None and not any(
+            abs(s - self.interval[side]) < 1e-9 * self.length for s in at_end
+        )
+
     def known_force(self, component: int, c: Constants) -> Any | None:
-        """Component of the contact force that a dead end force prescribes, or None where both ends are held there.
+        """Component of the contact force that a dead end force prescribes, or None where it is an unknown.
 
         Free at the right end the contact force is the applied one, free at the left end it is minus the applied one.
         """
+        if isinstance(self.ends, Ring):
+            return None
         left, right = self.ends
-        if right.held(c)[component] is None:
+        if self.plain(1) and right.held(c)[component] is None:
             return right.applied(c)[component]
-        if left.held(c)[component] is None:
+        if self.plain(0) and left.held(c)[component] is None:
             return -left.applied(c)[component]
         return None
 
-    def stiffness(self) -> np.ndarray:
+    def stiffness(self, s: float | None = None) -> np.ndarray:
         """Second derivative of ``W`` in the m free strains and ``k`` at the undeformed state, (m + 3, m + 3)."""
         free_v = self.free_strains
         x = ufl.variable(ufl.as_vector([UNDEFORMED[i] for i in free_v] + [0.0] * 3))
@@ -240,7 +306,7 @@ class Scene:
         for position, component in enumerate(free_v):
             v[component] = x[position]
         k = ufl.as_vector([x[len(free_v) + i] for i in range(3)])
-        W = ufl.as_ufl(self.energy(ufl.as_vector(v), k, self.constants()))
+        W = ufl.as_ufl(self.energy(ufl.as_vector(v), k, self.constants(s=s)))
         hessian = apply_derivatives(apply_algebra_lowering(ufl.diff(ufl.diff(W, x), x)))
         m = len(free_v) + 3
         return np.array([[float(hessian((), component=(i, j))) for j in range(m)] for i in range(m)])

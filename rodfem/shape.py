@@ -122,7 +122,7 @@ class Shape:
             ends = np.vstack([np.zeros(3), np.cumsum(all_fields["ends"], axis=0)])
             out["r"] = self._anchor(load, ends[-1]) + self._unique(ends[:-1, None, :] + all_fields["inside"])
         else:
-            out["r"] = out["r"] + self._lift(out["s"], load)
+            out["r"] = out["r"] + self.system.fields.lift(out["s"], load)
         for name in system.scalars:
             out[name] = system.scalar(x, name)
         return out
@@ -159,7 +159,7 @@ class Shape:
         own = degree if block.continuous else degree - 1
         table = np.asarray(sample[block.name])
         if block.name == "r":
-            table = table - self._lift(sample["s"], sample[LOAD])
+            table = table - self.system.fields.lift(sample["s"], sample[LOAD])
         if block.continuous:
             table = table[np.arange(len(ends) - 1)[:, None] * degree + np.arange(degree + 1)]
         local = (x - ends[cell]) / (ends[cell + 1] - ends[cell])
@@ -210,23 +210,16 @@ class Shape:
         if system.comm.size > 1:
             parts = system.comm.allreduce(parts)
         load = float(f.u.x.array[f.copies[0, -1]])
-        r = parts[1, :3] + (self._anchor(load, parts[2, :3]) if self.reduced else self._lift(np.array([s]), load)[0])
+        r = parts[1, :3] + (self._anchor(load, parts[2, :3]) if self.reduced else self.system.fields.lift(np.array(s), load))
         return r, parts[0] / np.linalg.norm(parts[0])
-
-    def _held(self, load: float) -> list[list[float | None]]:
-        c = self.system.scene.constants(load)
-        return [[None if x is None else float(x) for x in end.held(c)] for end in self.system.scene.ends]
 
     def _anchor(self, load: float, chord: np.ndarray) -> np.ndarray:
         """Position of the left end: where it is held, or else a chord back from where the right end is held."""
-        left, right = self._held(load)
+        f = self.system.fields
+        scalar = {x.name: float(f.u.x.array[f.copies[0, i]]) for i, x in enumerate(f.unknown_scalars)}
+        c = self.system.scene.constants(load)
+        left, right = (
+            [scalar.get(f"{letter}{i + 1}") if p is None else float(p) for i, p in enumerate(end.held(c))]
+            for letter, end in zip("ab", self.system.scene.sides, strict=True)
+        )
         return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])
-
-    def _lift(self, s: np.ndarray, load: float) -> np.ndarray:
-        """Linear function of the ends' positions that the pointwise centreline is measured from, (m, 3)."""
-        start, stop = self.system.scene.interval
-        x = ((np.asarray(s) - start) / (stop - start))[:, None]
-        left, right = self._held(load)
-        a = np.array([p if p is not None else q for p, q in zip(left, right, strict=True)], dtype=float)
-        b = np.array([q if q is not None else p for p, q in zip(left, right, strict=True)], dtype=float)
-        return (1 - x) * a + x * b

@@ -11,6 +11,7 @@ the load, and one drift scalar for each symmetry.  The last two kinds are border
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,10 @@ from rodfem.errors import ConvergenceError
 from rodfem.fields import LOAD, Discretization, Fields
 from rodfem.pattern import bordered_pattern, new_matrix
 from rodfem.scene import Scene
+from rodfem.symmetries import Symmetry, find_symmetries
 
+FEW = 4000
+"""Number of unknowns up to which symmetries are sought on the mesh itself."""
 SYMMETRIC_STATE = 1e-6
 """A generator smaller than this (in the metric) is zero: the state has the symmetry itself."""
 
@@ -54,9 +58,12 @@ class System:
         self.clock = clock or Clock()
         self.fields = Fields(scene, discretization, comm, mesh)
         self.equations = Equations(self.fields)
+        self._set_clamps()
+        self.symmetries = self._symmetries() if scene.conservative else []
+        self.fields.add_drifts(len(self.symmetries))
         number, self.scalars = self.fields.number, self.fields.scalars
         self.load_index = self.scalars[LOAD]
-        self.drifts = [self.scalars[f"drift{i}"] for i in range(len(scene.symmetries))]
+        self.drifts = [self.scalars[f"drift{i}"] for i in range(len(self.symmetries))]
         self.has_scalars = comm.rank == comm.size - 1
         without_load = np.where(number == self.load_index, -1, number).astype(PETSc.IntType)
         self._columns = {True: number.astype(PETSc.IntType), False: without_load}
@@ -71,11 +78,19 @@ class System:
         source = PETSc.IS().createGeneral(number[self._numbered].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
         self._gather = PETSc.Scatter().create(self.workspace, source, self.x_local, None)
         self._residual_local = np.zeros(len(self.fields.u.x.array))
-        self._set_clamps()
         self.metric = self._assemble_metric()
         self.phases: list[PETSc.Vec | None] = [None] * len(self.drifts)
         self._phase_offset = [0.0] * len(self.drifts)
         self.lu = Factorizer("lu", comm, {8: 0})  # no scaling: a third of the time; Newton's method mends what it costs
+
+    def _symmetries(self) -> list[Symmetry]:
+        """Symmetries of the scene; found with few elements, which have the same ones, where there are many."""
+        fields, equations = self.fields, self.equations
+        if fields.unknowns > FEW:
+            few = replace(fields.discretization, elements=max(2, len(self.scene.joints) + 1))
+            fields = Fields(self.scene, few, MPI.COMM_SELF)
+            equations = Equations(fields)
+        return find_symmetries(fields, equations)
 
     # --- vectors -----------------------------------------------------------------------------------------------
 
@@ -193,37 +208,47 @@ class System:
     # --- symmetry ----------------------------------------------------------------------------------------------
 
     def generator(self, x: PETSc.Vec, symmetry: int) -> PETSc.Vec:
-        """Change of ``x`` under the infinitesimal symmetry, in all fields and scalar forces that it moves."""
+        """Change of ``x`` under the infinitesimal symmetry, in all fields and scalars that it moves."""
         self.bring(x)
-        f, u = self.fields, self.fields.u.x.array
-        out = self.new_vector()
-        change = np.zeros(len(u))
-        matrices = self.scene.symmetries[symmetry]
-        for name, matrix in matrices.items():
-            if name in f.dofs:
-                dofs = f.dofs[name].reshape(-1, f.dofs[name].shape[-1])
-                change[dofs] = u[dofs] @ np.array(matrix).T
-        out.array[: len(f.free_owned)] = change[f.free_owned]
-        if f.forces and "n" in matrices:
-            n = np.zeros(3)
-            n[f.forces] = [self.scalar(x, f"n{i + 1}") for i in f.forces]
-            if self.has_scalars:
-                for i, value in zip(f.forces, (np.array(matrices["n"]) @ n)[f.forces], strict=True):
-                    out.setValue(self.scalars[f"n{i + 1}"], value)
-        out.assemble()
-        return out
+        u = self.fields.u.x.array
+        state, u[:] = u.copy(), self.symmetries[symmetry].change(self.fields)
+        change = self.take()
+        u[:] = state
+        return change
 
     def set_phase(self, reference: PETSc.Vec | None) -> None:
-        """Take the phase conditions at ``reference``: active for each symmetry that it breaks; None: none active."""
+        """Take the phase conditions at ``reference``: as many as it breaks symmetries; None: none active.
+
+        The symmetries form a linear space.  Those combinations of their generators that vanish at the reference state
+        are its own symmetries and have no phase condition; the others, orthonormal in the metric, have one each.
+        """
+        count = len(self.drifts)
+        self.phases, self._phase_offset, self.kept = [None] * count, [0.0] * count, np.eye(count)
+        if reference is None or count == 0:
+            return
+        generators = [self.generator(reference, i) for i in range(count)]
+        images = [self.metric * g for g in generators]
+        gram = np.array([[np.real(g.dot(m)) for m in images] for g in generators])
+        squares, combinations = np.linalg.eigh(gram)
+        self.kept = combinations[:, squares < SYMMETRIC_STATE**2].T
+        for i, (square, weights) in enumerate(zip(squares, combinations.T, strict=True)):
+            if square >= SYMMETRIC_STATE**2:
+                phase = combine(images, weights / square**0.5)
+                self.phases[i], self._phase_offset[i] = phase, np.real(phase.dot(reference))
+
+    def equivalent_directions(self, x: PETSc.Vec, direction: PETSc.Vec) -> list[PETSc.Vec]:
+        """Directions into which the symmetries that the state ``x`` has itself carry a direction, to first order.
+
+        The symmetries kept by the state last given to :meth:`set_phase`, which must be ``x``.
+        """
+        moved = x.copy()
+        moved.axpy(1.0, direction)
+        changes = []
         for i in range(len(self.drifts)):
-            generator = None if reference is None else self.generator(reference, i)
-            size = 0.0 if generator is None else self.norm(generator)
-            if generator is None or reference is None or size < SYMMETRIC_STATE:
-                self.phases[i] = None
-                continue
-            phase = self.metric * generator
-            phase.scale(1.0 / size)
-            self.phases[i], self._phase_offset[i] = phase, phase.dot(reference)
+            change = self.generator(moved, i)
+            change.axpy(-1.0, self.generator(x, i))
+            changes.append(change)
+        return [combine(changes, weights) for weights in self.kept]
 
     def active_drifts(self) -> int:
         """Number of symmetries that the current reference state breaks: as many zero eigenvalues belong to it."""
@@ -236,9 +261,9 @@ class System:
         u, f = self.fields.u.x.array, self.fields
         u[:] = 0.0
         x = f.coordinates(f.discretization.degree)
-        for end, s in zip(self.scene.ends, self.scene.interval, strict=True):
-            if end.rotation is not None:
-                u[f.dofs["q"][np.isclose(x, s, rtol=0, atol=1e-9 * self.scene.length)]] = end.rotation
+        for end, s in zip(self.scene.sides, self.scene.interval, strict=True):
+            if end.fixed_rotation is not None:
+                u[f.dofs["q"][np.isclose(x, s, rtol=0, atol=1e-9 * self.scene.length)]] = end.fixed_rotation
 
     def _assemble_metric(self) -> PETSc.Mat:
         metric = new_matrix(self.fields, self._pattern, self._no_load, self._no_load)
@@ -248,6 +273,14 @@ class System:
             metric.setValue(self.load_index, self.load_index, 1.0 / (b - a) ** 2, addv=True)
         metric.assemble()
         return metric
+
+
+def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:
+    """Linear combination of vectors."""
+    out = vectors[0].duplicate()
+    out.set(0.0)
+    out.maxpy(list(weights), vectors)
+    return out
 
 
 class Factorizer:

@@ -20,7 +20,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.system import Factorizer, System
+from rodfem.system import Factorizer, System, combine
 
 EPS = float(np.finfo(float).eps)
 
@@ -156,11 +156,3 @@ class Inertia:
         numbers = np.arange(begin, min(end, self.system.fields.field_unknowns))
         vector.array[: len(numbers)] = np.sin((1.0 + i) * (1.0 + 0.731 * numbers)) + 0.3
         return vector
-
-
-def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:
-    """Linear combination of vectors."""
-    out = vectors[0].duplicate()
-    out.set(0.0)
-    out.maxpy(list(weights), vectors)
-    return out

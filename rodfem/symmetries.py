@@ -1,0 +1,162 @@
+r"""The continuous symmetries of a scene, found from its equations.
+
+A rigid motion of space or of the cross-sections changes each field and group of scalars by one of a few elementary
+generators ``g_j`` (:mod:`forms.symmetry`).  A combination of them is a symmetry where it leaves the functional ``L`` as
+it is, at every state and load, and moves nothing that an end holds:
+
+    sum_j a_j dL(x)[g_j(x)] = 0   for all x,      sum_j a_j g_j(x) = 0  on what is held.
+
+The space of such ``a`` is the null space of a matrix with one row for each of a number of random states.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from forms.symmetry import AXES, Matrix, cross, left, right
+from rodfem.equations import Equations
+from rodfem.fields import Fields
+
+EXACT = 1e-9
+"""A combination of generators that changes the functional by less than this, relative, does not change it."""
+
+
+@dataclass(frozen=True)
+class Elementary:
+    """A generator of one target (a field or a group of scalars): ``change = matrix value + constant``."""
+
+    target: str
+    matrix: Matrix
+    constant: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """A combination of elementary generators."""
+
+    weights: np.ndarray
+    parts: tuple[Elementary, ...]
+
+    def change(self, fields: Fields) -> np.ndarray:
+        """Change of the state that ``fields.u`` holds: local values, consistent on all ranks; zero for the load."""
+        out = np.zeros(len(fields.u.x.array))
+        for weight, part in zip(self.weights, self.parts, strict=True):
+            if weight:
+                add_change(fields, part, weight, out)
+        return out
+
+
+def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
+    """All elementary generators of the fields and groups of scalars that a scene has."""
+    vectors = {"n", "a", "b", "ma", "mb", "f"} & {x.group for x in fields.unknown_scalars}
+    blocks = {b.name for b in fields.blocks}
+    out = []
+    sizes = {g: sum(x.group == g for x in fields.unknown_scalars) for g in vectors}
+    for axis in AXES:
+        out += [Elementary("q", m(axis), (0.0,) * 4) for m in (left, right)]
+        if "t" in {x.group for x in fields.unknown_scalars}:
+            out += [Elementary("t", m(axis), (0.0,) * 4) for m in (left, right)]
+        for target in sorted(vectors | ({"r", "n"} & blocks)):
+            if target in ("ma", "mb") and sizes[target] == 2:
+                continue
+            out.append(Elementary(target, cross(axis), (0.0,) * 3))
+            if target in ("r", "a", "b"):
+                out.append(Elementary(target, ((0.0,) * 3,) * 3, axis))
+    for target in sorted(g for g in vectors if g in ("ma", "mb") and sizes[g] == 2):
+        out.append(Elementary(target, ((0.0, -1.0), (1.0, 0.0)), (0.0, 0.0)))
+    return tuple(out)
+
+
+def add_change(fields: Fields, part: Elementary, weight: float, out: np.ndarray) -> None:
+    """Add ``weight`` times the change under an elementary generator, at the state that ``fields.u`` holds."""
+    u, matrix, constant = fields.u.x.array, np.array(part.matrix), np.array(part.constant)
+    load = float(u[fields.copies[0, -1]])
+    if part.target in fields.dofs:
+        dofs = fields.dofs[part.target]
+        values = u[dofs]
+        if part.target == "r":
+            values = values + fields.lift(fields.coordinates(fields.discretization.degree), load)
+        out[dofs] += weight * (values @ matrix.T + constant)
+        return
+    members = [(i, x.component) for i, x in enumerate(fields.unknown_scalars) if x.group == part.target]
+    values = _known(fields, part.target, load, len(constant))
+    for i, component in members:
+        values[component] = u[fields.copies[0, i]]
+    change = weight * (matrix @ values + constant)
+    for i, component in members:
+        out[fields.copies[:, i]] += change[component]
+
+
+def _known(fields: Fields, group: str, load: float, size: int) -> np.ndarray:
+    """Values of the components of a group that are no unknowns: known forces, held positions; else zero."""
+    scene, values = fields.scene, np.zeros(size)
+    c = scene.constants(load)
+    if group == "n":
+        known = [scene.known_force(i, c) for i in range(3)]
+    elif group in ("a", "b"):
+        known = scene.sides["ab".index(group)].held(c)
+    else:
+        return values
+    return np.array([0.0 if x is None else float(x) for x in known])
+
+
+def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
+    """Find a basis of all continuous symmetries; leaves the state that ``fields.u`` holds as it was."""
+    parts = elementary_generators(fields)
+    u, kept = fields.u.x.array, fields.u.x.array.copy()
+    count = len(parts)
+    one = np.eye(count)
+    moved = np.zeros((count, count))
+    rows, held = [], [np.zeros((1, count))]
+    residual = np.zeros(len(u))
+    for seed in range(count + 6):
+        _random_state(fields, kept, seed)
+        residual[:] = 0.0
+        fem.assemble_vector(residual, equations.residual)
+        changes = np.array([Symmetry(row, parts).change(fields) for row in one])
+        row = fields.comm.allreduce(changes @ residual, op=MPI.SUM)
+        rows.append(row / max(abs(row).max(), 1e-300))
+        held.append(changes[:, _held(fields)].T)
+        moved += fields.comm.allreduce(changes @ changes.T, op=MPI.SUM)
+    u[:] = kept
+    scale = np.sqrt(np.maximum(np.diag(moved), 1e-300))
+    local = np.linalg.qr(np.vstack(held), mode="r")
+    _, singular, vectors = np.linalg.svd(np.vstack([*rows, *fields.comm.allgather(local)]))
+    null = vectors[singular < EXACT * max(singular[0], 1.0)].T
+    sizes, combinations = np.linalg.eigh(null.T @ (moved / scale.max() ** 2) @ null)
+    basis = null @ combinations[:, sizes > EXACT]
+    return [Symmetry(np.where(abs(w) > 1e-12, w, 0.0), parts) for w in basis.T]
+
+
+def _held(fields: Fields) -> np.ndarray:
+    """Local degrees of freedom that an end holds, without norm multipliers."""
+    dofs = [d.ravel() for name, d in fields.dofs.items() if name in ("q", "r")]
+    used = np.unique(np.concatenate(dofs))
+    return used[fields.number[used] < 0]
+
+
+def _random_state(fields: Fields, kept: np.ndarray, seed: int) -> None:
+    """Put a random state with a random load into ``fields.u``: the same on any number of ranks, ends held.
+
+    Values are functions of the place along the rod, not of the numbering.
+    """
+    rng = np.random.default_rng(seed)
+    u = fields.u.x.array
+    scene = fields.scene
+    for block in fields.blocks:
+        x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
+        a, b, p = rng.normal(size=(3, block.size))
+        values = 0.5 * a + 0.5 * b * np.cos(2.1 * x[..., None] + 6.0 * p) + 0.3 * p * x[..., None] ** 2
+        if block.name == "v":
+            values = 0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains]
+        u[fields.dofs[block.name]] = values
+    held = _held(fields)
+    u[held] = kept[held]
+    for i in range(len(fields.unknown_scalars)):
+        u[fields.copies[:, i]] = rng.normal()
+    low, high = sorted(scene.span)
+    u[fields.copies[:, -1]] = low + (high - low) * rng.uniform(0.1, 0.9)
