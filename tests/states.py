@@ -14,7 +14,7 @@ from rodfem.continuation import Equilibria
 from rodfem.fields import Discretization
 from rodfem.scene import Scene
 from rodfem.stability.blocks import Blocks
-from rodfem.stability.matrices import gathered
+from rodfem.stability.matrices import first_of, gathered
 from rodfem.stability.reduction import Reduction
 from rodfem.system import System
 
@@ -63,9 +63,9 @@ def unit_mode(system: System, blocks: Blocks, x: PETSc.Vec) -> PETSc.Vec:
     reduced = Reduction(pencil).near(1, -100.0).vectors[:, 0]
     full: Any = gathered(pencil.T) @ reduced
     full *= np.sign(np.linspace(1.0, 1.4, len(full)) @ full)  # the same one of the two on fine and on coarse meshes
-    first, last = pencil.T.getOwnershipRange()
+    first = first_of(system.comm, len(blocks.rows))
     mode = system.new_vector()
-    mode.array[blocks.rows - system.fields.offset] = full[first:last]
+    mode.array[blocks.rows - system.fields.offset] = full[first : first + len(blocks.rows)]
     mode.assemble()
     mode.scale(1.0 / system.norm(mode))
     return mode

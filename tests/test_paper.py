@@ -24,8 +24,6 @@ from rodfem.stability.blocks import Blocks
 from rodfem.stability.matrices import gathered
 from rodfem.system import System
 
-pytestmark = pytest.mark.short
-
 STATES = [
     ("cord", "reduced", 40.0),
     ("cord", "pointwise", 40.0),
@@ -165,6 +163,7 @@ def rotated(system: System, blocks: Blocks, x: PETSc.Vec, dq: PETSc.Vec, eps: fl
     return y
 
 
+@pytest.mark.short
 @pytest.mark.parametrize(("name", "formulation", "load"), STATES)
 def test_tangential_hessian_is_the_second_derivative_along_rotations(name: str, formulation: str, load: float) -> None:
     """At a discrete equilibrium, to round-off: fourth order differences of the first derivative along the curve."""

@@ -126,33 +126,30 @@ class Traced:
 def midpoint(state: State) -> float:
     """Transverse displacement of the middle of the hemitropic rod.
 
-    AUTO is accurate to order 2 NCOL at mesh points, and to order NCOL + 1 only between them.  Hence Hermite
-    interpolation through the six mesh points around the middle, with r' = v d3 there.
+    AUTO is accurate to order 2 NCOL at mesh points, and to order NCOL + 1 only between them.  Hence the equations
+    are integrated from the mesh point nearest to the middle: half an interval at most, by Runge-Kutta's method.
     """
     nodes = np.arange(0, len(state.t), state.ncol)
-    near = np.sort(nodes[np.argsort(abs(state.t[nodes] - 0.5), kind="stable")[:6]])
-    a, b, c, d = state.u[near, :4].T
-    d3 = np.array([2 * (b * d + a * c), 2 * (c * d - a * b), a * a - b * b - c * c + d * d])
-    n3 = state.par[1] * d3[1] + state.par[2] * d3[2]
-    stretch = 1 + (n3 + 3 * state.u[near, 6]) / (10 - 9)
-    return math.hypot(*(hermite(state.t[near], state.u[near, 7 + i], 6 * stretch * d3[i], 0.5) for i in (0, 1)))
+    start = nodes[np.argmin(abs(state.t[nodes] - 0.5))]
+    u, steps = state.u[start], 32
+    step = 6 * (0.5 - state.t[start]) / steps  # of arclength: the rod's length is 6
+    for _ in range(steps if step else 0):
+        k1 = slope(u, state.par)
+        k2 = slope(u + step / 2 * k1, state.par)
+        k3 = slope(u + step / 2 * k2, state.par)
+        u = u + step / 6 * (k1 + 2 * k2 + 2 * k3 + slope(u + step * k3, state.par))
+    return math.hypot(u[7], u[8])
 
 
-def hermite(t: np.ndarray, y: np.ndarray, slope: np.ndarray, at: float) -> float:
-    """The polynomial with the given values and slopes at t, by divided differences."""
-    x = np.repeat(t, 2)
-    table = np.repeat(y, 2).astype(float)
-    coefficients = [table[0]]
-    for order in range(1, len(x)):
-        width = x[order:] - x[:-order]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            difference = np.diff(table) / width
-        table = np.where(width == 0, np.repeat(slope, 2)[: len(width)], difference)
-        coefficients.append(table[0])
-    result = 0.0
-    for i in reversed(range(len(x))):
-        result = result * (at - x[i]) + coefficients[i]
-    return float(result)
+def slope(u: np.ndarray, par: np.ndarray) -> np.ndarray:
+    """The right-hand side of hemitropic.f90, without eps and delta, which are zero."""
+    a, w, m = u[0], u[1:4], u[4:7]
+    force = np.array([0.0, par[1], par[2]])
+    n = (a * a - w @ w) * force + 2 * (w @ force) * w - 2 * a * np.cross(w, force)
+    k = np.array([m[0], m[1], 10 * m[2] + 3 * n[2]])
+    v = np.array([0.0, 0.0, 1 + n[2] + 3 * m[2]])
+    dr = (a * a - w @ w) * v + 2 * (w @ v) * w + 2 * a * np.cross(w, v)
+    return np.concatenate([[-w @ k / 2], (a * k + np.cross(w, k)) / 2, -np.cross(k, m) - np.cross(v, n), dr])
 
 
 CORD = Scene(
@@ -518,22 +515,24 @@ def sweep(scene: Scene, accuracies: Iterable[float] = ACCURACIES) -> dict[str, d
     meshes = (5, 6, 8, 10, 12, 14, 16, 20, 24, 30, 40, 60)
     best: dict[str, dict[str, list[float]]] = {branch.name: {} for branch in scene.branches if branch.targets}
     for accuracy, ncol, factor in itertools.product(accuracies, (3, 4, 5, 6, 7), (1e-1, 1e-2)):
-        tol = float(f"{accuracy * factor:.0e}")
+        tol, key = float(f"{accuracy * factor:.0e}"), f"{accuracy:g}"
         before: dict[str, Traced] = {}
+        done: set[str] = set()  # the branches for which a finer mesh, which is slower, need not be tried
         for ntst in meshes:
-            if len(before) == len(best) and all(b.error <= accuracy / 10 for b in before.values()):
-                break
-            try:
-                traced = {branch.name: branch for branch in trace(scene, ntst, ncol, tol, runs=2)}
-            except AutoError:
-                continue
-            for name, branch in traced.items():
-                old = before.get(name)
-                if old and old.complete and branch.complete and max(old.error, branch.error) <= accuracy:
-                    entry = best[name].get(f"{accuracy:g}")
+            now: dict[str, Traced] = {}
+            for name in sorted(best.keys() - done):
+                try:
+                    now[name] = trace(scene, ntst, ncol, tol, runs=2, only=name)[-1]
+                except (AutoError, IndexError):
+                    continue
+                old, new, entry = before.get(name), now[name], best[name].get(key)
+                if old and all(b.name == name and b.complete and b.error <= accuracy for b in (old, new)):
+                    done.add(name)
                     if entry is None or old.seconds < entry[3]:
-                        best[name][f"{accuracy:g}"] = [old.ntst, ncol, tol, old.seconds]
-            before = {name: branch for name, branch in traced.items() if name in best}
+                        best[name][key] = [old.ntst, ncol, tol, old.seconds]
+                elif entry and new.complete and new.seconds > 2 * entry[3]:
+                    done.add(name)
+            before = now
     return {name: {key: entry[:3] for key, entry in found.items()} for name, found in best.items()}
 
 
@@ -573,6 +572,7 @@ def arguments() -> argparse.Namespace:
         "--accuracy",
         type=float,
         nargs="+",
+        choices=ACCURACIES,
         default=list(ACCURACIES),
         help="as found by --sweep (default 1e-4 1e-6 1e-8)",
     )

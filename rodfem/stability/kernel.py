@@ -61,7 +61,7 @@ class Kernel:
 
     def expand(self, z: np.ndarray) -> np.ndarray:
         """``Q2 z`` for ``z`` (m - p,) or (m - p, w)."""
-        x = np.zeros((self.size, *z.shape[1:]))
+        x = np.zeros((self.size, *z.shape[1:]), dtype=z.dtype)
         x[self.free] = z
         for step in reversed(self.steps):
             step.apply(x, transposed=False)

@@ -8,20 +8,7 @@ Q2 z``, and the singular pencil ``(K C; C^t 0), (M 0; 0 0)`` of size m + p becom
 whose finite eigenvalues are those of the former, without its 2p infinite ones (Kumar & Healey 2010).  SLEPc sees a
 matrix that it can only multiply by, in O(m) operations for pointwise constraints, O(m p) for integral ones.
 
-Shift-invert and Cayley transforms need the inverse of the shifted matrix ``Q2^t A Q2``, ``A = K - sigma M``.  It is a
-part of the inverse of a sparse matrix:
-
-    ( A    C ) ( x )   ( Q2 b )
-    ( C^t  0 ) ( y ) = (  0   ),        (Q2^t A Q2)^-1 b = Q2^t x:
-
-the second row puts x in the kernel, Q2^t times the first is Q2^t A Q2 z = b (``inverse="saddle"``).  It holds whenever
-C has full rank and sigma is no eigenvalue, also where A itself is singular.  Elimination of x,
-
-    (Q2^t A Q2)^-1 = Q2^t [A^-1 - A^-1 C (C^t A^-1 C)^-1 C^t A^-1] Q2        (``inverse="elimination"``),
-
-factors A alone and needs p solves and a dense p x p matrix more: for a few integral constraints.  It fails where A is
-singular although the reduced matrix is not.  So it is in the pointwise formulation without mass (``rho_A = 0``) or with
-sigma = 0, where A has no entry for the centreline at all, and where sigma is an eigenvalue of the unconstrained pencil.
+Shift-invert and Cayley transforms need the inverse of the shifted matrix: :mod:`rodfem.stability.projection`.
 
 Every rank gathers the whole matrices and computes the same.
 """
@@ -32,29 +19,24 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse as sp
-from mpi4py import MPI
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.stability.blocks import Pencil
-from rodfem.stability.inertia import inertia_factorizer
-from rodfem.stability.kernel import kernel
-from rodfem.stability.matrices import gathered, petsc_matrix
+from rodfem.stability.projection import INVERSES, Projection, ShiftedInverse
 
 TRANSFORMS = ("shift-invert", "cayley")
-INVERSES = ("saddle", "elimination")
-SINGULAR = 1e-6
-"""A solve that leaves more than this of its right-hand side behind was made with a singular matrix."""
 TOLERANCE = 1e-13
+SPURIOUS = 1e-8
+"""A vector of an infinite eigenvalue (no mass) comes with an arbitrary value, and a residual greater than this."""
 
 
 def cayley_parameters(first: float, second: float) -> tuple[float, float]:
     """Shift ``a1 = (first + second)/2`` and antishift ``a2 = 2 second - a1`` for two left-most values.
 
-    ``(mu - a2)/(mu - a1)`` is then -3 at the first, -1 at the second, and less than one in size beyond: the first
+    ``(mu - a2)/(mu - a1)`` is then 3 at the first, -1 at the second, and less than one in size beyond: the first
     dominates (Kumar & Healey 2010).  Along a branch the two are estimated by the values at the point before.
     """
     shift = (first + second) / 2
@@ -83,8 +65,7 @@ class Reduction:
         if inverse not in INVERSES:
             raise SceneError(f"Unknown inverse {inverse!r}: choose one of {', '.join(INVERSES)}.")
         self.inverse, self.symmetric = inverse, pencil.symmetric
-        self.K, self.C, self.M = gathered(pencil.K), gathered(pencil.C), gathered(pencil.M)
-        self.kernel = kernel(self.C, pencil.place)
+        self.projection = Projection(pencil)
 
     def near(
         self, number: int, target: float, transform: str = "shift-invert", antishift: float | None = None
@@ -98,47 +79,38 @@ class Reduction:
         """
         if transform not in TRANSFORMS:
             raise SceneError(f"Unknown transform {transform!r}: choose one of {', '.join(TRANSFORMS)}.")
-        n = self.kernel.dimension
+        n = self.projection.kernel.dimension
         if number > n:
             raise SceneError(f"{number} eigenvalues of a reduced pencil of size {n}: ask for at most {n}.")
-        shifted = ShiftedInverse(self, target)
+        shifted = ShiftedInverse(self.projection, target, self.inverse)
         found = Reduced(np.array([]), np.array([]), np.array([]), False)
         for extra in (2, 6, 14) if self.symmetric else (0,):
-            found = self._solve(shifted, min(number + extra, n), target, transform, antishift)
+            found = self._solve(shifted, number, min(number + extra, n), transform, antishift)
             if self.symmetric:
                 found = self._certified(found, number, target)
             if found.certified:
                 break
         return found
 
-    def below(self, sigma: float) -> int:
-        """Number of eigenvalues of a symmetric pencil below ``sigma``, by the inertia of the saddle matrix."""
-        factors = inertia_factorizer(MPI.COMM_SELF)
-        return int(factors(petsc_matrix(MPI.COMM_SELF, self.saddle(sigma))).getInertia()[0]) - self.C.shape[1]
-
-    def saddle(self, sigma: float) -> sp.csr_matrix:
-        """``(K - sigma M, C; C^t, 0)``."""
-        shifted = self.K - sigma * self.M
-        return (sp.bmat([[shifted, self.C], [self.C.T, None]]) if self.C.shape[1] else shifted).tocsr()
-
     def _certified(self, found: Reduced, number: int, target: float) -> Reduced:
         """Keep the ``number`` nearest to ``target``, and count whether any is missing among them."""
         distance = abs(found.values - target)
         nearest = np.argsort(distance)[:number]
         radius = distance[nearest[-1]] * (1 + 1e-6)
-        count = self.below(target + radius) - self.below(target - radius)
+        count = self.projection.below(target + radius) - self.projection.below(target - radius)
         keep = np.sort(nearest)
         return Reduced(
             found.values[keep], found.vectors[:, keep], found.errors[keep], count == int((distance < radius).sum())
         )
 
     def _solve(
-        self, shifted: ShiftedInverse, number: int, target: float, transform: str, antishift: float | None
+        self, shifted: ShiftedInverse, least: int, number: int, transform: str, antishift: float | None
     ) -> Reduced:
-        n = self.kernel.dimension
+        """Return about ``number`` eigenvalues, ``least`` at least: a pencil may have fewer finite ones than rows."""
+        n, target = self.projection.kernel.dimension, shifted.sigma
         solver = SLEPc.EPS().create(PETSc.COMM_SELF)
         solver.setOptionsPrefix("rodfem_reduced_")
-        solver.setOperators(self._operator(self.K), self._operator(self.M))
+        solver.setOperators(self._operator(self.projection.K), self._operator(self.projection.M))
         # Not GHEP: where strains have no mass M is semidefinite, and in the coordinates of the kernel only up to
         # round-off.  At a breakdown, which double eigenvalues bring about early, SLEPc would find it indefinite.
         solver.setProblemType(SLEPc.EPS.ProblemType.GNHEP)
@@ -151,6 +123,10 @@ class Reduction:
         spectral.setMatMode(SLEPc.ST.MatMode.SHELL)
         spectral.setShift(target)
         if transform == "cayley":
+            if not self.symmetric:
+                raise SceneError(
+                    "SLEPc does not transform complex eigenvalues back from Cayley's transform: use shift-invert."
+                )
             a2 = -target if antishift is None else antishift
             if a2 == target:
                 raise SceneError(f"A Cayley transform with shift and antishift {target:g} is constant: change one.")
@@ -159,8 +135,9 @@ class Reduction:
         ksp.setType("preonly")
         ksp.getPC().setType("python")
         ksp.getPC().setPythonContext(shifted)
-        start = self._operator(self.K).createVecRight()
-        start.array[:] = shifted(self._times(self.M, np.sin(1.0 + 0.731 * np.arange(n)) + 0.3))  # no massless part
+        start = self._operator(self.projection.K).createVecRight()
+        anything = np.sin(1.0 + 0.731 * np.arange(n)) + 0.3
+        start.array[:] = shifted(self.projection.times(self.projection.M, anything))  # no massless part
         solver.setInitialSpace([start])
         solver.setFromOptions()
         try:
@@ -170,38 +147,43 @@ class Reduction:
                 f"SLEPc gave up on eigenvalues near {target:g} ({str(trouble).splitlines()[-1]}): change the target."
             ) from trouble
         found = solver.getConverged()
-        if found < number:
-            solver.destroy()
-            raise ConvergenceError(f"SLEPc found {found} of {number} eigenvalues near {target:g}: change the target.")
-        return self._collect(solver, number)
-
-    def _times(self, matrix: sp.csr_matrix, z: np.ndarray) -> np.ndarray:
-        return self.kernel.project(matrix @ self.kernel.expand(z))
+        result = self._collect(solver, shifted, min(found, number))
+        solver.destroy()
+        if len(result.values) < least:
+            raise ConvergenceError(
+                f"SLEPc found {len(result.values)} of {least} eigenvalues near {target:g}: ask for fewer, or elsewhere."
+            )
+        return result
 
     def _operator(self, matrix: sp.csr_matrix) -> PETSc.Mat:
-        n = self.kernel.dimension
-        context = Product(lambda z: self._times(matrix, z))
+        n = self.projection.kernel.dimension
+        context = Product(lambda z: self.projection.times(matrix, z))
         out = PETSc.Mat().createPython((n, n), context, comm=PETSc.COMM_SELF)
         out.setUp()
         return out
 
-    def _collect(self, solver: SLEPc.EPS, number: int) -> Reduced:
-        re, im = self._operator(self.K).createVecs()
-        values = np.array([solver.getEigenpair(i, re, im) for i in range(number)])
-        vectors = np.empty((self.kernel.size, number), dtype=complex)
+    def _collect(self, solver: SLEPc.EPS, shifted: ShiftedInverse, number: int) -> Reduced:
+        re, im = self._operator(self.projection.K).createVecs()
+        values, vectors = np.empty(number, dtype=complex), np.empty((re.getSize(), number), dtype=complex)
         for i in range(number):
-            solver.getEigenpair(i, re, im)
-            vectors[:, i] = self.kernel.expand(re.array_r) + 1j * self.kernel.expand(im.array_r)
-        solver.destroy()
+            values[i] = solver.getEigenpair(i, re, im)
+            vectors[:, i] = re.array_r + 1j * im.array_r
+        vectors = self.projection.kernel.expand(vectors)
         order = np.lexsort((values.imag, values.real))
         values, vectors = values[order], vectors[:, order]
         if self.symmetric:  # round-off may make a complex pair of a double eigenvalue: its parts span the same plane
             second = np.append(False, (values.imag[1:] > 0) & (values.imag[:-1] < 0))
-            values, vectors = values.real, np.where(second, vectors.imag, vectors.real)
-        residuals = self.kernel.project(self.K @ vectors - (self.M @ vectors) * values)
-        size = abs(self.K).sum(axis=1).max() + abs(values) * abs(self.M).sum(axis=1).max()
-        errors = np.linalg.norm(residuals, axis=0) / (size * np.linalg.norm(vectors, axis=0))
-        return Reduced(values, vectors, errors, False)
+            vectors = np.where(second, vectors.imag, vectors.real)
+            values = shifted.quotients(vectors)
+            order = np.argsort(values)
+            values, vectors = values[order], vectors[:, order]
+        p = self.projection
+        residuals = np.linalg.norm(p.kernel.project(p.K @ vectors - (p.M @ vectors) * values), axis=0)
+        residuals /= np.linalg.norm(vectors, axis=0)
+        stiffness, mass = (float(abs(matrix).sum(axis=1).max()) for matrix in (p.K, p.M))
+        finite = residuals < SPURIOUS * stiffness
+        errors = residuals / (stiffness + abs(values) * mass)
+        return Reduced(values[finite], vectors[:, finite], errors[finite], False)
 
 
 class Product:
@@ -214,69 +196,3 @@ class Product:
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """``y = A x``."""
         y.array[:] = self.product(x.array_r)
-
-
-class ShiftedInverse:
-    """``(Q2^t (K - sigma M) Q2)^-1`` as the python context of a PETSc preconditioner."""
-
-    def __init__(self, reduction: Reduction, sigma: float) -> None:
-        """Factor at ``sigma``; raises :class:`ConvergenceError` where the formula does not apply."""
-        r = self.reduction = reduction
-        shifted, p = r.K - sigma * r.M, r.C.shape[1]
-        if r.inverse == "saddle":
-            self.solve = factored(r.saddle(sigma))
-            return
-        self.solve = factored(shifted)
-        self.border = np.zeros((r.C.shape[0], 0))
-        if p:
-            columns = r.C.toarray()
-            self.border = np.stack([self.solve(column) for column in columns.T], axis=1)
-            left = abs(shifted @ self.border - columns).max() / abs(columns).max()
-            if not left < SINGULAR:
-                raise ConvergenceError(
-                    f"K - sigma M is singular at sigma = {sigma:g} without the constraints: use the inverse 'saddle'."
-                )
-            self.capacitance = scipy.linalg.lu_factor(columns.T @ self.border)
-
-    def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
-        """``z = (Q2^t (K - sigma M) Q2)^-1 b``."""
-        z.array[:] = self(b.array_r)
-
-    def __call__(self, b: np.ndarray) -> np.ndarray:
-        """Solution for the right-hand side ``b`` (m - p,)."""
-        r = self.reduction
-        x = r.kernel.expand(b)
-        if r.inverse == "saddle":
-            x = self.solve(np.append(x, np.zeros(r.C.shape[1])))[: len(x)]
-        else:
-            x = self.solve(x)
-            if r.C.shape[1]:
-                x = x - self.border @ scipy.linalg.lu_solve(self.capacitance, r.C.T @ x)
-        return r.kernel.project(x)
-
-
-def factored(matrix: sp.spmatrix) -> Callable[[np.ndarray], np.ndarray]:
-    """Solver with the LU factors of a matrix (MUMPS); raises :class:`ConvergenceError` where there are none."""
-    petsc = petsc_matrix(MPI.COMM_SELF, matrix)
-    ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-    ksp.setOptionsPrefix("rodfem_reduced_inverse_")
-    ksp.setType("preonly")
-    ksp.getPC().setType("lu")
-    ksp.getPC().setFactorSolverType("mumps")
-    ksp.setFromOptions()
-    ksp.setOperators(petsc)
-    ksp.getPC().setFactorSetUpSolverType()
-    factors = ksp.getPC().getFactorMatrix()
-    factors.setMumpsIcntl(14, 200)  # room for delayed pivots
-    ksp.setUp()
-    status = ksp.getPC().getFactorMatrix().getMumpsInfog(1)
-    if status < 0:
-        raise ConvergenceError(f"MUMPS could not factor the shifted matrix (INFOG(1) = {status}): change the shift.")
-    right, out = petsc.createVecs()
-
-    def solve(b: np.ndarray) -> np.ndarray:
-        right.array[:] = b
-        ksp.solve(right, out)
-        return out.array_r.copy()
-
-    return solve

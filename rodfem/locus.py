@@ -1,0 +1,441 @@
+r"""Loci of special points in the plane of two parameters: the boundary of stability.
+
+A fold, a branch point or a flutter load ``lam`` of a scene moves as another of its parameters does.  Its curve in the
+plane of both is followed by pseudo-arclength continuation of the equations that define it, in the space of the state
+and *both* parameters (see :mod:`rodfem.singular` and :mod:`rodfem.collision`): neither is the independent one, so that
+the curve may turn back with respect to either, and a fold's curve goes through cusps, where it is smooth but for its
+projection on the plane.  Both directions are followed, to the bounds, exactly, or to where the special point changes
+its kind.
+
+Arclength is measured with the parameters relative to the widths of their bounds, and the state in its metric.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from petsc4py import PETSc
+from scipy.optimize import brentq
+
+from rodfem.accuracy import Richer, Transfer
+from rodfem.branch import BRANCH_POINT, FLUTTER, FOLD, Special
+from rodfem.collision import Collision
+from rodfem.continuation import Equilibria, Follower, Steps
+from rodfem.diagram import save_json
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.plane import Interval, Node, Plane, between, predict
+from rodfem.report import number
+from rodfem.singular import Destroyed, Singular
+from rodfem.system import System
+
+STEPS = Steps(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
+"""Steps of a locus, as shares of the bounds."""
+LOCATED = 1e-8
+"""Arclength to which turning points and cusps are located: their parameters are so to its square."""
+
+
+class Criterion(Protocol):
+    """What defines a locus: corrects a guess to it."""
+
+    def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
+        """Size of a step."""
+
+    def correct(
+        self, p: np.ndarray, x: PETSc.Vec, tangent: tuple[np.ndarray, PETSc.Vec | None], near: Node, reach: float = 1.0
+    ) -> Node:
+        """Point of the locus on the plane through ``(p, x)`` across ``tangent``."""
+
+
+@dataclass
+class Mark:
+    """A row of a locus where something happens: ``kind`` says what."""
+
+    kind: str
+    row: int
+
+
+@dataclass
+class Locus:
+    """A curve of special points in the plane of two parameters, one row a point, in order along the curve.
+
+    Attributes
+    ----------
+    kind
+        ``fold``, ``branch point`` or ``flutter``.
+    names, bounds
+        The two parameters, the scene's load first, and their intervals.
+    values
+        Both parameters, (n, 2).
+    ordinate
+        The scene's ordinate, (n,).
+    index
+        Index of the equilibria on the two sides of the curve, (n, 2): the eigenvalues that vanish on it positive, and
+        negative.  -1 for flutter.
+    omega2
+        The double eigenvalue of flutter, (n,), nan for others.
+    located_to
+        How far the parameters are uncertain for the given discretisation, (n, 2).
+    error
+        How far, measured across the curve, that of a discretisation one degree richer is away in either parameter, (n,
+        2); nan where it was not computed.
+    marks
+        Rows at which the curve turns in a parameter, cusps, and rows (away from the start) before which another
+        eigenvalue has passed through zero, not located.
+    start
+        Row of the special point from which the curve was started.
+    ended
+        Why it ends, at its first and at its last row.
+    """
+
+    scene: str
+    title: str
+    kind: str
+    names: tuple[str, str]
+    labels: tuple[str, str]
+    ordinate_name: str
+    bounds: tuple[Interval, Interval]
+    values: np.ndarray
+    ordinate: np.ndarray
+    index: np.ndarray
+    omega2: np.ndarray
+    located_to: np.ndarray
+    error: np.ndarray
+    marks: list[Mark]
+    start: int
+    ended: tuple[str, str]
+    constants: dict[str, float]
+    discretization: dict[str, Any]
+
+    def data(self) -> dict[str, Any]:
+        """Plain lists, numbers and strings for a file; what was not computed is None."""
+        columns: dict[str, list] = {name: self.values[:, i].tolist() for i, name in enumerate(self.names)}
+        columns["ordinate"] = self.ordinate.tolist()
+        for key, table in (("index", self.index), ("located_to", self.located_to)):
+            columns[key] = table.tolist()
+        columns["error"] = [[None if np.isnan(v) else v for v in row] for row in self.error.tolist()]
+        columns["omega2"] = [None if np.isnan(v) else v for v in self.omega2.tolist()]
+        same = ("scene", "title", "kind", "ordinate_name", "start", "constants", "discretization")
+        return {name: getattr(self, name) for name in same} | {
+            "parameters": list(self.names),
+            "labels": list(self.labels),
+            "bounds": [list(b) for b in self.bounds],
+            "columns": columns,
+            "marks": [{"kind": m.kind, "row": m.row} for m in self.marks],
+            "ended": list(self.ended),
+        }
+
+    def save(self, path: Path) -> None:
+        """Write :meth:`data` as JSON, whole or not at all; call it on one rank."""
+        save_json(self.data(), path)
+
+    def text(self, rows: int = 12) -> str:
+        """Rows of the curve for the terminal: some of them, its ends, and all that are marked."""
+        n, marks = len(self.values), {m.row: m.kind for m in self.marks}
+        shown = sorted({0, n - 1, self.start, *marks, *np.linspace(0, n - 1, min(rows, n)).astype(int).tolist()})
+        lines = [
+            f"\nLocus of the {self.kind} in {self.names[0]} and {self.names[1]} (in brackets the estimated error of "
+            "the discretisation across the curve)",
+            f"  {self.names[0]:<24} {self.names[1]:<24} {'ordinate':<14} index",
+        ]
+        for i in shown:
+            pair = [
+                f"{v:.10g}" if np.isnan(e) else number(v, e) for v, e in zip(self.values[i], self.error[i], strict=True)
+            ]
+            index = f"{self.index[i, 0]}|{self.index[i, 1]}" if self.index[i, 0] >= 0 else ""
+            note = "start" if i == self.start else marks.get(i, "")
+            lines.append(f"  {pair[0]:<24} {pair[1]:<24} {self.ordinate[i] + 0.0:<14.8f} {index:<6} {note}".rstrip())
+        return "\n".join([*lines, f"  {n} points; ends: {self.ended[0]}; {self.ended[1]}"])
+
+
+@dataclass
+class _Half:
+    """One direction of a curve: nodes, marked ones by number, why it ended."""
+
+    nodes: list[Node]
+    marks: dict[int, str] = field(default_factory=dict)
+    ended: str = ""
+
+
+class _Tracer:
+    """Follows a curve from a node in the direction of its tangent."""
+
+    def __init__(self, criterion: Criterion, plane: Plane, steps: Steps) -> None:
+        self.criterion, self.plane, self.steps = criterion, plane, steps
+
+    def run(self, start: Node) -> _Half:
+        """Follow to an end."""
+        half, history, step = _Half([start]), [start], self.steps.first
+        ahead = start.p + 1e-9 * start.dp
+        over = self.plane.outside(ahead)
+        if over is not None:
+            half.ended = self._bound(*over)
+            return half
+        while len(history) < self.steps.most:
+            last = history[-1]
+            try:
+                node, moved, bound = self._next(history, step)
+            except Destroyed as trouble:
+                half.ended = str(trouble)
+                return half
+            except ConvergenceError as trouble:
+                step /= 2
+                if step < self.steps.smallest:
+                    half.ended = f"no convergence with steps of {self.steps.smallest:g}: {trouble}"
+                    return half
+                continue
+            half.ended = self._between(half, last, node)
+            if half.ended:
+                return half
+            half.nodes.append(node)
+            if bound:
+                half.ended = bound
+                return half
+            if len(history) > 10 and self._closes(start, last, node):
+                half.nodes.append(start)
+                half.ended = "closed curve"
+                return half
+            history.append(node)
+            order = min(len(history) - 1, 3) + 1
+            step = min(
+                step * min(max((self.steps.aim / max(moved, 1e-12)) ** (1 / order), 0.4), 1.6), self.steps.largest
+            )
+        half.ended = f"{self.steps.most} points reached"
+        return half
+
+    def _next(self, history: list[Node], step: float) -> tuple[Node, float, str]:
+        """Next node, how far it is from its prediction, and the bound that it is on; ConvergenceError to retry."""
+        last = history[-1]
+        p, x, dp, dx = predict(history, last.s + step)
+        over = self.plane.outside(p)
+        if over is None:
+            node = self._after(last, self.criterion.correct(p, x, (dp, dx), last, 0.5 * step))
+            turn = self._cosine(node, dp, dx)
+            over = self.plane.outside(node.p)
+            if over is None:
+                if turn < 0.9 or node.s - last.s > 2 * step:
+                    raise ConvergenceError("the curve bends too sharply")
+                p = p - node.p
+                x.aypx(-1.0, node.x)
+                return node, self.criterion.length(p, x), ""
+            p = node.p
+        which, bound = over
+        share = (bound - last.p[which]) / (p[which] - last.p[which])
+        p, x, dp, dx = predict(history, last.s + share * step)
+        p[which] = bound
+        axis = (np.arange(2) == which) * self.plane.width
+        node = self.criterion.correct(p, x, (axis, None), last, max(0.5 * step, 1e-6))
+        node.p[which] = bound
+        node = self._after(last, node if self._cosine(node, dp, dx) >= 0 else node.reversed())
+        other = self.plane.outside(node.p)
+        if other is not None or node.s - last.s > 2 * step:
+            raise ConvergenceError("it leaves near a corner of the bounds")
+        return node, 0.0, self._bound(which, bound)
+
+    def _bound(self, which: int, bound: float) -> str:
+        return f"{self.plane.names[which]} = {bound:g}, its bound"
+
+    def _after(self, last: Node, node: Node) -> Node:
+        change = node.x.copy()
+        change.axpy(-1.0, last.x)
+        node.s = last.s + self.criterion.length(node.p - last.p, change)
+        return node
+
+    def _cosine(self, node: Node, dp: np.ndarray, dx: PETSc.Vec) -> float:
+        """Cosine between a node's tangent and a direction."""
+        plus, minus = node.dx.copy(), node.dx.copy()
+        size = self.criterion.length(dp, dx)
+        plus.axpy(1 / size, dx)
+        minus.axpy(-1 / size, dx)
+        a, b = (self.criterion.length(node.dp + s * dp / size, v) for s, v in ((1, plus), (-1, minus)))
+        return (a * a - b * b) / 4
+
+    def _between(self, half: _Half, a: Node, b: Node) -> str:
+        """Insert what lies between two nodes; a reason if the curve ends there."""
+        names = self.plane.names
+        if a.coupling @ b.coupling < 0:
+            return self._last(half, a, b, lambda n: float(n.coupling @ a.coupling), "the fold ends on a branch point")
+        if a.omega2 * b.omega2 < 0:
+            return self._last(half, a, b, lambda n: n.omega2, "the double eigenvalue vanishes: divergence")
+        found: list[tuple[Node, str]] = []
+        if a.curvature * b.curvature < 0:
+            found = self._located(a, b, lambda n: n.curvature, "cusp")
+        else:
+            for i in np.flatnonzero(a.dp * b.dp < 0):
+                found += self._located(a, b, lambda n, i=i: float(n.dp[i]), f"turns in {names[i]}")  # type: ignore[misc]
+        for node, kind in sorted(found, key=lambda item: item[0].s):
+            half.marks[len(half.nodes)] = kind
+            half.nodes.append(node)
+        if a.rest != b.rest:
+            half.marks[len(half.nodes)] = "another eigenvalue has vanished since the row before, seen from the start"
+        return ""
+
+    def _located(self, a: Node, b: Node, f: Callable[[Node], float], kind: str) -> list[tuple[Node, str]]:
+        """Node between two others at which ``f`` vanishes; none where it cannot be located."""
+
+        def at(s: float) -> Node:
+            p, x, dp, dx = between(a, b, s)
+            return self.criterion.correct(p, x, (dp, dx), a)
+
+        try:
+            s = brentq(lambda s: f(at(s)), a.s, b.s, xtol=LOCATED)
+            node = at(s)
+        except (ConvergenceError, ValueError):
+            return []
+        node.s = s
+        return [(node, kind)]
+
+    def _last(self, half: _Half, a: Node, b: Node, f: Callable[[Node], float], sentence: str) -> str:
+        """End at a node where ``f`` vanishes."""
+        found = self._located(a, b, f, sentence)
+        where = (a.p + b.p) / 2
+        if found and not np.any(abs(found[0][0].p - where) > abs(b.p - a.p) + 1e-3 * self.plane.width):
+            half.marks[len(half.nodes)] = sentence
+            half.nodes.append(found[0][0])
+            where = found[0][0].p
+        return f"{sentence} near {', '.join(f'{n} = {v:.8g}' for n, v in zip(self.plane.names, where, strict=True))}"
+
+    def _closes(self, start: Node, a: Node, b: Node) -> bool:
+        """Whether the curve passes its beginning again between two nodes."""
+        whole, part = (b.p - a.p) / self.plane.width, (start.p - a.p) / self.plane.width
+        size = float(np.linalg.norm(whole))
+        if not size or not 0 < part @ whole <= size**2 or self._cosine(b, start.dp, start.dx) < 0.5:
+            return False
+        aside = abs(part[0] * whole[1] - part[1] * whole[0]) / size
+        return aside < 0.05 * size and abs(start.ordinate - a.ordinate) <= 2 * abs(b.ordinate - a.ordinate) + 1e-9
+
+
+def locus(
+    solver: Equilibria,
+    special: Special,
+    parameter: str,
+    bounds: tuple[Interval, Interval],
+    steps: Steps = STEPS,
+    error_bars: int = 5,
+) -> Locus:
+    """Follow a special point in the plane of the scene's load and a second parameter, to both sides.
+
+    Parameters
+    ----------
+    solver
+        The :class:`~rodfem.continuation.Follower` that found the special point, or for flutter the
+        :class:`~rodfem.continuation.Equilibria` of the sweep.  It is left as it was found.
+    special
+        A fold, a branch point, or a flutter load.
+    parameter
+        Name of the second parameter of the scene.
+    bounds
+        Intervals of the load and of the second parameter, on which the curve ends exactly.
+    steps
+        Control of the step; lengths are relative to the bounds.
+    error_bars
+        At how many rows, besides the marked ones, the error of the discretisation is estimated; 0: at none.
+
+    Raises
+    ------
+    SceneError
+        For a parameter, bounds or a kind of special point that make no sense.
+    ConvergenceError
+        Where the special point itself is not found again.
+    """
+    system, scene = solver.system, solver.system.scene
+    plane = Plane(system, parameter, bounds)
+    p = np.array([special.point.load, scene.parameters[parameter].value])
+    if plane.outside(p) is not None:
+        raise SceneError(
+            f"The special point at {scene.load} = {p[0]:g}, {parameter} = {p[1]:g} is outside the bounds: widen them."
+        )
+    with system.clock.purpose("locus"), plane.kept():
+        criterion = _criterion(solver, plane, special)
+        guess = Node(p, special.point.x, p, special.point.x, p, omega2=special.omega2, modes=list(special.null_vectors))
+        first = criterion.correct(p, special.point.x, (np.array([0.0, 1.0]) * plane.width, None), guess, 0.1)
+        tracer = _Tracer(criterion, plane, steps)
+        onwards = tracer.run(first)
+        backwards = _Half([first], ended="closed curve")
+        if onwards.ended != "closed curve":
+            backwards = tracer.run(first.reversed())
+        nodes = backwards.nodes[:0:-1] + onwards.nodes
+        start = len(backwards.nodes) - 1
+        marks = {start - i: kind for i, kind in backwards.marks.items()} | {
+            start + i: kind for i, kind in onwards.marks.items()
+        }
+        error = np.full((len(nodes), 2), np.nan)
+        if error_bars:
+            rows = np.linspace(0, len(nodes) - 1, error_bars).round().astype(int).tolist()
+            _estimate(solver, special.kind, plane, nodes, sorted({*rows, *marks}), error)
+    rest, k = np.array([n.rest for n in nodes]), special.multiplicity
+    d = system.fields.discretization
+    return Locus(
+        scene=scene.name,
+        title=scene.title or scene.name,
+        kind=special.kind,
+        names=plane.names,
+        labels=(scene.parameters[scene.load].label or scene.load, scene.parameters[parameter].label or parameter),
+        ordinate_name=scene.ordinate.name,
+        bounds=bounds,
+        values=np.array([n.p for n in nodes]),
+        ordinate=np.array([n.ordinate for n in nodes]),
+        index=np.stack([rest, np.where(rest >= 0, rest + k, -1)], axis=1),
+        omega2=np.array([n.omega2 for n in nodes]),
+        located_to=np.array([n.located_to for n in nodes]),
+        error=error,
+        marks=[Mark(kind, row) for row, kind in sorted(marks.items())],
+        start=start,
+        ended=(backwards.ended, onwards.ended),
+        constants={name: v.value for name, v in scene.parameters.items() if name not in plane.names},
+        discretization={
+            "formulation": d.formulation,
+            "elements": d.elements,
+            "degree": d.degree,
+            "unknowns": system.fields.unknowns,
+        },
+    )
+
+
+def _criterion(solver: Equilibria, plane: Plane, special: Special) -> Criterion:
+    """What defines the locus of a special point."""
+    if special.kind == FLUTTER:
+        return Collision(solver, plane)
+    if special.kind not in (FOLD, BRANCH_POINT):
+        raise SceneError(f"A point of the kind {special.kind!r} has no locus: choose a fold, branch point or flutter.")
+    if not isinstance(solver, Follower):
+        raise SceneError("The locus of a fold or a branch point needs the follower that found it.")
+    return Singular(solver, plane, special.null_vectors, special.kind == FOLD)
+
+
+def _estimate(
+    solver: Equilibria, kind: str, plane: Plane, nodes: Sequence[Node], rows: list[int], error: np.ndarray
+) -> None:
+    """Fill ``rows`` of ``error`` with the distance, across the curve, to that of a richer discretisation."""
+    richer: Equilibria
+    if isinstance(solver, Follower):
+        found = Richer(solver)
+        richer, transfer = found.follower, found.transfer
+    else:
+        d = solver.system.fields.discretization
+        finer = type(d)(d.formulation, d.elements, d.degree + 1)
+        richer = Equilibria(
+            System(plane.system.scene, finer, solver.system.comm, solver.system.clock, solver.system.fields.mesh)
+        )
+        transfer = Transfer(solver.system, richer.system)
+    other = Plane(richer.system, plane.names[1], (tuple(plane.bounds[0]), tuple(plane.bounds[1])))
+    criterion: Criterion | None = None
+    for row in rows:
+        node = nodes[row]
+        x = transfer(node.x, state=True)
+        modes = [transfer(v, state=False) for v in node.modes]
+        near = Node(node.p, x, node.dp, x, node.p, omega2=node.omega2, modes=modes)
+        if criterion is None:
+            criterion = Collision(richer, other) if kind == FLUTTER else Singular(richer, other, modes, kind == FOLD)  # type: ignore[arg-type]
+        along = node.dp
+        if np.linalg.norm(along / plane.width) < 1e-3:  # a cusp
+            along = nodes[min(row + 1, len(nodes) - 1)].p - nodes[max(row - 1, 0)].p
+        try:
+            error[row] = np.maximum(abs(criterion.correct(node.p, x, (along, None), near, 0.1).p - node.p), 0)
+        except ConvergenceError:
+            error[row] = np.inf
+            continue
+        error[row] = np.maximum(error[row], node.located_to)

@@ -1,0 +1,330 @@
+r"""Equilibria whose second variation is singular, as a regular system of equations in two parameters.
+
+Let ``F(x, a, b) = 0`` be the equations of equilibrium with the phase conditions of the symmetries that the state
+breaks, and ``S = F_x``, which is symmetric.  With vectors ``psi`` near ``M phi``, ``phi`` the null vectors, the matrix
+
+    ( S       psi )  ( V )     ( 0 )
+    ( psi^t   0   )  ( G )  =  ( I )
+
+is regular where ``S`` is singular, and ``S`` is singular exactly where the small matrix ``G`` is; its derivative along
+any ``z`` is ``-V^t S_z V`` (Govaerts, *Numerical Methods for Bifurcations of Dynamical Equilibria*, SIAM 2000,
+chapters 3 and 4).  All solves below are with this one bordered matrix.
+
+*Fold*: ``F = 0`` and ``G = 0`` in ``(x, a, b)``.  The curve has the null vector of
+
+    ( phi.F_a   phi.F_b   0           )
+    ( G_a       G_b       phi.S_phi phi )
+
+as its tangent ``(da, db, xi)``, ``xi`` the share of ``phi`` in ``dx`` (Doedel, Keller & Kernevez, Int. J. Bifurcation
+Chaos 1 (1991) 493-520).  It is regular also at a *cusp*, where ``phi.S_phi phi = 0`` and ``da = db = 0``; only where
+``phi.F_a = phi.F_b = 0`` is it not: there the fold ends on a branch point.
+
+*Branch point*: ``phi.F_a = phi.F_b = 0`` all along the curve, because of a symmetry that ``phi`` breaks.  Then ``F +
+beta psi = 0``, ``psi.(x - x0) = 0`` and ``tr G = 0`` are regular in ``(x, beta, a, b)``, and ``beta = 0``: the equation
+``psi.(x - x0) = 0`` keeps the state symmetric, and ``beta`` is the imperfection that a parameter would have to make up
+for.  Where it does not vanish the parameter destroys the branch point.  Null vectors that a symmetry relates are
+several columns of ``psi``, and ``G`` is a multiple of the identity.
+
+The index comes for free: the negative eigenvalues of the bordered matrix, less all constraints and the columns of
+``psi``, are those of the second variation on what is orthogonal to the null vectors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.continuation import Follower
+from rodfem.errors import ConvergenceError
+from rodfem.newton import ROUND_OFF, TOLERANCE
+from rodfem.plane import Node, Plane
+from rodfem.stability.inertia import combine, inertia_factorizer
+
+DIFFERENCE = 1e-4
+"""Step of the central differences for the third derivatives, in the metric: they are of no account to the result."""
+IMPERFECT = 1e-7
+"""An imperfection above this, of the rod's lowest bending eigenvalue, is not round-off."""
+FEWER = 1e-5
+"""Null vectors whose eigenvalues differ by more than this, of the same, are not related by a symmetry."""
+
+
+class Destroyed(ConvergenceError):
+    """A special point that does not go on to be what it was; says why."""
+
+
+class Bordered:
+    """The symmetric matrix ``S`` of a state with dense borders, its LDL^t factors and its count."""
+
+    def __init__(self, follower: Follower, borders: int) -> None:
+        """Allocate for a number of borders."""
+        self.inertia, self.k = follower.inertia, borders
+        self.system = follower.system
+        self.comm, self.last = self.system.comm, self.system.has_scalars
+        self.extra = borders if self.last else 0
+        self.n = self.system.fields.unknowns
+        start, columns, _ = self.inertia.matrix.getValuesCSR()
+        rows = len(start) - 1
+        lengths = np.concatenate([np.diff(start) + borders, np.full(self.extra, self.n + borders)])
+        self.start = np.concatenate([[0], np.cumsum(lengths)]).astype(PETSc.IntType)
+        own = int(self.start[rows])
+        self._border = np.zeros(own, dtype=bool)
+        self._border[(self.start[1 : rows + 1, None] - 1 - np.arange(borders)[::-1]).ravel()] = True
+        self.columns = np.empty(self.start[-1], dtype=PETSc.IntType)
+        self.columns[:own][~self._border] = columns
+        self.columns[:own][self._border] = np.tile(self.n + np.arange(borders), rows)
+        self.columns[own:] = np.tile(np.arange(self.n + borders), self.extra)
+        self.values, self.own = np.zeros(self.start[-1]), own
+        size = (rows + self.extra, self.n + borders)
+        self.matrix = PETSc.Mat().createAIJ((size, size), comm=self.comm)
+        self.matrix.setPreallocationCSR((self.start, self.columns, self.values))
+        self.factors = inertia_factorizer(self.comm)
+        self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))
+
+    def factor(self, psi: list[PETSc.Vec]) -> int:
+        """Factor with ``S`` as last assembled; negative eigenvalues of ``S`` off the borders."""
+        self.values[: self.own][~self._border] = self.inertia.matrix.getValuesCSR()[2]
+        local = np.stack([v.array_r for v in psi], axis=1)
+        self.values[: self.own][self._border] = local.ravel()
+        parts = self.comm.gather(local, root=self.comm.size - 1)
+        if parts is not None:
+            rows = np.zeros((self.k, self.n + self.k))
+            rows[:, : self.n] = np.concatenate(parts).T
+            self.values[self.own :] = rows.ravel()
+        self.matrix.setValuesCSR(self.start, self.columns, self.values)
+        self.matrix.assemble()
+        with self.system.clock("stability"):
+            negative, zero, _ = self.factors(self.matrix).getInertia()
+        rest = negative - self.inertia.constraints - self.system.active_drifts() - self.k
+        if zero or rest < 0:
+            raise ConvergenceError("another eigenvalue vanishes")
+        return int(rest)
+
+    def solve(self, f: PETSc.Vec | None, g: np.ndarray) -> tuple[PETSc.Vec, np.ndarray]:
+        """Solve for the right-hand side ``(f, g)``, with one step of iterative refinement."""
+        with self.system.clock("solve"):
+            out, right = self.out, self.right
+            right.set(0.0)
+            rows = right.getLocalSize() - self.extra
+            if f is not None:
+                right.array[:rows] = f.array_r
+            if self.last:
+                right.array[rows:] = g
+            self.factors.ksp.solve(right, out)
+            self.matrix.mult(out, self.residual)
+            self.residual.aypx(-1.0, right)
+            self.factors.ksp.solve(self.residual, right)
+            out.axpy(1.0, right)
+            x = self.system.new_vector()
+            x.array[:] = out.array_r[:rows]
+            return x, np.array(self.comm.bcast(out.array_r[rows:].copy(), root=self.comm.size - 1))
+
+
+@dataclass
+class _Linear:
+    """What is known at a state: residual solve, responses to the two parameters, null vectors, derivatives of G."""
+
+    s0: PETSc.Vec
+    b0: np.ndarray
+    response: list[PETSc.Vec]
+    b: np.ndarray
+    v: list[PETSc.Vec]
+    g: float
+    spread: float
+    grad_x: PETSc.Vec
+    grad_p: np.ndarray
+    rest: int
+
+
+class Singular:
+    """Corrects states to where the second variation is singular; ``fold`` or a branch point."""
+
+    def __init__(self, follower: Follower, plane: Plane, vectors: list[PETSc.Vec], fold: bool) -> None:
+        """Take the null vectors of a special point."""
+        self.follower, self.system, self.plane, self.fold = follower, follower.system, plane, fold
+        self.metric = follower.inertia.metric
+        self.borders = len(vectors)
+        self.psi: list[PETSc.Vec] = []
+        self._adopt(vectors)
+        follower.inertia.assemble(vectors[0])  # for its pattern
+        self.bordered = Bordered(follower, len(vectors))
+
+    def _adopt(self, vectors: list[PETSc.Vec]) -> None:
+        """Border with these vectors from now on, made orthonormal in the metric."""
+        done: list[PETSc.Vec] = []
+        for vector in vectors:
+            v = vector.copy()
+            self.system.set_load(v, 0.0)
+            for other in done:
+                v.axpy(-(self.metric * other).dot(v), other)
+            v.scale(1.0 / self.system.norm(v))
+            done.append(v)
+        self.psi = [self.metric * v for v in done]
+
+    def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
+        """Size of a step: parameters over the widths of their bounds, the state in the metric."""
+        return float(np.hypot(np.linalg.norm(dp / self.plane.width), self._norm(dx)))
+
+    def _norm(self, d: PETSc.Vec) -> float:
+        return float(max((self.metric * d).dot(d), 0.0)) ** 0.5
+
+    def correct(
+        self, p: np.ndarray, x: PETSc.Vec, tangent: tuple[np.ndarray, PETSc.Vec | None], near: Node, reach: float = 1.0
+    ) -> Node:
+        """Point of the locus on the plane through ``(p, x)`` across ``tangent``; raises :class:`ConvergenceError`.
+
+        With None for the state's part of the tangent the plane is that of the parameters alone: a line of theirs.
+        ``near`` is a point of the curve whose null vectors are close by.
+        """
+        self._adopt(near.modes)
+        p, x, origin = np.array(p, dtype=float), x.copy(), (np.array(p, dtype=float), x.copy())
+        self.system.set_phase(x)
+        row_p = tangent[0] / self.plane.width**2
+        row_x = None if tangent[1] is None else self.metric * tangent[1]
+        scale = self.length(tangent[0], tangent[1] or self.system.new_vector())
+        old: _Linear | None = None
+        before, total = np.inf, 0.0
+        for _ in range(12):
+            now = self._linear(p, x, origin[1], old)
+            gone = x.copy()
+            gone.axpy(-1.0, origin[1])
+            along = row_p @ (p - origin[0]) + (row_x.dot(gone) if row_x else 0.0)
+            dp, dx = self._step(now, row_p, row_x, along, scale)
+            size = self.length(dp, dx)
+            p, total = p + dp, total + size
+            x.axpy(1.0, dx)
+            if not np.isfinite(size) or total > reach:
+                break
+            if size < TOLERANCE or (ROUND_OFF > size > 0.5 * before):
+                return self._node(p, x, tangent, abs(dp))
+            old = now if size < 0.1 * before and size < 0.02 else None
+            before = size
+        raise ConvergenceError("Newton's method does not converge")
+
+    def _step(
+        self, at: _Linear, row_p: np.ndarray, row_x: PETSc.Vec | None, along: float, scale: float
+    ) -> tuple[np.ndarray, PETSc.Vec]:
+        """Newton's correction of parameters and state."""
+        free = [at.s0, *at.response] + ([at.v[0]] if self.fold else [])
+        g = np.array([at.grad_x.dot(w) for w in free])
+        g[0] += at.g
+        g[1:3] += at.grad_p
+        r = np.array([row_x.dot(w) if row_x else 0.0 for w in free])
+        r[0] += along
+        r[1:3] += row_p
+        rows = [g, r / scale]
+        if self.fold:
+            rows.append(np.array([at.b0[0], *at.b[:, 0], at.g]))
+        table = np.array(rows)
+        unknowns = table[:, 1:] * np.append(self.plane.width, [1.0] * (len(free) - 3))
+        size = abs(unknowns).max(axis=1)
+        try:
+            z = np.linalg.solve(unknowns / size[:, None], -table[:, 0] / size)
+        except np.linalg.LinAlgError as trouble:
+            raise ConvergenceError("the curve is singular") from trouble
+        dp = z[:2] * self.plane.width
+        return dp, combine(free, np.array([1.0, *dp, *z[2:]]))
+
+    def _columns(self, p: np.ndarray, x: PETSc.Vec, v: PETSc.Vec | None) -> tuple[list[PETSc.Vec], PETSc.Vec]:
+        """Derivatives of ``F`` in both parameters at ``x``, and ``S v``."""
+        system, scratch, columns = self.system, self.system.new_vector(), []
+        x, image = x.copy(), scratch
+        for which in (0, 1):
+            self.plane.look(p, which)
+            system.set_load(x, float(p[which]))
+            system.residual(x, scratch)
+            matrix = system.jacobian(self.follower.axis)
+            column = matrix * self.follower.axis
+            system.set_load(column, 0.0)
+            columns.append(column)
+            if v is not None and which == 0:
+                image = matrix * v
+                system.set_load(image, 0.0)
+        self.plane.look(p, 0)
+        return columns, image
+
+    def _linear(self, p: np.ndarray, x: PETSc.Vec, reference: PETSc.Vec, old: _Linear | None) -> _Linear:
+        """Linearise at a point; with ``old`` its derivatives serve again."""
+        system, bordered, k = self.system, self.bordered, len(self.psi)
+        columns = self._columns(p, x, None)[0] if old is None else []
+        system.set_load(x, float(p[0]))
+        self.plane.look(p, 0)
+        right = system.new_vector()
+        system.residual(x, right)
+        right.scale(-1.0)
+        if not np.isfinite(right.norm()):
+            raise ConvergenceError("the stored energy is not defined there")
+        self.follower.inertia.assemble(x)
+        rest = bordered.factor(self.psi)
+        gauge = np.zeros(k)
+        if not self.fold:
+            gone = x.copy()
+            gone.axpy(-1.0, reference)
+            gauge = np.array([-w.dot(gone) for w in self.psi])
+        s0, b0 = bordered.solve(right, gauge)
+        solved = [bordered.solve(None, e) for e in np.eye(k)]
+        v, G = [w for w, _ in solved], np.array([row for _, row in solved])
+        g = float(np.trace(G)) / k
+        spread = float(abs(G - g * np.eye(k)).max())
+        if old is not None:
+            return _Linear(s0, b0, old.response, old.b, v, g, spread, old.grad_x, old.grad_p, rest)
+        responses = []
+        for column in columns:
+            column.scale(-1.0)
+            responses.append(bordered.solve(column, np.zeros(k)))
+        grad_x, grad_p = self._gradient(p, x, v)
+        b = np.array([row for _, row in responses])
+        return _Linear(s0, b0, [w for w, _ in responses], b, v, g, spread, grad_x, grad_p, rest)
+
+    def _gradient(self, p: np.ndarray, x: PETSc.Vec, v: list[PETSc.Vec]) -> tuple[PETSc.Vec, np.ndarray]:
+        """Derivatives of ``tr G / k``: as ``S`` is a second derivative, ``v.S_z v`` is ``z.d/de S(x + e v) v``."""
+        grad_x, grad_p = self.system.new_vector(), np.zeros(2)
+        for w in v:
+            for sign in (1.0, -1.0):
+                y = x.copy()
+                y.axpy(sign * DIFFERENCE, w)
+                columns, image = self._columns(p, y, w)
+                factor = -sign / (2 * DIFFERENCE * len(v))
+                grad_x.axpy(factor, image)
+                grad_p += factor * np.array([column.dot(w) for column in columns])
+        return grad_x, grad_p
+
+    def _node(self, p: np.ndarray, x: PETSc.Vec, along: tuple[np.ndarray, PETSc.Vec | None], last: np.ndarray) -> Node:
+        """Evaluate tangent, count and records at a point of the locus, and border with its null vectors."""
+        at = self._linear(p, x, x, None)
+        scale = self.follower.inertia.scale
+        if not self.fold and abs(at.b0).max() > IMPERFECT * scale:
+            raise Destroyed(f"{self.plane.names[1]} is an imperfection that destroys the branch point")
+        if at.spread > FEWER * scale:
+            raise Destroyed(f"its {len(self.psi)} zero eigenvalues do not vanish together any more")
+        width = self.plane.width
+        g = (np.array([at.grad_x.dot(w) for w in at.response]) + at.grad_p) * width
+        curvature = at.grad_x.dot(at.v[0])
+        coupling = at.b[:, 0] * width
+        if self.fold:
+            a, b = np.array([*coupling, at.g]), np.array([*g, curvature])
+            z = np.cross(a / max(np.linalg.norm(a), 1e-300), b / np.linalg.norm(b))
+            dp, free, weights = z[:2] * width, [*at.response, at.v[0]], np.array([*(z[:2] * width), z[2]])
+        else:
+            dp = np.array([-g[1], g[0]]) * width
+            free, weights = at.response, dp
+        dx = combine(free, weights)
+        size = self.length(dp, dx)
+        forward = along[0] / width**2 @ dp + ((self.metric * dx).dot(along[1]) if along[1] else 0.0)
+        size = size if forward >= 0 else -size
+        dx.scale(1.0 / size)
+        located = np.maximum(last, 1e-12 * np.maximum(1.0, abs(p)))
+        self.plane.show(p)
+        return Node(
+            p,
+            x,
+            dp / size,
+            dx,
+            located,
+            ordinate=self.follower.shape.ordinate(x),
+            rest=at.rest,
+            curvature=float(curvature) if self.fold else 0.0,
+            coupling=coupling if self.fold else np.zeros(2),
+            modes=at.v,
+        )
