@@ -19,8 +19,8 @@ from math import hypot, inf
 
 import rodfem.cli as cli
 from forms.energy import bending
-from rodfem.errors import SceneError
 from rodfem.ends import clamped, free
+from rodfem.errors import SceneError
 from rodfem.scene import Inertia, Ordinate, Parameter, Scene
 
 

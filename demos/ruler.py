@@ -19,8 +19,8 @@ from argparse import Namespace
 
 import rodfem.cli as cli
 from forms.energy import bending, logarithmic_stretch
-from rodfem.errors import SceneError
 from rodfem.ends import clamped, free
+from rodfem.errors import SceneError
 from rodfem.scene import Ordinate, Parameter, Scene
 
 DIRECTIONS = {"e1": (1.0, 0.0), "e2": (0.0, 1.0)}

@@ -52,7 +52,7 @@ def pressure(r: Expr, dr: Expr, p: Any, normal: Sequence[float] = (0.0, 1.0, 0.0
 
 
 def semi_tangential(d1: Expr, d2: Expr, moment: Any) -> Expr:
-    """Potential ``-M/2 (d1 . e2 - d2 . e1)`` of a semi-tangential moment about ``e3``: dead forces on two crossed arms."""
+    """Potential ``-M/2 (d1 . e2 - d2 . e1)`` of a semi-tangential moment about ``e3``: dead forces on crossed arms."""
     return -0.5 * moment * (d1[1] - d2[0])
 
 

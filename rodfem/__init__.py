@@ -20,13 +20,13 @@ from importlib import import_module
 from typing import Any
 
 _HOMES = {
-    'End': 'ends',
+    **dict.fromkeys(
+        ("End", "clamped", "pinned", "sliding", "hinged", "free", "Ring", "Attachment", "Constraint"), "ends"
+    ),
+    **dict.fromkeys(("integral", "at", "everywhere"), "ends"),
     "Scene": "scene",
     "Parameter": "scene",
-    "End": "scene",
     "Ordinate": "scene",
-    "clamped": "scene",
-    "free": "scene",
     "Inertia": "scene",
     "Discretization": "fields",
     "Plan": "explore",

@@ -133,7 +133,8 @@ def cell_vertices(mesh: Any, cells: int) -> np.ndarray:
 def compile_forms(forms: Sequence[Any]) -> list[Any]:
     """Compile UFL forms; raises :class:`EnvironmentTrouble` where the form cache is locked by a killed run."""
     try:
-        return [fem.form(form, dtype=REAL) for form in forms]
+        with _quiet():
+            return [fem.form(form, dtype=REAL) for form in forms]
     except TimeoutError as locked:
         raise EnvironmentTrouble(
             "A compiled form never became ready, most likely because an earlier run was killed while compiling: "
@@ -169,8 +170,25 @@ def assemble_matrix(matrix: PETSc.Mat, form: Any, rows: np.ndarray, columns: np.
 
 
 @contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the compilers' own chatter off the terminal."""
+    root = logging.getLogger()
+    level = root.level
+    root.addFilter(_is_warning)
+    try:
+        yield
+    finally:
+        root.removeFilter(_is_warning)
+        root.setLevel(level)
+
+
+def _is_warning(record: logging.LogRecord) -> bool:
+    return record.levelno > logging.INFO
+
+
+@contextmanager
 def announce_compilation(say: Callable[[], None]) -> Iterator[None]:
-    """Call ``say`` once if forms are compiled inside the block; keep the compilers' own chatter off the terminal."""
+    """Call ``say`` once if forms are compiled inside the block."""
     compile_objects = ffcx.compiler.compile_ufl_objects
     said: list[bool] = []
 
@@ -180,16 +198,8 @@ def announce_compilation(say: Callable[[], None]) -> Iterator[None]:
             say()
         return compile_objects(*arguments, **options)
 
-    def silent(record: logging.LogRecord) -> bool:
-        return record.levelno > logging.INFO
-
-    root = logging.getLogger()
-    level = root.level
-    root.addFilter(silent)
     ffcx.compiler.compile_ufl_objects = compile_aloud
     try:
         yield
     finally:
         ffcx.compiler.compile_ufl_objects = compile_objects
-        root.removeFilter(silent)
-        root.setLevel(level)

@@ -35,8 +35,8 @@ class End:
     Parameters
     ----------
     position
-        ``position(c)`` gives three components, each an expression (held there) or None (free to move in that direction);
-        None leaves all three free.
+        ``position(c)`` gives three components, each an expression (held there) or None (free to move in that
+        direction); None leaves all three free.
     rotation
         Quaternion (scalar first) at which the directors are held; ``rotation(c)`` gives one that changes with the
         constants; None leaves them free.
@@ -96,9 +96,7 @@ class End:
         return self.follower is None and self.follower_moment is None and self.moment is None
 
 
-def clamped(
-    position: OfConstants = lambda c: (0.0, 0.0, 0.0), rotation: Quaternion | OfConstants = IDENTITY
-) -> End:
+def clamped(position: OfConstants = lambda c: (0.0, 0.0, 0.0), rotation: Quaternion | OfConstants = IDENTITY) -> End:
     """Return an end whose position and directors are given, both as functions of the constants if wanted."""
     return End(position=position, rotation=rotation)
 
@@ -125,9 +123,7 @@ def hinged(
     return End(position=position, rotation=rotation, hinge=axis, force=force)
 
 
-def free(
-    force: OfConstants | None = None, follower: OfConstants | None = None, energy: OfPlace | None = None
-) -> End:
+def free(force: OfConstants | None = None, follower: OfConstants | None = None, energy: OfPlace | None = None) -> End:
     """Return an end without support, loaded by a dead force, a follower force, a potential energy, or none."""
     return End(force=force, follower=follower, energy=energy)
 
@@ -136,9 +132,9 @@ def free(
 class Ring:
     """Both ends joined to each other, with equal directors: a closed rod.
 
-    ``turns`` is half the number of sign changes of the quaternion: a rod closed with an even linking number of its
-    directors about the centreline has ``q(l) = q(0)``, with an odd one ``q(l) = -q(0)``.  The number itself is that of the
-    scene's ``start``.
+    Where the directors turn about the closed rod an odd number of times in all (a circle without twist: once), its
+    quaternion changes sign, ``q(l) = -q(0)``; with ``odd = False`` it does not.  The number itself, and with it the
+    link, is that of the scene's ``start``.
     """
 
     odd: bool = True
@@ -151,8 +147,10 @@ class Ring:
 
 @dataclass(frozen=True)
 class Attachment:
-    """Something at arclength ``s``: a dead ``force(c)``, a ``follower(c)`` force (along the directors), a potential
-    ``energy(x, c)`` (a spring), a ``mass(c)``, a ``rotary_inertia(c)`` (3,) about the directors.
+    """Something attached at arclength ``s``.
+
+    A dead ``force(c)``, a ``follower(c)`` force by its components along the directors, a potential ``energy(x, c)`` (a
+    spring), a ``mass(c)``, a ``rotary_inertia(c)`` (3,) about the directors.
     """
 
     s: float
@@ -165,10 +163,12 @@ class Attachment:
 
 @dataclass(frozen=True)
 class Constraint:
-    """An equation ``of(x, c) = 0`` with a multiplier of its own; made by :func:`integral`, :func:`at`, :func:`everywhere`.
+    """An equation ``of(x, c) = 0`` with a multiplier of its own.
 
-    ``kind`` is ``integral`` (of the average over the rod), ``point`` (at ``s``) or ``pointwise`` (all along the rod; the
-    multiplier is continuous where the equation is one of position or rotation, else not).
+    Made by :func:`integral`, :func:`at` and :func:`everywhere`.
+
+    ``kind`` is ``integral`` (over the rod), ``point`` (at ``s``) or ``pointwise`` (all along the rod; the multiplier is
+    continuous where the equation is one of position or rotation, else not).
     """
 
     of: OfPlace
@@ -177,14 +177,13 @@ class Constraint:
     continuous: bool = False
 
 
-def integral(of: OfPlace, equals: Callable[[Constants], Any] = lambda c: 0.0, name: str = "") -> Constraint:
+def integral(of: OfPlace, equals: Callable[[Constants], Any] = lambda c: 0.0) -> Constraint:
     """Constrain ``int of(x, c) ds = equals(c)``: a total twist, say.  The multiplier is one scalar."""
-    del name
     return Constraint(_Difference(of, equals), "integral")
 
 
 def at(s: float, of: OfPlace) -> Constraint:
-    """Constrain ``of(x, c) = 0`` at arclength ``s``: a point kept on a plane or at a distance.  One scalar multiplier."""
+    """Constrain ``of(x, c) = 0`` at arclength ``s``: a point kept on a plane, say.  The multiplier is one scalar."""
     return Constraint(of, "point", s)
 
 

@@ -76,8 +76,9 @@ class Explorer:
     def _primary(self) -> Branch:
         start, stop = self.plan.span
         follower = self.follower
-        follower.system.set_phase(None)
-        x, outcome = follower.at_load(follower.start(start), start)
+        guess = follower.start(start)
+        follower.system.set_phase(guess)
+        x, outcome = follower.at_load(guess, start)
         if not outcome.converged:
             raise ConvergenceError(
                 f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: "
@@ -248,6 +249,8 @@ class Explorer:
         """Recognise a branch point that is known already; a reason if the branch ends there."""
         for other in self.branches:
             for i, known in enumerate(other.special):
+                if other is branch and special.point.arclength - known.point.arclength < 0.5:
+                    continue  # a neighbour on this branch: a nearly double eigenvalue
                 if known.kind == BRANCH_POINT and _equivalent(known.point, special.point, 1e-6):
                     special.meets = (other.name, i)
                     special.switched = known.switched = True

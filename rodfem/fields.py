@@ -60,7 +60,7 @@ class Discretization:
 
 @dataclass(frozen=True)
 class Unknown:
-    """One scalar unknown: its name, the group that it belongs to with its place there, and whether it is a multiplier."""
+    """One scalar unknown: its name, its group and place there, and whether it is a multiplier."""
 
     name: str
     group: str
@@ -69,7 +69,7 @@ class Unknown:
 
 
 def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:
-    """Fields of a scene: ``q``, ``mu``, ``v`` where strains are free, ``r`` and ``n`` if pointwise, multipliers ``p0``.."""
+    """Fields: ``q``, ``mu``, ``v`` where strains are free, ``r`` and ``n`` if pointwise, multipliers ``p0``.."""
     k = discretization.degree
     blocks = [Block("q", 4, k, True, False), Block("mu", 1, k, True, True)]
     if scene.free_strains:
@@ -173,7 +173,9 @@ class Fields:
         vertices = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
         mesh = compat.interval_mesh(self.comm, elements, *scene.interval)
         if len(pieces) > 2:
-            compat.move_vertices(mesh, np.linspace(*scene.interval, elements + 1), np.append(np.concatenate(vertices), pieces[-1]))
+            compat.move_vertices(
+                mesh, np.linspace(*scene.interval, elements + 1), np.append(np.concatenate(vertices), pieces[-1])
+            )
         return mesh
 
     def _block_dofs(self, part: int, size: int, cells: int) -> np.ndarray:

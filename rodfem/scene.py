@@ -18,7 +18,8 @@ from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from forms.kinematics import RODS, UNDEFORMED
-from rodfem.ends import Attachment, Constants, Constraint, End, OfConstants, OfPlace, Ring, Vector, check_vector
+from rodfem.checks import check_scene
+from rodfem.ends import Attachment, Constants, Constraint, End, OfConstants, OfPlace, Ring, Vector
 from rodfem.errors import SceneError
 
 
@@ -145,86 +146,7 @@ class Scene:
                 f"The ordinate's arclength {self.ordinate.s:g} is not on the rod: choose {a:g} <= s <= {b:g}."
             )
         self.check_span(self.span)
-        self._check_supports()
-        self._check_places()
-        for s in self.samples():
-            stiffness = self.stiffness(s)
-            if stiffness.size and np.linalg.eigvalsh(stiffness)[0] <= 1e-12 * abs(stiffness).max():
-                raise SceneError(
-                    f"The stored energy is not convex at s = {s:g}: its second derivative at the undeformed state has the "
-                    f"eigenvalue {np.linalg.eigvalsh(stiffness)[0]:.3g}; choose constants for which all are positive."
-                )
-
-    def _check_supports(self) -> None:
-        """Check shapes, whether anything holds the rod, and whether the ends can be where they are asked to be."""
-        for side, end in zip(("left", "right"), self.sides, strict=True):
-            for load in self.span:
-                c = self.constants(load)
-                check_vector(f"position of the {side} end", end.held(c), 3)
-                check_vector(f"force on the {side} end", end.applied(c), 3)
-                rotation = end.rotation(c) if callable(end.rotation) else end.rotation
-                if rotation is not None:
-                    check_vector(f"rotation of the {side} end", rotation, 4)
-                    if not sum(float(x) ** 2 for x in rotation) > 0:
-                        raise SceneError(f"The rotation of the {side} end is the zero quaternion: give one of size one.")
-            if end.hinge is not None and end.rotation is None:
-                raise SceneError(f"The {side} end has a hinge but no rotation: say which directors the hinge holds.")
-            if end.hinge is not None and not np.linalg.norm(end.hinge) > 0:
-                raise SceneError(f"The hinge of the {side} end has no axis: give three components, not all zero.")
-            if end.follower is not None and any(x is not None for x in end.held(self.constants())):
-                raise SceneError(
-                    f"A follower force acts on the {side} end, which is held: leave its position free, or use a force."
-                )
-        self._check_drift()
-        self._check_reach()
-
-    def _check_drift(self) -> None:
-        """Raise unless something holds the rod, or what acts on it is in balance whatever its shape."""
-        c = self.constants()
-        if isinstance(self.ends, Ring) or self.potential is not None or self.constraints:
-            return
-        if any(end.energy is not None for end in self.sides) or any(a.energy is not None for a in self.attachments):
-            return
-        held = [[x is not None for x in end.held(c)] for end in self.sides]
-        for i, (left, right) in enumerate(zip(*held, strict=True)):
-            if not (left or right):
-                raise SceneError(
-                    f"The rod can drift away along e{i + 1}: hold that component of the position at one end at least, "
-                    "or attach a spring."
-                )
-
-    def _check_reach(self) -> None:
-        """Raise where a rod that cannot stretch is held at ends that are farther apart than it is long."""
-        if 2 in self.free_strains or 0 in self.free_strains:
-            return
-        for load in self.span:
-            left, right = (end.held(self.constants(load)) for end in self.sides)
-            if None not in left and None not in right:
-                distance = sum((float(b) - float(a)) ** 2 for a, b in zip(left, right, strict=True)) ** 0.5
-                if distance > self.length * (1 + 1e-12):
-                    raise SceneError(
-                        f"At {self.load} = {load:g} the ends are {distance:.6g} apart, but the rod is inextensible and only "
-                        f"{self.length:.6g} long: let it stretch, or move the ends together."
-                    )
-
-    def _check_places(self) -> None:
-        """Raise for attachments, constraints and breaks that are not on the rod."""
-        a, b = self.interval
-        places = [("attachment", x.s) for x in self.attachments] + [("break", s) for s in self.breaks]
-        places += [("constraint", x.s) for x in self.constraints if x.s is not None]
-        for what, s in places:
-            if not a <= s <= b:
-                raise SceneError(f"The {what} at s = {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
-        c = self.constants()
-        for what, values in (
-            ("distributed force", self.distributed and self.distributed(c)),
-            ("distributed follower force", self.follower and self.follower(c)),
-            *(("force of an attachment", x.force(c)) for x in self.attachments if x.force),
-            *(("moment on an end", end.moment(c)) for end in self.sides if end.moment),
-            *(("follower force on an end", end.follower(c)) for end in self.sides if end.follower),
-        ):
-            if values is not None:
-                check_vector(what, values, 3)
+        check_scene(self)
 
     @property
     def sides(self) -> tuple[End, End]:
@@ -278,7 +200,7 @@ class Scene:
             )
 
     def plain(self, side: int) -> bool:
-        """Whether dead forces are all that loads an end (0: left, 1: right), so that they are the contact force there."""
+        """Whether dead forces are all that loads an end (0: left, 1: right): they are the contact force there."""
         at_end = [x.s for x in self.attachments] + [x.s for x in self.constraints if x.s is not None]
         return self.sides[side].energy is None and not any(
             abs(s - self.interval[side]) < 1e-9 * self.length for s in at_end

@@ -210,7 +210,9 @@ class Shape:
         if system.comm.size > 1:
             parts = system.comm.allreduce(parts)
         load = float(f.u.x.array[f.copies[0, -1]])
-        r = parts[1, :3] + (self._anchor(load, parts[2, :3]) if self.reduced else self.system.fields.lift(np.array(s), load))
+        r = parts[1, :3] + (
+            self._anchor(load, parts[2, :3]) if self.reduced else self.system.fields.lift(np.array(s), load)
+        )
         return r, parts[0] / np.linalg.norm(parts[0])
 
     def _anchor(self, load: float, chord: np.ndarray) -> np.ndarray:

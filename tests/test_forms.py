@@ -17,7 +17,7 @@ from forms.inertia import rotary
 from forms.kinematics import RODS, curvature, strain
 from forms.lagrangian import pointwise, reduced
 from forms.rotation import product, rotation
-from forms.symmetry import axial
+from forms.symmetry import cross, left, right
 
 pytestmark = pytest.mark.short
 
@@ -87,7 +87,7 @@ def test_strain_knows_no_observer() -> None:
 
     def integrands(q: np.ndarray, dr: np.ndarray, n: np.ndarray) -> list[float]:
         R, W = rotation(vector(q)), ufl.as_ufl(energy)
-        full = pointwise(W, R, vector(v), vector(dr), vector(n), vector([0, 0, 0]))
+        full = pointwise(W, R, vector(v), vector(dr), vector(n))
         return [float(value(full)), float(value(reduced(W, R, vector(v), vector(n), vector(dr))))]
 
     expected = energy + n @ (dr - scipy_rotation(Q).as_matrix() @ v)
@@ -112,16 +112,15 @@ def test_rotary_inertia_of_a_spinning_body() -> None:
     np.testing.assert_allclose(energy, inertia @ w**2, rtol=1e-14)
 
 
-def test_axial_generator_is_the_derivative_of_the_action() -> None:
-    """Its exponential is the action itself: ``q -> a q conj(a)``, ``r -> a r``, ``n -> a n``."""
+def test_generators_are_derivatives_of_the_motions() -> None:
+    """Their exponentials rotate space, ``q -> a q`` and ``r -> a r``, and the cross-sections, ``q -> q a``."""
     axis, angle = np.array([2.0, -1.0, 2.0]) / 3, 0.8
     turn = Rotation.from_rotvec(angle * axis)
-    action = {name: expm(angle * np.array(matrix)) for name, matrix in axial(tuple(axis)).items()}
+    space, body, vectors = (expm(angle * np.array(matrix(tuple(axis)))) for matrix in (left, right, cross))
     r = np.array([1.0, 2.0, -0.5])
-    np.testing.assert_allclose(action["r"] @ r, turn.apply(r), atol=1e-14)
-    np.testing.assert_allclose(action["n"] @ r, turn.apply(r), atol=1e-14)
-    conjugated = turn * scipy_rotation(Q) * turn.inv()
-    np.testing.assert_allclose(scipy_rotation(action["q"] @ Q).as_matrix(), conjugated.as_matrix(), atol=1e-14)
+    np.testing.assert_allclose(vectors @ r, turn.apply(r), atol=1e-14)
+    for found, expected in ((space @ Q, turn * scipy_rotation(Q)), (body @ Q, scipy_rotation(Q) * turn)):
+        np.testing.assert_allclose(scipy_rotation(found).as_matrix(), expected.as_matrix(), atol=1e-14)
 
 
 def test_hemitropic_constitutive_law() -> None:

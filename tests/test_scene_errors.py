@@ -10,9 +10,10 @@ import pytest
 from mpi4py import MPI
 from rods import run_demo
 
+from rodfem.ends import clamped, free
 from rodfem.errors import SceneError
 from rodfem.fields import Discretization
-from rodfem.scene import Ordinate, Parameter, Scene, clamped, free
+from rodfem.scene import Ordinate, Parameter, Scene
 from rodfem.system import System
 
 pytestmark = pytest.mark.short
