@@ -62,7 +62,7 @@ class Equilibria:
         self.axis = system.load_axis()
 
     def start(self, load: float) -> PETSc.Vec:
-        """First guess at ``load``: the scene's ``start`` rotation, undeformed strains, zero forces."""
+        """First guess at ``load``: the scene's ``start`` rotation, undeformed strains, where that leads, zero forces."""
         system, f = self.system, self.system.fields
         x = f.coordinates(f.discretization.degree)
         guess = system.scene.start
@@ -72,6 +72,8 @@ class Equilibria:
         f.u.x.array[f.dofs["q"]] = np.where(held, clamped, q.reshape(*x.shape, 4))
         if "v" in f.dofs:
             f.u.x.array[f.dofs["v"]] = [1.0 if i == 2 else 0.0 for i in system.scene.free_strains]
+        f.u.x.array[f.copies[:, -1]] = load
+        self.shape.place_centreline(load)
         out = system.take()
         system.set_load(out, load)
         return out

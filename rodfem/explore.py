@@ -62,6 +62,7 @@ class Explorer:
         self.low, self.high = sorted(plan.span)
         self.branches: list[Branch] = []
         self.richer: Richer | None = None
+        self.warned = False
 
     def run(self) -> list[Branch]:
         """Trace the start state's branch, then what leaves each branch point, breadth first."""
@@ -170,6 +171,7 @@ class Explorer:
                 return
             previous = history[-1]
             self._check_symmetry(item)
+            self._check_zeros(history, item)
             if item.stretch <= 0:
                 self._end_at_zero_stretch(branch, previous, item)
                 return
@@ -332,6 +334,17 @@ class Explorer:
             raise SymmetryError(
                 f"A symmetry of the scene is not one of its equations: the drift is {point.drift:.2g} at "
                 f"{self.scene.load} = {point.load:.6g} where it should vanish; use a richer discretisation."
+            )
+
+    def _check_zeros(self, history: list[Point], point: Point) -> None:
+        """Warn once where eigenvalues stay zero without a symmetry: the scene leaves the rod a freedom."""
+        extra = point.zero - self.follower.system.active_drifts()
+        recent = history[-4:]
+        if extra > 0 and len(recent) == 4 and all(p.zero == point.zero for p in recent) and not self.warned:
+            self.warned = True
+            self.report.warn(
+                f"{extra} eigenvalue(s) stay zero that no symmetry of the scene explains: the rod may turn or move "
+                "freely; other eigenvalues that pass through zero may be missed: hold it."
             )
 
     def _finish(self, branch: Branch) -> None:

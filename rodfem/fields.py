@@ -196,7 +196,10 @@ class Fields:
                 if block.name == "r":
                     held = [x is not None for x in end.held(self.scene.constants())]
                     found.append(at_end[:, held].ravel())
-                elif end.fixed_rotation is not None and block.name in ("q", "mu"):
+                elif block.name.startswith("p"):  # what holds the end fulfils the constraint there
+                    if end.rotation is not None or any(x is not None for x in end.held(self.scene.constants())):
+                        found.append(at_end.ravel())
+                elif end.fixed_rotation is not None:
                     found.append(at_end.ravel())
                 elif ring and block.name != "q" and s == self.scene.interval[1]:
                     found.append(at_end.ravel())  # the norm of q(l) = +-q(0), or any other equation, is that of q(0)

@@ -49,4 +49,5 @@ def new_matrix(fields: Fields, pattern: sp.csr_matrix, rows: PETSc.LGMap, column
     )
     matrix.setLGMap(rows, columns)
     matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
+    matrix.setOption(PETSc.Mat.Option.IGNORE_ZERO_ENTRIES, True)  # a point between two cells couples all of both, by 0
     return matrix

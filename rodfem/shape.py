@@ -143,6 +143,39 @@ class Shape:
         f.u.x.array[held] = clamped
         return self.system.take()
 
+    def place_centreline(self, load: float) -> None:
+        """Set the centreline, or the scalar positions of the ends, to what the rotations and strains integrate to.
+
+        What then misses a held end is spread evenly over the rod.
+        """
+        system, f = self.system, self.system.fields
+        slopes = self._slopes()
+        pieces = np.einsum("g,cgi,c->ci", self.gauss.weights, slopes, self.size)
+        starts, inside = self.start, np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), slopes, self.size)
+        order = np.argsort(self._gather(starts))
+        steps = self._gather(pieces)[order]
+        before = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+        c = system.scene.constants(load)
+        left, right = ([None if p is None else float(p) for p in end.held(c)] for end in system.scene.sides)
+        a = np.array([p if p is not None else (q or 0.0) - d for p, q, d in zip(left, right, before[-1], strict=True)])
+        b = np.array([q if q is not None else x + d for q, x, d in zip(right, a, before[-1], strict=True)])
+        for i, unknown in enumerate(f.unknown_scalars):
+            if unknown.group in ("a", "b"):
+                f.u.x.array[f.copies[:, i]] = (a if unknown.group == "a" else b)[unknown.component]
+        if self.reduced:
+            return
+        first = np.searchsorted(self._gather(starts)[order], starts)
+        r = a + before[:-1][first][:, None, :] + inside
+        s = starts[:, None] + self.size[:, None] * self.nodes
+        x = (s - system.scene.interval[0])[..., None] / system.scene.length
+        r = r + x * (b - a - before[-1]) - f.lift(s, load)
+        values = np.empty_like(r)
+        values[:, self._order] = r
+        local = f.dofs["r"][self._cells]
+        free = f.number[local] >= 0
+        f.u.x.array[local[free]] = values[free]
+        f.u.x.scatter_forward()
+
     # --- inside ------------------------------------------------------------------------------------------------
 
     @staticmethod

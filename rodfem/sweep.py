@@ -16,6 +16,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 
+from rodfem.accuracy import Transfer
 from rodfem.branch import END, FLUTTER, USER, Branch, Point, Special
 from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError
@@ -141,7 +142,12 @@ class Sweep:
             new = max(many, key=lambda v: min((abs(v - w) for w in few), default=np.inf))
             middle = (a.load + b.load) / 2
             try:
-                located = locate_flutter(self._discriminant, middle, abs(b.load - a.load), new.real)
+                located = locate_flutter(
+                    lambda load, center: discriminant(self.solver, self.vibration, load, center, a.x),
+                    middle,
+                    abs(b.load - a.load),
+                    new.real,
+                )
             except ConvergenceError as trouble:
                 self.report.warn(f"{len(few)} complex pairs become {len(many)} near {middle:.6g}: {trouble}")
                 self.pairs = after
@@ -158,9 +164,6 @@ class Sweep:
         branch.special.append(special)
         self.report.special(branch, special)
 
-    def _discriminant(self, load: float, center: float) -> tuple[float, float]:
-        return discriminant(self.solver, self.vibration, load, center)
-
     def _error_bars(self, branch: Branch) -> None:
         with self.solver.system.clock.purpose("error bars"):
             system = self.solver.system
@@ -168,13 +171,14 @@ class Sweep:
             richer = Equilibria(
                 System(system.scene, replace(d, degree=d.degree + 1), system.comm, system.clock, system.fields.mesh)
             )
-            vibration = Vibration(richer.system)
+            vibration, transfer = Vibration(richer.system), Transfer(system, richer.system)
             for s in branch.special:
                 floor = max(s.located_to, 1e-12 * max(1.0, abs(s.point.load)))
                 s.error_estimate = s.ordinate_error = floor
                 if s.kind == FLUTTER:
+                    guess = transfer(s.point.x, state=True)
                     load, _, mu = locate_flutter(
-                        lambda p, m: discriminant(richer, vibration, p, m),
+                        lambda p, m, guess=guess: discriminant(richer, vibration, p, m, guess),
                         s.point.load,
                         0.05 * abs(s.point.load),
                         s.omega2,
@@ -183,18 +187,24 @@ class Sweep:
                     s.omega2_error = max(abs(mu - s.omega2), 1e-12 * abs(mu))
 
 
-def discriminant(solver: Equilibria, vibration: Vibration, load: float, center: float) -> tuple[float, float]:
-    """Discriminant ``((mu1 - mu2)/2)^2`` of the two eigenvalues nearest to ``center`` at ``load``, and their mean."""
+def discriminant(
+    solver: Equilibria, vibration: Vibration, load: float, center: float, guess: PETSc.Vec
+) -> tuple[float, float]:
+    """Discriminant ``((mu1 - mu2)/2)^2`` of the two eigenvalues nearest to ``center`` at ``load``, and their mean.
+
+    ``guess`` is an equilibrium at a load nearby.
+    """
     solver.system.set_phase(None)
-    x, outcome = solver.at_load(solver.start(load), load)
+    x, outcome = solver.at_load(guess, load)
     if not outcome.converged:
         raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g} while locating flutter.")
     vibration.assemble(x)
-    values = vibration.near(4, 0.97 * center).values
+    found = vibration.near(4, 0.97 * center)
+    values = found.values
     best: tuple[float, complex, complex] | None = None
     for i, p in enumerate(values):
-        for q in values[i + 1 :]:
-            both_real = abs(p.imag) + abs(q.imag) < REAL * abs(p)
+        for j, q in enumerate(values[i + 1 :], start=i + 1):
+            both_real = abs(p.imag) + abs(q.imag) < REAL * abs(p) and found.kinds[i] == found.kinds[j]
             conjugate = abs(p - q.conjugate()) < REAL * abs(p)
             if both_real or conjugate:
                 distance = abs((p + q) / 2 - center) + 0.1 * abs(p - q)

@@ -66,6 +66,12 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
             out.append(Elementary(target, cross(axis), (0.0,) * 3))
             if target in ("r", "a", "b"):
                 out.append(Elementary(target, ((0.0,) * 3,) * 3, axis))
+    count = sum(x.group == "g" for x in fields.unknown_scalars)
+    for i in range(count):  # multipliers of constraints may turn into each other
+        for j in range(i):
+            turn = np.zeros((count, count))
+            turn[i, j], turn[j, i] = 1.0, -1.0
+            out.append(Elementary("g", tuple(map(tuple, turn)), (0.0,) * count))
     for target in sorted(g for g in vectors if g in ("ma", "mb") and sizes[g] == 2):
         out.append(Elementary(target, ((0.0, -1.0), (1.0, 0.0)), (0.0, 0.0)))
     return tuple(out)

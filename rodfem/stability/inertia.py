@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -110,7 +109,7 @@ class Inertia:
     ) -> tuple[np.ndarray, list[PETSc.Vec]]:
         """Return the eigenvalues nearest zero of the matrix last factored, and their vectors (metric norm 1).
 
-        Block inverse iteration from the vectors of the last call, until the ``number`` wanted values change by
+        Block inverse iteration from the vectors of the last call, with a Rayleigh-Ritz projection of ``S``, until the ``number`` wanted values change by
         less than ``accuracy`` relative to themselves (or by what the arithmetic resolves).  The block has
         ``spare`` more vectors.
         """
@@ -123,20 +122,15 @@ class Inertia:
             v.axpy(1e-3, self._seed(i))  # the old vectors may span an invariant space that misses the nearest one
         with self.system.clock("stability"):
             for _ in range(most):
-                images = [metric * v for v in self._vectors]
                 solved = [v.duplicate() for v in self._vectors]
-                for image, out in zip(images, solved, strict=True):
-                    self.factors.ksp.solve(image, out)
-                a = np.array([[y.dot(w) for w in images] for y in solved])
-                masses = [metric * y for y in solved]
-                b = np.array([[y.dot(w) for w in masses] for y in solved])
-                size = np.sqrt(np.diag(b))
-                theta, z = scipy.linalg.eigh(
-                    ((a + a.T) / 2) / np.outer(size, size), ((b + b.T) / 2) / np.outer(size, size)
-                )
+                for v, out in zip(self._vectors, solved, strict=True):
+                    self.factors.ksp.solve(metric * v, out)
+                orthonormalize(solved, metric)
+                images = [self.matrix * y for y in solved]
+                theta, z = np.linalg.eigh(np.array([[y.dot(w) for w in images] for y in solved]))
                 order = np.argsort(abs(theta + self.shift))
                 last, values = values, theta[order] + self.shift
-                self._vectors = [combine(solved, z[:, j] / size) for j in order]
+                self._vectors = [combine(solved, z[:, j]) for j in order]
                 change = abs(values - last)[:number]
                 if np.all(change <= np.maximum(accuracy * abs(values[:number]), self.resolution)):
                     break
@@ -156,3 +150,13 @@ class Inertia:
         numbers = np.arange(begin, min(end, self.system.fields.field_unknowns))
         vector.array[: len(numbers)] = np.sin((1.0 + i) * (1.0 + 0.731 * numbers)) + 0.3
         return vector
+
+
+def orthonormalize(vectors: list[PETSc.Vec], metric: PETSc.Mat) -> None:
+    """Make vectors orthonormal in a metric, in place, by Gram-Schmidt twice."""
+    for _ in range(2):
+        for i, v in enumerate(vectors):
+            v.scale(1.0 / max(np.sqrt(max(v.dot(metric * v), 0.0)), 1e-300))
+            for w in vectors[:i]:
+                v.axpy(-v.dot(metric * w), w)
+            v.scale(1.0 / max(np.sqrt(max(v.dot(metric * v), 0.0)), 1e-300))
