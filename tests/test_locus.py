@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 
 from forms.energy import bending
 from rodfem.branch import Branch, Special
-from rodfem.continuation import Equilibria, Follower
+from rodfem.continuation import Equilibria, Follower, Steps
 from rodfem.errors import SceneError
 from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization
@@ -33,12 +33,13 @@ from rodfem.sweep import Sweep
 from rodfem.system import System
 
 PLANE = ((0.01, 0.9), (-3.1, 1.0))
+WIDE = Steps(first=0.05, largest=0.15)
 
 
 @cache
 def straight() -> Locus:
     """Second buckling load of the hemitropic rod against the coupling A."""
-    return locus(follower(), specials(explored()[0], "branch point")[1], "A", PLANE)
+    return locus(follower(), specials(explored()[0], "branch point")[1], "A", PLANE, WIDE)
 
 
 def bent(s: np.ndarray) -> np.ndarray:
@@ -94,7 +95,7 @@ def test_buckling_of_the_straight_rod() -> None:
 
 def test_straight_cord() -> None:
     (first, _) = specials(demo("cord")["straight"], "branch point")
-    found = locus(demo("cord").follower, first, "k0", ((-10.0, 60.0), (3.0, 16.0)), error_bars=2)
+    found = locus(demo("cord").follower, first, "k0", ((-10.0, 60.0), (3.0, 16.0)), steps=WIDE, error_bars=2)
     lam, k0 = found.values.T
     assert (lam[0], lam[-1]) == (-10.0, 60.0)
     assert abs(lam - k0**2 + 4 * pi**2).max() < 1e-9
@@ -105,7 +106,7 @@ def test_fold_of_the_cord_by_shooting() -> None:
     """The state depends on both parameters; the fold by shooting is where its determinant vanishes, in the moment."""
     cord = demo("cord")
     (fold,) = specials(cord["branch 2"], "fold")
-    found = locus(cord.follower, fold, "k0", ((4.0, 13.0), (8.0, 11.0)), error_bars=3)
+    found = locus(cord.follower, fold, "k0", ((4.0, 13.0), (8.0, 11.0)), steps=WIDE, error_bars=3)
     assert found.values[[0, -1], 0].tolist() == [4.0, 13.0]
     assert found.values[found.start, 0] == pytest.approx(7.8065554232, abs=1e-8)
     for row in (0, len(found.values) - 1):
@@ -129,7 +130,7 @@ def test_fold_of_the_cord_by_shooting() -> None:
 def test_fold_ends_where_the_pitchfork_changes_its_side() -> None:
     constants = (-2.0, 1.0, 1.0, 3.0)
     (fold,) = specials(explored(constants=constants)[2], "fold")
-    found = locus(follower(constants=constants), fold, "A", PLANE, error_bars=2)
+    found = locus(follower(constants=constants), fold, "A", PLANE, steps=WIDE, error_bars=2)
     assert all(sentence.startswith("the fold ends on a branch point") for sentence in found.ended)
     for row in (0, -1):
         lam, A = found.values[row]
@@ -142,7 +143,7 @@ def test_cusp() -> None:
     """A thrust above Euler's and a force across that sweeps from one side to the other: folds that meet at a cusp."""
     solver, (branch,) = cantilever("e", (0.3, -0.3))
     fold = specials(branch, "fold")[0]
-    found = locus(solver, fold, "lam", ((-0.5, 0.5), (2.0, 3.0)), error_bars=0)
+    found = locus(solver, fold, "lam", ((-0.5, 0.5), (2.0, 3.0)), steps=WIDE, error_bars=0)
     (cusp,) = found.marks
     assert cusp.kind == "cusp"
     assert found.values[cusp.row] == pytest.approx([0, pi**2 / 4], abs=1e-9)
@@ -154,7 +155,7 @@ def test_cusp() -> None:
 def test_a_parameter_that_destroys_the_branch_point() -> None:
     solver, (branch,) = cantilever("lam", (0.0, 4.0))
     (euler,) = specials(branch, "branch point")
-    found = locus(solver, euler, "e", ((0.0, 4.0), (-1.0, 1.0)), error_bars=0)
+    found = locus(solver, euler, "e", ((0.0, 4.0), (-1.0, 1.0)), steps=WIDE, error_bars=0)
     assert len(found.values) == 1
     assert found.ended == ("e is an imperfection that destroys the branch point",) * 2
 
@@ -165,7 +166,7 @@ def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None
     solver = Equilibria(System(rod, Discretization("pointwise", 4, 6)))
     (branch,) = Sweep(solver, Plan(rod.span, error_bars=False), Report(quiet=True), lambda: None).run()
     (flutter,) = specials(branch, "flutter")
-    found = locus(solver, flutter, "J1", ((18.0, 22.0), (0.0, 0.004)), error_bars=2)
+    found = locus(solver, flutter, "J1", ((18.0, 22.0), (0.0, 0.004)), steps=WIDE, error_bars=2)
     assert found.ended == ("J1 = 0, its bound", "J1 = 0.004, its bound")
     for (P, J), mu in zip(found.values, found.omega2, strict=True):
         assert [P, mu] == pytest.approx(double(P, mu, J).tolist(), rel=3e-11)
@@ -179,7 +180,7 @@ def test_nothing_is_left_behind() -> None:
     system.set_phase(point.x)
     before, phases = solver.point(point.x, 0.0, None), list(system.phases)
     constants = equations.base.value.copy(), equations.direction.value.copy(), system.scene
-    locus(solver, special, "C", ((0.01, 0.9), (0.95, 1.05)), error_bars=0)
+    locus(solver, special, "C", ((0.01, 0.9), (0.95, 1.05)), steps=WIDE, error_bars=0)
     assert (equations.base.value == constants[0]).all() and (equations.direction.value == constants[1]).all()
     assert system.scene is constants[2]
     assert all(a is b for a, b in zip(system.phases, phases, strict=True))
