@@ -32,6 +32,7 @@ class Point:
     spectrum: list[float] = field(default_factory=list)
     omega2: list[list[float]] = field(default_factory=list)
     motion: list[str] = field(default_factory=list)
+    negative_in_space: int | None = None
 
 
 @dataclass

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def check_scene(scene: Scene) -> None:
     """Check supports, places and the stored energy; raises :class:`~rodfem.errors.SceneError`."""
+    if scene.planar not in (None, "e1", "e2"):
+        raise SceneError(f"A rod cannot be planar across {scene.planar!r}: choose 'e1' or 'e2', or None for space.")
     check_supports(scene)
     check_places(scene)
     check_convexity(scene)
@@ -42,6 +44,10 @@ def check_supports(scene: Scene) -> None:
             rotation = end.rotation(c) if callable(end.rotation) else end.rotation
             if rotation is not None:
                 check_vector(f"rotation of the {side} end", rotation, 4)
+                if scene.normal is not None and any(rotation[i + 1] != 0 for i in range(3) if i != scene.normal):
+                    raise SceneError(
+                        f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about that axis only."
+                    )
                 if not sum(float(x) ** 2 for x in rotation) > 0:
                     raise SceneError(f"The rotation of the {side} end is the zero quaternion: give one of size one.")
         if end.hinge is not None and end.rotation is None:

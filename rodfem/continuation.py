@@ -20,6 +20,7 @@ from rodfem.branch import Point
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.newton import Outcome, correct
 from rodfem.shape import Shape
+from rodfem.stability.in_space import InSpace
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.spectrum import Spectrum
 from rodfem.system import System, combine
@@ -104,6 +105,7 @@ class Follower(Equilibria):
         self.inertia = Inertia(system)
         self.modes = spectrum
         self.spectrum = Spectrum(self.inertia) if spectrum else None
+        self.space = InSpace(system) if system.scene.normal is not None else None
 
     def point(self, x: PETSc.Vec, arclength: float, tangent: PETSc.Vec | None, outcome: Outcome | None = None) -> Point:
         """Evaluate all records of the equilibrium ``x``."""
@@ -123,6 +125,7 @@ class Follower(Equilibria):
             drift=max((abs(system.scalar(x, f"drift{i}")) for i in range(len(system.drifts))), default=0.0),
             error=outcome.error if outcome else 0.0,
             spectrum=self._leftmost(x, index),
+            negative_in_space=None if self.space is None else self.space.count(x).negative,
         )
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:

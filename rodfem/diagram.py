@@ -76,6 +76,8 @@ def _branch_data(branch: Branch) -> dict[str, Any]:
     columns: dict[str, list[Any]] = {name: [_plain(getattr(p, name)) for p in branch.points] for name in COLUMNS}
     if any(p.spectrum for p in branch.points):
         columns["spectrum"] = [p.spectrum for p in branch.points]
+    if any(p.negative_in_space is not None for p in branch.points):
+        columns["negative_in_space"] = [p.negative_in_space for p in branch.points]
     if any(p.omega2 for p in branch.points):
         columns["omega2"] = [p.omega2 for p in branch.points]
         columns["motion"] = [p.motion for p in branch.points]

@@ -15,7 +15,7 @@ from forms.kinematics import curvature, strain
 from forms.rotation import rotation
 from rodfem import compat
 from rodfem.ends import Place, Ring
-from rodfem.fields import Fields
+from rodfem.fields import Fields, across
 from rodfem.places import place
 
 
@@ -93,7 +93,7 @@ class Equations:
         if f.r is not None:
             return lagrangian.pointwise(W, along.R, along.v, along.dr, f.n)
         scene = self.fields.scene
-        force = [f.scalars.get(f"n{i + 1}", scene.known_force(i, c)) for i in range(3)]
+        force = [f.scalars.get(f"n{i + 1}", scene.known_force(i, c) or 0.0) for i in range(3)]
         left, right = self._ends(f, c)
         chord = [0.0 if x is None or y is None else y - x for x, y in zip(left, right, strict=True)]
         return lagrangian.reduced(W, along.R, along.v, ufl.as_vector(force), ufl.as_vector(chord) / self.length)
@@ -130,12 +130,12 @@ class Equations:
             x, c, _, ds = self._at(f, s)
             free = [i for i, p in enumerate(end.held(c)) if p is None]
             if end.force is not None and (f.r is not None or not scene.plain(side)):
-                out += -sum(end.applied(c)[i] * x.r[i] for i in free) * ds
+                out += -sum(end.applied(c)[i] * x.r[i] for i in free if i != scene.normal) * ds
             if end.energy is not None:
                 out += end.energy(x, c) * ds
             if end.turned is not None:
                 g = loads.misalignment(x.q, end.turned(c))
-                for i, direction in enumerate(_across(end.hinge)):
+                for i, direction in enumerate(across(end.hinge, scene.normal)):
                     out += f.scalars[f"m{letter}{i + 1}"] * ufl.dot(g, ufl.as_vector(direction)) * ds
         for attachment in scene.attachments:
             x, c, _, measure = self._at(f, attachment.s)
@@ -153,12 +153,16 @@ class Equations:
 
     def _closure(self, f: Any, sign: float) -> Any:
         """Both ends of a ring joined: ``q(l) = +-q(0)`` and, with a centreline, ``r(l) = r(0)``."""
+
+        def closing(letter: str) -> list[tuple[str, Any]]:
+            return [(name, x) for name, x in f.scalars.items() if name[0] == letter]
+
         out = 0
         for s, weights in zip(self.fields.scene.interval, ((-sign, -1.0), (1.0, 1.0)), strict=True):
             ds = self.measures(s)[0]
-            out += weights[0] * sum(f.scalars[f"t{i + 1}"] * f.q[i] for i in range(4)) * ds
+            out += weights[0] * sum(x * f.q[int(name[1]) - 1] for name, x in closing("t")) * ds
             if f.r is not None:
-                out += weights[1] * sum(f.scalars[f"f{i + 1}"] * f.r[i] for i in range(3)) * ds
+                out += weights[1] * sum(x * f.r[int(name[1]) - 1] for name, x in closing("f")) * ds
         return out
 
     def _at(self, f: Any, s: float) -> tuple[Place, Any, Any, Any]:
@@ -248,13 +252,6 @@ class Equations:
             pair = (b, b) if a is None else (a, a) if b is None else (a, b)
             lift.append(0.0 if pair == (None, None) else (1 - x) * pair[0] + x * pair[1])
         return ufl.as_vector([value + 0 * x for value in lift])
-
-
-def _across(axis: tuple[float, float, float] | None) -> list[list[float]]:
-    """Unit vectors across ``axis``, all three without one: the directions about which an end does not turn."""
-    if axis is None:
-        return [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-    return [[float(x) for x in row] for row in np.linalg.svd(np.array([axis], dtype=float))[2][1:]]
 
 
 def point_measures(mesh: Any, points: list[float]) -> Any:

@@ -89,23 +89,38 @@ def scalars_of(scene: Scene, discretization: Discretization) -> list[Unknown]:
     integral and point constraints, forces ``f`` and moments ``t`` that close a ring.
     """
     out, c = [], scene.constants()
+    inside = [i for i in range(3) if i != scene.normal]
     if discretization.formulation == "reduced":
-        out += [Unknown(f"n{i + 1}", "n", i, True) for i in range(3) if scene.known_force(i, c) is None]
+        out += [Unknown(f"n{i + 1}", "n", i, True) for i in inside if scene.known_force(i, c) is None]
         for side, (letter, end) in enumerate(zip("ab", scene.sides, strict=True)):
             if not scene.plain(side):
-                free = [i for i in range(3) if end.held(c)[i] is None]
+                free = [i for i in inside if end.held(c)[i] is None]
                 out += [Unknown(f"{letter}{i + 1}", letter, i, False) for i in free]
     for letter, end in zip("ab", scene.sides, strict=True):
         if end.turned is not None:
-            size = 3 if end.hinge is None else 2
+            size = len(across(end.hinge, scene.normal))
             out += [Unknown(f"m{letter}{i + 1}", f"m{letter}", i, True) for i in range(size)]
     count = sum(x.kind != "pointwise" for x in scene.constraints)
     out += [Unknown(f"g{i + 1}", "g", i, True) for i in range(count)]
     if isinstance(scene.ends, Ring):
-        out += [Unknown(f"t{i + 1}", "t", i, True) for i in range(4)]
+        out += [Unknown(f"t{i + 1}", "t", i, True) for i in (range(4) if scene.normal is None else (0, scene.normal + 1))]
         if discretization.formulation == "pointwise":
-            out += [Unknown(f"f{i + 1}", "f", i, True) for i in range(3)]
+            out += [Unknown(f"f{i + 1}", "f", i, True) for i in inside]
     return out
+
+
+def across(axis: tuple[float, float, float] | None, normal: int | None = None) -> list[list[float]]:
+    """Unit vectors across ``axis``, all three without one: the directions about which an end does not turn.
+
+    In a plane that is its normal, or nothing where the axis is along it.
+    """
+    if normal is not None:
+        unit = [float(i == normal) for i in range(3)]
+        along = axis is not None and abs(axis[normal]) > 0.999 * float(np.linalg.norm(axis))
+        return [] if along else [unit]
+    if axis is None:
+        return [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    return [[float(x) for x in row] for row in np.linalg.svd(np.array([axis], dtype=float))[2][1:]]
 
 
 class Fields:
@@ -184,8 +199,11 @@ class Fields:
         return np.stack([compat.cell_dofs(component, cells) for component in components], axis=-1)
 
     def _clamped(self) -> np.ndarray:
-        """Local degrees of freedom that an end holds: ``q`` and ``mu`` at clamped directors, ``r`` where held."""
-        found = []
+        """Local degrees of freedom that an end holds: ``q`` and ``mu`` at clamped directors, ``r`` where held.
+
+        Of a planar rod also all that would leave the plane.
+        """
+        found = [dofs.ravel() for dofs in self.out_of_plane().values()]
         ring = isinstance(self.scene.ends, Ring)
         for end, s in zip(self.scene.sides, self.scene.interval, strict=True):
             for block in self.blocks:
@@ -204,6 +222,19 @@ class Fields:
                 elif ring and block.name != "q" and s == self.scene.interval[1]:
                     found.append(at_end.ravel())  # the norm of q(l) = +-q(0), or any other equation, is that of q(0)
         return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
+
+    def out_of_plane(self) -> dict[str, np.ndarray]:
+        """Degrees of freedom of each field that a planar rod does without; empty for a rod in space."""
+        normal = self.scene.normal
+        if normal is None:
+            return {}
+        components = {
+            "q": [i + 1 for i in range(3) if i != normal],
+            "r": [normal],
+            "n": [normal],
+            "v": [place for place, i in enumerate(self.scene.free_strains) if i == normal],
+        }
+        return {name: self.dofs[name][..., chosen] for name, chosen in components.items() if name in self.dofs}
 
     def _number(self, copies: np.ndarray, names: list[str]) -> None:
         """Number free unknowns rank by rank; scalars come last and belong to the last rank."""
@@ -290,6 +321,8 @@ class Fields:
         scene, c = self.scene, self.scene.constants()
         fixed = [i for i in range(3) if i not in scene.free_strains]
         lines = []
+        if scene.normal is not None:
+            lines.append(f"rotations, displacement, force and strain out of the plane across {scene.planar}")
         if fixed:
             lines.append(f"strain {', '.join(f'v{i + 1}' for i in fixed)}: the rod is {scene.rod}")
         if self.discretization.formulation == "reduced":

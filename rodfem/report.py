@@ -30,7 +30,9 @@ def number(value: float, error: float) -> str:
 def _index(special: Special) -> str:
     """Index at a special point in words: before and after if it changes."""
     before, after = special.negative_before, special.negative_after
-    return f"{before}->{after}" if before != after else f"{special.point.negative}"
+    index = f"{before}->{after}" if before != after else f"{special.point.negative}"
+    space = special.point.negative_in_space
+    return index if space is None else f"{index} (in space {space})"
 
 
 def _roots(point: Point) -> dict[str, str]:

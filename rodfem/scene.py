@@ -102,6 +102,9 @@ class Scene:
         What is attached along the rod, and equations that it must fulfil: see :mod:`rodfem.ends`.
     breaks
         Arclengths at which the material or the loads jump: element boundaries are put there.
+    planar
+        ``"e1"`` or ``"e2"``: the rod moves only in the plane across that axis.  Rotations about it, two displacements,
+        two forces and two strains are all that is left; the index in space is recorded besides that in the plane.
     start
         Quaternion(s) of a first guess, ``start(s)`` of shape (m,) -> (m, 4); by default the identity (a straight rod).
     span
@@ -125,6 +128,7 @@ class Scene:
     attachments: tuple[Attachment, ...] = ()
     constraints: tuple[Constraint, ...] = ()
     breaks: tuple[float, ...] = ()
+    planar: str | None = None
     start: Callable[[np.ndarray], np.ndarray] | None = None
     states: str = field(default="straight")
 
@@ -152,6 +156,11 @@ class Scene:
     def sides(self) -> tuple[End, End]:
         """The two ends; those of a ring hold nothing."""
         return (End(), End()) if isinstance(self.ends, Ring) else self.ends
+
+    @property
+    def normal(self) -> int | None:
+        """Component (0 or 1) across the plane of a planar rod, None for a rod in space."""
+        return None if self.planar is None else int(self.planar[1]) - 1
 
     @property
     def joints(self) -> tuple[float, ...]:

@@ -18,6 +18,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from forms.symmetry import AXES, Matrix, cross, left, right
+from rodfem.ends import Ring
 from rodfem.equations import Equations
 from rodfem.fields import Fields
 
@@ -52,14 +53,12 @@ class Symmetry:
 
 def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
     """All elementary generators of the fields and groups of scalars that a scene has."""
-    vectors = {"n", "a", "b", "ma", "mb", "f"} & {x.group for x in fields.unknown_scalars}
+    vectors = {"n", "a", "b", "ma", "mb"} & {x.group for x in fields.unknown_scalars}
     blocks = {b.name for b in fields.blocks}
     out = []
     sizes = {g: sum(x.group == g for x in fields.unknown_scalars) for g in vectors}
     for axis in AXES:
         out += [Elementary("q", m(axis), (0.0,) * 4) for m in (left, right)]
-        if "t" in {x.group for x in fields.unknown_scalars}:
-            out += [Elementary("t", m(axis), (0.0,) * 4) for m in (left, right)]
         for target in sorted(vectors | ({"r", "n"} & blocks)):
             if target in ("ma", "mb") and sizes[target] == 2:
                 continue
@@ -127,7 +126,8 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
         row = fields.comm.allreduce(changes @ residual, op=MPI.SUM)
         rows.append(row / max(abs(row).max(), 1e-300))
         held.append(changes[:, _held(fields)].T)
-        moved += fields.comm.allreduce(changes @ changes.T, op=MPI.SUM)
+        free = changes[:, fields.number >= 0]
+        moved += fields.comm.allreduce(free @ free.T, op=MPI.SUM)
     u[:] = kept
     scale = np.sqrt(np.maximum(np.diag(moved), 1e-300))
     local = np.linalg.qr(np.vstack(held), mode="r")
@@ -139,8 +139,8 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
 
 
 def _held(fields: Fields) -> np.ndarray:
-    """Local degrees of freedom that an end holds, without norm multipliers."""
-    dofs = [d.ravel() for name, d in fields.dofs.items() if name in ("q", "r")]
+    """Local degrees of freedom that an end holds, or that a planar rod does without."""
+    dofs = [d.ravel() for d in fields.dofs.values()]
     used = np.unique(np.concatenate(dofs))
     return used[fields.number[used] < 0]
 
@@ -148,7 +148,8 @@ def _held(fields: Fields) -> np.ndarray:
 def _random_state(fields: Fields, kept: np.ndarray, seed: int) -> None:
     """Put a random state with a random load into ``fields.u``: the same on any number of ranks, ends held.
 
-    Values are functions of the place along the rod, not of the numbering.
+    Values are functions of the place along the rod, not of the numbering.  Those of a ring are closed: whether a pressure
+    is felt by a translation, say, only shows there; the multipliers that close it have no generators of their own.
     """
     rng = np.random.default_rng(seed)
     u = fields.u.x.array
@@ -157,11 +158,13 @@ def _random_state(fields: Fields, kept: np.ndarray, seed: int) -> None:
         x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
         a, b, p = rng.normal(size=(3, block.size))
         values = 0.5 * a + 0.5 * b * np.cos(2.1 * x[..., None] + 6.0 * p) + 0.3 * p * x[..., None] ** 2
+        if isinstance(scene.ends, Ring) and block.continuous:
+            turns = np.pi * (1 if scene.ends.odd and block.name == "q" else 2)
+            values = a * np.cos(turns * x[..., None]) + b * np.sin(3 * turns * x[..., None] + 6.0 * p)
         if block.name == "v":
             values = 0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains]
         u[fields.dofs[block.name]] = values
-    held = _held(fields)
-    u[held] = kept[held]
+    u[fields.number < 0] = kept[fields.number < 0]
     for i in range(len(fields.unknown_scalars)):
         u[fields.copies[:, i]] = rng.normal()
     low, high = sorted(scene.span)

@@ -36,6 +36,10 @@ INVERSES = ("saddle", "elimination")
 SINGULAR = 1e-6
 """A solve that leaves more than this of its right-hand side behind was made with a singular matrix."""
 
+PREFIX = "rodfem_reduced_inverse_"
+CONTROLS = {7: 6, 14: 200}
+"""MUMPS's ordering for dense rows, as those of integral constraints (its default takes O(n^2)); room for pivots."""
+
 
 class Projection:
     """Blocks ``K``, ``C``, ``M`` of all ranks (scipy) and the kernel of ``C^t``."""
@@ -125,15 +129,16 @@ def factored(matrix: sp.spmatrix) -> Callable[[np.ndarray], np.ndarray]:
     """Solver with the LU factors of a matrix (MUMPS); raises :class:`ConvergenceError` where there are none."""
     petsc = petsc_matrix(MPI.COMM_SELF, matrix)
     ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-    ksp.setOptionsPrefix("rodfem_reduced_inverse_")
+    ksp.setOptionsPrefix(PREFIX)
+    options = PETSc.Options(PREFIX)
+    for control, number in CONTROLS.items():
+        if not options.hasName(f"mat_mumps_icntl_{control}"):
+            options.setValue(f"mat_mumps_icntl_{control}", number)
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
     ksp.getPC().setFactorSolverType("mumps")
     ksp.setFromOptions()
     ksp.setOperators(petsc)
-    ksp.getPC().setFactorSetUpSolverType()
-    factors = ksp.getPC().getFactorMatrix()
-    factors.setMumpsIcntl(14, 200)  # room for delayed pivots
     ksp.setUp()
     status = ksp.getPC().getFactorMatrix().getMumpsInfog(1)
     if status < 0:

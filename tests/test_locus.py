@@ -1,0 +1,227 @@
+"""Loci in the plane of two parameters against closed forms, and against shooting where the state depends on both."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from math import pi
+from pathlib import Path
+from types import SimpleNamespace
+
+import closed_form
+import numpy as np
+import pytest
+from exact import double
+from integration import Problem, Rod
+from mpi4py import MPI
+from rods import explored, follower, specials
+from scenes import explored as demo
+from scenes import scene as demo_scene
+from scipy.optimize import brentq
+
+from forms.energy import bending
+from rodfem.branch import Branch, Special
+from rodfem.continuation import Equilibria, Follower, Steps
+from rodfem.errors import SceneError
+from rodfem.explore import Explorer, Plan
+from rodfem.fields import Discretization
+from rodfem.locus import Locus, locus
+from rodfem.plot_locus import draw_locus
+from rodfem.report import Report
+from rodfem.scene import Ordinate, Parameter, Scene, clamped, free
+from rodfem.sweep import Sweep
+from rodfem.system import System
+
+PLANE = ((0.01, 0.9), (-3.1, 1.0))
+WIDE = Steps(first=0.05, largest=0.15)
+
+
+@cache
+def straight() -> Locus:
+    """Second buckling load of the hemitropic rod against the coupling A."""
+    return locus(follower(), specials(explored()[0], "branch point")[1], "A", PLANE, WIDE)
+
+
+def bent(s: np.ndarray) -> np.ndarray:
+    """Rotation by sin(pi s/2) about e2."""
+    half = np.sin(np.pi * s / 2) / 2
+    return np.stack([np.cos(half), 0 * s, np.sin(half), 0 * s], axis=-1)
+
+
+@cache
+def cantilever(load: str, span: tuple[float, float]) -> tuple[Follower, list[Branch]]:
+    """An inextensible cantilever under a thrust lam and a small force e across it, in the plane of weak bending."""
+    rod = Scene(
+        name="cantilever",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending(k, (10.0, 1.0, 10.0)),
+        parameters={"lam": Parameter(0.0 if load == "lam" else 2.8, r"\lambda"), "e": Parameter(0.0)},
+        load=load,
+        ends=(clamped(), free(lambda c: (c.e, 0.0, -c.lam))),
+        start=None if load == "lam" else bent,
+        ordinate=Ordinate("deflection of the tip", s=1.0, of=lambda r, q: float(r[0])),
+        span=span,
+    )
+    solver = Follower(System(rod, Discretization("reduced", 4, 6)))
+    plan = Plan(span, depth=0, error_bars=False)
+    return solver, Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+
+
+def root(f, guess: float) -> float:  # type: ignore[no-untyped-def]
+    return float(brentq(f, guess - 1e-3, guess + 1e-3, xtol=1e-15, rtol=1e-14))
+
+
+def test_buckling_of_the_straight_rod() -> None:
+    """On the closed form all along, with two turning points in the load, and bounds that are met exactly."""
+    found = straight()
+    exact = np.array([root(lambda x, A=A: closed_form.buckling(x, A, 1, 1, 3), lam) for lam, A in found.values])
+    miss, known = abs(found.values[:, 0] - exact), ~np.isnan(found.error[:, 0])
+    assert miss.max() < 1e-10
+    assert known.sum() >= 5
+    assert np.all(miss[known] <= 3 * found.error[known].sum(axis=1))
+    assert found.error[known].max() < 1e-9
+    assert found.ended == ("A = -3.1, its bound", "A = 1, its bound")
+    assert (found.values[0, 1], found.values[-1, 1]) == (-3.1, 1.0)
+    assert found.values[found.start] == pytest.approx([closed_form.loads(-3, 1, 1, 3)[1], -3.0], abs=1e-10)
+    assert {tuple(pair) for pair in found.index.tolist()} == {(2, 4)}
+    turns = [found.values[m.row] for m in found.marks]
+    assert [m.kind for m in found.marks] == ["turns in lam"] * 2
+    for lam, A in turns:
+        slope = closed_form.buckling(lam, A + 1e-4, 1, 1, 3) - closed_form.buckling(lam, A - 1e-4, 1, 1, 3)
+        assert abs(slope) < 1e-10
+    assert turns[1][1] == pytest.approx(0, abs=1e-7)
+
+
+def test_straight_cord() -> None:
+    (first, _) = specials(demo("cord")["straight"], "branch point")
+    found = locus(demo("cord").follower, first, "k0", ((-10.0, 60.0), (3.0, 16.0)), steps=WIDE, error_bars=2)
+    lam, k0 = found.values.T
+    assert (lam[0], lam[-1]) == (-10.0, 60.0)
+    assert abs(lam - k0**2 + 4 * pi**2).max() < 1e-9
+    assert {tuple(pair) for pair in found.index.tolist()} == {(0, 1)}
+
+
+def test_fold_of_the_cord_by_shooting() -> None:
+    """The state depends on both parameters; the fold by shooting is where its determinant vanishes, in the moment."""
+    cord = demo("cord")
+    (fold,) = specials(cord["branch 2"], "fold")
+    found = locus(cord.follower, fold, "k0", ((4.0, 13.0), (8.0, 11.0)), steps=WIDE, error_bars=3)
+    assert found.values[[0, -1], 0].tolist() == [4.0, 13.0]
+    assert found.values[found.start, 0] == pytest.approx(7.8065554232, abs=1e-8)
+    for row in (0, len(found.values) - 1):
+        lam, k0 = found.values[row]
+        n, k = cord.start_of_rod(SimpleNamespace(x=found.states[row]))  # type: ignore[arg-type]
+        rod = Problem(Rod(intrinsic=(0.0, k0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])
+        p = np.array([n[0], n[1], lam, k[0], k[1] - k0, k[2]])
+
+        def beside(h: float, rod: Problem = rod, p: np.ndarray = p) -> tuple[np.ndarray, np.ndarray]:
+            return rod.solve(p + h * np.eye(6)[4], shot=[0, 1, 2, 3, 5])
+
+        h = brentq(lambda h: rod.singular(beside(h)[0]), -1e-3, 1e-3, xtol=1e-8)  # noqa: B023
+        p, end = beside(h)
+        beyond = found.values[row] - found.values[abs(row - 1)]
+        at_this_k0 = found.error[row] @ [1.0, abs(beyond[0] / beyond[1])]  # errors are measured across the curve
+        assert abs(p[2] - lam) <= 3 * at_this_k0 <= 1e-7
+        assert 1 - end[9] == pytest.approx(found.ordinate[row], abs=1e-7)
+    assert {tuple(pair) for pair in found.index.tolist()} == {(1, 2)}
+
+
+def test_fold_ends_where_the_pitchfork_changes_its_side() -> None:
+    constants = (-2.0, 1.0, 1.0, 3.0)
+    (fold,) = specials(explored(constants=constants)[2], "fold")
+    found = locus(follower(constants=constants), fold, "A", PLANE, steps=WIDE, error_bars=2)
+    assert all(sentence.startswith("the fold ends on a branch point") for sentence in found.ended)
+    for row in (0, -1):
+        lam, A = found.values[row]
+        assert closed_form.loads(A, 1, 1, 3)[1] == pytest.approx(lam, abs=1e-9)
+        assert found.ordinate[row] < 1e-5
+    assert found.values[found.start, 0] == pytest.approx(0.3534002860735, abs=1e-9)
+
+
+def test_cusp() -> None:
+    """A thrust above Euler's and a force across that sweeps from one side to the other: folds that meet at a cusp."""
+    solver, (branch,) = cantilever("e", (0.3, -0.3))
+    fold = specials(branch, "fold")[0]
+    found = locus(solver, fold, "lam", ((-0.5, 0.5), (2.0, 3.0)), steps=WIDE, error_bars=0)
+    (cusp,) = found.marks
+    assert cusp.kind == "cusp"
+    assert found.values[cusp.row] == pytest.approx([0, pi**2 / 4], abs=1e-9)
+    assert found.ended == ("lam = 3, its bound", "lam = 3, its bound")
+    assert found.values[0, 0] == pytest.approx(-found.values[-1, 0], abs=1e-9)
+    assert {tuple(pair) for pair in found.index.tolist()} == {(0, 1)}
+
+
+def test_a_parameter_that_destroys_the_branch_point() -> None:
+    solver, (branch,) = cantilever("lam", (0.0, 4.0))
+    (euler,) = specials(branch, "branch point")
+    found = locus(solver, euler, "e", ((0.0, 4.0), (-1.0, 1.0)), steps=WIDE, error_bars=0)
+    assert len(found.values) == 1
+    assert found.ended == ("e is an imperfection that destroys the branch point",) * 2
+
+
+def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rodfem.sweep.LOADS", 6)
+    rod = demo_scene("follower", span=(19.0, 21.0))
+    solver = Equilibria(System(rod, Discretization("pointwise", 4, 6)))
+    (branch,) = Sweep(solver, Plan(rod.span, error_bars=False), Report(quiet=True), lambda: None).run()
+    (flutter,) = specials(branch, "flutter")
+    found = locus(solver, flutter, "J1", ((18.0, 22.0), (0.0, 0.004)), steps=WIDE, error_bars=2)
+    assert found.ended == ("J1 = 0, its bound", "J1 = 0.004, its bound")
+    for (P, J), mu in zip(found.values, found.omega2, strict=True):
+        assert [P, mu] == pytest.approx(double(P, mu, J).tolist(), rel=3e-11)
+    assert abs(found.values[-1, 0] - double(20.0, 120.0, 0.004)[0]) <= 10 * found.error[-1].max() <= 1e-9
+
+
+def test_nothing_is_left_behind() -> None:
+    solver, special = follower(), specials(explored()[0], "branch point")[0]
+    system, equations = solver.system, solver.system.equations
+    point = explored()[1].points[5]
+    system.set_phase(point.x)
+    before, phases = solver.point(point.x, 0.0, None), list(system.phases)
+    constants = equations.base.value.copy(), equations.direction.value.copy(), system.scene
+    locus(solver, special, "C", ((0.01, 0.9), (0.95, 1.05)), steps=WIDE, error_bars=0)
+    assert (equations.base.value == constants[0]).all() and (equations.direction.value == constants[1]).all()
+    assert system.scene is constants[2]
+    assert all(a is b for a, b in zip(system.phases, phases, strict=True))
+    after = solver.point(point.x, 0.0, None)
+    for name in ("load", "ordinate", "energy", "negative", "zero", "stretch"):
+        assert getattr(after, name) == pytest.approx(getattr(before, name), rel=1e-13)
+
+
+def test_saved_and_drawn(folder: Path) -> None:
+    found = straight()
+    if MPI.COMM_WORLD.rank == 0:
+        found.save(folder / "locus.json")
+        data = json.loads((folder / "locus.json").read_text())
+        assert data["columns"]["lam"] == found.values[:, 0].tolist()
+        assert data["columns"]["error"][1] == [None, None]
+        assert draw_locus([data], folder / "locus.png").stat().st_size > 20000
+        text = found.text()
+        assert "Locus of the branch point in lam and A" in text
+        assert "turns in lam" in text
+        with pytest.raises(ValueError, match="no locus"):
+            draw_locus([], folder / "none.png")
+
+
+@pytest.mark.parametrize(
+    ("parameter", "bounds", "message"),
+    [
+        ("D", PLANE, "'D' is no parameter of the scene"),
+        ("lam", PLANE, "is the load itself"),
+        ("A", ((0.01, 0.9), (1.0, -1.0)), "bounds 1, -1 of A are empty"),
+        ("A", ((0.01, 2.0), (-3.1, 1.0)), "outside its admissible range"),
+        ("A", ((0.01, 0.9), (-4.0, 1.0)), "not convex"),
+        ("A", ((0.2, 0.9), (-3.1, 1.0)), "outside the bounds: widen them"),
+    ],
+)
+def test_mistakes(parameter: str, bounds: tuple, message: str) -> None:
+    special = specials(explored()[0], "branch point")[0]
+    with pytest.raises(SceneError, match=message):
+        locus(follower(), special, parameter, bounds)
+
+
+def test_no_locus_of_an_end() -> None:
+    end: Special = specials(explored()[0], "end")[0]
+    with pytest.raises(SceneError, match="has no locus"):
+        locus(follower(), end, "A", ((0.01, 0.96), (-3.1, 1.0)))
