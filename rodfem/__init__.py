@@ -20,6 +20,8 @@ from importlib import import_module
 from typing import Any
 
 _HOMES = {
+    "locus": "loci.locus",
+    "Locus": "loci.locus",
     **dict.fromkeys(
         ("End", "clamped", "pinned", "sliding", "hinged", "free", "Ring", "Attachment", "Constraint"), "ends"
     ),

@@ -103,7 +103,9 @@ def scalars_of(scene: Scene, discretization: Discretization) -> list[Unknown]:
     count = sum(x.kind != "pointwise" for x in scene.constraints)
     out += [Unknown(f"g{i + 1}", "g", i, True) for i in range(count)]
     if isinstance(scene.ends, Ring):
-        out += [Unknown(f"t{i + 1}", "t", i, True) for i in (range(4) if scene.normal is None else (0, scene.normal + 1))]
+        out += [
+            Unknown(f"t{i + 1}", "t", i, True) for i in (range(4) if scene.normal is None else (0, scene.normal + 1))
+        ]
         if discretization.formulation == "pointwise":
             out += [Unknown(f"f{i + 1}", "f", i, True) for i in inside]
     return out

@@ -32,7 +32,7 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     Parameters
     ----------
     loci
-        Contents of files written by :meth:`rodfem.locus.Locus.save`, of the same two parameters.
+        Contents of files written by :meth:`rodfem.loci.locus.Locus.save`, of the same two parameters.
     path
         Picture to write, 7.5 in by 5 in at 200 dpi; the suffix decides the format.
 

@@ -134,8 +134,21 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
     _, singular, vectors = np.linalg.svd(np.vstack([*rows, *fields.comm.allgather(local)]))
     null = vectors[singular < EXACT * max(singular[0], 1.0)].T
     sizes, combinations = np.linalg.eigh(null.T @ (moved / scale.max() ** 2) @ null)
-    basis = null @ combinations[:, sizes > EXACT]
-    return [Symmetry(np.where(abs(w) > 1e-12, w, 0.0), parts) for w in basis.T]
+    basis = simplest(null @ combinations[:, sizes > EXACT])
+    return [Symmetry(w, parts) for w in basis.T]
+
+
+def simplest(basis: np.ndarray) -> np.ndarray:
+    """Basis of the same space, columns with a one where all others have a zero: plain rotations and translations."""
+    rows = basis.T.copy()
+    for i in range(len(rows)):
+        column = int(np.argmax(abs(rows[i:]).max(axis=0) > 0.5 * abs(rows[i:]).max()))
+        pivot = i + int(np.argmax(abs(rows[i:, column])))
+        rows[[i, pivot]] = rows[[pivot, i]]
+        rows[i] /= rows[i, column]
+        others = np.arange(len(rows)) != i
+        rows[others] -= np.outer(rows[others, column], rows[i])
+    return np.where(abs(rows) > 1e-9, rows, 0.0).T
 
 
 def _held(fields: Fields) -> np.ndarray:

@@ -22,13 +22,14 @@ from scipy.optimize import brentq
 from forms.energy import bending
 from rodfem.branch import Branch, Special
 from rodfem.continuation import Equilibria, Follower, Steps
+from rodfem.ends import clamped, free
 from rodfem.errors import SceneError
 from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization
-from rodfem.locus import Locus, locus
+from rodfem.loci.locus import Locus, locus
 from rodfem.plot_locus import draw_locus
 from rodfem.report import Report
-from rodfem.scene import Ordinate, Parameter, Scene, clamped, free
+from rodfem.scene import Ordinate, Parameter, Scene
 from rodfem.sweep import Sweep
 from rodfem.system import System
 

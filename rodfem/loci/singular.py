@@ -36,11 +36,11 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.bordered import Bordered
 from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError
+from rodfem.loci.bordered import Bordered
+from rodfem.loci.plane import Node, Plane
 from rodfem.newton import ROUND_OFF, TOLERANCE
-from rodfem.plane import Node, Plane
 from rodfem.stability.inertia import combine
 
 DIFFERENCE = 1e-4

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError
-from rodfem.plane import Node, Plane
+from rodfem.loci.plane import Node, Plane
 from rodfem.stability.vibration import Vibration
 from rodfem.sweep import REAL
 

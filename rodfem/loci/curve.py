@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 
 from rodfem.continuation import Steps
 from rodfem.errors import ConvergenceError
-from rodfem.plane import Node, Plane, between, predict
-from rodfem.singular import Destroyed
+from rodfem.loci.plane import Node, Plane, between, predict
+from rodfem.loci.singular import Destroyed
 
 LOCATED = 1e-8
 """Arclength to which turning points and cusps are located: their parameters are so to its square."""

@@ -2,7 +2,7 @@ r"""Loci of special points in the plane of two parameters: the boundary of stabi
 
 A fold, a branch point or a flutter load ``lam`` of a scene moves as another of its parameters does.  Its curve in the
 plane of both is followed by pseudo-arclength continuation of the equations that define it, in the space of the state
-and *both* parameters (see :mod:`rodfem.singular` and :mod:`rodfem.collision`): neither is the independent one, so that
+and *both* parameters (see :mod:`rodfem.loci.singular` and :mod:`rodfem.loci.collision`): neither is the independent one, so that
 the curve may turn back with respect to either, and a fold's curve goes through cusps, where it is smooth but for its
 projection on the plane.  Both directions are followed, to the bounds, exactly, or to where the special point changes
 its kind.
@@ -22,14 +22,14 @@ from petsc4py import PETSc
 
 from rodfem.accuracy import Richer, Transfer
 from rodfem.branch import BRANCH_POINT, FLUTTER, FOLD, Special
-from rodfem.collision import Collision
 from rodfem.continuation import Equilibria, Follower, Steps
-from rodfem.curve import Criterion, Half, Tracer
 from rodfem.diagram import save_json
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.plane import Interval, Node, Plane
+from rodfem.loci.collision import Collision
+from rodfem.loci.curve import Criterion, Half, Tracer
+from rodfem.loci.plane import Interval, Node, Plane
+from rodfem.loci.singular import Singular
 from rodfem.report import number
-from rodfem.singular import Singular
 from rodfem.system import System
 
 STEPS = Steps(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
