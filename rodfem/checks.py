@@ -24,12 +24,13 @@ def check_scene(scene: Scene) -> None:
 
 def check_convexity(scene: Scene) -> None:
     """Raise where the stored energy is not strictly convex at the undeformed state."""
-    for s in scene.samples():
+    for s in scene.samples() if scene.depends_on_s() else [None]:
         stiffness = scene.stiffness(s)
         lowest = np.linalg.eigvalsh(stiffness)[0] if stiffness.size else 1.0
         if lowest <= 1e-12 * abs(stiffness).max(initial=0.0):
+            where = "" if s is None else f" at s = {s:g}"
             raise SceneError(
-                f"The stored energy is not convex at s = {s:g}: its second derivative at the undeformed state has the "
+                f"The stored energy is not convex{where}: its second derivative at the undeformed state has the "
                 f"eigenvalue {lowest:.3g}; choose constants for which all are positive."
             )
 
@@ -46,7 +47,8 @@ def check_supports(scene: Scene) -> None:
                 check_vector(f"rotation of the {side} end", rotation, 4)
                 if scene.normal is not None and any(rotation[i + 1] != 0 for i in range(3) if i != scene.normal):
                     raise SceneError(
-                        f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about that axis only."
+                        f"The rotation of the {side} end leaves the plane across {scene.planar}: "
+                        "turn about that axis only."
                     )
                 if not sum(float(x) ** 2 for x in rotation) > 0:
                     raise SceneError(f"The rotation of the {side} end is the zero quaternion: give one of size one.")

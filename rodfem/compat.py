@@ -5,6 +5,7 @@ Supported: 0.5.2 (Debian 12) and 0.9.0 (Debian 13).  Nothing else in rodfem asks
 
 from __future__ import annotations
 
+import inspect
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -140,6 +141,21 @@ def compile_forms(forms: Sequence[Any]) -> list[Any]:
             "A compiled form never became ready, most likely because an earlier run was killed while compiling: "
             "delete the folder ~/.cache/fenics (or $XDG_CACHE_HOME/fenics) and run again."
         ) from locked
+
+
+def expression(form: Any, points: np.ndarray, mesh: Any, cells: int) -> Callable[[], np.ndarray]:
+    """Compile a UFL vector to be evaluated at reference ``points`` (m, 1) of the first cells: (cells, m * size)."""
+    with _quiet():
+        compiled = fem.Expression(form, points, dtype=REAL)
+    chosen = np.arange(cells, dtype=np.int32)
+    takes_mesh = "mesh" in inspect.signature(compiled.eval).parameters
+    takes_entities = "entities" in inspect.signature(compiled.eval).parameters
+
+    def evaluate() -> np.ndarray:
+        values = compiled.eval(mesh, chosen) if takes_mesh or takes_entities else compiled.eval(chosen)
+        return np.asarray(values).reshape(cells, -1)
+
+    return evaluate
 
 
 def assemble_matrix(matrix: PETSc.Mat, form: Any, rows: np.ndarray, columns: np.ndarray) -> None:

@@ -17,6 +17,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.branch import Point
+from rodfem.convexity import Convexity
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.newton import Outcome, correct
 from rodfem.shape import Shape
@@ -63,7 +64,7 @@ class Equilibria:
         self.axis = system.load_axis()
 
     def start(self, load: float) -> PETSc.Vec:
-        """First guess at ``load``: the scene's ``start`` rotation, undeformed strains, where that leads, zero forces."""
+        """First guess at ``load``: the scene's ``start`` rotation, undeformed strains, zero forces."""
         system, f = self.system, self.system.fields
         x = f.coordinates(f.discretization.degree)
         guess = system.scene.start
@@ -105,6 +106,7 @@ class Follower(Equilibria):
         self.inertia = Inertia(system)
         self.modes = spectrum
         self.spectrum = Spectrum(self.inertia) if spectrum else None
+        self.convexity = None if system.scene.is_quadratic() else Convexity(system)
         self.space = InSpace(system) if system.scene.normal is not None else None
 
     def point(self, x: PETSc.Vec, arclength: float, tangent: PETSc.Vec | None, outcome: Outcome | None = None) -> Point:

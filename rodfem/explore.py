@@ -175,6 +175,9 @@ class Explorer:
             if item.stretch <= 0:
                 self._end_at_zero_stretch(branch, previous, item)
                 return
+            if self.follower.convexity is not None and self.follower.convexity.lowest(item.x) <= 0:
+                branch.ended = f"the stored energy is not convex any more at {self.scene.load} = {item.load:.6g}"
+                return
             reason = self._between(branch, previous, item)
             if reason:
                 branch.ended = reason

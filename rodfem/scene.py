@@ -229,6 +229,35 @@ class Scene:
             return -left.applied(c)[component]
         return None
 
+    def depends_on_s(self) -> bool:
+        """Whether the stored energy is a function of the arclength too."""
+        asked: list[bool] = []
+
+        class Watched(SimpleNamespace):
+            def __getattribute__(self, name: str) -> Any:
+                if name == "s":
+                    asked.append(True)
+                return super().__getattribute__(name)
+
+        self._energy_at(np.zeros(3), np.zeros(3), Watched(**vars(self.constants())))
+        return bool(asked)
+
+    def _energy_at(self, v: np.ndarray, k: np.ndarray, c: Constants) -> float:
+        strains = [UNDEFORMED[i] + float(v[i]) for i in range(3)]
+        W = self.energy(ufl.as_vector(strains), ufl.as_vector([float(x) for x in k]), c)
+        return float(ufl.as_ufl(W)(()))
+
+    def is_quadratic(self) -> bool:
+        """Whether the stored energy is a quadratic function of the strains, by third differences along lines."""
+        rng = np.random.default_rng(1)
+        free = np.isin(np.arange(3), self.free_strains)
+        for _ in range(2):
+            v, k = 0.05 * rng.uniform(-1, 1, size=(2, 3))
+            values = [self._energy_at(t * v * free, t * k, self.constants()) for t in (0.0, 1.0, 2.0, 3.0)]
+            if abs(np.diff(values, 3)[0]) > 1e-9 * max(map(abs, values)):
+                return False
+        return True
+
     def stiffness(self, s: float | None = None) -> np.ndarray:
         """Second derivative of ``W`` in the m free strains and ``k`` at the undeformed state, (m + 3, m + 3)."""
         free_v = self.free_strains

@@ -176,15 +176,21 @@ class Sweep:
                 floor = max(s.located_to, 1e-12 * max(1.0, abs(s.point.load)))
                 s.error_estimate = s.ordinate_error = floor
                 if s.kind == FLUTTER:
-                    guess = transfer(s.point.x, state=True)
-                    load, _, mu = locate_flutter(
-                        lambda p, m, guess=guess: discriminant(richer, vibration, p, m, guess),
-                        s.point.load,
-                        0.05 * abs(s.point.load),
-                        s.omega2,
-                    )
+                    load, _, mu = self._richer_flutter(richer, vibration, transfer, s)
                     s.error_estimate = max(abs(load - s.point.load), floor)
                     s.omega2_error = max(abs(mu - s.omega2), 1e-12 * abs(mu))
+
+    @staticmethod
+    def _richer_flutter(
+        richer: Equilibria, vibration: Vibration, transfer: Transfer, s: Special
+    ) -> tuple[float, float, float]:
+        """Flutter load on the richer discretisation, its uncertainty, and the double eigenvalue."""
+        guess = transfer(s.point.x, state=True)
+
+        def f(load: float, center: float) -> tuple[float, float]:
+            return discriminant(richer, vibration, load, center, guess)
+
+        return locate_flutter(f, s.point.load, 0.05 * abs(s.point.load), s.omega2)
 
 
 def discriminant(

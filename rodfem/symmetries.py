@@ -161,8 +161,8 @@ def _held(fields: Fields) -> np.ndarray:
 def _random_state(fields: Fields, kept: np.ndarray, seed: int) -> None:
     """Put a random state with a random load into ``fields.u``: the same on any number of ranks, ends held.
 
-    Values are functions of the place along the rod, not of the numbering.  Those of a ring are closed: whether a pressure
-    is felt by a translation, say, only shows there; the multipliers that close it have no generators of their own.
+    Values are functions of the place along the rod, not of the numbering.  Those of a ring are closed: whether a
+    pressure is felt by a translation, say, only shows there; multipliers that close it have no generators of their own.
     """
     rng = np.random.default_rng(seed)
     u = fields.u.x.array

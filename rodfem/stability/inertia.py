@@ -109,9 +109,9 @@ class Inertia:
     ) -> tuple[np.ndarray, list[PETSc.Vec]]:
         """Return the eigenvalues nearest zero of the matrix last factored, and their vectors (metric norm 1).
 
-        Block inverse iteration from the vectors of the last call, with a Rayleigh-Ritz projection of ``S``, until the ``number`` wanted values change by
-        less than ``accuracy`` relative to themselves (or by what the arithmetic resolves).  The block has
-        ``spare`` more vectors.
+        Block inverse iteration from the vectors of the last call, with a Rayleigh-Ritz projection of ``S``, until the
+        ``number`` wanted values change by less than ``accuracy`` relative to themselves (or by what the arithmetic
+        resolves).  The block has ``spare`` more vectors.
         """
         metric, block = self.metric, number + spare
         while len(self._vectors) < block:
