@@ -4,8 +4,8 @@ A fold, a branch point or a flutter load ``lam`` of a scene moves as another of 
 plane of both is followed by pseudo-arclength continuation of the equations that define it, in the space of the state
 and *both* parameters (see :mod:`rodfem.loci.singular` and :mod:`rodfem.loci.collision`): neither is the independent
 one, so that the curve may turn back with respect to either, and a fold's curve goes through cusps, where it is smooth
-but for its projection on the plane.  Both directions are followed, to the bounds, exactly, or to where the special point changes
-its kind.
+but for its projection on the plane.  Both directions are followed, to the bounds, exactly, or to where the special
+point changes its kind.
 
 Arclength is measured with the parameters relative to the widths of their bounds, and the state in its metric.
 """
