@@ -59,9 +59,7 @@ def scene(options: Namespace) -> Scene:
 
 
 if __name__ == "__main__":
-    parser = cli.parser_for(
-        "follower", __doc__, load="P", span=(0.0, 25.0), elements=4, degree=6, formulation="pointwise"
-    )
+    parser = cli.parser_for("follower", __doc__, load="P", span=(0.0, 25.0), elements=4, degree=6)
     constants = parser.add_argument_group("constants of the rod")
     constants.add_argument(
         "--stiffness", type=float, nargs=3, default=(1.0, 10.0, 1.0), metavar="B", help="B1 B2 B3 (default 1 10 1)"

@@ -1,15 +1,45 @@
 """Stability of the equilibria of elastic rods: which are stable, and where they stop being so.
 
-A person states a :class:`~rodfem.scene.Scene` (rod, ends, load, symmetry, what to record), chooses a
-:class:`~rodfem.fields.Discretization` and a :class:`~rodfem.explore.Plan`, and calls :func:`~rodfem.runner.run`, which
-traces the equilibria, decides the stability of each, finds and classifies the points where it is lost, and follows what
-branches off.
-``demos/hemitropic.py`` is a whole example.
+A person states a :class:`Scene` and calls :func:`run`, which traces the equilibria, decides the stability of each,
+finds and classifies the points where it is lost, follows what branches off, and writes files and pictures::
 
-Data flows, and imports go, one way: ``scene`` -> ``fields`` -> ``equations`` -> ``system`` (the bordered saddle
-point) -> ``newton``, ``stability`` -> ``continuation`` -> ``locate``, ``bifurcation`` -> ``accuracy`` ->
-``explore`` -> ``diagram``, ``runner`` -> ``cli``. ``plot`` and ``render`` draw from saved files alone. The
-mathematics is in the package ``forms``.
+    from math import hypot
+    from forms.energy import bending
+    from rodfem import Ordinate, Parameter, Scene, clamped, free, run
+
+    column = Scene(
+        name="column",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending(k, (c.EI, 2 * c.EI, 1.0)),
+        parameters={"P": Parameter(0.0), "EI": Parameter(1.0)},
+        load="P",
+        ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
+        ordinate=Ordinate("tip displacement", s=1.0, of=lambda r, q: hypot(r[0], r[1])),
+        span=(0.0, 10.0),
+    )
+    run(column)
+
+* **Rod**: ``flexible``, ``unshearable``, ``inextensible`` or both; any stored energy ``W(v, k, c)`` that returns a UFL
+  expression of the strains, the constants and the arclength ``c.s`` (:mod:`forms.energy` has a few).
+* **Ends**: :func:`clamped`, :func:`pinned`, :func:`sliding`, :func:`hinged`, :func:`free`, :func:`elastic`, or in full
+  :class:`End`; a closed rod is a :class:`Ring`.  Positions and rotations may be functions of the constants.
+* **Loads**: forces and moments of an :class:`End`; ``distributed``, ``follower`` and ``potential`` of a :class:`Scene`;
+  an :class:`Attachment` at any point (:mod:`forms.loads` has potentials).  Loads without a potential make
+  ``Scene.conservative`` False: then frequencies are computed, and flutter.
+* **Constraints**: :func:`at` a point, :func:`integral` over the rod, :func:`everywhere` along it.
+* **Parameters**: any of them can be the load, :meth:`Scene.varying`; :func:`locus` follows a special point in the plane
+  of two of them.
+* **Plane**: ``planar="e2"`` keeps the rod in the plane across e2, and records its index in space besides.
+* **What is not connected**: :func:`further` looks for other equilibria at a load by deflation.
+
+Continuous symmetries (a rod free to turn about its axis, a ring that may go anywhere) are found, not stated: each state
+that breaks one has a zero eigenvalue for it, which is counted as zero.
+
+Data flows, and imports go, one way: ``ends``, ``scene`` -> ``fields`` -> ``equations`` -> ``symmetries``, ``system``
+(the bordered saddle point) -> ``newton``, ``stability`` -> ``continuation`` -> ``locate``, ``bifurcation`` ->
+``accuracy`` -> ``explore``, ``sweep``, ``loci``, ``deflation`` -> ``diagram``, ``runner`` -> ``cli``. ``plot`` and
+``render`` draw from saved files alone. The mathematics is in the package ``forms``.
 
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
 """
@@ -23,7 +53,7 @@ _HOMES = {
     "locus": "loci.locus",
     "Locus": "loci.locus",
     **dict.fromkeys(
-        ("End", "clamped", "pinned", "sliding", "hinged", "free", "Ring", "Attachment", "Constraint"), "ends"
+        ("End", "clamped", "pinned", "sliding", "hinged", "free", "elastic", "Ring", "Attachment", "Constraint"), "ends"
     ),
     **dict.fromkeys(("integral", "at", "everywhere"), "ends"),
     "Scene": "scene",
@@ -34,6 +64,9 @@ _HOMES = {
     "Plan": "explore",
     "Steps": "continuation",
     "run": "runner",
+    "further": "deflation",
+    "SceneError": "errors",
+    "ConvergenceError": "errors",
     "load_json": "diagram",
     "load_state": "diagram",
 }
@@ -46,3 +79,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'rodfem' has no attribute {name!r}; it has {', '.join(__all__)}")
     return getattr(import_module(f"rodfem.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """All public names, so that ``help(rodfem)`` and completion show them."""
+    return __all__

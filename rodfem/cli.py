@@ -63,7 +63,7 @@ def parser_for(
     span: tuple[float, float],
     elements: int,
     degree: int,
-    formulation: str = "reduced",
+    formulation: str = "auto",
 ) -> Parser:
     """Return the options that every demo has; a demo adds its own constants."""
     parser = Parser(
@@ -90,8 +90,9 @@ def parser_for(
     group.add_argument(
         "--formulation",
         default=formulation,
-        metavar="{reduced,pointwise}",
-        help=f"reduced: no centreline, the contact force as scalars; pointwise: all fields (default {formulation})",
+        metavar="{auto,reduced,pointwise}",
+        help="reduced: no centreline, the contact force as scalars; pointwise: all fields "
+        f"(default {formulation}: reduced where the scene allows it)",
     )
     group = parser.add_argument_group("what to compute")
     group.add_argument(

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from rodfem.branch import Point
 from rodfem.convexity import Convexity
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.newton import Outcome, correct
+from rodfem.newton import Outcome, correct, relax
 from rodfem.shape import Shape
 from rodfem.stability.in_space import InSpace
 from rodfem.stability.inertia import Index, Inertia
@@ -85,6 +85,16 @@ class Equilibria:
         x = guess.copy()
         self.system.set_load(x, load)
         outcome = correct(self.system, x, self.axis, reach=reach)
+        return x, outcome
+
+    def first(self, load: float) -> tuple[PETSc.Vec, Outcome]:
+        """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill."""
+        guess = self.start(load)
+        self.system.set_phase(guess)
+        x, outcome = self.at_load(guess, load)
+        if not outcome.converged:
+            x = guess.copy()
+            outcome = relax(self.system, x, self.axis)
         return x, outcome
 
     def energy(self, x: PETSc.Vec) -> float:

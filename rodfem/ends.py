@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
+from forms import loads
 from forms.rotation import IDENTITY
 from rodfem.errors import SceneError
 
@@ -126,6 +127,26 @@ def hinged(
 def free(force: OfConstants | None = None, follower: OfConstants | None = None, energy: OfPlace | None = None) -> End:
     """Return an end without support, loaded by a dead force, a follower force, a potential energy, or none."""
     return End(force=force, follower=follower, energy=energy)
+
+
+def elastic(
+    translation: Callable[[Constants], Any] | None = None,
+    rotation: Callable[[Constants], Any] | None = None,
+    anchor: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    directors: Quaternion = IDENTITY,
+    force: OfConstants | None = None,
+) -> End:
+    """Return an end held by springs: stiffness in translation and in rotation, each one number or three.
+
+    The first three are along e1, e2, e3, from ``anchor``; the second about the directors of ``directors``.  See
+    :func:`forms.loads.spring` and :func:`forms.loads.rotational_spring` (linear in the angle while it is small).
+    """
+
+    def energy(x: Place, c: Constants) -> Any:
+        out = 0 if translation is None else loads.spring(x.r, translation(c), anchor)
+        return out + (0 if rotation is None else loads.rotational_spring(x.q, rotation(c), directors))
+
+    return End(energy=energy, force=force)
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,13 @@ from rodfem.accuracy import Richer, zero_stretch
 from rodfem.bifurcation import VERTICAL, directions, find_special, midpoint, start_branch
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
 from rodfem.continuation import Follower, Steps, distance, follow, hermite
+from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError, SymmetryError
 from rodfem.locate import solve_at
 from rodfem.pitchfork import law_of
 from rodfem.report import Report
 from rodfem.scene import Scene
+from rodfem.topology import link
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
@@ -77,9 +79,7 @@ class Explorer:
     def _primary(self) -> Branch:
         start, stop = self.plan.span
         follower = self.follower
-        guess = follower.start(start)
-        follower.system.set_phase(guess)
-        x, outcome = follower.at_load(guess, start)
+        x, outcome = follower.first(start)
         if not outcome.converged:
             raise ConvergenceError(
                 f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: "
@@ -87,6 +87,13 @@ class Explorer:
             )
         follower.system.set_phase(x)
         point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
+        if isinstance(self.scene.ends, Ring):
+            number, Tw, Wr = link(follower.shape.sample(x))
+            self.report.say(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
+        if point.negative:
+            self.report.say(
+                f"  the first state is unstable already (index {point.negative}): stability was lost outside the range"
+            )
         return Branch(self.scene.states, None, 0, [point])
 
     def _switch(self, parent: Branch, i: int, special: Special) -> None:

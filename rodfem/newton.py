@@ -25,7 +25,13 @@ class Outcome:
     moved: float
 
 
-def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3) -> Outcome:
+def correct(
+    system: System,
+    x: PETSc.Vec,
+    row: PETSc.Vec,
+    most: int = 12,
+    reach: float = 1e3,
+) -> Outcome:
     """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
 
     A Jacobian is factored first, and again only while corrections do not shrink tenfold from one to the next:
@@ -55,3 +61,33 @@ def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach:
         previous = size
     origin.aypx(-1.0, x)
     return Outcome(False, iteration, size, float("inf"))
+
+
+def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Outcome:
+    """Solve from a guess that is too far for Newton's method, in place, by pseudo-transient continuation.
+
+    The overdamped motion ``M x' = -F(x)`` on the constraints is integrated by implicit Euler steps, ``(S + M/tau) dx =
+    -F``, with ``M`` the metric: it goes downhill, to a state that is stable if one can be reached.  The time step grows
+    while the steps are small, and Newton's method takes over near the end (Kelley & Keyes, SIAM J. Numer. Anal. 35
+    (1998) 508-523).
+    """
+    equations, step = system.new_vector(), system.new_vector()
+    tau, trial = 1e-2 / system.stiffness_scale, x.copy()
+    for iteration in range(most):
+        system.residual(x, equations)
+        system.factor(row, damping=1.0 / tau)
+        if not isfinite(equations.norm()) or not system.solve(equations, step):
+            break
+        size = system.norm(step)
+        if not size < 0.5:
+            tau /= 4
+            continue
+        x.axpy(-1.0, step)
+        tau *= 2.0 if size < 0.2 else 1.0
+        if iteration % 5 == 4 or size < 1e-3:
+            x.copy(trial)
+            outcome = correct(system, trial, row, reach=1.0)
+            if outcome.converged:
+                trial.copy(x)
+                return outcome
+    return Outcome(False, most, float("inf"), float("inf"))

@@ -42,9 +42,9 @@ def writable(folder: Path, comm: MPI.Comm) -> None:
 
 def run(
     scene: Scene,
-    discretization: Discretization,
-    plan: Plan,
-    output: Path,
+    discretization: Discretization | None = None,
+    plan: Plan | None = None,
+    output: Path | None = None,
     *,
     figures: bool = True,
     comm: MPI.Comm = MPI.COMM_WORLD,
@@ -52,8 +52,13 @@ def run(
 ) -> list[Branch]:
     """Explore a scene and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
-    Files are brought up to date after every branch, so that an interrupted run loses no finished one.
+    By default 8 elements of degree 6, the scene's own span, and the folder ``results/<name>``.  Files are brought up to
+    date after every branch, so that an interrupted run loses no finished one.  Raises
+    :class:`~rodfem.errors.SceneError` for bad input, before any computation, and
+    :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
     """
+    discretization, plan = discretization or Discretization(), plan or Plan(scene.span)
+    output = output or Path("results") / scene.name
     if scene.conservative:
         compat.require_real_petsc()
     plan.check(scene)

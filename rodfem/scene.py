@@ -1,4 +1,4 @@
-"""What a person states: a rod, its ends, its loads, its symmetry, and what to record.
+"""What a person states: a rod, its ends, its loads, and what to record.
 
 A :class:`Scene` is plain immutable data without meshes or matrices.  Functions in it receive a namespace ``c`` of
 named constants (``c.lam``, ``c.C``, ...; ``c.s`` is the arclength) and work on UFL expressions and on numbers alike.
@@ -7,7 +7,7 @@ named constants (``c.lam``, ``c.C``, ...; ``c.s`` is the arclength) and work on 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 from types import SimpleNamespace
 from typing import Any
@@ -175,6 +175,14 @@ class Scene:
         a, b = self.interval
         eps = 1e-6 * self.length
         return sorted({a + eps, (a + b) / 2, b - eps, *(s + d for s in self.joints for d in (-eps, eps))})
+
+    def varying(self, load: str, span: tuple[float, float], **values: float) -> Scene:
+        """Return the same scene with another parameter as its load, over ``span``, and other constants."""
+        unknown = [name for name in values if name not in self.parameters]
+        if unknown:
+            raise SceneError(f"{unknown[0]!r} is not a parameter: choose one of {', '.join(self.parameters)}.")
+        parameters = {n: replace(p, value=values.get(n, p.value)) for n, p in self.parameters.items()}
+        return replace(self, load=load, span=span, parameters=parameters)
 
     @property
     def length(self) -> float:

@@ -53,7 +53,7 @@ class Sweep:
         self.report.branch(branch)
         a, b = self.plan.span
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
-        x = self.solver.start(a)
+        x, _ = self.solver.first(a)
         for load in loads if a < b else loads[::-1]:
             x = self._state(x, float(load))
             before = self.pairs

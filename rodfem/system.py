@@ -189,9 +189,17 @@ class System:
             matrix.setValues([index], own, phase.array_r, addv=True)
             matrix.setValues(own, [index], phase.array_r, addv=True)
 
-    def factor(self, row: PETSc.Vec) -> None:
-        """Assemble and factor the Jacobian at the state last brought."""
+    @property
+    def stiffness_scale(self) -> float:
+        """Lowest bending eigenvalue of the rod relative to the metric, up to a number about one."""
+        return float(np.linalg.eigvalsh(self.scene.stiffness()[-3:, -3:])[0] * np.pi**2 / self.scene.length)
+
+    def factor(self, row: PETSc.Vec, damping: float = 0.0) -> None:
+        """Assemble and factor the Jacobian at the state last brought, with ``damping`` times the metric added."""
         matrix = self.jacobian(row)
+        if damping:
+            matrix.axpy(damping, self.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            matrix.stateIncrease()
         with self.clock("solve"):
             self.lu(matrix)
 

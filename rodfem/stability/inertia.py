@@ -58,9 +58,7 @@ class Inertia:
         self.metric.assemble()
         self.factors = inertia_factorizer(system.comm)
         self.constraints = system.fields.constraints()
-        length = system.scene.length
-        bending = np.linalg.eigvalsh(system.scene.stiffness()[-3:, -3:])[0]
-        self.scale = float(bending * np.pi**2 / length)
+        self.scale = system.stiffness_scale
         self.tolerance = 1e-7 * self.scale
         self.resolution = 0.0
         self._vectors: list[PETSc.Vec] = []
