@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
 from rodfem.errors import SceneError
@@ -40,7 +41,7 @@ def twist(s: np.ndarray, q: np.ndarray) -> float:
     fine = np.linspace(s[0], s[-1], 8 * len(s) + 1)
     p, d = spline(fine), spline(fine, 1)
     k3 = 2 * (p[:, 0] * d[:, 3] - p[:, 3] * d[:, 0] + p[:, 2] * d[:, 1] - p[:, 1] * d[:, 2]) / np.sum(p * p, axis=1)
-    return float(np.trapz(k3, fine) if hasattr(np, "trapz") else np.trapezoid(k3, fine)) / (2 * np.pi)
+    return float(trapezoid(k3, fine)) / (2 * np.pi)
 
 
 def link(sample: dict[str, Any], points: int = 400) -> tuple[int, float, float]:
