@@ -17,7 +17,7 @@ nearest point of that, where the gradient of ``d_i^2`` is still ``2 (x - x_i)``.
 
 Far from equilibrium, multipliers that fit the guess matter more than anything else.  A few steps of gradient flow
 (backward Euler: Newton's method with ``K + alpha M`` for ``K``) find them, and lead to where branches are.  Of guesses
-turned by 0.8 from a straight hemitropic rod 3 of 20 led to a buckled state without these steps, and 20 of 20 with them.
+turned by 0.8 from a straight hemitropic rod 4 of 20 led to a buckled state without these steps, and 20 of 20 with them.
 """
 
 from __future__ import annotations
