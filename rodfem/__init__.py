@@ -38,7 +38,7 @@ that breaks one has a zero eigenvalue for it, which is counted as zero.
 
 Data flows, and imports go, one way: ``ends``, ``scene`` -> ``fields`` -> ``equations`` -> ``symmetries``, ``system``
 (the bordered saddle point) -> ``newton``, ``stability`` -> ``continuation`` -> ``locate``, ``bifurcation`` ->
-``accuracy`` -> ``explore``, ``sweep``, ``loci``, ``deflation`` -> ``diagram``, ``runner`` -> ``cli``. ``plot`` and
+``accuracy`` -> ``explore``, ``sweep``, ``loci``, ``search`` -> ``diagram``, ``runner`` -> ``cli``. ``plot`` and
 ``render`` draw from saved files alone. The mathematics is in the package ``forms``.
 
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
@@ -64,7 +64,8 @@ _HOMES = {
     "Plan": "explore",
     "Steps": "continuation",
     "run": "runner",
-    "further": "deflation",
+    "further": "search.deflation",
+    "states_at": "search.deflation",
     "SceneError": "errors",
     "ConvergenceError": "errors",
     "load_json": "diagram",

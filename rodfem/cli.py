@@ -126,6 +126,13 @@ def parser_for(
         metavar="K",
         help="also compute the K left-most eigenvalues of every state with SLEPc",
     )
+    group.add_argument(
+        "--search",
+        type=int,
+        default=0,
+        metavar="TRIES",
+        help="at each load of --at also look for equilibria that no branch has reached, with that many tries",
+    )
     group = parser.add_argument_group("output")
     group.add_argument(
         "--output",
@@ -170,7 +177,8 @@ def main(
         discretization = Discretization(options.formulation, options.elements, options.degree)
         scene = scene_of(options)
         span = tuple(options.span)
-        plan = Plan(span, at=tuple(options.at), spectrum=options.spectrum, steps=Steps(largest=options.step))
+        steps = Steps(largest=options.step)
+        plan = Plan(span, at=tuple(options.at), spectrum=options.spectrum, steps=steps, tries=options.search)
         run(scene, discretization, plan, options.output, figures=options.figures)
     except KeyboardInterrupt:
         from mpi4py import MPI

@@ -69,6 +69,7 @@ class Equilibria:
         x = f.coordinates(f.discretization.degree)
         guess = system.scene.start
         q = np.tile([1.0, 0.0, 0.0, 0.0], (x.size, 1)) if guess is None else np.asarray(guess(x.ravel()))
+        f.u.x.array[f.number >= 0] = 0.0
         held = f.number[f.dofs["q"]] < 0
         clamped = f.u.x.array[f.dofs["q"]]
         f.u.x.array[f.dofs["q"]] = np.where(held, clamped, q.reshape(*x.shape, 4))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -19,6 +20,7 @@ from rodfem.locate import solve_at
 from rodfem.pitchfork import law_of
 from rodfem.report import Report
 from rodfem.scene import Scene
+from rodfem.search.deflation import further, starts, states_at
 from rodfem.topology import link
 
 BEYOND = 0.02
@@ -27,7 +29,11 @@ BEYOND = 0.02
 
 @dataclass(frozen=True)
 class Plan:
-    """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars."""
+    """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars.
+
+    ``spectrum`` left-most eigenvalues of every state are found besides its index; ``tries`` deflated iterations at each
+    of the loads ``at`` look for equilibria that no branch has reached.
+    """
 
     span: tuple[float, float]
     at: tuple[float, ...] = ()
@@ -35,6 +41,7 @@ class Plan:
     steps: Steps = field(default_factory=Steps)
     error_bars: bool = True
     spectrum: int = 0
+    tries: int = 0
 
     def check(self, scene: Scene) -> None:
         """Raise :class:`SceneError` for a range that the scene does not admit, or a load outside the range."""
@@ -46,6 +53,10 @@ class Plan:
                     f"The load {load:g} asked for is outside the range {low:g} to {high:g}: "
                     "widen the range or leave it out."
                 )
+        if self.tries < 0:
+            raise SceneError(f"{self.tries} is not a number of tries: give 0 or more to --search.")
+        if self.tries and not self.at:
+            raise SceneError("A search needs loads to search at: give them with --at.")
         if self.spectrum < 0:
             raise SceneError(f"{self.spectrum} is not a number of eigenvalues: give 0 or more to --spectrum.")
 
@@ -69,12 +80,30 @@ class Explorer:
     def run(self) -> list[Branch]:
         """Trace the start state's branch, then what leaves each branch point, breadth first."""
         self.trace(self._primary())
-        for branch in self.branches:  # grows while it is walked
+        self._branch_off(0)
+        for load in self.plan.at if self.plan.tries else ():
+            self._search(load)
+        return self.branches
+
+    def _search(self, load: float) -> None:
+        """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
+        self.report.say()
+        with self.follower.system.clock.purpose("search"):
+            known = states_at(self.follower, self.branches, load)
+            found = further(self.follower, load, known, self.plan.tries, report=self.report)
+        before = len(self.branches)
+        for i, point in enumerate(found):
+            for branch in starts(point, f"found {i + 1} at {load:g}"):
+                self.trace(branch)
+        self._branch_off(before)
+
+    def _branch_off(self, first: int) -> None:
+        """Trace what leaves the branch points of the branches from number ``first`` on, breadth first."""
+        for branch in itertools.islice(self.branches, first, None):  # grows while it is walked
             if branch.depth < self.plan.depth:
                 for i, special in enumerate(branch.special):
                     if special.kind == BRANCH_POINT and not special.switched:
                         self._switch(branch, i, special)
-        return self.branches
 
     def _primary(self) -> Branch:
         start, stop = self.plan.span

@@ -13,13 +13,13 @@ from scenes import Found, explored, scene
 
 from rodfem.branch import Point
 from rodfem.continuation import Follower, distance
-from rodfem.deflation import NEW, SAME, Deflation, further, starts, states_at
+from rodfem.search.deflation import NEW, SAME, Deflation, further, starts, states_at
 from rodfem.errors import SceneError
 from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization
-from rodfem.guesses import turned_state
-from rodfem.mirror import mirrors
-from rodfem.orbit import Orbit
+from rodfem.search.guesses import turned_state
+from rodfem.search.mirror import mirrors
+from rodfem.search.orbit import Orbit
 from rodfem.report import Report
 from rodfem.system import System
 

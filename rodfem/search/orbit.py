@@ -15,8 +15,7 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.stability.inertia import combine
-from rodfem.system import System
+from rodfem.system import System, combine
 
 FREQUENCIES = np.array([0.5, 1.0])
 ANGLES = np.linspace(0.0, 4 * np.pi, 96, endpoint=False)

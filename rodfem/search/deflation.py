@@ -1,9 +1,9 @@
 r"""Deflation: further equilibria at one load, whether or not a branch connects them to those that are known.
 
-Each try starts from a smooth seeded guess (:mod:`rodfem.guesses`) and iterates by Newton's method on equations from
-which the known equilibria are divided out (:mod:`rodfem.deflated`).  What a symmetry makes of a known equilibrium is
-known too: a continuous symmetry makes it a circle (:mod:`rodfem.orbit`), discrete ones a few isolated images
-(:mod:`rodfem.mirror`).  What converges is polished by the plain Newton method, and kept if it is new and admissible.
+Each try starts from a smooth seeded guess (:mod:`rodfem.search.guesses`) and iterates by Newton's method on equations from
+which the known equilibria are divided out (:mod:`rodfem.search.deflated`).  What a symmetry makes of a known equilibrium is
+known too: a continuous symmetry makes it a circle (:mod:`rodfem.search.orbit`), discrete ones a few isolated images
+(:mod:`rodfem.search.mirror`).  What converges is polished by the plain Newton method, and kept if it is new and admissible.
 It is the start of branches (:func:`starts`), and states of known branches are found by :func:`states_at`.
 
 A search can show that there are more equilibria, and never that there are no more.
@@ -21,13 +21,13 @@ from petsc4py import PETSc
 
 from rodfem.branch import Branch, Point
 from rodfem.continuation import Follower, hermite
-from rodfem.deflated import FLOW, MOST, DeflatedNewton
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.guesses import turned_state
-from rodfem.mirror import mirrors
 from rodfem.newton import correct
 from rodfem.report import Report
-from rodfem.stability.inertia import combine
+from rodfem.search.deflated import FLOW, MOST, DeflatedNewton
+from rodfem.search.guesses import turned_state
+from rodfem.search.mirror import mirrors
+from rodfem.system import combine
 
 SAME = 1e-5
 """Equilibria nearer to each other than this, in the metric, are one."""
@@ -95,7 +95,7 @@ class Deflation(DeflatedNewton):
             if abs(point.load - load) > 1e-9 * abs(scene.span[1] - scene.span[0]):
                 raise SceneError(
                     f"A known equilibrium is at {scene.load} = {point.load:.8g}, not {load:.8g}: "
-                    "give equilibria at the load of the search (rodfem.deflation.states_at finds them on branches)."
+                    "give equilibria at the load of the search (rodfem.search.deflation.states_at finds them on branches)."
                 )
         fields.u.x.array[fields.number >= 0] = 0.0  # multipliers of the state that was there before are no guess
         self.start = follower.start(load)

@@ -1,0 +1,1 @@
+"""Search for equilibria that no branch connects to those that are known."""
