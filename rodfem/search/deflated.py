@@ -12,8 +12,8 @@ Newton step is the plain one ``p = -F'^-1 F``, rescaled (Sherman & Morrison) ::
 
 The distance is that of the system's metric (root mean square rotation, with the centreline where it is an unknown):
 at a given load the rotation determines the strains and multipliers of a rod with a convex energy, and these have no
-common unit.  A known equilibrium stands for its orbit (:mod:`rodfem.search.orbit`), and ``d_i`` is the distance from the
-nearest point of that, where the gradient of ``d_i^2`` is still ``2 (x - x_i)``.
+common unit.  A known equilibrium stands for its orbit (:mod:`rodfem.search.orbit`), and ``d_i`` is the distance from
+the nearest point of that, where the gradient of ``d_i^2`` is still ``2 (x - x_i)``.
 
 Far from equilibrium, multipliers that fit the guess matter more than anything else.  A few steps of gradient flow
 (backward Euler: Newton's method with ``K + alpha M`` for ``K``) find them, and lead to where branches are.  Of guesses

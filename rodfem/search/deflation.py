@@ -1,10 +1,11 @@
 r"""Deflation: further equilibria at one load, whether or not a branch connects them to those that are known.
 
-Each try starts from a smooth seeded guess (:mod:`rodfem.search.guesses`) and iterates by Newton's method on equations from
-which the known equilibria are divided out (:mod:`rodfem.search.deflated`).  What a symmetry makes of a known equilibrium is
-known too: a continuous symmetry makes it a circle (:mod:`rodfem.search.orbit`), discrete ones a few isolated images
-(:mod:`rodfem.search.mirror`).  What converges is polished by the plain Newton method, and kept if it is new and admissible.
-It is the start of branches (:func:`starts`), and states of known branches are found by :func:`states_at`.
+Each try starts from a smooth seeded guess (:mod:`rodfem.search.guesses`) and iterates by Newton's method on equations
+from which the known equilibria are divided out (:mod:`rodfem.search.deflated`).  What a symmetry makes of a known
+equilibrium is known too: a continuous symmetry makes it a circle (:mod:`rodfem.search.orbit`), discrete ones a few
+isolated images (:mod:`rodfem.search.mirror`).  What converges is polished by the plain Newton method, and kept if it is
+new and admissible.  It is the start of branches (:func:`starts`), and states of known branches are found by
+:func:`states_at`.
 
 A search can show that there are more equilibria, and never that there are no more.
 """
@@ -95,7 +96,7 @@ class Deflation(DeflatedNewton):
             if abs(point.load - load) > 1e-9 * abs(scene.span[1] - scene.span[0]):
                 raise SceneError(
                     f"A known equilibrium is at {scene.load} = {point.load:.8g}, not {load:.8g}: "
-                    "give equilibria at the load of the search (rodfem.search.deflation.states_at finds them on branches)."
+                    "give equilibria at the load of the search (rodfem.states_at finds them on branches)."
                 )
         fields.u.x.array[fields.number >= 0] = 0.0  # multipliers of the state that was there before are no guess
         self.start = follower.start(load)
