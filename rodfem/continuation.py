@@ -15,6 +15,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.spatial.transform import Rotation
 
 from rodfem.branch import Point
 from rodfem.convexity import Convexity
@@ -63,8 +64,11 @@ class Equilibria:
         self.shape = Shape(system)
         self.axis = system.load_axis()
 
-    def start(self, load: float) -> PETSc.Vec:
-        """First guess at ``load``: the scene's ``start`` rotation, undeformed strains, zero forces."""
+    def start(self, load: float, bent: float = 0.0) -> PETSc.Vec:
+        """First guess at ``load``: the scene's ``start`` rotation, undeformed strains, zero forces.
+
+        ``bent`` is the size, in radian, of a smooth rotation on top: a taut straight rod is a singular place to start.
+        """
         system, f = self.system, self.system.fields
         x = f.coordinates(f.discretization.degree)
         guess = system.scene.start
@@ -72,6 +76,8 @@ class Equilibria:
         f.u.x.array[f.number >= 0] = 0.0
         held = f.number[f.dofs["q"]] < 0
         clamped = f.u.x.array[f.dofs["q"]]
+        if bent:
+            q = _bend(q, (x.ravel() - system.scene.interval[0]) / system.scene.length, bent)
         f.u.x.array[f.dofs["q"]] = np.where(held, clamped, q.reshape(*x.shape, 4))
         if "v" in f.dofs:
             f.u.x.array[f.dofs["v"]] = [1.0 if i == 2 else 0.0 for i in system.scene.free_strains]
@@ -94,8 +100,12 @@ class Equilibria:
         self.system.set_phase(guess)
         x, outcome = self.at_load(guess, load)
         if not outcome.converged:
-            x = guess.copy()
-            outcome = relax(self.system, x, self.axis)
+            for bent in (0.0, 0.4, 0.8):
+                x = self.start(load, bent)
+                self.system.set_phase(x)
+                outcome = relax(self.system, x, self.axis)
+                if outcome.converged:
+                    break
         return x, outcome
 
     def energy(self, x: PETSc.Vec) -> float:
@@ -181,6 +191,14 @@ class Follower(Equilibria):
         if not increasing:
             tangent.scale(-1.0)
         return tangent
+
+
+def _bend(q: np.ndarray, x: np.ndarray, size: float) -> np.ndarray:
+    """Quaternions (m, 4) turned by a smooth rotation vector that vanishes at both ends; ``x`` in [0, 1]."""
+    w = size * (np.outer(np.sin(np.pi * x), (0.6, 0.8, 0.3)) + np.outer(np.sin(2 * np.pi * x), (0.5, -0.4, 0.2)))
+    turned = Rotation.from_rotvec(w) * Rotation.from_quat(np.roll(q, -1, axis=1))
+    out = np.roll(turned.as_quat(), 1, axis=1)
+    return np.asarray(out * np.sign(np.sum(out * q, axis=1, keepdims=True)))
 
 
 def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:

@@ -79,11 +79,10 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Outc
         if not isfinite(equations.norm()) or not system.solve(equations, step):
             break
         size = system.norm(step)
-        if not size < 0.5:
-            tau /= 4
-            continue
-        x.axpy(-1.0, step)
-        tau *= 2.0 if size < 0.2 else 1.0
+        if not isfinite(size):
+            break
+        x.axpy(-min(1.0, 0.4 / size), step)  # a step that mends constraints is long whatever the time step
+        tau *= 2.0 if size < 0.2 else 0.5 if size > 0.4 else 1.0
         if iteration % 5 == 4 or size < 1e-3:
             x.copy(trial)
             outcome = correct(system, trial, row, reach=1.0)

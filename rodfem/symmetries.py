@@ -18,9 +18,11 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from forms.symmetry import AXES, Matrix, cross, left, right
+from rodfem import compat
 from rodfem.ends import Ring
 from rodfem.equations import Equations
 from rodfem.fields import Fields
+from rodfem.scene import Scene
 
 EXACT = 1e-9
 """A combination of generators that changes the functional by less than this, relative, does not change it."""
@@ -49,6 +51,44 @@ class Symmetry:
             if weight:
                 add_change(fields, part, weight, out)
         return out
+
+
+@dataclass(frozen=True)
+class Shift:
+    """The motion of a uniform ring along itself: every field's derivative in arclength.
+
+    A mesh has this symmetry only up to its error: what is a zero eigenvalue of the rod is a very small one of the mesh.
+    """
+
+    def change(self, fields: Fields) -> np.ndarray:
+        """Derivative of the state that ``fields.u`` holds: local values, consistent on all ranks; zero for scalars."""
+        u, kept = fields.u, fields.u.x.array.copy()
+        size = (fields.vertices[:, 1] - fields.vertices[:, 0])[:, None, None]
+        out, count = np.zeros(len(kept)), np.zeros(len(kept))
+        for block in fields.blocks:
+            dofs = fields.dofs[block.name]
+            values = np.einsum("pn,cni->cpi", differentiation(compat.nodes(block.degree)), kept[dofs]) / size
+            np.add.at(out, dofs.ravel(), values.ravel())
+            np.add.at(count, dofs.ravel(), 1.0)
+        u.x.array[:] = out / np.maximum(count, 1.0)
+        u.x.scatter_forward()
+        change = u.x.array.copy()
+        u.x.array[:] = kept
+        change[fields.number < 0] = 0.0
+        return change
+
+
+def differentiation(nodes: np.ndarray) -> np.ndarray:
+    """Matrix of the derivative of the polynomial through values at ``nodes``, at the nodes: (m, m)."""
+    powers = np.vander(2 * nodes - 1, increasing=True)
+    slopes = np.zeros_like(powers)
+    slopes[:, 1:] = 2 * powers[:, :-1] * np.arange(1, len(nodes))
+    return np.asarray(slopes @ np.linalg.inv(powers))
+
+
+def is_uniform_ring(scene: Scene) -> bool:
+    """Whether a scene is a closed rod that is the same all along, so that it may move along itself."""
+    return isinstance(scene.ends, Ring) and not scene.depends_on_s() and not scene.joints and not scene.constraints
 
 
 def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
