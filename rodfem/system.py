@@ -309,9 +309,9 @@ def prefer_options(prefix: str, values: dict[str, int]) -> None:
 class Factorizer:
     """MUMPS factors of a matrix whose pattern stays: ``lu``, or ``cholesky`` (LDL^t, which also counts the inertia).
 
-    Unknowns are ordered by an approximate minimum degree that knows dense rows (QAMD): what MUMPS chooses by itself takes
-    ten times as long to order the matrix of 3e4 elements with an integral constraint.  PETSc's options change that and
-    all else, ``-rodfem_lu_mat_mumps_icntl_7 2`` or ``-rodfem_cholesky_...`` for example.
+    Unknowns are ordered by an approximate minimum degree that knows dense rows (QAMD): what MUMPS chooses by itself
+    takes ten times as long to order the matrix of 3e4 elements with an integral constraint.  PETSc's options change
+    that and all else, ``-rodfem_lu_mat_mumps_icntl_7 2`` or ``-rodfem_cholesky_...`` for example.
     """
 
     def __init__(

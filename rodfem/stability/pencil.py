@@ -5,7 +5,7 @@ from __future__ import annotations
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from rodfem.system import System
+from rodfem.system import DENSE_ROWS, System, prefer_options
 
 
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> None:
@@ -37,5 +37,6 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
     ksp.getPC().setFactorSolverType("mumps")
+    prefer_options("rodfem_st_", DENSE_ROWS)
     solver.setFromOptions()
     return solver

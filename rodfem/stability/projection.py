@@ -31,14 +31,15 @@ from rodfem.stability.blocks import Pencil
 from rodfem.stability.inertia import inertia_factorizer
 from rodfem.stability.kernel import kernel
 from rodfem.stability.matrices import gathered, petsc_matrix
+from rodfem.system import DENSE_ROWS, prefer_options
 
 INVERSES = ("saddle", "elimination")
 SINGULAR = 1e-6
 """A solve that leaves more than this of its right-hand side behind was made with a singular matrix."""
 
 PREFIX = "rodfem_reduced_inverse_"
-CONTROLS = {7: 6, 14: 200}
-"""MUMPS's ordering for dense rows, as those of integral constraints (its default takes O(n^2)); room for pivots."""
+CONTROLS = DENSE_ROWS | {"mat_mumps_icntl_14": 200}
+"""MUMPS's ordering for dense rows, and room for pivots."""
 
 
 class Projection:
@@ -130,10 +131,7 @@ def factored(matrix: sp.spmatrix) -> Callable[[np.ndarray], np.ndarray]:
     petsc = petsc_matrix(MPI.COMM_SELF, matrix)
     ksp = PETSc.KSP().create(PETSc.COMM_SELF)
     ksp.setOptionsPrefix(PREFIX)
-    options = PETSc.Options(PREFIX)
-    for control, number in CONTROLS.items():
-        if not options.hasName(f"mat_mumps_icntl_{control}"):
-            options.setValue(f"mat_mumps_icntl_{control}", number)
+    prefer_options(PREFIX, CONTROLS)
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
     ksp.getPC().setFactorSolverType("mumps")
