@@ -91,11 +91,6 @@ class End:
         rotation = self.rotation
         return rotation if callable(rotation) else lambda c: rotation
 
-    @property
-    def conservative(self) -> bool:
-        """Whether all loads on the end have a potential."""
-        return self.follower is None and self.follower_moment is None and self.moment is None
-
 
 def clamped(position: OfConstants = lambda c: (0.0, 0.0, 0.0), rotation: Quaternion | OfConstants = IDENTITY) -> End:
     """Return an end whose position and directors are given, both as functions of the constants if wanted."""

@@ -83,9 +83,9 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Outc
             break
         x.axpy(-min(1.0, 0.4 / size), step)  # a step that mends constraints is long whatever the time step
         tau *= 2.0 if size < 0.2 else 0.5 if size > 0.4 else 1.0
-        if iteration % 5 == 4 or size < 1e-3:
+        if (iteration % 5 == 4 and size < 0.1) or size < 1e-3:  # not earlier: it might jump to a state uphill
             x.copy(trial)
-            outcome = correct(system, trial, row, reach=1.0)
+            outcome = correct(system, trial, row, reach=0.3)
             if outcome.converged:
                 trial.copy(x)
                 return outcome

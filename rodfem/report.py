@@ -76,6 +76,9 @@ class Report:
             f"{d.elements} elements of degree {d.degree}, {f.unknowns} unknowns"
         )
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
+        if not scene.conservative:
+            loads = ", ".join(scene.without_potential())
+            self.say(f"  not conservative ({loads}): stability is a matter of frequencies, not of an index")
         for line in f.left_out():
             self.say(f"  left out: {line}")
 

@@ -192,8 +192,17 @@ class Scene:
     @property
     def conservative(self) -> bool:
         """Whether all loads have a potential, so that stability is a matter of the second variation alone."""
-        ends = all(end.conservative for end in self.sides)
-        return ends and self.follower is None and all(x.follower is None for x in self.attachments)
+        return not self.without_potential()
+
+    def without_potential(self) -> list[str]:
+        """Loads that have no potential, in words."""
+        found = []
+        for side, end in zip(("left", "right"), self.sides, strict=True):
+            kinds = {"follower force": end.follower, "moment": end.moment, "follower moment": end.follower_moment}
+            found += [f"{kind} on the {side} end" for kind, load in kinds.items() if load is not None]
+        if self.follower is not None:
+            found.append("distributed follower force")
+        return found + [f"follower force at s = {x.s:g}" for x in self.attachments if x.follower is not None]
 
     @property
     def free_strains(self) -> tuple[int, ...]:

@@ -115,11 +115,11 @@ class Inertia:
         """
         metric, block = self.metric, number + spare
         while len(self._vectors) < block:
-            self._vectors.append(self._seed(len(self._vectors)))
+            self._vectors.append(self.seed(len(self._vectors)))
         del self._vectors[block:]
         values = np.full(block, np.inf)
         for i, v in enumerate(self._vectors):
-            v.axpy(1e-3, self._seed(i))  # the old vectors may span an invariant space that misses the nearest one
+            v.axpy(1e-3, self.seed(i))  # the old vectors may span an invariant space that misses the nearest one
         with self.system.clock("stability"):
             for _ in range(most):
                 solved = [v.duplicate() for v in self._vectors]
@@ -143,7 +143,7 @@ class Inertia:
             self.factors.ksp.solve(image, self.system.workspace)
             return 1.0 / image.dot(self.system.workspace) + self.shift
 
-    def _seed(self, i: int) -> PETSc.Vec:
+    def seed(self, i: int) -> PETSc.Vec:
         """Vector with a bit of everything but the scalars."""
         vector = self.system.new_vector()
         begin, end = vector.getOwnershipRange()

@@ -1,11 +1,17 @@
-"""The pencil of a state, and SLEPc set up to find its eigenvalues near a shift."""
+"""The pencil of a state, and SLEPc set up to find its eigenvalues.
+
+SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...), and
+overrule what is set here.  Those of the factorisation inside are ``-rodfem_st_...`` for a pencil without symmetry, else
+``-rodfem_cholesky_...`` (see :class:`~rodfem.system.Factorizer`).
+"""
 
 from __future__ import annotations
 
+import numpy as np
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from rodfem.system import DENSE_ROWS, System, prefer_options
+from rodfem.system import DENSE_ROWS, Factorizer, System, prefer_options
 
 
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> None:
@@ -19,6 +25,29 @@ def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc
             matrix.setValue(index, index, 1.0, addv=True)
     matrix.assemble()
     mass.assemble()
+
+
+def symmetry_modes(system: System, x: PETSc.Vec) -> dict[int, PETSc.Vec]:
+    """Generators at ``x`` of the symmetries that have a phase condition, by their drift scalar's global number."""
+    pairs = zip(system.drifts, system.phases, strict=True)
+    return {index: system.generator(x, i) for i, (index, phase) in enumerate(pairs) if phase is not None}
+
+
+def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat, mass: PETSc.Mat) -> None:
+    """Add to an assembled pencil the constraints ``g.Mx = 0`` for symmetry modes ``g``, one for each drift scalar.
+
+    ``g`` being an eigenvector (of ``mu = 0``), what they leave of the spectrum is all the rest of it, unchanged.
+    """
+    for index, mode in modes.items():
+        image = mass * mode
+        image.scale(1.0 / max(np.sqrt(max(np.real(image.dot(mode)), 0.0)), 1e-300))
+        begin, end = image.getOwnershipRange()
+        own = np.arange(begin, end, dtype=PETSc.IntType)
+        if system.has_scalars:
+            matrix.setValue(index, index, -1.0, addv=True)
+        matrix.setValues([index], own, image.array_r, addv=True)
+        matrix.setValues(own, [index], image.array_r, addv=True)
+    matrix.assemble()
 
 
 def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex, *, symmetric: bool) -> SLEPc.EPS:
@@ -38,5 +67,41 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     ksp.getPC().setType("lu")
     ksp.getPC().setFactorSolverType("mumps")
     prefer_options("rodfem_st_", DENSE_ROWS)
+    solver.setFromOptions()
+    return solver
+
+
+class Inverse:
+    """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
+
+    def __init__(self, factors: Factorizer) -> None:
+        """Keep the factors."""
+        self.factors = factors
+
+    def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
+        """Solve for ``z``."""
+        self.factors.ksp.solve(b, z)
+
+
+def with_factors(
+    matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: float, factors: Factorizer, start: PETSc.Vec
+) -> SLEPc.EPS:
+    """Set up the same for a symmetric pencil, with the factors of ``matrix - target mass`` and a first vector."""
+    solver = SLEPc.EPS().create(matrix.comm)
+    solver.setOptionsPrefix("rodfem_")
+    solver.setOperators(matrix, mass)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    solver.setTarget(target)
+    solver.setTolerances(tol=1e-12, max_it=300)
+    solver.setDimensions(number, 2 * number + 6)
+    solver.setInitialSpace([start])
+    transform = solver.getST()
+    transform.setType(SLEPc.ST.Type.SINVERT)
+    transform.setMatMode(SLEPc.ST.MatMode.SHELL)
+    ksp = transform.getKSP()
+    ksp.setType("preonly")
+    ksp.getPC().setType("python")
+    ksp.getPC().setPythonContext(Inverse(factors))
     solver.setFromOptions()
     return solver

@@ -1,14 +1,16 @@
-r"""Left-most eigenvalues of an equilibrium by SLEPc, on the singular pencil of its saddle matrix.
+"""Left-most eigenvalues of an equilibrium by SLEPc, on the singular pencil of its saddle matrix.
 
     (K C; C^t 0) x = mu (M 0; 0 0) x
 
 with ``M`` the kinetic metric: stable where all ``mu = omega^2`` are positive (Kumar & Healey 2010, (21) and
 (45)).  ``M`` is singular, so that only shift-invert is free of spurious eigenvalues: its image ``(S - sigma M)^-1
-M`` is zero on all that has no inertia.  No Dirichlet row exists that could bring one in.  Symmetry modes are
-deflated: their zero eigenvalue is known and is not among those returned.
+M`` is zero on all that has no inertia.  No Dirichlet row exists that could bring one in.  A symmetry mode, whose
+eigenvalue is known to be zero, is kept out by the constraint ``g.Mx = 0``, and is not among those returned.
 
-The shift is put below the spectrum, which a count by inertia at the shift proves; the nearest eigenvalues to it
-are then the left-most ones, and a second count, just above the last of them, proves that none is missing.
+The shift is put below the spectrum, which the inertia of the very factors of shift-invert proves; the nearest
+eigenvalues to it are then the left-most ones, and a second count, just above the last of them, proves that none is
+missing.  Along a branch the shift, the symbolic factorisation and the modes as first vector are taken from the point
+before: two numeric factorisations a point, as many as a count of the index.
 """
 
 from __future__ import annotations
@@ -21,7 +23,10 @@ from slepc4py import SLEPc
 
 from rodfem.errors import ConvergenceError
 from rodfem.stability.inertia import Inertia, inertia_factorizer
-from rodfem.stability.pencil import assemble_pencil, shift_invert
+from rodfem.stability.pencil import assemble_pencil, exclude_modes, symmetry_modes, with_factors
+
+HIT = 1e-8
+"""A shift nearer to an eigenvalue than this, relative to the farthest one found, spoils the others by round-off."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,15 @@ class Modes:
 
 
 class Spectrum:
-    """Computes left-most eigenvalues at states of the system of an :class:`~rodfem.stability.inertia.Inertia`."""
+    """Computes left-most eigenvalues at states of the system of an :class:`~rodfem.stability.inertia.Inertia`.
+
+    Attributes
+    ----------
+    shift
+        Where the next computation starts: it is moved to the left until no eigenvalue is below it.
+    factorisations
+        Number of numeric factorisations made so far.
+    """
 
     def __init__(self, inertia: Inertia) -> None:
         """Allocate the matrices of the pencil once."""
@@ -49,49 +62,80 @@ class Spectrum:
         self._shifted = self.system.state_matrix()
         self._factors = inertia_factorizer(self.system.comm)
         self.shift = -inertia.scale
+        self.factorisations = 0
+        self._factored_at = np.nan
+        self._start: PETSc.Vec | None = None
+
+    def assemble(self, x: PETSc.Vec) -> None:
+        """Assemble the pencil of the state ``x``, at which the phase conditions must be set."""
+        system = self.system
+        with system.clock("assembly"):
+            modes = symmetry_modes(system, x)
+            assemble_pencil(system, x, self.matrix, self.mass)
+            exclude_modes(system, modes, self.matrix, self.mass)
+        self._factored_at = np.nan
 
     def leftmost(self, x: PETSc.Vec, number: int) -> Modes:
         """Return the ``number`` left-most eigenvalues of the state ``x``, at which the phase conditions must be set.
 
         Raises :class:`ConvergenceError` where SLEPc finds fewer.
         """
-        system = self.system
-        symmetry = [system.generator(x, i) for i, phase in enumerate(system.phases) if phase is not None]
-        with system.clock("assembly"):
-            assemble_pencil(system, x, self.matrix, self.mass)
-        with system.clock("stability"):
-            for _ in range(40):
-                if self._below(self.shift) == 0:
-                    break
-                self.shift *= 4
-            else:
-                raise ConvergenceError(
-                    "The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness."
-                )
-            for extra in (2, 6, 14):
-                modes = self._solve(number, extra, symmetry)
+        self.assemble(x)
+        with self.system.clock("stability"):
+            self.go_below()
+            for extra in (1, 4, 12):
+                modes = self._solve(number, extra)
                 if modes.certified:
                     break
-        if abs(modes.values[0]) * 100 < abs(self.shift):
-            self.shift = min(2 * modes.values[0], -self.inertia.scale)
+        spread = modes.values[-1] - modes.values[0] + 1e-3 * abs(modes.values).max()
+        self.shift = modes.values[0] - spread
         return modes
 
-    def _below(self, sigma: float) -> int:
-        """Number of eigenvalues of the pencil below ``sigma``, symmetry modes included."""
+    def go_below(self) -> None:
+        """Move the shift to below the spectrum; raises :class:`ConvergenceError` where it has no lower end."""
+        step = max(abs(self.shift), self.inertia.scale)
+        for _ in range(40):
+            if self.below(self.shift) == 0:
+                return
+            self.shift -= step
+            step *= 3
+        raise ConvergenceError(
+            "The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness."
+        )
+
+    def below(self, sigma: float) -> int:
+        """Number of eigenvalues of the pencil last assembled below ``sigma``, symmetry modes not included."""
+        self._factor(sigma)
+        negative, zero, _ = self._factors.factor.getInertia()
+        below = negative - self.inertia.constraints - self.system.active_drifts()
+        if zero or below < 0:
+            raise ConvergenceError(
+                f"The count of eigenvalues below {sigma:.6g} broke down ({zero} zero pivots, {negative} negative ones "
+                f"for {self.inertia.constraints} constraints): the constraints depend on each other."
+            )
+        return int(below)
+
+    def _factor(self, sigma: float) -> None:
+        if sigma == self._factored_at:
+            return
         self.matrix.copy(self._shifted, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         self._shifted.axpy(-sigma, self.mass, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         self._shifted.stateIncrease()
-        return int(self._factors(self._shifted).getInertia()[0] - self.inertia.constraints)
+        self._factors(self._shifted)
+        self._factored_at = sigma
+        self.factorisations += 1
 
-    def _solve(self, number: int, extra: int, symmetry: list[PETSc.Vec]) -> Modes:
+    def _solve(self, number: int, extra: int) -> Modes:
         """Solve for ``number`` values and some more, and count whether any is missing among the first ``number``.
 
         A Krylov method finds the second of two equal eigenvalues late, by round-off: it is there when more are
         asked for.
         """
-        solver = shift_invert(self.matrix, self.mass, number + extra, self.shift, symmetric=True)
-        if symmetry:
-            solver.setDeflationSpace(symmetry)
+        self._factor(self.shift)
+        start = self.inertia.seed(1)
+        if self._start is not None:  # all of a space that is invariant already would find nothing else
+            start.aypx(1e-3 * self._start.norm() / start.norm(), self._start)
+        solver = with_factors(self.matrix, self.mass, number + extra, self.shift, self._factors, start)
         solver.solve()
         found = solver.getConverged()
         if found < number:
@@ -104,11 +148,18 @@ class Spectrum:
         order = np.argsort(values)
         cut = values[order[number - 1]]
         cut += 1e-6 * max(abs(cut), self.inertia.scale)
-        known = int((values < cut).sum()) + (len(symmetry) if cut > 0 else 0)
+        known = int((values < cut).sum())
         order = order[:number]
         errors = np.array([solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD) for i in order])
         vectors = [self.system.new_vector() for _ in order]
         for i, vector in zip(order, vectors, strict=True):
             solver.getEigenvector(i, vector)
         solver.destroy()
-        return Modes(values[order], vectors, errors, self._below(cut) == known)
+        values = values[order]
+        if values[0] - self.shift < HIT * (values[-1] - self.shift):
+            self.shift -= max(values[-1] - self.shift, self.inertia.scale)
+            return self._solve(number, extra)
+        self._start = vectors[0].copy()
+        for vector in vectors[1:]:
+            self._start.axpy(1.0, vector)
+        return Modes(values, vectors, errors, self.below(cut) == known)
