@@ -2,21 +2,61 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Sequence
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
+import ufl
 
-from rodfem.ends import Ring, check_vector
+from forms.kinematics import UNDEFORMED
+from rodfem.ends import End, Ring, check_vector
 from rodfem.errors import SceneError
 
 if TYPE_CHECKING:
     from rodfem.scene import Scene
 
 
+def check_kinds(scene: Scene) -> None:
+    """Check that what a scene is made of is of the right kind."""
+    if not isinstance(scene.ends, Ring) and not (
+        isinstance(scene.ends, (tuple, list)) and len(scene.ends) == 2 and all(isinstance(e, End) for e in scene.ends)
+    ):
+        raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
+    for what, pair in (("interval", scene.interval), ("span", scene.span)):
+        if not (isinstance(pair, Sequence) and len(pair) == 2 and all(isinstance(x, Real) for x in pair)):
+            raise SceneError(f"The {what} is {pair!r}: give two numbers.")
+    for name, parameter in scene.parameters.items():
+        if not isinstance(getattr(parameter, "value", parameter), Real):
+            raise SceneError(f"The parameter {name} is {parameter!r}: give a number or a Parameter.")
+    if not (hasattr(scene.ordinate, "of") and hasattr(scene.ordinate, "s")):
+        raise SceneError(f"The ordinate is {scene.ordinate!r}: give an Ordinate(name, s, of).")
+    for what, function, count in (("stored energy", scene.energy, 3), ("start", scene.start, 1)):
+        if function is None:
+            continue
+        if not callable(function):
+            raise SceneError(f"The {what} is {function!r}: give a function.")
+        try:
+            inspect.signature(function).bind(*range(count))
+        except TypeError:
+            wanted = "W(v, k, c)" if count == 3 else "start(s)"
+            raise SceneError(f"The {what} is no function of {count} argument(s): give {wanted}.") from None
+
+
+def check_energy(scene: Scene) -> None:
+    """Check that the stored energy is a scalar."""
+    v, k = ufl.as_vector(UNDEFORMED), ufl.as_vector([0.0, 0.0, 0.0])
+    shape = ufl.as_ufl(scene.energy(v, k, scene.constants())).ufl_shape
+    if shape != ():
+        raise SceneError(f"The stored energy has the shape {shape}: return a scalar, the energy per unit length.")
+
+
 def check_scene(scene: Scene) -> None:
     """Check supports, places and the stored energy; raises :class:`~rodfem.errors.SceneError`."""
     if scene.planar not in (None, "e1", "e2"):
         raise SceneError(f"A rod cannot be planar across {scene.planar!r}: choose 'e1' or 'e2', or None for space.")
+    check_energy(scene)
     check_supports(scene)
     check_places(scene)
     check_convexity(scene)
@@ -40,8 +80,9 @@ def check_supports(scene: Scene) -> None:
     for side, end in zip(("left", "right"), scene.sides, strict=True):
         for load in scene.span:
             c = scene.constants(load)
-            check_vector(f"position of the {side} end", end.held(c), 3)
-            check_vector(f"force on the {side} end", end.applied(c), 3)
+            for what, function in (("position of", end.position), ("force on", end.force)):
+                if function is not None:
+                    check_vector(f"{what} the {side} end", function(c), 3)
             rotation = end.rotation(c) if callable(end.rotation) else end.rotation
             if rotation is not None:
                 check_vector(f"rotation of the {side} end", rotation, 4)
@@ -56,9 +97,13 @@ def check_supports(scene: Scene) -> None:
             raise SceneError(f"The {side} end has a hinge but no rotation: say which directors the hinge holds.")
         if end.hinge is not None and not np.linalg.norm(end.hinge) > 0:
             raise SceneError(f"The hinge of the {side} end has no axis: give three components, not all zero.")
-        if end.follower is not None and any(x is not None for x in end.held(scene.constants())):
+        if end.follower is not None and all(x is not None for x in end.held(scene.constants())):
             raise SceneError(
-                f"A follower force acts on the {side} end, which is held: leave its position free, or use a force."
+                f"A follower force acts on the {side} end, whose position is held: leave it free in one direction."
+            )
+        if end.fixed_rotation is not None and (end.moment or end.follower_moment):
+            raise SceneError(
+                f"A moment acts on the {side} end, whose directors are held: leave its rotation free, or use a hinge."
             )
     check_drift(scene)
     check_reach(scene)

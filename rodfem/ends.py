@@ -21,7 +21,20 @@ from forms import loads
 from forms.rotation import IDENTITY
 from rodfem.errors import SceneError
 
-Constants = SimpleNamespace
+
+class Constants(SimpleNamespace):
+    """The named constants of a scene and the arclength ``s``; an unknown name is a :class:`SceneError`."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Name what is missing, and what there is."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        raise SceneError(
+            f"A function of the scene asks for a constant {name!r}: add it to the parameters, or choose one of "
+            f"{', '.join(sorted(vars(self)))}."
+        )
+
+
 Place = SimpleNamespace
 Vector = Sequence[Any]
 OfConstants = Callable[[Constants], Vector]

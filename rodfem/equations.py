@@ -14,7 +14,7 @@ from forms import inertia, lagrangian, loads
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
 from rodfem import compat
-from rodfem.ends import Place, Ring
+from rodfem.ends import Constants, Place, Ring
 from rodfem.fields import Fields, across
 from rodfem.places import place
 
@@ -238,12 +238,12 @@ class Equations:
     def _components(part: Any, size: int) -> list[Any]:
         return [] if part is None else [part] if size == 1 else [part[i] for i in range(size)]
 
-    def _constants(self, load: Any, s: float | None = None) -> SimpleNamespace:
+    def _constants(self, load: Any, s: float | None = None) -> Constants:
         """Named constants as functions of the load, along the rod or at arclength ``s``."""
         values = {name: self.base[i] + self.direction[i] * load for i, name in enumerate(self.names)}
-        return SimpleNamespace(s=ufl.SpatialCoordinate(self.fields.mesh)[0] if s is None else s, **values)
+        return Constants(s=ufl.SpatialCoordinate(self.fields.mesh)[0] if s is None else s, **values)
 
-    def _lift(self, c: SimpleNamespace) -> Any:
+    def _lift(self, c: Constants) -> Any:
         """Linear in s and equal to the ends' positions: the unknown ``r`` is what comes on top, zero where held."""
         x = (c.s - self.ends[0]) / self.length
         left, right = (end.held(c) for end in self.fields.scene.sides)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from math import inf, isfinite
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from forms.kinematics import RODS, UNDEFORMED
-from rodfem.checks import check_scene
+from rodfem.checks import check_kinds, check_scene
 from rodfem.ends import Attachment, Constants, Constraint, End, OfConstants, OfPlace, Ring, Vector
 from rodfem.errors import SceneError
 
@@ -84,7 +83,7 @@ class Scene:
     energy
         Stored energy ``W(v, k, c)`` per unit length.
     parameters
-        Named constants; ``load`` names the one that is varied unless another is asked for.
+        Named constants, each a :class:`Parameter` or a number; ``load`` names the one that is varied.
     ends
         Left and right :class:`~rodfem.ends.End`, or a :class:`~rodfem.ends.Ring`.
     ordinate
@@ -134,6 +133,9 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Check all that can be checked before any computation; raises :class:`SceneError`."""
+        check_kinds(self)
+        named = {n: p if isinstance(p, Parameter) else Parameter(float(p)) for n, p in self.parameters.items()}
+        object.__setattr__(self, "parameters", named)
         a, b = self.interval
         if not (isfinite(a) and isfinite(b) and a < b):
             raise SceneError(
@@ -214,7 +216,7 @@ class Scene:
         values = {name: p.value for name, p in self.parameters.items()}
         if load is not None:
             values[self.load] = load
-        return SimpleNamespace(s=sum(self.interval) / 2 if s is None else s, **values)
+        return Constants(s=sum(self.interval) / 2 if s is None else s, **values)
 
     def check_span(self, span: tuple[float, float]) -> None:
         """Raise :class:`SceneError` unless both ends of a range of loads are admissible and differ."""
@@ -250,7 +252,7 @@ class Scene:
         """Whether the stored energy is a function of the arclength too."""
         asked: list[bool] = []
 
-        class Watched(SimpleNamespace):
+        class Watched(Constants):
             def __getattribute__(self, name: str) -> Any:
                 if name == "s":
                     asked.append(True)
