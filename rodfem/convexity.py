@@ -18,7 +18,10 @@ from rodfem.system import System
 
 
 class Convexity:
-    """Evaluates the least eigenvalue of the second derivative of ``W`` at the Gauss points of a state."""
+    """Evaluates the least eigenvalue of the second derivative of ``W`` along a state.
+
+    At the Gauss points of each element and at its ends: strains are largest at a clamp or a joint more often than not.
+    """
 
     def __init__(self, system: System) -> None:
         """Compile the second derivative."""
@@ -34,7 +37,8 @@ class Convexity:
         hessian = ufl.diff(ufl.diff(W, x), x)
         self.size = len(free) + 3
         entries = [hessian[i, j] for i in range(self.size) for j in range(self.size)]
-        points = (np.polynomial.legendre.leggauss(f.discretization.degree + 1)[0] + 1) / 2
+        inside = (np.polynomial.legendre.leggauss(f.discretization.degree + 1)[0] + 1) / 2
+        points = np.array([0.0, *inside, 1.0])
         self.evaluate = compat.expression(ufl.as_vector(entries), points.reshape(-1, 1), f.mesh, f.owned_cells)
 
     def lowest(self, x: PETSc.Vec) -> float:
