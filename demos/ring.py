@@ -1,0 +1,56 @@
+r"""Michell's ring.
+
+A thin rod is bent to a circle, and its ends are joined.  It has round cross-sections, W = 1/2 [k1^2 + k2^2 + C (k3 -
+t0)^2], and would like to be twisted by t0 all along: but its link was fixed when it was closed, so that the circle has
+no twist, and is under a torque C t0.  With radius 1 it buckles out of its plane where
+
+    C t0 = sqrt(n^2 - 1),    n = 2, 3, ...
+
+(Michell 1889; Zajac, J. Appl. Mech. 29 (1962) 136): at C t0 = sqrt(3) first, like a kinked cable.  What leaves there
+leads, past a figure of eight, to a circle with another link, in which the rod has passed through itself.
+
+A ring may go anywhere: rotations, the turning of its cross-sections and the motion along itself are zero eigenvalues at
+every state.  They are found from the equations, and counted apart.
+"""
+
+from argparse import Namespace
+from math import inf, pi
+
+import numpy as np
+
+import rodfem.cli as cli
+from forms.energy import bending
+from rodfem.ends import Ring
+from rodfem.scene import Ordinate, Parameter, Scene
+
+
+def circle(s):
+    """Quaternions of the circle of radius 1 in the plane of e1 and e3: a turn by s about e2, no twist."""
+    return np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1)
+
+
+def scene(options: Namespace) -> Scene:
+    """State the problem: what the rod is made of, that it is closed, and what to look at."""
+    return Scene(
+        name="ring",
+        title="Michell's ring",
+        interval=(0.0, 2 * pi),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending((k[0], k[1], k[2] - c.t0), (1.0, 1.0, c.C)),
+        parameters={"t0": Parameter(0.0, "t_0"), "C": Parameter(options.twisting, admissible=(0.0, inf))},
+        load="t0",
+        ends=Ring(),
+        start=circle,
+        states="circle",
+        ordinate=Ordinate("distance of opposite points", s=pi, of=lambda r, q: float(np.linalg.norm(r))),
+        span=tuple(options.span),
+    )
+
+
+if __name__ == "__main__":
+    parser = cli.parser_for("ring", __doc__, load="t0", span=(0.0, 1.6), elements=8, degree=6)
+    constants = parser.add_argument_group("constants of the rod")
+    constants.add_argument(
+        "--twisting", type=float, default=1.5, metavar="C", help="stiffness of twist over that of bending (default 1.5)"
+    )
+    cli.main(parser, scene)
