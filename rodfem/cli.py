@@ -133,6 +133,13 @@ def parser_for(
         metavar="TRIES",
         help="at each load of --at also look for equilibria that no branch has reached, with that many tries",
     )
+    group.add_argument(
+        "--locus",
+        nargs=3,
+        default=None,
+        metavar=("NAME", "LOW", "HIGH"),
+        help="follow every special point in the plane of the load and the constant NAME from LOW to HIGH",
+    )
     group = parser.add_argument_group("output")
     group.add_argument(
         "--output",
@@ -143,6 +150,16 @@ def parser_for(
     )
     group.add_argument("--no-figures", dest="figures", action="store_false", help="draw nothing")
     return parser
+
+
+def pair(words: Sequence[str] | None) -> tuple[str, float, float] | None:
+    """Name and interval of a second parameter; raises :class:`SceneError` for what are no numbers."""
+    if words is None:
+        return None
+    try:
+        return words[0], float(words[1]), float(words[2])
+    except ValueError:
+        raise SceneError(f"{words[1]} to {words[2]} is no interval: give two numbers after {words[0]}.") from None
 
 
 def main(
@@ -178,7 +195,8 @@ def main(
         scene = scene_of(options)
         span = tuple(options.span)
         steps = Steps(largest=options.step)
-        plan = Plan(span, at=tuple(options.at), spectrum=options.spectrum, steps=steps, tries=options.search)
+        at = tuple(options.at)
+        plan = Plan(span, at, spectrum=options.spectrum, steps=steps, tries=options.search, locus=pair(options.locus))
         run(scene, discretization, plan, options.output, figures=options.figures)
     except KeyboardInterrupt:
         from mpi4py import MPI

@@ -32,7 +32,8 @@ class Plan:
     """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars.
 
     ``spectrum`` left-most eigenvalues of every state are found besides its index; ``tries`` deflated iterations at each
-    of the loads ``at`` look for equilibria that no branch has reached.
+    of the loads ``at`` look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
+    special point in the plane of the load and that parameter.
     """
 
     span: tuple[float, float]
@@ -42,6 +43,7 @@ class Plan:
     error_bars: bool = True
     spectrum: int = 0
     tries: int = 0
+    locus: tuple[str, float, float] | None = None
 
     def check(self, scene: Scene) -> None:
         """Raise :class:`SceneError` for a range that the scene does not admit, or a load outside the range."""
@@ -53,6 +55,21 @@ class Plan:
                     f"The load {load:g} asked for is outside the range {low:g} to {high:g}: "
                     "widen the range or leave it out."
                 )
+        if self.locus is not None:
+            name, a, b = self.locus
+            if name == scene.load or name not in scene.parameters:
+                others = ", ".join(n for n in scene.parameters if n != scene.load)
+                raise SceneError(f"{name!r} is no second parameter: choose one of {others}.")
+            if not a <= scene.parameters[name].value <= b or a == b:
+                raise SceneError(
+                    f"The interval of {name} from {a:g} to {b:g} does not hold its value "
+                    f"{scene.parameters[name].value:g}: choose one that does."
+                )
+            for value in (a, b):
+                try:
+                    scene.varying(scene.load, scene.span, **{name: value})
+                except SceneError as trouble:
+                    raise SceneError(f"The locus cannot reach {name} = {value:g}. {trouble}") from None
         if self.tries < 0:
             raise SceneError(f"{self.tries} is not a number of tries: give 0 or more to --search.")
         if self.tries and not self.at:

@@ -8,13 +8,14 @@ from pathlib import Path
 from mpi4py import MPI
 
 from rodfem import compat
-from rodfem.branch import Branch
+from rodfem.branch import BRANCH_POINT, FLUTTER, FOLD, Branch
 from rodfem.clock import Clock
 from rodfem.continuation import Equilibria, Follower
 from rodfem.diagram import as_data, save_json, save_states
-from rodfem.errors import SceneError
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization
+from rodfem.loci.locus import locus
 from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.sweep import Sweep
@@ -81,6 +82,8 @@ def run(
     report.frequencies(branches, scene.load)
     report.timing(clock, sum(len(b.points) for b in branches))
     report.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
+    if plan.locus is not None:
+        _loci(branches, follower, plan, output, report, figures)
     if figures and comm.rank == 0:
         _draw(output, report)
     comm.barrier()
@@ -96,6 +99,36 @@ def _save(explorer: Explorer | Sweep, follower: Equilibria, clock: Clock, output
 def _save_diagram(explorer: Explorer | Sweep, follower: Equilibria, clock: Clock, output: Path) -> None:
     if follower.system.comm.rank == 0:
         save_json(as_data(explorer.branches, follower.system, clock, explorer.plan.span), output / "diagram.json")
+
+
+def _loci(
+    branches: list[Branch], follower: Equilibria, plan: Plan, output: Path, report: Report, figures: bool
+) -> None:
+    """Follow all special points in the plane of two parameters; each into a file of its own, all into one picture."""
+    from rodfem.plot_locus import draw_locus
+
+    if plan.locus is None:
+        return
+    name, low, high = plan.locus
+    load = (min(plan.span), max(plan.span))
+    saved: list[dict] = []
+    for branch in branches:
+        for special in branch.special:
+            if special.kind not in (FOLD, BRANCH_POINT, FLUTTER) or special.meets is not None:
+                continue
+            report.say(f"\nLocus of the {special.kind} of {branch.name} at {special.point.load:.8g}")
+            try:
+                found = locus(follower, special, name, (load, (low, high)))
+            except (SceneError, ConvergenceError) as trouble:
+                report.warn(str(trouble))
+                continue
+            report.say(found.text())
+            saved.append(found.data())
+            if follower.system.comm.rank == 0:
+                found.save(output / f"locus-{len(saved)}.json")
+    if saved and figures and follower.system.comm.rank == 0:
+        draw_locus(saved, output / "locus.png")
+        report.say(f"Loci in {output}{os.sep}: locus-1.json ..., locus.png")
 
 
 def _draw(output: Path, report: Report) -> None:
