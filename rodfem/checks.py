@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
 
 from forms.kinematics import UNDEFORMED
+from forms.rotation import IDENTITY, rotation
 from rodfem.ends import End, Ring, check_vector
 from rodfem.errors import SceneError
+from rodfem.places import NoCentreline, place
 
 if TYPE_CHECKING:
     from rodfem.scene import Scene
@@ -28,28 +30,110 @@ def check_kinds(scene: Scene) -> None:
         if not (isinstance(pair, Sequence) and len(pair) == 2 and all(isinstance(x, Real) for x in pair)):
             raise SceneError(f"The {what} is {pair!r}: give two numbers.")
     for name, parameter in scene.parameters.items():
+        if not str(name).isidentifier() or name == "s":
+            raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
         if not isinstance(getattr(parameter, "value", parameter), Real):
             raise SceneError(f"The parameter {name} is {parameter!r}: give a number or a Parameter.")
     if not (hasattr(scene.ordinate, "of") and hasattr(scene.ordinate, "s")):
         raise SceneError(f"The ordinate is {scene.ordinate!r}: give an Ordinate(name, s, of).")
-    for what, function, count in (("stored energy", scene.energy, 3), ("start", scene.start, 1)):
-        if function is None:
-            continue
+    for what, function, wanted in functions_of(scene):
+        count = wanted.count(",") + 1
         if not callable(function):
-            raise SceneError(f"The {what} is {function!r}: give a function.")
+            raise SceneError(f"The {what} is {function!r}: give a function {wanted}.")
         try:
             inspect.signature(function).bind(*range(count))
         except TypeError:
-            wanted = "W(v, k, c)" if count == 3 else "start(s)"
             raise SceneError(f"The {what} is no function of {count} argument(s): give {wanted}.") from None
+
+
+def functions_of(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], str]]:
+    """All functions of a scene that are given: what each is in words, the function, how it is called."""
+    along: list[tuple[str, Any, str]] = [
+        ("stored energy", scene.energy, "W(v, k, c)"),
+        ("start", scene.start, "start(s)"),
+        ("ordinate", scene.ordinate.of, "of(r, q)"),
+        ("distributed force", scene.distributed, "f(c)"),
+        ("distributed follower force", scene.follower, "f(c)"),
+        ("potential along the rod", scene.potential, "f(x, c)"),
+        ("mass per length", scene.inertia.rho_A, "f(c)"),
+        ("rotary inertia per length", scene.inertia.rho_I, "f(c)"),
+    ]
+    for side, end in zip(("left", "right"), scene.sides, strict=True):
+        of_constants = {"position of": end.position, "force on": end.force, "follower force on": end.follower}
+        of_constants |= {"moment on": end.moment, "follower moment on": end.follower_moment}
+        along += [(f"{what} the {side} end", f, "f(c)") for what, f in of_constants.items()]
+        along.append((f"energy of the {side} end", end.energy, "f(x, c)"))
+    for x in scene.attachments:
+        of_constants = {"force": x.force, "follower force": x.follower, "mass": x.mass, "inertia": x.rotary_inertia}
+        along += [(f"{what} of an attachment", f, "f(c)") for what, f in of_constants.items()]
+        along.append(("energy of an attachment", x.energy, "f(x, c)"))
+    along += [("constraint", x.of, "f(x, c)") for x in scene.constraints]
+    for what, function, wanted in along:
+        if function is not None:
+            yield what, function, wanted
+
+
+def check_shapes(scene: Scene) -> None:
+    """Check that forces and moments are vectors, and energies and constraints scalars."""
+    c = scene.constants()
+    for what, function, wanted in functions_of(scene):
+        if wanted.endswith("f(c)") and "position" not in what:
+            if "mass" in what:
+                check_scalar(what, function(c))
+            else:
+                check_vector(what, function(c), 3)
+    for what, function, known in functions_of_places(scene):
+        check_scalar(what, function(known, c))
+
+
+def functions_of_places(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], Any]]:
+    """Functions of a place, each with a place of the kind that it will be given: some rotation, strains, position."""
+    q = ufl.as_vector([0.5, 0.1, 0.7, 0.5])
+    R = rotation(q)
+    r, strains = ufl.as_vector([0.2, 0.3, 0.4]), (ufl.as_vector([0.01, 0.02, 1.01]), ufl.as_vector([0.1, 0.2, 0.3]))
+    point = place(q, R, scene.interval[0], r, length=scene.length)
+    rod = place(q, R, scene.interval[0], r, dr=ufl.dot(R, strains[0]), v=strains[0], k=strains[1], length=scene.length)
+    for what, function, wanted in functions_of(scene):
+        if wanted == "f(x, c)" and what != "constraint":
+            yield what, function, rod if "along" in what else point
+    for x in scene.constraints:
+        yield "constraint", x.of, point if x.kind == "point" else rod
+
+
+def check_scalar(what: str, value: Any) -> None:
+    """Raise :class:`SceneError` unless ``value`` is a scalar, a number or an expression."""
+    try:
+        shape = ufl.as_ufl(value).ufl_shape
+    except (ValueError, TypeError):
+        raise SceneError(f"The {what} is {value!r}: return a number or a UFL expression.") from None
+    if shape != ():
+        raise SceneError(f"The {what} has the shape {shape}: return a scalar.")
+
+
+def check_start(scene: Scene) -> None:
+    """Check that the start returns quaternions, and that of a ring closes."""
+    ring = isinstance(scene.ends, Ring)
+    if scene.start is None:
+        if ring:
+            raise SceneError("A ring has no straight start: give its rotation as a function start(s).")
+        return
+    s = np.linspace(*scene.interval, 5)
+    q = np.asarray(scene.start(s), dtype=float)
+    if q.shape != (5, 4):
+        raise SceneError(f"The start has the shape {q.shape} at 5 arclengths: return a quaternion for each, (5, 4).")
+    if not (np.linalg.norm(q, axis=1) > 0).all():
+        raise SceneError("The start is no rotation everywhere: return quaternions of size one.")
+    if isinstance(scene.ends, Ring) and scene.ends.sign * (q[0] @ q[-1]) <= 0:
+        raise SceneError(
+            f"The start of the ring does not end as it begins: make q(l) = {scene.ends.sign:+g} q(0), or choose "
+            f"Ring(odd={not scene.ends.odd})."
+        )
 
 
 def check_energy(scene: Scene) -> None:
     """Check that the stored energy is a scalar."""
     v, k = ufl.as_vector(UNDEFORMED), ufl.as_vector([0.0, 0.0, 0.0])
-    shape = ufl.as_ufl(scene.energy(v, k, scene.constants())).ufl_shape
-    if shape != ():
-        raise SceneError(f"The stored energy has the shape {shape}: return a scalar, the energy per unit length.")
+    check_scalar("stored energy", scene.energy(v, k, scene.constants()))
 
 
 def check_scene(scene: Scene) -> None:
@@ -57,8 +141,10 @@ def check_scene(scene: Scene) -> None:
     if scene.planar not in (None, "e1", "e2"):
         raise SceneError(f"A rod cannot be planar across {scene.planar!r}: choose 'e1' or 'e2', or None for space.")
     check_energy(scene)
-    check_supports(scene)
     check_places(scene)
+    check_shapes(scene)
+    check_supports(scene)
+    check_start(scene)
     check_convexity(scene)
 
 
@@ -80,9 +166,8 @@ def check_supports(scene: Scene) -> None:
     for side, end in zip(("left", "right"), scene.sides, strict=True):
         for load in scene.span:
             c = scene.constants(load)
-            for what, function in (("position of", end.position), ("force on", end.force)):
-                if function is not None:
-                    check_vector(f"{what} the {side} end", function(c), 3)
+            if end.position is not None:
+                check_vector(f"position of the {side} end", end.position(c), 3)
             rotation = end.rotation(c) if callable(end.rotation) else end.rotation
             if rotation is not None:
                 check_vector(f"rotation of the {side} end", rotation, 4)
@@ -95,6 +180,8 @@ def check_supports(scene: Scene) -> None:
                     raise SceneError(f"The rotation of the {side} end is the zero quaternion: give one of size one.")
         if end.hinge is not None and end.rotation is None:
             raise SceneError(f"The {side} end has a hinge but no rotation: say which directors the hinge holds.")
+        if end.hinge is not None:
+            check_vector(f"hinge of the {side} end", end.hinge, 3)
         if end.hinge is not None and not np.linalg.norm(end.hinge) > 0:
             raise SceneError(f"The hinge of the {side} end has no axis: give three components, not all zero.")
         if end.follower is not None and all(x is not None for x in end.held(scene.constants())):
@@ -112,9 +199,7 @@ def check_supports(scene: Scene) -> None:
 def check_drift(scene: Scene) -> None:
     """Raise unless something holds the rod, or what acts on it is in balance whatever its shape."""
     c = scene.constants()
-    if isinstance(scene.ends, Ring) or scene.potential is not None or scene.constraints:
-        return
-    if any(end.energy is not None for end in scene.sides) or any(a.energy is not None for a in scene.attachments):
+    if isinstance(scene.ends, Ring) or any(asks_where(f, c) for _, f, _ in functions_of_places(scene)):
         return
     held = [[x is not None for x in end.held(c)] for end in scene.sides]
     for i, (left, right) in enumerate(zip(*held, strict=True)):
@@ -125,11 +210,22 @@ def check_drift(scene: Scene) -> None:
             )
 
 
+def asks_where(function: Callable[..., Any], c: Any) -> bool:
+    """Whether a function of a place depends on where the rod is."""
+    q = ufl.as_vector([ufl.as_ufl(x) for x in IDENTITY])
+    strains = {"v": ufl.as_vector(UNDEFORMED), "k": ufl.as_vector([0.0, 0.0, 0.0]), "length": 1.0}
+    try:
+        function(place(q, rotation(q), 0.0, **strains), c)
+    except NoCentreline:
+        return True
+    return False
+
+
 def check_reach(scene: Scene) -> None:
     """Raise where a rod that cannot stretch is held at ends that are farther apart than it is long."""
     if 2 in scene.free_strains or 0 in scene.free_strains:
         return
-    for load in scene.span:
+    for load in np.linspace(*scene.span, 9):
         left, right = (end.held(scene.constants(load)) for end in scene.sides)
         if None not in left and None not in right:
             distance = sum((float(b) - float(a)) ** 2 for a, b in zip(left, right, strict=True)) ** 0.5
@@ -148,13 +244,3 @@ def check_places(scene: Scene) -> None:
     for what, s in places:
         if not a <= s <= b:
             raise SceneError(f"The {what} at s = {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
-    c = scene.constants()
-    for what, values in (
-        ("distributed force", scene.distributed and scene.distributed(c)),
-        ("distributed follower force", scene.follower and scene.follower(c)),
-        *(("force of an attachment", x.force(c)) for x in scene.attachments if x.force),
-        *(("moment on an end", end.moment(c)) for end in scene.sides if end.moment),
-        *(("follower force on an end", end.follower(c)) for end in scene.sides if end.follower),
-    ):
-        if values is not None:
-            check_vector(what, values, 3)

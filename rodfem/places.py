@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import ufl
 
@@ -11,27 +11,42 @@ from forms.kinematics import UNDEFORMED
 from forms.rotation import IDENTITY, rotation
 from rodfem.ends import Place
 from rodfem.errors import SceneError
-from rodfem.scene import Scene
+
+if TYPE_CHECKING:
+    from rodfem.scene import Scene
 
 
 class NoCentreline(SceneError):
     """A function of a place asked for the centreline where there is none."""
 
 
-class Reduced(SimpleNamespace):
+class Known(SimpleNamespace):
+    """A place; asking for what it does not have is a :class:`SceneError`."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Say what a place has."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        raise SceneError(
+            f"A function of a place asks for {name!r}: it has r, q, R, d1, d2, d3, s and length, and where it is the "
+            "whole rod dr, v and k."
+        )
+
+
+class Reduced(Known):
     """Place of the reduced formulation: it knows rotations and strains, not where the rod is."""
 
     def __getattr__(self, name: str) -> Any:
         """Raise :class:`NoCentreline` for ``r`` and ``dr``."""
         if name in ("r", "dr"):
             raise NoCentreline("The reduced formulation has no centreline here: use --formulation pointwise.")
-        raise AttributeError(f"A place has no {name!r}: it has r, q, R, d1, d2, d3, s, and along the rod dr, v, k.")
+        return super().__getattr__(name)
 
 
 def place(q: Any, R: Any, s: Any, r: Any = None, **more: Any) -> Place:
     """Make a place from quaternion, rotation, arclength, centreline (None: there is none) and what else is known."""
     d = {f"d{i + 1}": ufl.as_vector([R[j, i] for j in range(3)]) for i in range(3)}
-    kind = Reduced if r is None else Place
+    kind = Reduced if r is None else Known
     known = {} if r is None else {"r": r}
     return kind(q=q, R=R, s=s, **d, **known, **more)
 

@@ -9,8 +9,9 @@ eigenvalue is known to be zero, is kept out by the constraint ``g.Mx = 0``, and 
 
 The shift is put below the spectrum, which the inertia of the very factors of shift-invert proves; the nearest
 eigenvalues to it are then the left-most ones, and a second count, just above the last of them, proves that none is
-missing.  Along a branch the shift, the symbolic factorisation and the modes as first vector are taken from the point
-before: two numeric factorisations a point, as many as a count of the index.
+missing.  The first state is solved by SLEPc's Krylov-Schur method.  Along a branch the shift, the symbolic factorisation and the
+modes are those of the point before, from which a block Lanczos iteration converges in a few steps: two numeric
+factorisations a point, as many as a count of the index.
 """
 
 from __future__ import annotations
@@ -19,14 +20,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from petsc4py import PETSc
-from slepc4py import SLEPc
 
 from rodfem.errors import ConvergenceError
 from rodfem.stability.inertia import Inertia, inertia_factorizer
+from rodfem.stability.lanczos import Block, refine
 from rodfem.stability.pencil import assemble_pencil, exclude_modes, symmetry_modes, with_factors
 
 HIT = 1e-8
 """A shift nearer to an eigenvalue than this, relative to the farthest one found, spoils the others by round-off."""
+
+
+EXTRA = (2, 6, 14)
+"""How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
+
+NOISE = 1e-6
+"""Size of what is added to the modes of the state before: they may span an invariant space that misses the lowest one."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +72,7 @@ class Spectrum:
         self.shift = -inertia.scale
         self.factorisations = 0
         self._factored_at = np.nan
-        self._start: PETSc.Vec | None = None
+        self._last = np.zeros((0, 0))
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Assemble the pencil of the state ``x``, at which the phase conditions must be set."""
@@ -83,12 +91,12 @@ class Spectrum:
         self.assemble(x)
         with self.system.clock("stability"):
             self.go_below()
-            for extra in (1, 4, 12):
+            for extra in EXTRA:
                 modes = self._solve(number, extra)
                 if modes.certified:
                     break
         spread = modes.values[-1] - modes.values[0] + 1e-3 * abs(modes.values).max()
-        self.shift = modes.values[0] - spread
+        self.shift = modes.values[0] - 0.5 * spread
         return modes
 
     def go_below(self) -> None:
@@ -132,34 +140,50 @@ class Spectrum:
         asked for.
         """
         self._factor(self.shift)
-        start = self.inertia.seed(1)
-        if self._start is not None:  # all of a space that is invariant already would find nothing else
-            start.aypx(1e-3 * self._start.norm() / start.norm(), self._start)
-        solver = with_factors(self.matrix, self.mass, number + extra, self.shift, self._factors, start)
+        found = self._from_last(number) if extra == EXTRA[0] and self._last.shape[1] >= number else None
+        values, vectors = self._krylov_schur(number, number + extra) if found is None else found
+        if values[0] - self.shift < HIT * (values[number - 1] - self.shift):
+            self.shift -= max(values[number - 1] - self.shift, self.inertia.scale)
+            return self._solve(number, extra)
+        self._last = vectors
+        cut = values[number - 1] + 1e-6 * max(abs(values[number - 1]), self.inertia.scale)
+        known = int((values < cut).sum())
+        values, vectors = values[:number], vectors[:, :number]
+        errors = self._errors(values, vectors)
+        out = [self.system.new_vector() for _ in range(number)]
+        for vector, column in zip(out, vectors.T, strict=True):
+            vector.array[:] = column
+        return Modes(values, out, errors, self.below(cut) == known)
+
+    def _from_last(self, number: int) -> tuple[np.ndarray, np.ndarray] | None:
+        """Solve from the modes of the state before; None where they are too far away."""
+        noise = self.inertia.seed(1).array_r[:, None] * np.sin(1.0 + np.arange(self._last.shape[1]))
+        start = self._last + NOISE * noise / self.system.norm(self.inertia.seed(1))
+        found = refine(Block(self._factors.factor, self.mass), start, number)
+        return None if found is None else (self.shift + 1 / found[0], found[1])
+
+    def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """Solve by SLEPc, for ``number`` eigenvalues or all there are."""
+        solver = with_factors(self.matrix, self.mass, number, self.shift, self._factors, self.inertia.seed(1))
         solver.solve()
         found = solver.getConverged()
-        if found < number:
-            solver.destroy()
+        values = np.array([solver.getEigenvalue(i).real for i in range(found)])
+        vector, vectors = self.system.new_vector(), []
+        for i in np.argsort(values):
+            solver.getEigenvector(i, vector)
+            vectors.append(vector.array_r.copy())
+        solver.destroy()
+        if found < least:
             raise ConvergenceError(
-                f"SLEPc found {found} of the {number} eigenvalues asked for: "
+                f"SLEPc found {found} of the {least} eigenvalues asked for: "
                 f"ask for at most {found} at this discretisation."
             )
-        values = np.array([solver.getEigenvalue(i).real for i in range(found)])
-        order = np.argsort(values)
-        cut = values[order[number - 1]]
-        cut += 1e-6 * max(abs(cut), self.inertia.scale)
-        known = int((values < cut).sum())
-        order = order[:number]
-        errors = np.array([solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD) for i in order])
-        vectors = [self.system.new_vector() for _ in order]
-        for i, vector in zip(order, vectors, strict=True):
-            solver.getEigenvector(i, vector)
-        solver.destroy()
-        values = values[order]
-        if values[0] - self.shift < HIT * (values[-1] - self.shift):
-            self.shift -= max(values[-1] - self.shift, self.inertia.scale)
-            return self._solve(number, extra)
-        self._start = vectors[0].copy()
-        for vector in vectors[1:]:
-            self._start.axpy(1.0, vector)
-        return Modes(values, vectors, errors, self.below(cut) == known)
+        return np.sort(values), np.stack(vectors, axis=1)
+
+    def _errors(self, values: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+        """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""
+        block = Block(self._factors.factor, self.mass)
+        residuals = block.product(self.matrix, vectors) - block.weigh(vectors) * values
+        sums = self.system.comm.allreduce(np.array([(residuals**2).sum(axis=0), (vectors**2).sum(axis=0)]))
+        stiffness, mass = (A.norm(PETSc.NormType.INFINITY) for A in (self.matrix, self.mass))
+        return np.sqrt(sums[0] / sums[1]) / (stiffness + abs(values) * mass)
