@@ -1,0 +1,95 @@
+r"""A stability map: how a compressed hemitropic rod behaves for every coupling of stretch and twist.
+
+For each of a grid of couplings A the whole diagram of demos/hemitropic.py is traced, and read at a grid of compressions
+lam: the index of the straight rod, and the displacement of the middle of the stable state.  Rods are independent, so
+that ranks share them: mpirun -n 2 .venv/bin/python demos/map.py.  What is finished is kept: started again, it goes on.
+"""
+
+from math import hypot, inf
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+import rodfem.cli as cli
+from forms.energy import hemitropic
+from rodfem.continuation import Follower
+from rodfem.ends import clamped
+from rodfem.explore import Explorer, Plan
+from rodfem.fields import Discretization
+from rodfem.many import many
+from rodfem.report import Report
+from rodfem.scene import Ordinate, Parameter, Scene
+from rodfem.system import System
+
+
+def scene(A: float, highest: float) -> Scene:
+    """The rod of demos/hemitropic.py with the coupling A."""
+    return Scene(
+        name="map",
+        interval=(-3.0, 3.0),
+        rod="unshearable",
+        energy=lambda v, k, c: hemitropic(v, k, stretching=10.0, coupling=c.A, twisting=1.0, bending=1.0),
+        parameters={"lam": Parameter(0.0, r"\lambda", admissible=(-inf, 1.0)), "A": Parameter(A)},
+        load="lam",
+        ends=(clamped(lambda c: (0.0, 0.0, -3 * (1 - c.lam))), clamped(lambda c: (0.0, 0.0, 3 * (1 - c.lam)))),
+        ordinate=Ordinate("mid-point displacement", s=0.0, of=lambda r, q: hypot(r[0], r[1])),
+        span=(0.0, highest),
+    )
+
+
+def read(rod: Scene, loads: np.ndarray) -> dict:
+    """Index of the straight rod, and least displacement of a stable state (nan where there is none), at each load."""
+    follower = Follower(System(rod, Discretization("reduced", 8, 6), MPI.COMM_SELF))
+    plan = Plan(rod.span, at=tuple(loads), depth=1, error_bars=False)
+    branches = Explorer(follower, plan, Report(MPI.COMM_SELF, quiet=True), lambda: None).run()
+    index, stable = np.full(len(loads), -1), np.full(len(loads), np.nan)
+    for branch in branches:
+        for s in (s for s in branch.special if s.kind == "user"):
+            i = int(np.argmin(abs(loads - s.point.load)))
+            if branch.depth == 0:
+                index[i] = s.point.negative
+            if s.point.negative == 0:
+                stable[i] = np.fmin(stable[i], s.point.ordinate)
+    return {"index": index.tolist(), "stable": [None if np.isnan(x) else x for x in stable]}
+
+
+def draw(couplings: np.ndarray, loads: np.ndarray, results: list[dict], path: Path) -> None:
+    """Draw the map: colour for the displacement of the stable state, lines where the straight rod's index changes."""
+    from matplotlib.figure import Figure
+
+    stable = np.array([[np.nan if x is None else x for x in r["stable"]] for r in results]).T
+    index = np.array([r["index"] for r in results]).T
+    figure = Figure(figsize=(7.5, 5.0), dpi=200, layout="constrained")
+    axes = figure.subplots()
+    picture = axes.pcolormesh(couplings, loads, stable, shading="nearest", cmap="viridis")
+    lines = axes.contour(couplings, loads, index, levels=[1, 3], colors=["white", "black"], linewidths=1.5)
+    axes.clabel(lines, fmt={1: "0|2", 3: "2|4"})
+    figure.colorbar(picture, label="mid-point displacement of the stable state")
+    axes.set(xlabel="$A$", ylabel=r"$\lambda$", title="Compressed hemitropic rod: lines are the straight rod's index")
+    figure.savefig(path)
+
+
+if __name__ == "__main__":
+    parser = cli.Parser(prog="map.py", description=__doc__)
+    parser.add_argument("--couplings", type=int, default=40, metavar="N", help="number of couplings A (default 40)")
+    parser.add_argument("--loads", type=int, default=40, metavar="N", help="number of compressions (default 40)")
+    parser.add_argument("--output", type=Path, default=Path("results/map"), metavar="DIR", help="(default results/map)")
+    options = parser.parse_args()
+    if min(options.couplings, options.loads) < 2:
+        cli.complain("A map needs two couplings and two loads at least.")
+    couplings, loads = np.linspace(-3.1, 3.1, options.couplings), np.linspace(0.01, 0.6, options.loads)
+    report = Report()
+    rods = [scene(float(A), 0.6) for A in couplings]
+    results = many(
+        rods,
+        lambda rod: read(rod, loads),
+        options.output,
+        progress=lambda done, count: report.say(f"  {done} of {count} rods"),
+    )
+    failed = [r["error"] for r in results if "error" in r]
+    for sentence in failed:
+        report.warn(sentence)
+    if MPI.COMM_WORLD.rank == 0 and not failed:
+        draw(couplings, loads, results, options.output / "map.png")
+    report.say(f"Results in {options.output}: rod-00000.json ..., map.png")
