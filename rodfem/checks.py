@@ -97,14 +97,14 @@ def functions_of_places(scene: Scene) -> Iterator[tuple[str, Callable[..., Any],
         if wanted == "f(x, c)" and what != "constraint":
             yield what, function, rod if "along" in what else point
     for x in scene.constraints:
-        yield "constraint", x.of, point if x.kind == "point" else rod
+        yield "constraint", getattr(x.of, "of", x.of), point if x.kind == "point" else rod
 
 
 def check_scalar(what: str, value: Any) -> None:
     """Raise :class:`SceneError` unless ``value`` is a scalar, a number or an expression."""
     try:
         shape = ufl.as_ufl(value).ufl_shape
-    except (ValueError, TypeError):
+    except Exception:  # of UFL's own, which differ from release to release
         raise SceneError(f"The {what} is {value!r}: return a number or a UFL expression.") from None
     if shape != ():
         raise SceneError(f"The {what} has the shape {shape}: return a scalar.")

@@ -217,6 +217,7 @@ class Explorer:
         self._finish(branch)
 
     def _follow(self, branch: Branch) -> None:
+        self._first_users(branch)
         history = list(branch.points)
         for item in follow(self.follower, history, self.plan.steps, (self.low, self.high)):
             if isinstance(item, str):
@@ -293,6 +294,18 @@ class Explorer:
                 found.append(Special(USER, point, p.negative, q.negative, 1e-12 * max(1.0, abs(load))))
                 found[-1].negative_before = found[-1].negative_after = point.negative
         return found
+
+    def _first_users(self, branch: Branch) -> None:
+        """User points between the special point that a branch leaves and its first point, if they are on the branch."""
+        if len(branch.points) != 2 or branch.parent is None:
+            return
+        a, b = branch.points
+        for special in self._users(branch, a, b, a, b):
+            p, system = special.point, self.follower.system
+            guess = hermite(a, b, p.arclength)[0]
+            if distance(system, guess, p.x) < 0.5 * distance(system, a.x, p.x):  # not fallen back to the trunk
+                branch.insert(special)
+                self.report.special(branch, special)
 
     def _user(self, guess: PETSc.Vec, load: float, s: float, increasing: bool) -> Point:
         self.follower.system.set_phase(guess)

@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import pi
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 from rods import run_demo
 
-from rodfem.ends import clamped, free
+from rodfem.ends import (
+    Attachment,
+    End,
+    Ring,
+    at,
+    clamped,
+    elastic,
+    everywhere,
+    free,
+    hinged,
+    integral,
+    pinned,
+)
 from rodfem.errors import SceneError
-from rodfem.fields import Discretization
-from rodfem.scene import Ordinate, Parameter, Scene
+from rodfem.fields import Discretization, Fields
+from rodfem.scene import Inertia, Ordinate, Parameter, Scene
 from rodfem.system import System
 
 pytestmark = pytest.mark.short
@@ -116,6 +130,121 @@ def test_bad_scene(change: dict, words: str) -> None:
     Scene(**GOOD)
     with pytest.raises(SceneError, match=words):
         Scene(**(GOOD | change))
+
+
+ZERO = (0.0, 0.0, 0.0)
+RIGID: dict[str, Any] = {"rod": "unshearable and inextensible"}
+Ends = tuple[End, End]
+
+
+def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
+    return {"ends": (left or clamped(), right or free())}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        # names
+        ({"parameters": {"F": 0.0, "s": 1.0}}, "cannot have the name 's'"),
+        ({"parameters": {"F": Parameter(0.0)}}, "asks for a constant 'B': add it"),
+        ({"potential": lambda x, c: c.G * x.r[0]}, "asks for a constant 'G'"),
+        ({"potential": lambda x, c: x.z}, "asks for 'z': it has"),
+        ({"constraints": (at(0.5, lambda x, c: x.k[0]),)}, "asks for 'k': it has"),
+        # functions
+        (held(clamped(ZERO)), "position of the left end is .*: give a function"),  # type: ignore[arg-type]
+        (held(right=free(ZERO)), "force on the right end is .*: give a function"),  # type: ignore[arg-type]
+        ({"energy": lambda v, k: k[0]}, "no function of 3 argument"),
+        ({"energy": lambda v, k, c: None}, "energy is None: return"),
+        # sizes and shapes
+        ({"energy": lambda v, k, c: k}, "energy has the shape"),
+        ({"potential": lambda x, c: x.r}, "potential along the rod has the shape"),
+        (held(right=End(energy=lambda x, c: x.r)), "energy of the right end has the shape"),
+        ({"constraints": (at(0.5, lambda x, c: x.r),)}, "constraint has the shape"),
+        ({"constraints": (integral(lambda x, c: x.k),)}, "constraint has the shape"),
+        ({"constraints": (everywhere(lambda x, c: x.k, strain=True),)}, "constraint has the shape"),
+        (held(clamped(lambda c: (0, 0))), "position of the left end has 2 components: give 3"),
+        (held(clamped(lambda c: 0)), "position of the left end is a single value"),  # type: ignore[arg-type,return-value]
+        (held(right=free(lambda c: (0, c.F))), "force on the right end has 2 components"),
+        (held(right=free(follower=lambda c: (0, c.F))), "follower force on the right end has 2"),
+        (held(right=End(moment=lambda c: (0, c.F))), "moment on the right end has 2"),
+        (held(right=End(follower_moment=lambda c: (0, c.F))), "follower moment on the right end has 2"),
+        ({"distributed": lambda c: (0, 1)}, "distributed force has 2"),
+        ({"follower": lambda c: (0, 1)}, "distributed follower force has 2"),
+        ({"attachments": (Attachment(0.5, force=lambda c: (0, 1)),)}, "force of an attachment has 2"),
+        ({"attachments": (Attachment(0.5, rotary_inertia=lambda c: (0, 1)),)}, "inertia of an attachment has 2"),
+        ({"inertia": Inertia(rho_I=lambda c: (1.0, 1.0))}, "rotary inertia per length has 2"),
+        ({"start": lambda s: np.zeros((4, len(s)))}, r"start has the shape \(4, 5\)"),
+        # clamps that contradict themselves
+        (held(clamped(rotation=(1.0, 0.0, 0.0))), "rotation of the left end has 3"),  # type: ignore[arg-type]
+        (held(clamped(rotation=(0.0, 0.0, 0.0, 0.0))), "zero quaternion"),
+        (held(clamped(rotation=lambda c: (0, 0, 0, c.F))), "zero quaternion"),
+        ({"planar": "e2"} | held(clamped(rotation=(1.0, 0.0, 0.0, 1.0))), "leaves the plane across e2"),
+        (held(hinged((0.0, 0.0, 0.0))), "no axis"),
+        (held(hinged((1.0, 0.0))), "hinge of the left end has 2"),  # type: ignore[arg-type]
+        (held(End(position=lambda c: ZERO, hinge=(1.0, 0.0, 0.0))), "a hinge but no rotation"),
+        ({"start": lambda s: np.zeros((len(s), 4))}, "no rotation everywhere"),
+        # loads on what is held
+        (held(End(position=lambda c: ZERO, follower=lambda c: ZERO)), "whose position is held"),
+        (held(right=End(rotation=(1.0, 0.0, 0.0, 0.0), moment=lambda c: ZERO)), "whose directors are held"),
+        # nothing that holds, or nothing that gives way
+        ({"ends": (pinned(lambda c: (0, 0, None)), pinned(lambda c: (0, 0, None)))}, "drift away along e3"),
+        ({"ends": (free(), free()), "constraints": (integral(lambda x, c: x.k[2]),)}, "drift away along e1"),
+        (RIGID | held(right=clamped(lambda c: (0, 0, 1.2))), "only 1 long"),
+        (RIGID | held(right=clamped(lambda c: (0, 0, 0.5 + 4 * c.F * (1 - c.F)))), "At F = .* only 1 long"),
+        # rings
+        ({"ends": (clamped(),)}, "not two of the kind End"),
+        ({"ends": Ring()}, "no straight start"),
+        ({"ends": Ring(odd=False), "start": lambda s: turns(s, 1)}, r"Ring\(odd=True\)"),
+        ({"ends": Ring(odd=True), "start": lambda s: turns(s, 2)}, r"Ring\(odd=False\)"),
+        # places
+        ({"attachments": (Attachment(1.5, force=lambda c: ZERO),)}, "attachment at s = 1.5 is not on the rod"),
+        ({"constraints": (at(-0.5, lambda x, c: x.r[0]),)}, "constraint at s = -0.5 is not on the rod"),
+        ({"breaks": (2.0,)}, "break at s = 2 is not on the rod"),
+        ({"planar": "e3"}, "planar across 'e3'"),
+    ],
+)
+def test_mistakes(change: dict, words: str, capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SceneError, match=words) as raised:
+        Scene(**(GOOD | change))
+    message = str(raised.value)
+    assert message[0].isupper() and message.endswith(".") and "\n" not in message
+    assert capfd.readouterr() == ("", "")
+
+
+def turns(s: np.ndarray, count: int) -> np.ndarray:
+    """So many turns about e2 in all."""
+    return np.stack([np.cos(pi * count * s), 0 * s, np.sin(pi * count * s), 0 * s], axis=1)
+
+
+def test_scenes_that_are_no_mistakes() -> None:
+    """Held by a spring only; ends farther apart than a rod that may stretch or shear; closed after two turns."""
+    Scene(**(GOOD | {"ends": (elastic(lambda c: 1.0), free())}))
+    for rod in ("flexible", "unshearable", "inextensible"):
+        Scene(**(GOOD | {"rod": rod} | held(right=clamped(lambda c: (0, 0, 1.2)))))
+    Scene(**(GOOD | {"ends": Ring(odd=False), "start": lambda s: turns(s, 2)}))
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        ({"distributed": lambda c: (0, 0, c.F)}, "a distributed force"),
+        ({"potential": lambda x, c: x.r[0] ** 2}, "the potential along the rod"),
+        ({"attachments": (Attachment(0.5, force=lambda c: (0, 0, c.F)),)}, "what is attached along the rod"),
+        ({"constraints": (at(0.5, lambda x, c: x.r[0]),)}, "a constraint"),
+        (held(right=free(follower=lambda c: (0, 0, c.F))), "a load without potential"),
+    ],
+)
+def test_no_centreline(change: dict, what: str) -> None:
+    scene = Scene(**(GOOD | change))
+    with pytest.raises(SceneError, match=f"{what} needs: use --formulation pointwise"):
+        Fields(scene, Discretization("reduced", 4, 3))
+    assert Fields(scene, Discretization("auto", 4, 3)).discretization.formulation == "pointwise"
+
+
+def test_fewer_elements_than_pieces() -> None:
+    scene = Scene(**(GOOD | {"breaks": (0.1, 0.2, 0.3, 0.4)}))
+    with pytest.raises(SceneError, match=r"5 pieces between joints.*use more than 4 elements"):
+        Fields(scene, Discretization("auto", 4, 3))
 
 
 @pytest.mark.parametrize(

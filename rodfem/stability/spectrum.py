@@ -96,7 +96,7 @@ class Spectrum:
                 if modes.certified:
                     break
         spread = modes.values[-1] - modes.values[0] + 1e-3 * abs(modes.values).max()
-        self.shift = modes.values[0] - 0.5 * spread
+        self.shift = modes.values[0] - 0.1 * spread
         return modes
 
     def go_below(self) -> None:
