@@ -4,7 +4,7 @@ PYTHON := .venv/bin/python
 # Debian's own mpirun, whatever else may be first on PATH. More ranks than cores are fine here.
 MPIRUN := /usr/bin/mpirun.openmpi --oversubscribe
 # Seconds after which one run of the tests or the demo is stopped: ranks that wait for each other never end.
-LIMIT := 600
+LIMIT := 1200
 # More options for pytest, as in: make test ARGS="-k hemitropic"
 ARGS :=
 
@@ -14,6 +14,8 @@ export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 export OMPI_MCA_btl := self,vader
 export HWLOC_HIDE_ERRORS := 2
 export UCX_LOG_LEVEL := fatal
+# Ranks that wait leave the core to those that work: other things may run beside.
+export OMPI_MCA_mpi_yield_when_idle := 1
 # One thread a rank.
 export OMP_NUM_THREADS := 1
 # Pictures into files, without a display.
