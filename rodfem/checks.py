@@ -123,6 +123,8 @@ def check_start(scene: Scene) -> None:
         raise SceneError(f"The start has the shape {q.shape} at 5 arclengths: return a quaternion for each, (5, 4).")
     if not (np.linalg.norm(q, axis=1) > 0).all():
         raise SceneError("The start is no rotation everywhere: return quaternions of size one.")
+    if scene.normal is not None and abs(np.delete(q[:, 1:], scene.normal, axis=1)).max() > 1e-12:
+        raise SceneError(f"The start leaves the plane across {scene.planar}: turn about that axis only.")
     if isinstance(scene.ends, Ring) and scene.ends.sign * (q[0] @ q[-1]) <= 0:
         raise SceneError(
             f"The start of the ring does not end as it begins: make q(l) = {scene.ends.sign:+g} q(0), or choose "
@@ -136,6 +138,21 @@ def check_energy(scene: Scene) -> None:
     check_scalar("stored energy", scene.energy(v, k, scene.constants()))
 
 
+def check_inertia(scene: Scene) -> None:
+    """Check that no inertia is negative, and that a scene whose stability is a matter of motion has one."""
+    c = scene.constants()
+    masses = [float(scene.inertia.rho_A(c)), *(float(x.mass(c)) for x in scene.attachments if x.mass)]
+    rotary = [float(x) for x in scene.inertia.rho_I(c)]
+    rotary += [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
+    if min(masses + rotary) < 0:
+        raise SceneError(f"A mass or rotary inertia of {min(masses + rotary):g} is negative: give zero or more.")
+    if not scene.conservative and max(masses) == 0 and scene.inertia == type(scene.inertia)():
+        raise SceneError(
+            f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter of "
+            "motion, so give it an inertia, as in inertia=Inertia(rho_A=lambda c: 1.0)."
+        )
+
+
 def check_scene(scene: Scene) -> None:
     """Check supports, places and the stored energy; raises :class:`~rodfem.errors.SceneError`."""
     if scene.planar not in (None, "e1", "e2"):
@@ -146,6 +163,7 @@ def check_scene(scene: Scene) -> None:
     check_supports(scene)
     check_start(scene)
     check_convexity(scene)
+    check_inertia(scene)
 
 
 def check_convexity(scene: Scene) -> None:
@@ -187,6 +205,11 @@ def check_supports(scene: Scene) -> None:
         if end.follower is not None and all(x is not None for x in end.held(scene.constants())):
             raise SceneError(
                 f"A follower force acts on the {side} end, whose position is held: leave it free in one direction."
+            )
+        if end.force is not None and all(x is not None for x in end.held(scene.constants())):
+            raise SceneError(
+                f"A dead force acts on the {side} end, whose position is held: it has no effect there; leave it out, "
+                "or leave the position free in one direction."
             )
         if end.fixed_rotation is not None and (end.moment or end.follower_moment):
             raise SceneError(

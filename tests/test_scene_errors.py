@@ -216,6 +216,26 @@ def turns(s: np.ndarray, count: int) -> np.ndarray:
     return np.stack([np.cos(pi * count * s), 0 * s, np.sin(pi * count * s), 0 * s], axis=1)
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (held(right=free(follower=lambda c: (0, 0, c.F))), "give it an inertia"),
+        ({"inertia": Inertia(rho_A=lambda c: -1.0)}, "-1 is negative"),
+        (
+            held(right=clamped(lambda c: (0, 0, 1))) | {"inertia": Inertia(rho_I=lambda c: (1.0, -2.0, 1.0))},
+            "-2 is negative",
+        ),
+        (
+            {"planar": "e2", "start": lambda s: np.stack([np.cos(s), np.sin(s), 0 * s, 0 * s], axis=1)},
+            "leaves the plane",
+        ),
+    ],
+)
+def test_inertia_and_plane(change: dict, words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        Scene(**(GOOD | change))
+
+
 def test_scenes_that_are_no_mistakes() -> None:
     """Held by a spring only; ends farther apart than a rod that may stretch or shear; closed after two turns."""
     Scene(**(GOOD | {"ends": (elastic(lambda c: 1.0), free())}))
@@ -231,7 +251,10 @@ def test_scenes_that_are_no_mistakes() -> None:
         ({"potential": lambda x, c: x.r[0] ** 2}, "the potential along the rod"),
         ({"attachments": (Attachment(0.5, force=lambda c: (0, 0, c.F)),)}, "what is attached along the rod"),
         ({"constraints": (at(0.5, lambda x, c: x.r[0]),)}, "a constraint"),
-        (held(right=free(follower=lambda c: (0, 0, c.F))), "a load without potential"),
+        (
+            held(right=free(follower=lambda c: (0, 0, c.F))) | {"inertia": Inertia(rho_A=lambda c: 1.0)},
+            "a load without potential",
+        ),
     ],
 )
 def test_no_centreline(change: dict, what: str) -> None:
