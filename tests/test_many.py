@@ -1,0 +1,42 @@
+"""Many rods: shared among ranks, kept in files, and taken up again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mpi4py import MPI
+from scenes import scene
+
+from rodfem.errors import SceneError
+from rodfem.many import many
+from rodfem.scene import Scene
+
+COMM = MPI.COMM_WORLD
+
+
+@pytest.mark.short
+def test_shared_kept_and_taken_up_again(folder: Path) -> None:
+    rods = [scene("cord", turns=float(turns)) for turns in (1.0, 1.5, 2.0, 2.5, 3.0)]
+    done: list[float] = []
+
+    def work(rod: Scene) -> dict[str, Any]:
+        k0 = rod.parameters["k0"].value
+        done.append(k0)
+        if k0 > 18:
+            raise SceneError("too many turns")
+        return {"square": k0**2}
+
+    results = many(rods, work, folder / "many")
+    assert [round(r["square"], 6) for r in results[:4]] == [round(r.parameters["k0"].value ** 2, 6) for r in rods[:4]]
+    assert results[4] == {"error": "too many turns"}
+    assert len(done) == len(rods[COMM.rank :: COMM.size])
+    assert COMM.allreduce(len(done)) == 5
+    (folder / "many" / "rod-00001.json").write_text("{ cut off")
+    COMM.barrier()
+    changed = [replace(rods[0], span=(50.0, 0.0)), *rods[1:]]
+    done.clear()
+    assert many(changed, work, folder / "many") == results
+    assert COMM.allreduce(len(done)) == 2  # the one that was cut off, the one that has changed
