@@ -13,14 +13,14 @@ from scenes import Found, explored, scene
 
 from rodfem.branch import Point
 from rodfem.continuation import Follower, distance
-from rodfem.search.deflation import NEW, SAME, Deflation, further, starts, states_at
 from rodfem.errors import SceneError
 from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization
+from rodfem.report import Report
+from rodfem.search.deflation import NEW, SAME, Deflation, further, starts, states_at
 from rodfem.search.guesses import turned_state
 from rodfem.search.mirror import mirrors
 from rodfem.search.orbit import Orbit
-from rodfem.report import Report
 from rodfem.system import System
 
 K0 = 3 * pi
