@@ -129,8 +129,8 @@ class Explorer:
         if not outcome.converged:
             raise ConvergenceError(
                 f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: start at another "
-                "load, give the scene a start nearer to one, or see whether constraints repeat each other or what an end "
-                "holds."
+                "load, give the scene a start nearer to one, or see whether constraints repeat each other or what an "
+                "end holds."
             )
         follower.system.set_phase(x)
         point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
