@@ -1,8 +1,8 @@
 """The pencil of a state, and SLEPc set up to find its eigenvalues.
 
-SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...), and
-overrule what is set here.  Those of the factorisation inside are ``-rodfem_st_...`` for a pencil without symmetry, else
-``-rodfem_cholesky_...`` (see :class:`~rodfem.system.Factorizer`).
+SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
+and overrule what is set here.  Those of the factorisation inside are ``-rodfem_st_...`` for a pencil without symmetry,
+else ``-rodfem_cholesky_...`` (see :class:`~rodfem.system.Factorizer`).
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def with_factors(
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTarget(target)
-    solver.setTolerances(tol=1e-12, max_it=300)
+    solver.setTolerances(tol=1e-9, max_it=300)  # of vectors: the error of eigenvalues is the square
     solver.setDimensions(number, 2 * number + 6)
     solver.setInitialSpace([start])
     transform = solver.getST()
@@ -104,4 +104,27 @@ def with_factors(
     ksp.getPC().setType("python")
     ksp.getPC().setPythonContext(Inverse(factors))
     solver.setFromOptions()
+    return solver
+
+
+def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> SLEPc.EPS:
+    """Set up spectrum slicing for all eigenvalues of a symmetric pencil between two numbers that are none themselves.
+
+    Options: ``-rodfem_slicing_eps_...``, ``-rodfem_slicing_st_...``.
+    """
+    solver = SLEPc.EPS().create(matrix.comm)
+    solver.setOptionsPrefix("rodfem_slicing_")
+    solver.setOperators(matrix, mass)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
+    solver.setInterval(low, high)
+    solver.setTolerances(tol=1e-10)
+    transform = solver.getST()
+    transform.setType(SLEPc.ST.Type.SINVERT)
+    solver.setFromOptions()
+    ksp = solver.getKrylovSchurKSP()  # that of the solver for one slice
+    ksp.setType("preonly")
+    ksp.getPC().setType("cholesky")
+    ksp.getPC().setFactorSolverType("mumps")
+    prefer_options(ksp.getOptionsPrefix(), DENSE_ROWS | {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1})
     return solver

@@ -9,9 +9,8 @@ eigenvalue is known to be zero, is kept out by the constraint ``g.Mx = 0``, and 
 
 The shift is put below the spectrum, which the inertia of the very factors of shift-invert proves; the nearest
 eigenvalues to it are then the left-most ones, and a second count, just above the last of them, proves that none is
-missing.  The first state is solved by SLEPc's Krylov-Schur method.  Along a branch the shift, the symbolic factorisation and the
-modes are those of the point before, from which a block Lanczos iteration converges in a few steps: two numeric
-factorisations a point, as many as a count of the index.
+missing.  Along a branch the shift, the symbolic factorisation and a first vector, the sum of the modes, are those
+of the point before: two numeric factorisations a point, as many as a count of the index takes.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.stability.inertia import Inertia, inertia_factorizer
-from rodfem.stability.lanczos import Block, refine
 from rodfem.stability.pencil import assemble_pencil, exclude_modes, symmetry_modes, with_factors
 
 HIT = 1e-8
@@ -34,7 +32,7 @@ EXTRA = (2, 6, 14)
 """How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
 
 NOISE = 1e-6
-"""Size of what is added to the modes of the state before: they may span an invariant space that misses the lowest one."""
+"""Size of what is added to the modes of the state before, which may span an invariant space without the lowest one."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class Spectrum:
         self.shift = -inertia.scale
         self.factorisations = 0
         self._factored_at = np.nan
-        self._last = np.zeros((0, 0))
+        self._last = np.zeros(0)
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Assemble the pencil of the state ``x``, at which the phase conditions must be set."""
@@ -114,7 +112,7 @@ class Spectrum:
     def below(self, sigma: float) -> int:
         """Number of eigenvalues of the pencil last assembled below ``sigma``, symmetry modes not included."""
         self._factor(sigma)
-        negative, zero, _ = self._factors.factor.getInertia()
+        negative, zero, _ = self._factors.ksp.getPC().getFactorMatrix().getInertia()
         below = negative - self.inertia.constraints - self.system.active_drifts()
         if zero or below < 0:
             raise ConvergenceError(
@@ -140,50 +138,44 @@ class Spectrum:
         asked for.
         """
         self._factor(self.shift)
-        found = self._from_last(number) if extra == EXTRA[0] and self._last.shape[1] >= number else None
-        values, vectors = self._krylov_schur(number, number + extra) if found is None else found
+        values, vectors = self._krylov_schur(number, number + extra)
         if values[0] - self.shift < HIT * (values[number - 1] - self.shift):
             self.shift -= max(values[number - 1] - self.shift, self.inertia.scale)
             return self._solve(number, extra)
-        self._last = vectors
+        self._last = sum(vector.array_r for vector in vectors)
         cut = values[number - 1] + 1e-6 * max(abs(values[number - 1]), self.inertia.scale)
         known = int((values < cut).sum())
-        values, vectors = values[:number], vectors[:, :number]
-        errors = self._errors(values, vectors)
-        out = [self.system.new_vector() for _ in range(number)]
-        for vector, column in zip(out, vectors.T, strict=True):
-            vector.array[:] = column
-        return Modes(values, out, errors, self.below(cut) == known)
+        values, vectors = values[:number], vectors[:number]
+        errors = self.backward_errors(values, vectors)
+        return Modes(values, vectors, errors, self.below(cut) == known)
 
-    def _from_last(self, number: int) -> tuple[np.ndarray, np.ndarray] | None:
-        """Solve from the modes of the state before; None where they are too far away."""
-        noise = self.inertia.seed(1).array_r[:, None] * np.sin(1.0 + np.arange(self._last.shape[1]))
-        start = self._last + NOISE * noise / self.system.norm(self.inertia.seed(1))
-        found = refine(Block(self._factors.factor, self.mass), start, number)
-        return None if found is None else (self.shift + 1 / found[0], found[1])
-
-    def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, np.ndarray]:
+    def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec]]:
         """Solve by SLEPc, for ``number`` eigenvalues or all there are."""
-        solver = with_factors(self.matrix, self.mass, number, self.shift, self._factors, self.inertia.seed(1))
+        start = self.inertia.seed(1)
+        if len(self._last):  # a space that is invariant already would miss all else
+            start.scale(NOISE / self.system.norm(start))
+            start.array[:] += self._last
+        solver = with_factors(self.matrix, self.mass, number, self.shift, self._factors, start)
         solver.solve()
         found = solver.getConverged()
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
-        vector, vectors = self.system.new_vector(), []
-        for i in np.argsort(values):
+        vectors = [self.system.new_vector() for _ in range(found)]
+        for i, vector in zip(np.argsort(values), vectors, strict=True):
             solver.getEigenvector(i, vector)
-            vectors.append(vector.array_r.copy())
         solver.destroy()
         if found < least:
             raise ConvergenceError(
                 f"SLEPc found {found} of the {least} eigenvalues asked for: "
                 f"ask for at most {found} at this discretisation."
             )
-        return np.sort(values), np.stack(vectors, axis=1)
+        return np.sort(values), vectors
 
-    def _errors(self, values: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:
         """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""
-        block = Block(self._factors.factor, self.mass)
-        residuals = block.product(self.matrix, vectors) - block.weigh(vectors) * values
-        sums = self.system.comm.allreduce(np.array([(residuals**2).sum(axis=0), (vectors**2).sum(axis=0)]))
         stiffness, mass = (A.norm(PETSc.NormType.INFINITY) for A in (self.matrix, self.mass))
-        return np.sqrt(sums[0] / sums[1]) / (stiffness + abs(values) * mass)
+        errors = []
+        for value, vector in zip(values, vectors, strict=True):
+            residual = self.matrix * vector
+            residual.axpy(-value, self.mass * vector)
+            errors.append(residual.norm() / ((stiffness + abs(value) * mass) * vector.norm()))
+        return np.array(errors)

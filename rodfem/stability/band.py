@@ -1,0 +1,72 @@
+r"""What the arithmetic of a count supports, and what decides where it supports none.
+
+A factorisation is that of a matrix which differs by about ``eps |S|``.  An eigenvalue relative to the metric moves by
+that over the smallest mass: ``|S| ~ 1/h``, ``m ~ h`` for linear elements of size h, so that a count knows nothing of an
+eigenvalue within the *band* ``10 eps |S| / m ~ eps/h^2``.  It bounds the worst perturbation of the worst, rough vector.
+For one smooth vector y of metric norm 1 independent errors of the entries of S change the quotient ``y.Sy`` by about
+
+    eps (sum_ij (S_ij y_i y_j)^2)^(1/2),
+
+smaller by some powers of h.  Eigenvalues inside the band are therefore decided by their vectors, and count as zero only
+where ten times this does not tell them from zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.stability.inertia import EPS, Index, Inertia
+
+SPARE = 2
+"""Vectors more than there are eigenvalues in the band."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """An index, the half width of what counted as zero, and the eigenvalues inside the band of the count.
+
+    Attributes
+    ----------
+    band
+        Half width of the band in which the inertia alone decides nothing, relative to the system's metric.
+    inside
+        Rayleigh quotients of what the band holds, symmetry modes left out.
+    uncertainty
+        What round-off in the matrix may make of each of them: those smaller than theirs are counted as zero.
+    """
+
+    index: Index
+    band: float
+    inside: np.ndarray
+    uncertainty: np.ndarray
+
+
+def decide(inertia: Inertia, x: PETSc.Vec) -> Decision:
+    """Count at the state ``x``; eigenvalues within the band are decided by their Rayleigh quotients."""
+    index = inertia.count(x)
+    known = inertia.system.active_drifts()
+    inside = index.zero - known
+    least = 1e-7 * inertia.scale
+    if inside == 0 or inertia.resolution <= least:
+        return Decision(index, inertia.tolerance, np.zeros(0), np.zeros(0))
+    theta, vectors = inertia.nearest(inside + SPARE)
+    nearest = np.argsort(abs(theta))[:inside]
+    theta = theta[nearest]
+    inertia.below(0.0)  # puts S itself into the matrix again
+    doubt = np.array([max(quotient_error(inertia.matrix, vectors[i]), least) for i in nearest])
+    theta = np.array([vectors[i].dot(inertia.matrix * vectors[i]) for i in nearest])
+    negative = int((theta < -doubt).sum())
+    zero = int((abs(theta) <= doubt).sum())
+    return Decision(Index(index.negative + negative, zero + known), inertia.tolerance, theta, doubt)
+
+
+def quotient_error(matrix: PETSc.Mat, y: PETSc.Vec) -> float:
+    """Ten times the change of ``y.Sy`` by independent relative errors eps of all entries of S."""
+    starts, columns, values = matrix.getValuesCSR()
+    squares = PETSc.Mat().createAIJ(matrix.getSizes(), csr=(starts, columns, values**2), comm=matrix.comm)
+    square = y.copy()
+    square.pointwiseMult(y, y)
+    return float(10 * EPS * np.sqrt(square.dot(squares * square)))

@@ -1,0 +1,87 @@
+r"""The rank of the constraints: the smallest singular value of their gradients ``C`` (m, p).
+
+The index and all eigenvalues rest on ``C`` having full column rank.  ``sigma_min(C)`` says how far it is from losing
+it; for pointwise constraints on linear elements it shrinks like the size h of an element, ``sigma_min / h`` tends to a
+constant (Kumar & Healey 2010, Table 5).
+
+``1 / sigma_min^2`` is the greatest eigenvalue of ``(C^t C)^-1``, found by Lanczos' method.  Products with it come from
+
+    ( a I  C ) ( x )   (  0 )
+    ( C^t  0 ) ( y ) = ( -b ),        y = a (C^t C)^-1 b:
+
+the condition number of this sparse matrix is that of ``C``, where ``C^t C`` would square it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.stability.blocks import Pencil
+from rodfem.stability.matrices import gathered
+from rodfem.stability.projection import factored
+
+DEPENDENT = 1e-12
+"""A singular value below this, relative to the greatest column of ``C``, is zero."""
+NAMES = {"mu": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
+
+
+def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
+    """Smallest singular value of ``C`` (m, p), p > 0, and its right vector (p,); zero where C is exactly singular."""
+    C = sp.csr_matrix(C)
+    m, p = C.shape
+    if p <= 20 or p > m:
+        _, s, vt = np.linalg.svd(C.toarray())
+        return (float(s[-1]) if p <= m else 0.0), vt[-1]
+    size = float(np.sqrt(np.asarray(C.multiply(C).sum(axis=0)).max()))
+    try:
+        solve = factored(sp.bmat([[size * sp.identity(m), C], [C.T, None]]).tocsr())
+    except ConvergenceError:
+        return 0.0, np.full(p, p**-0.5)
+
+    def product(b: np.ndarray) -> np.ndarray:
+        return solve(np.append(np.zeros(m), -b.ravel()))[m:] / size
+
+    start = np.sin(1.0 + 0.731 * np.arange(p)) + 0.3
+    start = product(product(start))
+    if not np.isfinite(start).all():
+        return 0.0, np.full(p, p**-0.5)
+    start /= np.linalg.norm(start)
+    operator = spl.LinearOperator((p, p), matvec=product, dtype=float)
+    _, vectors = spl.eigsh(operator, k=1, which="LM", v0=start, tol=1e-6, ncv=min(20, p - 1))
+    vector = vectors[:, 0] / np.linalg.norm(vectors[:, 0])
+    return float(np.linalg.norm(C @ vector)), vector
+
+
+def rank_of(pencil: Pencil) -> float:
+    """``sigma_min(C)`` of a pencil; infinite without constraints.
+
+    Raises :class:`SceneError` that names the constraints which depend on one another.
+    """
+    C = gathered(pencil.C)
+    if not C.shape[1]:
+        return np.inf
+    sigma, vector = smallest_singular(C)
+    if sigma > DEPENDENT * np.sqrt(np.asarray(C.multiply(C).sum(axis=0)).max()):
+        return sigma
+    comm = pencil.K.comm.tompi4py()
+    shares = {}
+    for name in NAMES:
+        columns = np.concatenate(comm.allgather(pencil.where.get(name, np.zeros(0, dtype=int)))).astype(int)
+        shares[name] = (float((vector[columns] ** 2).sum()), columns)
+    blocks = [name for name, (share, _) in shares.items() if share > 0.01]
+    words = []
+    for name in blocks or list(NAMES)[:1]:
+        columns = shares[name][1]
+        if name == "scalars":
+            which = [f"component {i + 1}" for i in np.flatnonzero(abs(vector[columns]) > 0.1)]
+            words.append(f"{NAMES[name]} ({', '.join(which) or 'all components'})")
+        else:
+            place = pencil.place[columns[np.argmax(abs(vector[columns]))]] if len(columns) else np.nan
+            words.append(f"{NAMES[name]} (most of all at s = {place:.4g})")
+    raise SceneError(
+        f"Constraints depend on one another ({' and '.join(words)}; smallest singular value {sigma:.1e}): "
+        "remove those that follow from the others."
+    )

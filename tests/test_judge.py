@@ -1,0 +1,267 @@
+"""One verdict from all methods; nasty pencils; the band of the count and the rank of the constraints."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import scenes
+import scipy.sparse as sp
+from mpi4py import MPI
+from petsc4py import PETSc
+from states import buckled, plain, scene
+
+from rodfem.continuation import Equilibria
+from rodfem.errors import SceneError
+from rodfem.fields import Discretization
+from rodfem.scene import Inertia
+from rodfem.stability.band import decide
+from rodfem.stability.blocks import Blocks
+from rodfem.stability.inertia import Inertia as Count
+from rodfem.stability.judge import METHODS, Judge, judge
+from rodfem.stability.matrices import gathered, petsc_matrix
+from rodfem.stability.rank import rank_of, smallest_singular
+from rodfem.system import System
+
+SMALL = (6, 3)
+STATES = [
+    ("cord", 20.0, False),
+    ("cord", 40.0, True),
+    ("hemitropic", 0.2, False),
+    ("hemitropic", 0.2, True),
+    ("ruler", 2.0, False),
+    ("ruler", 6.0, True),
+]
+REFERENCE = [-341.416740999, 467.908344864, 735.029226438]
+SERIAL = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="long on several ranks")
+
+
+@cache
+def at(name: str, formulation: str, load: float, bent: bool) -> tuple[Judge, PETSc.Vec]:
+    system, x = (buckled if bent else plain)(name, formulation, *SMALL, load)
+    return Judge(system), x
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+@pytest.mark.parametrize(("name", "load", "bent"), STATES)
+def test_methods_agree(name: str, load: float, bent: bool, formulation: str) -> None:
+    to_judge, x = at(name, formulation, load, bent)
+    expected = to_judge(x, "dense", 4)
+    scale = abs(expected.values).max()
+    for method in METHODS[1:-1]:
+        for _ in range(2):  # the second time from the modes of the first
+            found = to_judge(x, method, 4)
+            np.testing.assert_allclose(found.values, expected.values, rtol=1e-9, atol=2e-11 * scale, err_msg=method)
+            assert found.certified, method
+            assert found.errors.max() < 1e-10
+            assert (found.negative, found.zero) == (expected.negative, expected.zero)
+            assert len(found.vectors) == 4
+            assert found.method == method
+            assert found.factorisations >= 2
+    negative = int((expected.values < -1e-7 * scale).sum())
+    assert expected.negative == negative < 4
+    assert expected.zero == (1 if name == "hemitropic" and bent else 0)
+    assert to_judge(x, "count").negative == negative
+
+
+@pytest.mark.parametrize("load", [10.0, 40.0])
+def test_methods_agree_without_symmetry(load: float) -> None:
+    system, x = plain("follower", "pointwise", *SMALL, load)
+    to_judge = Judge(system)
+    expected = to_judge(x, "dense", 3)
+    for method in ("auto", "reduction"):
+        found = to_judge(x, method, 3).values
+        pairs = zip(
+            *(np.sort_complex(np.round(v[abs(v - v[0]) < 1e9], 6)) for v in (found, expected.values)), strict=True
+        )
+        for one, other in pairs:
+            assert one == pytest.approx(other, rel=1e-6)
+    assert expected.stable == (load < 20.05)
+
+
+def test_names() -> None:
+    to_judge, x = at("cord", "reduced", 20.0, False)
+    with pytest.raises(SceneError, match="Unknown method 'magic': choose one of auto, count, shift-invert"):
+        to_judge(x, "magic")
+    with pytest.raises(SceneError, match="ask for none or more"):
+        to_judge(x, "auto", -1)
+    system, y = plain("follower", "pointwise", *SMALL, 10.0)
+    for method in ("count", "cayley", "slicing"):
+        with pytest.raises(SceneError, match="needs a symmetric pencil"):
+            judge(system, y, method)
+    assert to_judge(x, number=0).method == "count"
+    assert to_judge(x, number=2).method == "shift-invert"
+    assert to_judge(x, number=30).method == "dense"
+    assert judge(system, y).reason.startswith("the load has no potential")
+    assert "none missing" in str(to_judge(x, number=2))
+
+
+@cache
+def reference() -> tuple[Judge, PETSc.Vec]:
+    inertia = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (1e-3, 1e-3, 2e-3))
+    solver = Equilibria(System(replace(scenes.scene("cord"), inertia=inertia), Discretization("pointwise", 9, 6)))
+    solver.system.set_phase(None)
+    x, outcome = solver.at_load(solver.start(20.0), 20.0)
+    assert outcome.converged
+    return Judge(solver.system), x
+
+
+@pytest.mark.short
+@pytest.mark.parametrize("method", METHODS[1:])
+def test_reference_values(method: str) -> None:
+    to_judge, x = reference()
+    np.testing.assert_allclose(to_judge(x, method, 3).values, REFERENCE, rtol=1e-9)
+
+
+def test_parameters_of_cayley_follow_a_branch() -> None:
+    solver = Equilibria(System(scene("cord"), Discretization("reduced", *SMALL)))
+    to_judge = Judge(solver.system)
+    work = []
+    for load in (30.0, 31.0, 32.0, 48.0, 60.0):
+        solver.system.set_phase(None)
+        x, _ = solver.at_load(solver.start(load), load)
+        found, other = to_judge(x, "cayley", 3), to_judge(x, "shift-invert", 3)
+        np.testing.assert_allclose(found.values, other.values, rtol=1e-9)
+        assert found.certified
+        work.append(found.factorisations)
+    assert work[1] < work[0]
+
+
+def test_interval() -> None:
+    to_judge, x = at("cord", "reduced", 20.0, False)
+    every = to_judge(x, "shift-invert", 8).values
+    low, high = (every[1] + every[2]) / 2, (every[5] + every[6]) / 2
+    found = to_judge(x, "slicing", interval=(low, high))
+    np.testing.assert_allclose(found.values, every[2:6], rtol=1e-9)
+    assert found.certified
+    with pytest.raises(SceneError, match="is empty"):
+        to_judge(x, "slicing", interval=(high, low))
+
+
+# --- nasty -----------------------------------------------------------------------------------------------------
+
+
+def test_shift_on_an_eigenvalue() -> None:
+    to_judge, x = at("cord", "reduced", 20.0, False)
+    expected = to_judge(x, "dense", 4).values
+    spectrum = to_judge.spectrum
+    assert spectrum is not None
+    for i in range(3):
+        spectrum.shift = expected[i]
+        found = to_judge(x, "shift-invert", 4)
+        np.testing.assert_allclose(found.values, expected, rtol=1e-9)
+        assert found.certified
+
+
+def test_triple_cluster() -> None:
+    """The isotropic straight rod has its eigenvalues in pairs, and the count tells a wanted one that cuts a pair."""
+    to_judge, x = at("hemitropic", "reduced", 0.2, False)
+    values = to_judge(x, "shift-invert", 5).values
+    assert np.diff(values).min() < 1e-9 * abs(values).max()  # double
+    twice = to_judge(x, "shift-invert", 3).values
+    np.testing.assert_allclose(twice, values[:3], rtol=1e-9)
+
+
+def test_more_constraints_than_half_the_unknowns() -> None:
+    """In full coordinates the pointwise formulation has p > m/2 with free strains none."""
+    system, x = plain("cord", "pointwise", *SMALL, 20.0)
+    pencil = Blocks(system, "full").assemble(x)
+    m, p = pencil.C.getSize()
+    assert p > m / 2
+    assert judge(system, x).certified
+
+
+def test_exact_zero() -> None:
+    """At the buckling load of this discretisation, found by bisection of the quotient, mu is zero to round-off."""
+    solver = Equilibria(System(scene("cord"), Discretization("reduced", *SMALL)))
+    solver.system.set_phase(None)
+    count = Count(solver.system)
+
+    def lowest(load: float) -> float:
+        count.count(solver.at_load(solver.start(load), load)[0])
+        return float(count.nearest(1, accuracy=1e-9)[0][0])
+
+    a, b = 49.0, 50.0
+    f, g = lowest(a), lowest(b)
+    for _ in range(8):
+        if abs(b - a) < 1e-13:
+            break
+        a, b, f = b, b - g * (b - a) / (g - f), g
+        g = lowest(b)
+    x, _ = solver.at_load(solver.start(b), b)
+    found = judge(solver.system, x, "shift-invert", 2)
+    assert (found.negative, found.zero) == (0, 1)
+    assert abs(found.values[0]) < 1e-9 * found.values[1]
+
+
+@SERIAL
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_small_eigenvalues_on_many_elements(formulation: str) -> None:
+    """On either side of the buckling load, ever closer: right, or zero within what is said to be unknown."""
+    solver = Equilibria(System(scene("cord"), Discretization(formulation, 10_000, 1)))
+    solver.system.set_phase(None)
+    count = Count(solver.system)
+
+    def decision(load: float):  # type: ignore[no-untyped-def]
+        return decide(count, solver.at_load(solver.start(load), load)[0])
+
+    loads = 49.348 + np.array([-0.5, 0.5])
+    values = []
+    for load in loads:
+        decision(load)
+        values.append(count.nearest(1, accuracy=1e-8)[0][0])
+    slope = (values[1] - values[0]) / 1.0
+    solver_state, _ = solver.at_load(solver.start(49.348), 49.348)
+    decide(count, solver_state)
+    middle = count.nearest(1, accuracy=1e-8)[0][0]
+    critical = 49.348 - middle / slope
+    for mu in (1e-3, -1e-4, 1e-5, -3e-6, 3e-6, -1e-8, 1e-10):
+        found = decision(critical + mu / slope)
+        if abs(mu) > 2e-6:
+            assert (found.index.negative, found.index.zero) == (int(mu < 0), 0)
+        else:
+            assert found.index.zero == 1
+        assert found.band < 1e-4
+
+
+# --- rank of the constraints -------------------------------------------------------------------------------------
+
+
+@pytest.mark.short
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_smallest_singular_value(formulation: str) -> None:
+    system, x = buckled("hemitropic", formulation, *SMALL, 0.2)
+    for coordinates in ("full", "tangent"):
+        pencil = Blocks(system, coordinates).assemble(x)
+        C = gathered(pencil.C).toarray()
+        assert rank_of(pencil) == pytest.approx(np.linalg.svd(C, compute_uv=False)[-1], rel=1e-9)
+
+
+def test_smallest_singular_value_is_of_the_size_of_an_element() -> None:
+    ratios = []
+    for n in (50, 100, 200):
+        system = System(scene("cord"), Discretization("pointwise", n, 1))
+        pencil = Blocks(system).assemble(Equilibria(system).start(20.0))
+        ratios.append(rank_of(pencil) * n)
+    assert abs(np.diff(ratios)).max() < 0.05 * ratios[-1]
+
+
+def test_dependent_constraints_are_named() -> None:
+    system, x = plain("hemitropic", "reduced", *SMALL, 0.2)
+    pencil = Blocks(system, "full").assemble(x)
+    comm = MPI.COMM_SELF
+    C = gathered(pencil.C).tolil()
+    last = np.concatenate(system.comm.allgather(pencil.where["scalars"]))
+    C[:, last[0]] = C[:, last[1]]
+    sigma, vector = smallest_singular(C)
+    assert sigma < 1e-13
+    np.testing.assert_allclose(abs(vector[last[:2]]), 2**-0.5, rtol=1e-6)
+    where = pencil.where | {"scalars": last, "mu": np.zeros(0, dtype=int)}
+    if system.comm.size == 1:
+        twin = replace(
+            pencil, K=petsc_matrix(comm, gathered(pencil.K)), C=petsc_matrix(comm, sp.csr_matrix(C)), where=where
+        )
+        with pytest.raises(SceneError, match=r"position of the ends \(component 1, component 2\).*remove those"):
+            rank_of(twin)
