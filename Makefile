@@ -23,7 +23,7 @@ export MPLBACKEND := Agg
 export PYVISTA_OFF_SCREEN := true
 export VTK_DEFAULT_OPENGL_WINDOW := vtkEGLRenderWindow
 
-.PHONY: help setup demo test lint figures clean
+.PHONY: help setup demo test lint figures bench clean
 
 help: ## list these commands
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 12
@@ -46,6 +46,9 @@ lint: setup ## check style and types
 
 figures: setup ## run all demos
 	@set -e; for demo in demos/*.py; do echo "$$demo"; $(PYTHON) "$$demo"; done
+
+bench: setup ## measure every way to judge a state: docs/stability.md (about ten minutes)
+	$(PYTHON) benchmarks/stability.py
 
 clean: ## remove what the commands above made, but not .venv
 	rm -rf results build *.egg-info .mypy_cache .ruff_cache .pytest_cache
