@@ -17,9 +17,9 @@ from rodfem.continuation import Follower
 from rodfem.ends import clamped
 from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization
-from rodfem.many import many
 from rodfem.report import Report
 from rodfem.scene import Ordinate, Parameter, Scene
+from rodfem.sharing import many
 from rodfem.system import System
 
 

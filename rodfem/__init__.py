@@ -31,6 +31,8 @@ finds and classifies the points where it is lost, follows what branches off, and
 * **Parameters**: any of them can be the load, :meth:`Scene.varying`; :func:`locus` follows a special point in the plane
   of two of them.
 * **Plane**: ``planar="e2"`` keeps the rod in the plane across e2, and records its index in space besides.
+* **Is it stable?**: :func:`judge` answers for one state by any of six methods, and says how far to trust it.
+* **Many rods**: :func:`many` shares a list of scenes among the ranks, into files, restartable.
 * **What is not connected**: :func:`further` looks for other equilibria at a load by deflation.
 
 Continuous symmetries (a rod free to turn about its axis, a ring that may go anywhere) are found, not stated: each state
@@ -64,6 +66,8 @@ _HOMES = {
     "Plan": "explore",
     "Steps": "continuation",
     "run": "runner",
+    "many": "sharing",
+    "judge": "stability.judge",
     "further": "search.deflation",
     "states_at": "search.deflation",
     "SceneError": "errors",

@@ -11,8 +11,8 @@ from mpi4py import MPI
 from scenes import scene
 
 from rodfem.errors import SceneError
-from rodfem.many import many
 from rodfem.scene import Scene
+from rodfem.sharing import many
 
 COMM = MPI.COMM_WORLD
 

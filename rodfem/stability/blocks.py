@@ -56,8 +56,10 @@ class Pencil:
     T
         Map from these coordinates to the full ones, (full m, m); None if they are the full ones.
     where
-        For each field this rank's global rows in ``K`` and ``C`` (``theta``, ``q``, ``v``, ``r``), or columns of ``C``
-        (``mu``, ``n``, ``scalars``: the components of a constant contact force).
+        For each field this rank's global rows in ``K`` and ``C`` (``theta``, ``q``, ``v``, ``r``, ``ends``: components of
+        the positions of ends that move), or columns of ``C`` (``mu``, ``n``, ``p0``.. and ``scalars``: components of a
+        constant contact force, moments at ends, multipliers of integral constraints, in the order of the fields' scalars).
+
     place
         Arclength (the middle of a cell) by which the constraints of all ranks are in order along the rod, (p,); nan for
         one that involves the whole rod.
@@ -102,9 +104,9 @@ class Blocks:
         fields = system.fields
         primal = {b.name: self._owned(b.name) for b in fields.blocks if not b.multiplier}
         dual = {b.name: self._owned(b.name) for b in fields.blocks if b.multiplier}
-        dual["scalars"] = np.array(
-            [fields.scalars[f"n{i + 1}"] for i in fields.forces if system.has_scalars], dtype=int
-        )
+        for numbers, multiplier in ((primal, False), (dual, True)):
+            scalars = [fields.scalars[x.name] for x in fields.unknown_scalars if x.multiplier == multiplier]
+            numbers["scalars" if multiplier else "ends"] = np.array(scalars if system.has_scalars else [], dtype=int)
         if coordinates != "full":
             del dual["mu"]
         self.rows, self.columns = (np.sort(np.concatenate(list(d.values()))) for d in (primal, dual))
@@ -137,7 +139,9 @@ class Blocks:
         kept = np.delete(np.arange(len(self.rows)), self._quads[:, 0])
         first = first_of(comm, len(kept))
         where |= {
-            name: np.searchsorted(kept, where[name] - self._first_row) + first for name in ("v", "r") if name in where
+            name: np.searchsorted(kept, where[name] - self._first_row) + first
+            for name in ("v", "r", "ends")
+            if name in where
         }
         where["theta"] = np.flatnonzero(spins[kept]) + first
         del where["q"]
@@ -221,7 +225,7 @@ class Blocks:
         T = follow.matMult(pencil.C.transposeMatMult(select))
         T.axpy(1.0, select, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         begin = first_of(comm, len(kept))
-        where = {name: np.searchsorted(kept, pencil.where[name] - first_row) + begin for name in ("theta", "r")}
+        where = {name: np.searchsorted(kept, pencil.where[name] - first_row) + begin for name in ("theta", "r", "ends")}
         where["n"] = rest.ravel() + first_of(comm, rest.size)
         middle = np.repeat(f.vertices[:cells].mean(axis=1), b - a)
         return Pencil(
