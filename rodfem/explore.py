@@ -21,6 +21,8 @@ from rodfem.pitchfork import law_of
 from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.search.deflation import further, starts, states_at
+from rodfem.stability.blocks import Blocks
+from rodfem.stability.rank import rank_of
 from rodfem.topology import link
 
 BEYOND = 0.02
@@ -127,6 +129,7 @@ class Explorer:
         follower = self.follower
         x, outcome = follower.first(start)
         if not outcome.converged:
+            self._check_rank(follower.start(start))
             raise ConvergenceError(
                 f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: start at another "
                 "load, give the scene a start nearer to one, or see whether constraints repeat each other or what an "
@@ -142,6 +145,19 @@ class Explorer:
                 f"  the first state is unstable already (index {point.negative}): stability was lost outside the range"
             )
         return Branch(self.scene.states, None, 0, [point])
+
+    def _check_rank(self, x: PETSc.Vec) -> None:
+        """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others."""
+        words = {
+            "n": "position of the ends along e{}",
+            "m": "rotation of an end, direction {}",
+            "g": "constraint {} of the scene",
+            "t": "closing of the ring's rotation, component {}",
+            "f": "closing of the ring along e{}",
+        }
+        scalars = [u for u in self.follower.system.fields.unknown_scalars if u.multiplier]
+        names = [words[u.group[0]].format(u.component + 1) for u in scalars]
+        rank_of(Blocks(self.follower.system, "full").assemble(x), names)
 
     def _switch(self, parent: Branch, i: int, special: Special) -> None:
         special.switched = True

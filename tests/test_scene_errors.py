@@ -12,6 +12,7 @@ import pytest
 from mpi4py import MPI
 from rods import run_demo
 
+from rodfem.continuation import Follower
 from rodfem.ends import (
     Attachment,
     End,
@@ -26,7 +27,9 @@ from rodfem.ends import (
     pinned,
 )
 from rodfem.errors import SceneError
+from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization, Fields
+from rodfem.report import Report
 from rodfem.scene import Inertia, Ordinate, Parameter, Scene
 from rodfem.system import System
 
@@ -276,3 +279,19 @@ def test_fewer_elements_than_pieces() -> None:
 def test_bad_discretization(make: Callable[[], Discretization]) -> None:
     with pytest.raises(SceneError, match=r"choose|give"):
         make()
+
+
+def test_constraints_that_repeat_each_other() -> None:
+    """Named where no first equilibrium can be found: twice the same one, and one on what an end holds."""
+    for constraints, words in (
+        (
+            (at(1.0, lambda x, c: x.r[1]), at(1.0, lambda x, c: 2 * x.r[1])),
+            "constraint 1 of the scene and constraint 2",
+        ),
+        ((at(0.0, lambda x, c: x.r[1]),), "constraint 1 of the scene"),
+    ):
+        rod = Scene(**(GOOD | {"constraints": constraints}))
+        solver = Follower(System(rod, Discretization("pointwise", 4, 6)))
+        plan = Plan(rod.span, error_bars=False)
+        with pytest.raises(SceneError, match=f"depend on one another .{words}"):
+            Explorer(solver, plan, Report(quiet=True), lambda: None).run()

@@ -14,6 +14,8 @@ the condition number of this sparse matrix is that of ``C``, where ``C^t C`` wou
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
@@ -25,6 +27,8 @@ from rodfem.stability.projection import factored
 
 DEPENDENT = 1e-12
 """A singular value below this, relative to the greatest column of ``C``, is zero."""
+SMALL = 300
+"""Number of columns up to which the singular values are computed by LAPACK."""
 NAMES = {"mu": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
 
 
@@ -32,7 +36,7 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     """Smallest singular value of ``C`` (m, p), p > 0, and its right vector (p,); zero where C is exactly singular."""
     C = sp.csr_matrix(C)
     m, p = C.shape
-    if p <= 20 or p > m:
+    if p <= SMALL or p > m:
         _, s, vt = np.linalg.svd(C.toarray())
         return (float(s[-1]) if p <= m else 0.0), vt[-1]
     size = float(np.sqrt(np.asarray(C.multiply(C).sum(axis=0)).max()))
@@ -55,8 +59,8 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     return float(np.linalg.norm(C @ vector)), vector
 
 
-def rank_of(pencil: Pencil) -> float:
-    """``sigma_min(C)`` of a pencil; infinite without constraints.
+def rank_of(pencil: Pencil, scalars: Sequence[str] = ()) -> float:
+    """``sigma_min(C)`` of a pencil; infinite without constraints.  ``scalars`` are words for its scalar multipliers.
 
     Raises :class:`SceneError` that names the constraints which depend on one another.
     """
@@ -76,8 +80,8 @@ def rank_of(pencil: Pencil) -> float:
     for name in blocks or list(NAMES)[:1]:
         columns = shares[name][1]
         if name == "scalars":
-            which = [f"component {i + 1}" for i in np.flatnonzero(abs(vector[columns]) > 0.1)]
-            words.append(f"{NAMES[name]} ({', '.join(which) or 'all components'})")
+            which = np.flatnonzero(abs(vector[columns]) > 0.1)
+            words += [scalars[i] if i < len(scalars) else f"{NAMES[name]}, component {i + 1}" for i in which]
         else:
             place = pencil.place[columns[np.argmax(abs(vector[columns]))]] if len(columns) else np.nan
             words.append(f"{NAMES[name]} (most of all at s = {place:.4g})")
