@@ -263,5 +263,5 @@ def test_dependent_constraints_are_named() -> None:
         twin = replace(
             pencil, K=petsc_matrix(comm, gathered(pencil.K)), C=petsc_matrix(comm, sp.csr_matrix(C)), where=where
         )
-        with pytest.raises(SceneError, match="component 1 and position of the ends, component 2.*remove those"):
+        with pytest.raises(SceneError, match=r"component 1 and position of the ends, component 2.*remove those"):
             rank_of(twin)
