@@ -25,6 +25,8 @@ from rodfem.stability.matrices import gathered, petsc_matrix
 from rodfem.stability.rank import rank_of, smallest_singular
 from rodfem.system import System
 
+pytestmark = pytest.mark.alone
+
 SMALL = (6, 3)
 STATES = [
     ("cord", 20.0, False),

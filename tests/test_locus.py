@@ -33,6 +33,8 @@ from rodfem.scene import Ordinate, Parameter, Scene
 from rodfem.sweep import Sweep
 from rodfem.system import System
 
+pytestmark = pytest.mark.alone
+
 PLANE = ((0.01, 0.9), (-3.1, 1.0))
 WIDE = Steps(first=0.05, largest=0.15)
 

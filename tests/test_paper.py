@@ -24,6 +24,8 @@ from rodfem.stability.blocks import Blocks
 from rodfem.stability.matrices import gathered
 from rodfem.system import System
 
+pytestmark = pytest.mark.alone
+
 STATES = [
     ("cord", "reduced", 40.0),
     ("cord", "pointwise", 40.0),

@@ -25,6 +25,8 @@ from rodfem.stability.projection import INVERSES, Projection
 from rodfem.stability.reduction import Reduction, cayley_parameters
 from rodfem.system import System
 
+pytestmark = pytest.mark.alone
+
 SMALL = (6, 3)
 STATES = [
     ("cord", 20.0, False),

@@ -3,10 +3,10 @@
 #
 #     tools/test.sh PYTHON MPIRUN SECONDS [options for pytest]        (as `make test` does)
 #
-# With two="-m short" in the environment two ranks run the short ones only.
+# Two ranks do without the tests marked `alone`; with marks=short in the environment they run the short ones only.
 set -eu
 cd "$(dirname "$0")/.."
-two=${two-}
+marks=${marks-not alone}
 python=$1 mpirun=$2 limit=$3
 shift 3
 
@@ -33,6 +33,6 @@ run() {
 }
 
 run "serially" "$python" -m pytest "$@"
-run "on two ranks${two:+ ($two)}" $mpirun -n 2 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider $two "$@"
+run "on two ranks ($marks)" $mpirun -n 2 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m "$marks" "$@"
 run "on three ranks (the short ones)" $mpirun -n 3 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m short "$@"
 echo "== Passed: the tests serially, on two ranks and on three"
