@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import classics
 import numpy as np
 import pytest
 import scenes
@@ -66,6 +67,30 @@ def test_methods_agree(name: str, load: float, bent: bool, formulation: str) -> 
     assert expected.negative == negative < 4
     assert expected.zero == (1 if name == "hemitropic" and bent else 0)
     assert to_judge(x, "count").negative == negative
+
+
+@pytest.mark.parametrize(
+    ("name", "formulation"),
+    [
+        ("semi_tangential", "reduced"),
+        ("tip_on_plane", "reduced"),
+        ("greenhill", "reduced"),
+        ("no_mean_deflection", "pointwise"),
+        ("on_plane", "pointwise"),
+    ],
+)
+def test_methods_agree_with_other_ends_and_constraints(name: str, formulation: str) -> None:
+    """Moving ends are rows, their moments and multipliers of constraints columns of C; eigenvalues come in pairs."""
+    given = getattr(classics, name)()
+    solver = Equilibria(System(given, Discretization(formulation, 4, 3)))
+    x, outcome = solver.first(0.9 * given.span[0] + 0.1 * given.span[1])
+    assert outcome.converged
+    to_judge = Judge(solver.system)
+    expected = to_judge(x, "dense", 3)
+    for method in METHODS[1:-1]:
+        found = to_judge(x, method, 3)
+        np.testing.assert_allclose(found.values, expected.values, rtol=1e-9, err_msg=method)
+        assert found.certified, method
 
 
 @pytest.mark.parametrize("load", [10.0, 40.0])

@@ -56,10 +56,9 @@ class Pencil:
     T
         Map from these coordinates to the full ones, (full m, m); None if they are the full ones.
     where
-        For each field this rank's global rows in ``K`` and ``C`` (``theta``, ``q``, ``v``, ``r``, ``ends``: components of
-        the positions of ends that move), or columns of ``C`` (``mu``, ``n``, ``p0``.. and ``scalars``: components of a
-        constant contact force, moments at ends, multipliers of integral constraints, in the order of the fields' scalars).
-
+        For each field this rank's global rows in ``K`` and ``C`` (``theta``, ``q``, ``v``, ``r``, ``ends``: positions
+        of ends that move), or columns of ``C`` (``mu``, ``n``, ``p0``.. and ``scalars``: components of a constant
+        contact force, moments at ends, multipliers of integral constraints, in the order of the fields' scalars).
     place
         Arclength (the middle of a cell) by which the constraints of all ranks are in order along the rod, (p,); nan for
         one that involves the whole rod.

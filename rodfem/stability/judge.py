@@ -30,7 +30,7 @@ from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.matrices import first_of, gathered, local_rows
-from rodfem.stability.pencil import in_interval, symmetry_modes
+from rodfem.stability.pencil import in_interval, symmetry_modes, weighed_modes
 from rodfem.stability.rank import rank_of
 from rodfem.stability.reduction import Reduction, cayley_parameters
 from rodfem.stability.spectrum import Spectrum
@@ -116,7 +116,7 @@ class Judge:
         self._blocks: Blocks | None = None
         self._map: sp.csr_matrix | None = None
         self._estimates: tuple[float, float] | None = None
-        self._made = 0
+        self._made, self._note = 0, ""
 
     def choose(self, method: str, number: int) -> tuple[str, str]:
         """Name of the method to use and the reason; raises :class:`SceneError` for one unknown or not applicable."""
@@ -151,7 +151,7 @@ class Judge:
             raise SceneError(f"{number} eigenvalues cannot be computed: ask for none or more.")
         started = perf_counter()
         self.system.set_phase(x)
-        self._made = 0
+        self._made, self._note = 0, ""
         if self.inertia is None or self.spectrum is None:
             values, vectors, errors = self._non_symmetric(x, method, max(number, 1))
             scale = self.system.stiffness_scale / self.system.scene.length
@@ -170,7 +170,7 @@ class Judge:
         return Verdict(
             *(found.index.negative, found.index.zero, values, vectors, errors),
             *(found.band, found.inside, found.uncertainty, certified),
-            *(perf_counter() - started, self._made, method, reason),
+            *(perf_counter() - started, self._made, method, reason + self._note),
         )
 
     def _index(self, x: PETSc.Vec) -> Decision:
@@ -228,23 +228,30 @@ class Judge:
     def _cayley(self, reduction: Reduction, number: int) -> Any:
         """Left-most eigenvalues by Cayley's transform with the paper's parameters, from estimates or the last state."""
         assert self.spectrum is not None
+        most = reduction.projection.kernel.dimension
         for fresh in (False, True):
             if self._estimates is None or fresh:
-                self._estimates = two_distinct(reduction.near(min(max(number, 3), 3), self.spectrum.shift).values)
+                self._estimates = two_distinct(reduction.near(3, self.spectrum.shift).values)
                 self._made += 3
             shift, antishift = cayley_parameters(*self._estimates)
             try:
-                found = reduction.near(number, shift, "cayley", antishift)
+                # the first two are equally far from the shift: more are asked for than wanted where they are multiple
+                found = reduction.near(min(number + 2, most), shift, "cayley", antishift)
             except ConvergenceError:
-                if fresh:
-                    raise
                 continue
             self._made += 3
-            if self.spectrum.below(found.values[0] - 1e-6 * max(abs(found.values).max(), 1e-3)) == 0:
+            first = found.values[0] - 1e-6 * max(abs(found.values).max(), 1e-3)
+            if found.certified and self.spectrum.below(first) == 0:
                 break
+        else:
+            found = reduction.near(number, self.spectrum.shift)
+            self._made += 3
+            self._note = ", but a count found some missing (equal eigenvalues): completed by shift-invert"
         if number > 1:
             self._estimates = two_distinct(found.values)
-        return found
+        return replace(
+            found, values=found.values[:number], vectors=found.vectors[:, :number], errors=found.errors[:number]
+        )
 
     def _slices(
         self, number: int, interval: tuple[float, float] | None
@@ -326,9 +333,13 @@ class Judge:
             return pencil
         comm = self.system.comm
         images = []
-        for mode in modes.values():
-            full = PETSc.Vec().createWithArray(mode.array_r[blocks.rows - self.system.fields.offset].copy(), comm=comm)
-            images.append(self._weighed(pencil, full))
+        for weighed in weighed_modes(self.system, modes, blocks.mass).values():
+            full = weighed.array_r[blocks.rows - self.system.fields.offset].copy()
+            image = PETSc.Vec().createWithArray(full, comm=comm)
+            if pencil.T is not None:
+                image, product = pencil.T.createVecRight(), image
+                pencil.T.multTranspose(product, image)
+            images.append(image.array_r.copy())
         last = comm.rank == comm.size - 1
         local = sp.hstack([local_rows(pencil.C), np.stack(images, axis=1)]).tocsr()
         local.sort_indices()
@@ -337,19 +348,6 @@ class Judge:
         csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
         C = PETSc.Mat().createAIJ(size, csr=csr, comm=comm)
         return replace(pencil, C=C, place=np.append(pencil.place, np.full(len(modes), np.nan)))
-
-    def _weighed(self, pencil: Pencil, full: PETSc.Vec) -> np.ndarray:
-        """``M g`` in the pencil's coordinates, of norm 1, for ``g`` in full ones."""
-        assert self._blocks is not None
-        image = pencil.M.createVecLeft()
-        if pencil.T is None:
-            pencil.M.mult(full, image)
-        else:  # T^t M T z with T z = g; from M of the full coordinates
-            rows = PETSc.IS().createGeneral(self._blocks.rows.astype(PETSc.IntType), comm=self.system.comm)
-            mass = self._blocks.mass.createSubMatrix(rows, rows)
-            pencil.T.multTranspose(mass * full, image)
-        image.scale(1.0 / max(image.norm(), 1e-300))
-        return np.array(image.array_r)
 
     def _lift(self, vectors: np.ndarray) -> list[PETSc.Vec]:
         """Vectors of the system from columns in the pencil's coordinates."""

@@ -13,6 +13,9 @@ from slepc4py import SLEPc
 
 from rodfem.system import DENSE_ROWS, Factorizer, System, prefer_options
 
+MASSLESS = 1e-12
+"""A symmetry mode with less kinetic energy than this, relative, has none."""
+
 
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> None:
     """Assemble tangent matrix and kinetic metric at the state ``x``, without the symmetries' phase conditions."""
@@ -33,14 +36,26 @@ def symmetry_modes(system: System, x: PETSc.Vec) -> dict[int, PETSc.Vec]:
     return {index: system.generator(x, i) for i, (index, phase) in enumerate(pairs) if phase is not None}
 
 
+def weighed_modes(system: System, modes: dict[int, PETSc.Vec], mass: PETSc.Mat) -> dict[int, PETSc.Vec]:
+    """``M g`` for each symmetry mode ``g``, scaled; where that is a motion without inertia, the metric's product."""
+    out = {}
+    for index, mode in modes.items():
+        image = mass * mode
+        square = float(np.real(image.dot(mode)))
+        if square < MASSLESS * mass.norm(PETSc.NormType.INFINITY) * system.norm(mode) ** 2:
+            image = system.metric * mode
+            square = float(np.real(image.dot(mode)))
+        image.scale(1.0 / np.sqrt(square))
+        out[index] = image
+    return out
+
+
 def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat, mass: PETSc.Mat) -> None:
     """Add to an assembled pencil the constraints ``g.Mx = 0`` for symmetry modes ``g``, one for each drift scalar.
 
     ``g`` being an eigenvector (of ``mu = 0``), what they leave of the spectrum is all the rest of it, unchanged.
     """
-    for index, mode in modes.items():
-        image = mass * mode
-        image.scale(1.0 / max(np.sqrt(max(np.real(image.dot(mode)), 0.0)), 1e-300))
+    for index, image in weighed_modes(system, modes, mass).items():
         begin, end = image.getOwnershipRange()
         own = np.arange(begin, end, dtype=PETSc.IntType)
         if system.has_scalars:
