@@ -271,9 +271,9 @@ Pointwise:
 
 The band is the half width of the interval about zero in which inertia alone decides nothing, relative to the system's
 metric: 10 eps |S| over the smallest mass. Inside it the Rayleigh quotient of the pair nearest zero decides, which
-round-off blurs by no more than the number in the next column (`rodfem/stability/band.py`). The band grows like n as long
-as the largest entries of S are those of the constraints, then like n^2; the other number like n^1.5. Few elements of high
-degree reach more digits with a narrower band.
+round-off blurs by no more than the number in the next column (`rodfem/stability/band.py`). The band grows like n as
+long as the largest entries of S are those of the constraints, then like n^2; the other number like n^1.5. Few elements
+of high degree reach more digits with a narrower band.
 
 {band}
 ## The rank of the constraints
