@@ -58,7 +58,7 @@ class System:
         self.clock = clock or Clock()
         self.fields = Fields(scene, discretization, comm, mesh)
         self.equations = Equations(self.fields)
-        self._set_clamps()
+        _set_clamps(self.fields)
         self.symmetries = self._symmetries() if scene.conservative else []
         self.fields.add_drifts(len(self.symmetries))
         number, self.scalars = self.fields.number, self.fields.scalars
@@ -87,8 +87,9 @@ class System:
         """Symmetries of the scene; found with few elements, which have the same ones, where there are many."""
         fields, equations = self.fields, self.equations
         if fields.unknowns > FEW:
-            few = replace(fields.discretization, elements=max(2, len(self.scene.joints) + 1))
+            few = replace(fields.discretization, elements=max(6, 2 * len(self.scene.joints) + 2))
             fields = Fields(self.scene, few, MPI.COMM_SELF)
+            _set_clamps(fields)
             equations = Equations(fields)
         found: list[Symmetry | Shift] = list(find_symmetries(fields, equations))
         return [*found, Shift()] if is_uniform_ring(self.scene) else found
@@ -267,15 +268,6 @@ class System:
 
     # --- set-up ------------------------------------------------------------------------------------------------
 
-    def _set_clamps(self) -> None:
-        """Give the clamped degrees of freedom their values, once and for all."""
-        u, f = self.fields.u.x.array, self.fields
-        u[:] = 0.0
-        x = f.coordinates(f.discretization.degree)
-        for end, s in zip(self.scene.sides, self.scene.interval, strict=True):
-            if end.fixed_rotation is not None:
-                u[f.dofs["q"][np.isclose(x, s, rtol=0, atol=1e-9 * self.scene.length)]] = end.fixed_rotation
-
     def _assemble_metric(self) -> PETSc.Mat:
         metric = new_matrix(self.fields, self._pattern, self._no_load, self._no_load)
         self.assemble_into(metric, self.equations.metric)
@@ -284,6 +276,16 @@ class System:
             metric.setValue(self.load_index, self.load_index, 1.0 / (b - a) ** 2, addv=True)
         metric.assemble()
         return metric
+
+
+def _set_clamps(fields: Fields) -> None:
+    """Give the clamped degrees of freedom their values, once and for all."""
+    u, scene = fields.u.x.array, fields.scene
+    u[:] = 0.0
+    x = fields.coordinates(fields.discretization.degree)
+    for end, s in zip(scene.sides, scene.interval, strict=True):
+        if end.fixed_rotation is not None:
+            u[fields.dofs["q"][np.isclose(x, s, rtol=0, atol=1e-9 * scene.length)]] = end.fixed_rotation
 
 
 def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:

@@ -16,7 +16,7 @@ from rodfem.ends import Constants, End, Ring, clamped, free, pinned
 from rodfem.fields import Discretization
 from rodfem.newton import relax
 from rodfem.scene import Ordinate, Parameter, Scene
-from rodfem.system import System
+from rodfem.system import FEW, System
 from rodfem.topology import link, writhe
 
 MIDDLE = Ordinate("displacement of the middle", s=0.5, of=lambda r, q: hypot(r[0], r[1]))
@@ -75,6 +75,14 @@ CASES = [
 def test_number_of_symmetries(rod: Scene, reduced: int, pointwise: int) -> None:
     for formulation, expected in (("reduced", reduced), ("pointwise", pointwise)):
         assert len(System(rod, Discretization(formulation, 4, 6)).symmetries) == expected
+
+
+@pytest.mark.parametrize(("rod", "expected"), [(scene("cord"), 0), (hemitropic(DEFAULT), 1), (scene("ruler"), 0)])
+def test_a_fine_mesh_has_the_same_symmetries(rod: Scene, expected: int) -> None:
+    """Those of many unknowns are sought with few elements."""
+    system = System(rod, Discretization("reduced", 1000, 1))
+    assert system.fields.unknowns > FEW
+    assert len(system.symmetries) == expected
 
 
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
