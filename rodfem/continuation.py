@@ -15,7 +15,6 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.spatial.transform import Rotation
 
 from rodfem.branch import Point
 from rodfem.convexity import Convexity
@@ -71,14 +70,14 @@ class Equilibria:
         """
         system, f = self.system, self.system.fields
         x = f.coordinates(f.discretization.degree)
-        guess = system.scene.start
-        q = np.tile([1.0, 0.0, 0.0, 0.0], (x.size, 1)) if guess is None else np.asarray(guess(x.ravel()))
+        turned = f.turning.start(system.scene.start, x.ravel(), system.scene.interval)
         f.u.x.array[f.number >= 0] = 0.0
-        held = f.number[f.dofs["q"]] < 0
-        clamped = f.u.x.array[f.dofs["q"]]
+        dofs = f.dofs[f.turning.name]
+        held, clamped = f.number[dofs] < 0, f.u.x.array[dofs]
         if bent:
-            q = _bend(q, (x.ravel() - system.scene.interval[0]) / system.scene.length, bent)
-        f.u.x.array[f.dofs["q"]] = np.where(held, clamped, q.reshape(*x.shape, 4))
+            along = (x.ravel() - system.scene.interval[0]) / system.scene.length
+            turned = f.turning.turned(turned, bent * _bend(along))
+        f.u.x.array[dofs] = np.where(held, clamped, turned.reshape(*x.shape, -1))
         if "v" in f.dofs:
             f.u.x.array[f.dofs["v"]] = [1.0 if i == 2 else 0.0 for i in system.scene.free_strains]
         f.u.x.array[f.copies[:, -1]] = load
@@ -128,12 +127,15 @@ class Follower(Equilibria):
         self.modes = spectrum
         self.spectrum = Spectrum(self.inertia) if spectrum else None
         self.convexity = None if system.scene.is_quadratic() else Convexity(system)
-        self.space = InSpace(system) if system.scene.normal is not None else None
+        self.space = (
+            None if system.scene.planar is None or system.scene.without_potential(in_space=True) else InSpace(system)
+        )
 
     def point(self, x: PETSc.Vec, arclength: float, tangent: PETSc.Vec | None, outcome: Outcome | None = None) -> Point:
         """Evaluate all records of the equilibrium ``x``."""
         system = self.system
         index = self.inertia.count(x)
+        system.damping = self.inertia.tolerance if index.zero > system.active_drifts() else 0.0
         return Point(
             x=x,
             tangent=tangent,
@@ -193,12 +195,9 @@ class Follower(Equilibria):
         return tangent
 
 
-def _bend(q: np.ndarray, x: np.ndarray, size: float) -> np.ndarray:
-    """Quaternions (m, 4) turned by a smooth rotation vector that vanishes at both ends; ``x`` in [0, 1]."""
-    w = size * (np.outer(np.sin(np.pi * x), (0.6, 0.8, 0.3)) + np.outer(np.sin(2 * np.pi * x), (0.5, -0.4, 0.2)))
-    turned = Rotation.from_rotvec(w) * Rotation.from_quat(np.roll(q, -1, axis=1))
-    out = np.roll(turned.as_quat(), 1, axis=1)
-    return np.asarray(out * np.sign(np.sum(out * q, axis=1, keepdims=True)))
+def _bend(x: np.ndarray) -> np.ndarray:
+    """Smooth rotation vector of size about one that vanishes at both ends, (m, 3); ``x`` (m,) in [0, 1]."""
+    return np.outer(np.sin(np.pi * x), (0.6, 0.8, 0.3)) + np.outer(np.sin(2 * np.pi * x), (0.5, -0.4, 0.2))
 
 
 def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:

@@ -423,14 +423,14 @@ class Explorer:
             )
 
     def _check_zeros(self, history: list[Point], point: Point) -> None:
-        """Warn once where eigenvalues stay zero without a symmetry: the scene leaves the rod a freedom."""
+        """Say once where eigenvalues stay zero without a symmetry: the state is one of a family at the same load."""
         extra = point.zero - self.follower.system.active_drifts()
         recent = history[-4:]
         if extra > 0 and len(recent) == 4 and all(p.zero == point.zero for p in recent) and not self.warned:
             self.warned = True
-            self.report.warn(
-                f"{extra} eigenvalue(s) stay zero that no symmetry of the scene explains: the rod may turn or move "
-                "freely; other eigenvalues that pass through zero may be missed: hold it."
+            self.report.say(
+                f"  {extra} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
+                "move freely at one and the same load"
             )
 
     def _finish(self, branch: Branch) -> None:

@@ -196,11 +196,19 @@ class Scene:
         """Whether all loads have a potential, so that stability is a matter of the second variation alone."""
         return not self.without_potential()
 
-    def without_potential(self) -> list[str]:
-        """Loads that have no potential, in words."""
+    def in_space(self) -> Scene:
+        """Return the same rod, free to leave its plane."""
+        return replace(self, planar=None)
+
+    def without_potential(self, *, in_space: bool = False) -> list[str]:
+        """Loads that have no potential, in words; for a planar rod those that have none while it stays in its plane."""
         found = []
         for side, end in zip(("left", "right"), self.sides, strict=True):
-            kinds = {"follower force": end.follower, "moment": end.moment, "follower moment": end.follower_moment}
+            kinds = {"follower force": end.follower}
+            if (
+                self.planar is None or in_space
+            ):  # in a plane all moments are about its normal: their potential is -M times the angle
+                kinds |= {"moment": end.moment, "follower moment": end.follower_moment}
             found += [f"{kind} on the {side} end" for kind, load in kinds.items() if load is not None]
         if self.follower is not None:
             found.append("distributed follower force")

@@ -123,6 +123,7 @@ class Shape:
             out["r"] = self._anchor(load, ends[-1]) + self._unique(ends[:-1, None, :] + all_fields["inside"])
         else:
             out["r"] = out["r"] + self.system.fields.lift(out["s"], load)
+        out["q"] = f.turning.quaternion(out[f.turning.name])
         for name in system.scalars:
             out[name] = system.scalar(x, name)
         return out
@@ -210,7 +211,8 @@ class Shape:
     def _slopes(self) -> np.ndarray:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""
         f = self.system.fields
-        q = np.einsum("gn,cni->cgi", self._q_at_gauss, f.u.x.array[f.dofs["q"][self._cells]])
+        turned = np.einsum("gn,cni->cgi", self._q_at_gauss, f.u.x.array[f.dofs[f.turning.name][self._cells]])
+        q = f.turning.quaternion(turned)
         v = np.broadcast_to(np.array(UNDEFORMED), (*q.shape[:2], 3)).copy()
         free = list(self.system.scene.free_strains)
         if free:
@@ -233,7 +235,8 @@ class Shape:
         integral, value = self._probe_weights
         u = f.u.x.array
         parts = np.zeros((3, 4))
-        parts[0] = np.einsum("cn,cni->i", value, u[f.dofs["q"][self._cells]])
+        size = f.turning.size
+        parts[0, :size] = np.einsum("cn,cni->i", value, u[f.dofs[f.turning.name][self._cells]])
         if self.reduced:
             slopes = self._slopes()
             parts[1, :3] = np.einsum("cg,cgi->i", integral, slopes)
@@ -246,7 +249,8 @@ class Shape:
         r = parts[1, :3] + (
             self._anchor(load, parts[2, :3]) if self.reduced else self.system.fields.lift(np.array(s), load)
         )
-        return r, parts[0] / np.linalg.norm(parts[0])
+        q = f.turning.quaternion(parts[0, :size])
+        return r, q / np.linalg.norm(q)
 
     def _anchor(self, load: float, chord: np.ndarray) -> np.ndarray:
         """Position of the left end: where it is held, or else a chord back from where the right end is held."""

@@ -43,6 +43,10 @@ class System:
         Symmetric matrix of the squared size of a change of state: rotations, centreline, and the load over its span.
     lu
         LU factors of the last Jacobian given to :meth:`factor`.
+    damping
+        Multiple of the metric added to every Jacobian.  Not zero where a state belongs to a family of equilibria at one
+        and the same load that no symmetry explains: the Jacobian is singular there, and Newton's method must not move
+        along the family.
     """
 
     def __init__(
@@ -54,7 +58,7 @@ class System:
         mesh: Any = None,
     ) -> None:
         """Compile the forms and allocate all matrices once; on a given mesh if there is one."""
-        self.scene, self.comm = scene, comm
+        self.scene, self.comm, self.damping = scene, comm, 0.0
         self.clock = clock or Clock()
         self.fields = Fields(scene, discretization, comm, mesh)
         self.equations = Equations(self.fields)
@@ -198,7 +202,7 @@ class System:
 
     def factor(self, row: PETSc.Vec, damping: float = 0.0) -> None:
         """Assemble and factor the Jacobian at the state last brought, with ``damping`` times the metric added."""
-        matrix = self.jacobian(row)
+        matrix, damping = self.jacobian(row), damping or self.damping
         if damping:
             matrix.axpy(damping, self.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
             matrix.stateIncrease()
@@ -285,7 +289,8 @@ def _set_clamps(fields: Fields) -> None:
     x = fields.coordinates(fields.discretization.degree)
     for end, s in zip(scene.sides, scene.interval, strict=True):
         if end.fixed_rotation is not None:
-            u[fields.dofs["q"][np.isclose(x, s, rtol=0, atol=1e-9 * scene.length)]] = end.fixed_rotation
+            here = fields.dofs[fields.turning.name][np.isclose(x, s, rtol=0, atol=1e-9 * scene.length)]
+            u[here] = fields.turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)
 
 
 def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:

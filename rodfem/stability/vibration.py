@@ -75,13 +75,14 @@ class Vibration:
         """Allocate the matrices of the pencil once."""
         self.system = system
         self.matrix, self.mass = system.state_matrix(), system.state_matrix()
-        self.q = np.zeros((0, 0, 4))
+        self.turned = np.zeros((0, 0, 4))
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Assemble the pencil at the state ``x``."""
         with self.system.clock("assembly"):
             assemble_pencil(self.system, x, self.matrix, self.mass)
-            self.q = self.system.fields.u.x.array[self.system.fields.dofs["q"]]
+            f = self.system.fields
+            self.turned = f.u.x.array[f.dofs[f.turning.name]]
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
@@ -120,7 +121,7 @@ class Vibration:
             found = sorted(found, key=lambda p: abs(p.value - target))[: number + 2]
             third = abs(found[min(2, len(found) - 1)].value - target)
             found = [p for p in found if abs(p.value - target) <= FAR * third]
-            kinds = [character.name(character.shares(self.system, self.q, p.parts)) for p in found]
+            kinds = [character.name(character.shares(self.system, self.turned, p.parts)) for p in found]
         order = sorted(range(len(found)), key=lambda i: (round(found[i].value.real, 9), found[i].value.imag))
         return Frequencies(
             np.array([found[i].value for i in order]),
