@@ -28,6 +28,8 @@ from rodfem.system import System, combine
 
 LEVEL = 0.05
 """Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh."""
+STRAYED = 0.3
+"""Distance from the start beyond which an equilibrium is not the one that the start stands for."""
 ON_BOUND = 1e-8
 """A load beyond a bound by less than this, of the span, is on it: branches of equal loads may lie there."""
 
@@ -94,18 +96,38 @@ class Equilibria:
         return x, outcome
 
     def first(self, load: float) -> tuple[PETSc.Vec, Outcome]:
-        """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill."""
+        """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill.
+
+        Also where Newton's method ends at an unstable one that is nowhere near the start.
+        """
         guess = self.start(load)
         self.system.set_phase(guess)
         x, outcome = self.at_load(guess, load)
-        if not outcome.converged:
-            for bent in (0.0, 0.4, 0.8):
-                x = self.start(load, bent)
-                self.system.set_phase(x)
-                outcome = relax(self.system, x, self.axis)
-                if outcome.converged:
-                    break
-        return x, outcome
+        if outcome.converged and (outcome.moved < STRAYED or self.is_stable(x)):
+            return x, outcome
+        other = self.downhill(load)
+        return other if other[1].converged else (x, outcome)
+
+    def downhill(self, load: float) -> tuple[PETSc.Vec, Outcome]:
+        """Equilibrium at ``load`` by going downhill from the scene's start, and from there bent a little.
+
+        From a symmetrical start the way down may end on a saddle: a stable state is preferred.
+        """
+        first: tuple[PETSc.Vec, Outcome] | None = None
+        for bent in (0.0, 0.4, 0.8):
+            x = self.start(load, bent)
+            self.system.set_phase(x)
+            outcome = relax(self.system, x, self.axis)
+            if outcome.converged and self.is_stable(x):
+                return x, outcome
+            if first is None or (outcome.converged and not first[1].converged):
+                first = x, outcome
+        assert first is not None
+        return first
+
+    def is_stable(self, x: PETSc.Vec) -> bool:
+        """Whether an equilibrium is stable, as far as is known without counting."""
+        return True
 
     def energy(self, x: PETSc.Vec) -> float:
         """Stored energy of the state ``x``."""
@@ -126,10 +148,15 @@ class Follower(Equilibria):
         self.inertia = Inertia(system)
         self.modes = spectrum
         self.spectrum = Spectrum(self.inertia) if spectrum else None
-        self.convexity = None if system.scene.is_quadratic() else Convexity(system)
+        varies = not system.scene.is_quadratic() or system.scene.depends_on_s()
+        self.convexity = Convexity(system) if varies else None
         self.space = (
             None if system.scene.planar is None or system.scene.without_potential(in_space=True) else InSpace(system)
         )
+
+    def is_stable(self, x: PETSc.Vec) -> bool:
+        """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
+        return self.inertia.count(x).negative == 0
 
     def point(self, x: PETSc.Vec, arclength: float, tangent: PETSc.Vec | None, outcome: Outcome | None = None) -> Point:
         """Evaluate all records of the equilibrium ``x``."""

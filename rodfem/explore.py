@@ -135,6 +135,11 @@ class Explorer:
                 "load, give the scene a start nearer to one, or see whether constraints repeat each other or what an "
                 "end holds."
             )
+        if follower.convexity is not None and follower.convexity.lowest(x) <= 0:
+            raise SceneError(
+                f"The stored energy is not convex somewhere along the first state, at {self.scene.load} = {start:g}: "
+                "choose constants that make it so."
+            )
         follower.system.set_phase(x)
         point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
         if isinstance(self.scene.ends, Ring):

@@ -173,10 +173,10 @@ class Scene:
         return tuple(sorted(s for s in places if self.interval[0] + close < s < self.interval[1] - close))
 
     def samples(self) -> list[float]:
-        """Arclengths at which the material is checked: ends, middle, and both sides of all breaks."""
+        """Arclengths at which the material is checked: nine from end to end, and both sides of all breaks."""
         a, b = self.interval
         eps = 1e-6 * self.length
-        return sorted({a + eps, (a + b) / 2, b - eps, *(s + d for s in self.joints for d in (-eps, eps))})
+        return sorted({*np.linspace(a + eps, b - eps, 9).tolist(), *(s + d for s in self.joints for d in (-eps, eps))})
 
     def varying(self, load: str, span: tuple[float, float], **values: float) -> Scene:
         """Return the same scene with another parameter as its load, over ``span``, and other constants."""

@@ -249,6 +249,15 @@ def rolled(kind: str) -> Scene:
     return column("rolled", ends, (0.0, 8 * pi), planar="e2")
 
 
+def chain(planar: str | None) -> Scene:
+    """A heavy cable of length 1 between supports 0.8 apart, that bends ever more easily."""
+    return column(
+        "chain", (pinned(), pinned(lambda c: (0.0, 0.0, 0.8))), (1e-2, 1e-5), load="k", planar=planar,
+        constants={"k": 1e-2}, energy=lambda v, k, c: bending(k, (c.k, c.k, c.k)),
+        distributed=lambda c: (1.0, 0.0, 0.0), ordinate=Ordinate("sag", s=0.5, of=lambda r, q: r[0]),
+    )  # fmt: skip
+
+
 def softening() -> Scene:
     """A cantilever whose moment 1 k - k^3 has a largest value."""
     return column(

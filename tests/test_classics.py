@@ -318,6 +318,19 @@ def test_rolled_up(kind: str, formulation: str) -> None:
         assert sample["r"] == pytest.approx(arc, abs=1e-7)
 
 
+@pytest.mark.parametrize("planar", ["e2", None])
+def test_hanging_cable(planar: str | None) -> None:
+    """Straight and too long at first, it finds down; but for what its stiffness does it is a catenary."""
+    a = root(lambda a: a * np.sinh(0.4 / a) - 0.5, 0.2, 2.0)
+    sag = a * (np.cosh(0.4 / a) - 1)
+    found = explore(classics.chain(planar), elements=12, stops=(1e-4, 1e-5))
+    (branch,) = found.branches
+    assert {p.negative for p in branch.points} == {0}
+    misses = [s.point.ordinate - sag for s in found.special("user")]
+    assert abs(misses[1]) < 2e-6
+    assert misses[0] / misses[1] == pytest.approx(10.0, rel=0.05)
+
+
 # --- a material that loses its convexity ----------------------------------------------------------------------------
 
 

@@ -12,9 +12,12 @@ state is a function of ``a`` alone, given the products of these six vectors, and
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.stability.inertia import orthonormalize
 from rodfem.symmetries import Symmetry
 from rodfem.system import System, combine
 
@@ -27,8 +30,10 @@ STILL = 1e-20
 class Orbit:
     """The states that one continuous symmetry makes of a state: a circle, a line, or a helix of states."""
 
-    def __init__(self, system: System, y: PETSc.Vec, symmetry: int) -> None:
-        """Split the velocity of ``y`` by frequency."""
+    def __init__(
+        self, system: System, y: PETSc.Vec, symmetry: int, seen: Callable[[PETSc.Vec], PETSc.Vec] = lambda x: x
+    ) -> None:
+        """Split the velocity of ``y`` by frequency; distances are those of what is ``seen`` of states, a projection."""
         zero = system.generator(system.new_vector(), symmetry)
         powers = [system.generator(y, symmetry)]
         for _ in range(5):
@@ -42,7 +47,7 @@ class Orbit:
         on_one, turned_one = (combine([powers[i], powers[i + 2]], of_one) for i in (2, 3))
         steady = combine([powers[0], on_half, on_one], np.array([1.0, -1.0, -1.0]))
         self.parts = [y, steady, on_half, turned_half, on_one, turned_one]
-        images = [system.metric * part for part in self.parts]
+        images = [system.metric * seen(part) for part in self.parts]
         self.products = np.array([[p.dot(image) for image in images] for p in self.parts])
         self.moves_on = self.products[1, 1] > STILL * self.products[0, 0]
 
@@ -79,35 +84,61 @@ class Orbit:
 
 
 class Orbits:
-    """A set of states, each standing for its orbit under all continuous symmetries of the scene."""
+    """A set of states, each standing for its orbit under all continuous symmetries of the scene.
+
+    The shift of a closed rod along itself is not among them: a mesh has it approximately only.
+    """
 
     def __init__(self, system: System) -> None:
-        """Start with none."""
+        """Start with none; translations, whose generators are the same at all states, are told from rotations."""
         self.system = system
-        self.symmetries = sum(isinstance(x, Symmetry) for x in system.symmetries)
         self.states: list[PETSc.Vec] = []
-        self._orbits: list[Orbit | None] = []
+        self.orbits: list[dict[int, Orbit]] = []
+        self.rotations: list[int] = []
+        self.translations: list[PETSc.Vec] = []
+        some = system.new_vector()
+        some.set(1.0)
+        for i, symmetry in enumerate(system.symmetries):
+            if isinstance(symmetry, Symmetry):
+                constant, change = system.generator(system.new_vector(), i), system.generator(some, i)
+                change.axpy(-1.0, constant)
+                if constant.norm() > 0 and change.norm() < 1e-12 * constant.norm():
+                    self.translations.append(constant)
+                else:
+                    self.rotations.append(i)
+        orthonormalize(self.translations, system.metric)
+        self._weighed = [system.metric * t for t in self.translations]
 
     def add(self, y: PETSc.Vec) -> None:
         """Add a state."""
         self.states.append(y)
-        self._orbits.append(Orbit(self.system, y, 0) if self.symmetries else None)
+        self.orbits.append({i: self._orbit(y, i) for i in self.rotations[:1]})
 
     def nearest(self, x: PETSc.Vec) -> list[tuple[float, PETSc.Vec]]:
         """Distance of each orbit from ``x``, and ``x`` minus the nearest state of the orbit.
 
-        For one symmetry the nearest state is exact; for more of them the angles are found in turn, three times.
+        Exact for translations and one rotation; for more of them the angles are found in turn, three times.
         """
         system = self.system
-        image = system.metric * x
+        image = system.metric * self._still(x)
         found = []
-        for y, orbit in zip(self.states, self._orbits, strict=True):
-            if orbit is not None:
+        for y, orbits in zip(self.states, self.orbits, strict=True):
+            for turn in range(3 * len(self.rotations) if len(self.rotations) > 1 else len(self.rotations)):
+                i = self.rotations[turn % len(self.rotations)]
+                orbit = orbits[i] if turn == 0 else self._orbit(y, i)
                 y = orbit.at(orbit.amount(image))
-                for turn in range(2 * self.symmetries if self.symmetries > 1 else 0):
-                    other = Orbit(system, y, (turn + 1) % self.symmetries)
-                    y = other.at(other.amount(image))
             apart = x.copy()
             apart.axpy(-1.0, y)
+            apart = self._still(apart)
             found.append((system.norm(apart), apart))
         return found
+
+    def _orbit(self, y: PETSc.Vec, symmetry: int) -> Orbit:
+        return Orbit(self.system, y, symmetry, self._still)
+
+    def _still(self, x: PETSc.Vec) -> PETSc.Vec:
+        """Part of ``x`` across all translations."""
+        out = x.copy()
+        for t, weighed in zip(self.translations, self._weighed, strict=True):
+            out.axpy(-weighed.dot(x), t)
+        return out
