@@ -67,11 +67,11 @@ class System:
         self.has_scalars = comm.rank == comm.size - 1
         without_load = np.where(number == self.load_index, -1, number).astype(PETSc.IntType)
         self._columns = {True: number.astype(PETSc.IntType), False: without_load}
-        all_map = PETSc.LGMap().create(self._columns[True], comm=comm)
+        self._all = PETSc.LGMap().create(self._columns[True], comm=comm)
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
         self._equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self._pattern = bordered_pattern(self.fields)
-        self.matrix = new_matrix(self.fields, self._pattern, self._no_load, all_map)
+        self.matrix = self.state_matrix(load=True)
         self.x_local = PETSc.Vec().createSeq(int((number >= 0).sum()), comm=PETSc.COMM_SELF)
         self._numbered = np.flatnonzero(number >= 0)
         self.workspace = self.matrix.createVecRight()
@@ -213,9 +213,9 @@ class System:
             self.lu.ksp.solve(right, out)
             return bool(self.lu.ksp.getConvergedReason() > 0)
 
-    def state_matrix(self) -> PETSc.Mat:
-        """Allocate a matrix for the second variation at fixed load (row and column of the load empty)."""
-        return new_matrix(self.fields, self._pattern, self._no_load, self._no_load)
+    def state_matrix(self, *, load: bool = False) -> PETSc.Mat:
+        """Allocate a matrix for the second variation at fixed load (row of the load empty, column unless ``load``)."""
+        return new_matrix(self.fields, self._pattern, self._no_load, self._all if load else self._no_load)
 
     # --- symmetry ----------------------------------------------------------------------------------------------
 
