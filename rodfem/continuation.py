@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from rodfem.branch import Point
 from rodfem.convexity import Convexity
-from rodfem.corrector import Corrector
+from rodfem.corrector import SENSITIVE, Corrector
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.newton import Outcome, correct, relax
 from rodfem.shape import Shape
@@ -29,7 +29,8 @@ from rodfem.stability.spectrum import Spectrum
 from rodfem.system import System, combine
 
 LEVEL = 0.05
-"""Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh."""
+"""Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh, unless the
+correction was so small that it cannot have changed its sign."""
 ON_BOUND = 1e-8
 """A load beyond a bound by less than this, of the span, is on it: branches of equal loads may lie there."""
 
@@ -191,8 +192,8 @@ class Follower(Equilibria):
         if not outcome.converged:
             return outcome, None, None
         tangent = self.corrector.tangent_along(row) if regular else self.tangent(row)
-        new = self.system.scalar(tangent)
-        if new * slope <= 0 or abs(new) < LEVEL * abs(self.system.scene.span[1] - self.system.scene.span[0]):
+        new, span = self.system.scalar(tangent), abs(self.system.scene.span[1] - self.system.scene.span[0])
+        if new * slope <= 0 or abs(new) < min(LEVEL, SENSITIVE * outcome.moved) * span:
             regular = regular and self.corrector.factor(x)
             tangent = self.corrector.tangent_along(row) if regular else self.tangent(row, at=x)
         return outcome, tangent, self.corrector.index(x) if regular else None
@@ -235,13 +236,16 @@ def _bend(q: np.ndarray, x: np.ndarray, size: float) -> np.ndarray:
 
 def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
     """Weights of the values at ``nodes`` in their interpolating polynomial at ``s``, and in its derivative there."""
-    n = len(nodes)
-    value, slope = np.ones(n), np.zeros(n)
-    for j in range(n):
-        others = np.delete(nodes, j)
-        factors = (s - others) / (nodes[j] - others)
-        value[j] = np.prod(factors)
-        slope[j] = sum(np.prod(np.delete(factors, i)) / (nodes[j] - others[i]) for i in range(n - 1))
+    known = [float(x) for x in nodes]
+    value, slope = np.empty(len(known)), np.empty(len(known))
+    for j, node in enumerate(known):
+        p, dp, scale = 1.0, 0.0, 1.0
+        for i, other in enumerate(known):
+            if i != j:
+                dp = dp * (s - other) + p
+                p *= s - other
+                scale *= node - other
+        value[j], slope[j] = p / scale, dp / scale
     return value, slope
 
 

@@ -58,6 +58,7 @@ class Corrector:
         self._equations, self._step, self._image = (system.new_vector() for _ in range(3))
         self._factored = system.new_vector()
         self._fresh = [inertia.seed(i) for i in range(BLOCK)]
+        self._fresh_images = [inertia.metric * v for v in self._fresh]
         self._below = 0
         self.tangent = system.new_vector()
         self.nearest = 0.0
@@ -66,6 +67,7 @@ class Corrector:
     def restart(self) -> None:
         """Begin a branch: nothing is known about its eigenvectors."""
         self._block = [v.copy() for v in self._fresh]
+        self._images = [v.copy() for v in self._fresh_images]
         self._started = False
 
     def factor(self, x: PETSc.Vec, right: PETSc.Vec | None = None) -> bool:
@@ -73,7 +75,7 @@ class Corrector:
 
         False where an eigenvalue is so near zero that its factors serve neither Newton's method nor the count.
         """
-        system, inertia = self.system, self.inertia
+        inertia = self.inertia
         inertia.assemble(x)
         try:
             self._below = inertia.below(0.0)
@@ -81,8 +83,9 @@ class Corrector:
             return False
         x.copy(self._factored)
         for _ in range(1 if self._started else 3):
-            for v, fresh in zip(self._block, self._fresh, strict=True):
-                v.axpy(FRESH, fresh)
+            for i in range(BLOCK):
+                self._block[i].axpy(FRESH, self._fresh[i])
+                self._images[i].axpy(FRESH, self._fresh_images[i])
             self._solve(right)
         self._started = True
         if not self.nearest > NEAR * inertia.scale:
@@ -98,25 +101,27 @@ class Corrector:
             columns[:, 0] = 0.0 if right is None else right.array_r
             columns[:, 1] = inertia.border.array_r
             sizes = []
-            for i, v in enumerate(self._block):
-                inertia.metric.mult(v, self._image)
-                columns[:, 2 + i] = self._image.array_r
-                sizes.append(self._image.dot(v) ** 0.5)
-            inertia.factors.factor.matSolve(self._right, self._solved)
+            for i, (v, image) in enumerate(zip(self._block, self._images, strict=True)):
+                columns[:, 2 + i] = image.array_r
+                sizes.append(image.dot(v) ** 0.5)
+            inertia.factors.solve_all(self._right, self._solved)
             solved = self._solved.getDenseArray()
             self._step.array[:] = solved[:, 0]
             self.tangent.array[:] = -solved[:, 1]
             system.set_load(self.tangent, 1.0)
             self.tangent.scale(1.0 / system.norm(self.tangent))
             growth = 0.0
-            for i, (v, size) in enumerate(zip(self._block, sizes, strict=True)):
+            for i, (v, image, size) in enumerate(zip(self._block, self._images, sizes, strict=True)):
                 v.array[:] = solved[:, 2 + i]
-                inertia.metric.mult(v, self._image)
-                grown = self._image.dot(v) ** 0.5
+                inertia.metric.mult(v, image)
+                grown = max(image.dot(v), 1e-300) ** 0.5
                 growth = max(growth, grown / size) if isfinite(grown) else float("inf")
                 v.scale(1.0 / grown)
-                for w in self._block[:i]:
-                    v.axpy(-self._image.dot(w) / grown, w)
+                image.scale(1.0 / grown)
+                for j in range(i):
+                    along = image.dot(self._block[j])
+                    v.axpy(-along, self._block[j])
+                    image.axpy(-along, self._images[j])
             self.nearest = 1.0 / growth
 
     def _chord(self, right: PETSc.Vec) -> None:

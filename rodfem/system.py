@@ -134,8 +134,7 @@ class System:
         x, f = self.new_vector(), self.fields
         x.array[: len(f.free_owned)] = f.u.x.array[f.free_owned]
         if self.has_scalars:
-            for position, name in enumerate(name for name in self.scalars if not name.startswith("drift")):
-                x.setValue(self.scalars[name], f.u.x.array[f.copies[0, position]])
+            x.array[len(f.free_owned) : len(f.free_owned) + f.copies.shape[1]] = f.u.x.array[f.copies[0]]
         x.assemble()
         return x
 
@@ -348,6 +347,10 @@ class Factorizer:
         if status < 0 and status != -10:  # -10 is a singular matrix, which the solve reports
             raise ConvergenceError(f"MUMPS could not factor the bordered matrix: its status INFOG(1) is {status}.")
         return self.factor
+
+    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
+        """Solve for all columns of a dense matrix at once, with the last factors."""
+        self.ksp.getPC().getFactorMatrix().matSolve(right, out)
 
     def _prepare(self, matrix: PETSc.Mat) -> None:
         self.ksp.reset()
