@@ -18,6 +18,7 @@ from petsc4py import PETSc
 
 from rodfem.branch import Point
 from rodfem.convexity import Convexity
+from rodfem.corrector import SENSITIVE, Corrector
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.newton import Outcome, correct, relax
 from rodfem.shape import Shape
@@ -27,7 +28,8 @@ from rodfem.stability.spectrum import Spectrum
 from rodfem.system import System, combine
 
 LEVEL = 0.05
-"""Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh."""
+"""Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh, unless the
+correction was so small that it cannot have changed its sign."""
 STRAYED = 0.3
 """Distance from the start beyond which an equilibrium is not the one that the start stands for."""
 ON_BOUND = 1e-8
@@ -146,6 +148,7 @@ class Follower(Equilibria):
         """Allocate matrices and tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
         super().__init__(system)
         self.inertia = Inertia(system)
+        self.corrector = Corrector(self.inertia)
         self.modes = spectrum
         self.spectrum = Spectrum(self.inertia) if spectrum else None
         varies = not system.scene.is_quadratic() or system.scene.depends_on_s()
@@ -158,10 +161,18 @@ class Follower(Equilibria):
         """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
         return self.inertia.count(x).negative == 0
 
-    def point(self, x: PETSc.Vec, arclength: float, tangent: PETSc.Vec | None, outcome: Outcome | None = None) -> Point:
-        """Evaluate all records of the equilibrium ``x``."""
+    def point(
+        self,
+        x: PETSc.Vec,
+        arclength: float,
+        tangent: PETSc.Vec | None,
+        outcome: Outcome | None = None,
+        index: Index | None = None,
+    ) -> Point:
+        """Evaluate all records of the equilibrium ``x``; its index is counted unless given."""
         system = self.system
-        index = self.inertia.count(x)
+        if index is None:
+            index = self.inertia.count(x)
         system.damping = self.inertia.tolerance if index.zero > system.active_drifts() else 0.0
         return Point(
             x=x,
@@ -193,6 +204,28 @@ class Follower(Equilibria):
                 f"{index.negative}: ask for more eigenvalues, or use a richer discretisation."
             )
         return [float(value) for value in modes.values]
+
+    def correct(
+        self, x: PETSc.Vec, row: PETSc.Vec, reach: float, slope: float
+    ) -> tuple[Outcome, PETSc.Vec | None, Index | None]:
+        """Correct a prediction in place; also its unit tangent on the side of ``row``, and its index.
+
+        The tangent is None without convergence, the index where the factors that served the correction do not tell it.
+        ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at ``x``
+        itself and not at the prediction.
+        """
+        outcome = self.corrector.correct(x, row, most=8, reach=reach)
+        regular = outcome is not None
+        if outcome is None:
+            outcome = correct(self.system, x, row, most=8, reach=reach)
+        if not outcome.converged:
+            return outcome, None, None
+        tangent = self.corrector.tangent_along(row) if regular else self.tangent(row)
+        new, span = self.system.scalar(tangent), abs(self.system.scene.span[1] - self.system.scene.span[0])
+        if new * slope <= 0 or abs(new) < min(LEVEL, SENSITIVE * outcome.moved) * span:
+            regular = regular and self.corrector.factor(x)
+            tangent = self.corrector.tangent_along(row) if regular else self.tangent(row, at=x)
+        return outcome, tangent, self.corrector.index(x) if regular else None
 
     def row(self, direction: PETSc.Vec) -> PETSc.Vec:
         """Row of the arclength equation for a direction: the metric times it, for a direction of unit size."""
@@ -229,13 +262,16 @@ def _bend(x: np.ndarray) -> np.ndarray:
 
 def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
     """Weights of the values at ``nodes`` in their interpolating polynomial at ``s``, and in its derivative there."""
-    n = len(nodes)
-    value, slope = np.ones(n), np.zeros(n)
-    for j in range(n):
-        others = np.delete(nodes, j)
-        factors = (s - others) / (nodes[j] - others)
-        value[j] = np.prod(factors)
-        slope[j] = sum(np.prod(np.delete(factors, i)) / (nodes[j] - others[i]) for i in range(n - 1))
+    known = [float(x) for x in nodes]
+    value, slope = np.empty(len(known)), np.empty(len(known))
+    for j, node in enumerate(known):
+        p, dp, scale = 1.0, 0.0, 1.0
+        for i, other in enumerate(known):
+            if i != j:
+                dp = dp * (s - other) + p
+                p *= s - other
+                scale *= node - other
+        value[j], slope[j] = p / scale, dp / scale
     return value, slope
 
 
@@ -275,20 +311,17 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
     system, step = follower.system, min(steps.first, steps.largest)
     span = abs(system.scene.span[1] - system.scene.span[0])
     low, high = (bound + sign * ON_BOUND * span for bound, sign in zip(bounds, (-1, 1), strict=True))
+    follower.corrector.restart()
     while len(points) < steps.most:
         last = points[-1]
         x, direction = predict(points, last.arclength + step)
-        load, outcome, tangent = system.scalar(x), None, None
+        load, outcome, tangent, index = system.scalar(x), None, None, None
         if low <= load <= high:
             row = follower.row(direction)
             system.set_phase(x)
-            outcome = correct(system, x, row, most=8, reach=0.5 * step)
+            outcome, tangent, index = follower.correct(x, row, 0.5 * step, last.slope)
             if outcome.converged:
                 load = system.scalar(x)
-                tangent = follower.tangent(row)
-                slope = system.scalar(tangent)
-                if slope * last.slope <= 0 or abs(slope) < LEVEL * span:
-                    tangent = follower.tangent(row, at=x)
         if not low <= load <= high:
             point = _to_load(follower, points, load, bounds[0] if load < low else bounds[1], step)
             if point is not None:
@@ -296,7 +329,7 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
                 yield "end of range"
                 return
         elif outcome is not None and tangent is not None and row.dot(tangent) > 0.9:
-            yield follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome)
+            yield follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome, index)
             order = min(len(points) - 1, 3) + 1
             factor = (steps.aim / max(outcome.moved, 1e-12)) ** (1 / order)
             step = min(step * min(max(factor, 0.4), 1.6), steps.largest)

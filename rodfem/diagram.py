@@ -14,7 +14,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from petsc4py import PETSc
 
@@ -142,6 +141,8 @@ def save_states(branch: Branch, follower: Equilibria, path: Path, first: bool) -
     Group ``/branches/<name>`` has ``load`` (P,), ``r`` (P, m, 3), ``q`` (P, m, 4), every further field and scalar
     with P rows, and the null vectors of its special points under ``special/<i>``.
     """
+    import h5py
+
     samples = [follower.shape.sample(p.x) for p in branch.points]
     modes = [[follower.shape.sample(v) for v in s.null_vectors] for s in branch.special]
     if follower.system.comm.rank:
@@ -173,6 +174,8 @@ def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc
 
     Raises :class:`SceneError` where the file has no such row, or has it in the other formulation.
     """
+    import h5py
+
     wanted = follower.system.fields.discretization.formulation
     try:
         with h5py.File(path, "r") as file:

@@ -15,7 +15,6 @@ from rodfem.diagram import as_data, save_json, save_states
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization
-from rodfem.loci.locus import locus
 from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.sweep import Sweep
@@ -105,6 +104,7 @@ def _loci(
     branches: list[Branch], follower: Equilibria, plan: Plan, output: Path, report: Report, figures: bool
 ) -> None:
     """Follow all special points in the plane of two parameters; each into a file of its own, all into one picture."""
+    from rodfem.loci.locus import locus
     from rodfem.plot_locus import draw_locus
 
     if plan.locus is None:

@@ -15,6 +15,7 @@ import numpy as np
 import ufl
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
+from ufl.utils.stacks import StackDict
 
 from forms.kinematics import RODS, UNDEFORMED
 from rodfem.checks import check_kinds, check_scene
@@ -295,5 +296,7 @@ class Scene:
         k = ufl.as_vector([x[len(free_v) + i] for i in range(3)])
         W = ufl.as_ufl(self.energy(ufl.as_vector(v), k, self.constants(s=s)))
         hessian = apply_derivatives(apply_algebra_lowering(ufl.diff(ufl.diff(W, x), x)))
-        m = len(free_v) + 3
-        return np.array([[float(hessian((), component=(i, j))) for j in range(m)] for i in range(m)])
+        out = np.zeros((len(free_v) + 3,) * 2)
+        for i, j in zip(*np.tril_indices(len(out)), strict=True):  # not hessian(...): it differentiates every time
+            out[i, j] = out[j, i] = float(hessian.evaluate((), {}, (int(i), int(j)), StackDict()))
+        return out

@@ -71,11 +71,11 @@ class System:
         self.has_scalars = comm.rank == comm.size - 1
         without_load = np.where(number == self.load_index, -1, number).astype(PETSc.IntType)
         self._columns = {True: number.astype(PETSc.IntType), False: without_load}
-        all_map = PETSc.LGMap().create(self._columns[True], comm=comm)
+        self._all = PETSc.LGMap().create(self._columns[True], comm=comm)
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
         self._equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self._pattern = bordered_pattern(self.fields)
-        self.matrix = new_matrix(self.fields, self._pattern, self._no_load, all_map)
+        self.matrix = self.state_matrix(load=True)
         self.x_local = PETSc.Vec().createSeq(int((number >= 0).sum()), comm=PETSc.COMM_SELF)
         self._numbered = np.flatnonzero(number >= 0)
         self.workspace = self.matrix.createVecRight()
@@ -138,8 +138,7 @@ class System:
         x, f = self.new_vector(), self.fields
         x.array[: len(f.free_owned)] = f.u.x.array[f.free_owned]
         if self.has_scalars:
-            for position, name in enumerate(name for name in self.scalars if not name.startswith("drift")):
-                x.setValue(self.scalars[name], f.u.x.array[f.copies[0, position]])
+            x.array[len(f.free_owned) : len(f.free_owned) + f.copies.shape[1]] = f.u.x.array[f.copies[0]]
         x.assemble()
         return x
 
@@ -217,9 +216,9 @@ class System:
             self.lu.ksp.solve(right, out)
             return bool(self.lu.ksp.getConvergedReason() > 0)
 
-    def state_matrix(self) -> PETSc.Mat:
-        """Allocate a matrix for the second variation at fixed load (row and column of the load empty)."""
-        return new_matrix(self.fields, self._pattern, self._no_load, self._no_load)
+    def state_matrix(self, *, load: bool = False) -> PETSc.Mat:
+        """Allocate a matrix for the second variation at fixed load (row of the load empty, column unless ``load``)."""
+        return new_matrix(self.fields, self._pattern, self._no_load, self._all if load else self._no_load)
 
     # --- symmetry ----------------------------------------------------------------------------------------------
 
@@ -353,6 +352,10 @@ class Factorizer:
         if status < 0 and status != -10:  # -10 is a singular matrix, which the solve reports
             raise ConvergenceError(f"MUMPS could not factor the bordered matrix: its status INFOG(1) is {status}.")
         return self.factor
+
+    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
+        """Solve for all columns of a dense matrix at once, with the last factors."""
+        self.ksp.getPC().getFactorMatrix().matSolve(right, out)
 
     def _prepare(self, matrix: PETSc.Mat) -> None:
         self.ksp.reset()
