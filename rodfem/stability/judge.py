@@ -181,7 +181,7 @@ class Judge:
         except ConvergenceError:
             rank_of(self._pencil(x, "full"))
             raise
-        self._made += 2 + (len(found.inside) > 0)
+        self._made += 2
         return found
 
     # --- symmetric pencils -------------------------------------------------------------------------------------
