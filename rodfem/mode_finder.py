@@ -63,9 +63,7 @@ class ModeFinder:
         vectors = self._turned(x, verdict.values, vectors)
         duals = [spectrum.mass * v for v in vectors]
         symmetries = symmetry_modes(self.system, x)
-        for index, dual in weighed_modes(self.system, symmetries, spectrum.mass).items():
-            vector = symmetries[index]
-            vector.scale(1.0 / dual.dot(vector))
+        for vector, dual in weighed_modes(self.system, symmetries, spectrum.mass).values():
             vectors.append(vector)
             duals.append(dual)
         motions = [self.motions.at(x, v) for v in vectors]

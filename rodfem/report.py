@@ -183,7 +183,7 @@ class Report:
         values, residuals = (found.values, found.errors) if modes is None else (modes.value, modes.residual)
         for value, residual, error, motion in zip(values, residuals, errors, motions, strict=True):
             doubt = f" ({error:.0e})" if isfinite(error) else ""
-            number = f"{value:.10g}" if np.isreal(value) and not np.iscomplexobj(value) else f"{complex(value):.9g}"
+            number = f"{value.real:.10g}" if value.imag == 0 else f"{complex(value):.9g}"
             known = f"residual {residual:.0e}" if isfinite(residual) else ""
             self.say(f"    mu = {number + doubt:<28} {known:<15} {motion}".rstrip())
         proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
