@@ -48,7 +48,7 @@ def weighed_modes(
     given = list(modes.values())
     images = [mass * mode for mode in given]
     squares, turn = np.linalg.eigh(
-        np.array([[np.real(g.dot(m)) for m in images] for g in given]).reshape(len(given), -1)
+        np.array([[np.real(g.dot(m)) for m in images] for g in given]).reshape(len(given), len(given))
     )
     out = {}
     for index, square, weights in zip(modes, squares, turn.T, strict=True):
