@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +22,8 @@ from rodfem.system import System, combine
 
 EQUAL = 1e-6
 """Eigenvalues closer than this, relative to the greatest, are one: their modes are any basis of a plane."""
+SEEN = 1e-3
+"""A functional to which a mode responds less than this, relative to the greatest response, does not see it."""
 FLOOR = 1e-12
 """Errors of eigenvalues are not said to be smaller than this, relative to the greatest."""
 
@@ -86,24 +87,28 @@ class ModeFinder:
         return character.name(character.shares(self.system, q, [v.array_r]))
 
     def _turned(self, x: PETSc.Vec, values: np.ndarray, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
-        """Sign each mode, and choose a basis of the modes of equal eigenvalues: the same from any orthonormal one."""
+        """Sign each mode, and choose a basis of the modes of equal eigenvalues: the same from any orthonormal one.
+
+        The first moves along e1 where it can, the next do not as far as a fixed functional tells; and so on.
+        """
         out: list[PETSc.Vec] = []
         for group in equal(values):
             members = [vectors[i] for i in group]
-            responses = np.array([list(self._probes(x, v, len(group))) for v in members])
-            turn, _ = np.linalg.qr(responses)
-            turn = turn * np.sign(np.sum(turn * responses, axis=0))
-            out += [combine(members, turn[:, j]) for j in range(len(group))]
+            responses = np.array([self._responses(x, v) for v in members])
+            basis: list[np.ndarray] = []
+            for response in responses.T:
+                rest = response - sum((b * (b @ response) for b in basis), np.zeros(len(group)))
+                if len(basis) < len(group) and np.linalg.norm(rest) > SEEN * abs(responses).max():
+                    basis.append(rest / np.linalg.norm(rest))
+            out += [combine(members, b) for b in basis] if len(basis) == len(group) else members
         return out
 
-    def _probes(self, x: PETSc.Vec, v: PETSc.Vec, count: int) -> Iterator[float]:
-        """Responses of a mode to fixed functionals: of its motion along e1, e2, e3, then others."""
+    def _responses(self, x: PETSc.Vec, v: PETSc.Vec) -> np.ndarray:
+        """Responses (36,) to fixed functionals of the motion along e1, e2, e3 and about them."""
         motion, s = self.motions.at(x, v), self.motions.sample(x)["s"]
         t = (s - s[0]) / (s[-1] - s[0])
-        weights = self.motions.node_weights()
-        for j in range(count):
-            shape = weights * (1 + t + np.cos(3.1 * t + 0.7 * (j // 3)))
-            yield float(shape @ (motion.r[:, j % 3] + 0.1 * motion.w[:, (j + 1) % 3] + 0.01 * motion.w[:, j % 3]))
+        shapes = self.motions.node_weights() * [1 + t + np.cos(3.1 * t + 0.7 * j) for j in range(6)]
+        return np.concatenate([(row @ np.hstack([motion.r, motion.w])) for row in shapes])
 
     # --- loads without a potential -----------------------------------------------------------------------------
 
