@@ -127,6 +127,20 @@ def parser_for(
         help="also compute the K left-most eigenvalues of every state with SLEPc",
     )
     group.add_argument(
+        "--method",
+        default="",
+        metavar="NAME",
+        help="judge the states at the loads of --at by auto, count, shift-invert, cayley, slicing, reduction or dense, "
+        "and print all that it says",
+    )
+    group.add_argument(
+        "--modes",
+        type=int,
+        default=0,
+        metavar="K",
+        help="find and draw the K left-most modes of the states at the loads of --at",
+    )
+    group.add_argument(
         "--search",
         type=int,
         default=0,
@@ -196,7 +210,16 @@ def main(
         span = tuple(options.span)
         steps = Steps(largest=options.step)
         at = tuple(options.at)
-        plan = Plan(span, at, spectrum=options.spectrum, steps=steps, tries=options.search, locus=pair(options.locus))
+        plan = Plan(
+            span,
+            at,
+            spectrum=options.spectrum,
+            steps=steps,
+            tries=options.search,
+            locus=pair(options.locus),
+            method=options.method,
+            modes=options.modes,
+        )
         run(scene, discretization, plan, options.output, figures=options.figures)
     except KeyboardInterrupt:
         from mpi4py import MPI

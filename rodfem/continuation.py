@@ -22,6 +22,7 @@ from rodfem.corrector import SENSITIVE, Corrector
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.newton import Outcome, correct, relax
 from rodfem.shape import Shape
+from rodfem.stability.band import decide
 from rodfem.stability.in_space import InSpace
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.spectrum import Spectrum
@@ -172,7 +173,7 @@ class Follower(Equilibria):
         """Evaluate all records of the equilibrium ``x``; its index is counted unless given."""
         system = self.system
         if index is None:
-            index = self.inertia.count(x)
+            index = decide(self.inertia, x).index
         system.damping = self.inertia.tolerance if index.zero > system.active_drifts() else 0.0
         return Point(
             x=x,
@@ -196,10 +197,11 @@ class Follower(Equilibria):
         if self.spectrum is None:
             return []
         modes = self.spectrum.leftmost(x, self.modes)
-        negative = modes.negative(self.inertia.tolerance / self.system.scene.length)
-        if negative != min(index.negative, self.modes) or not modes.certified:
+        tolerance = self.inertia.tolerance / self.system.scene.length
+        least, most = modes.negative(tolerance), modes.negative(-tolerance)
+        if not least <= min(index.negative, self.modes) <= most or not modes.certified:
             raise ConvergenceError(
-                f"SLEPc finds {negative} negative eigenvalues at "
+                f"SLEPc finds {least} negative eigenvalues at "
                 f"{self.system.scene.load} = {self.system.scalar(x):.8g}, the inertia "
                 f"{index.negative}: ask for more eigenvalues, or use a richer discretisation."
             )

@@ -21,6 +21,7 @@ from rodfem.branch import Branch, Special
 from rodfem.clock import Clock
 from rodfem.continuation import Equilibria
 from rodfem.errors import SceneError
+from rodfem.motion import Motions
 from rodfem.scene import Scene
 from rodfem.system import System
 
@@ -139,12 +140,14 @@ def save_states(branch: Branch, follower: Equilibria, path: Path, first: bool) -
     """Append the states of a branch to an HDF5 file; collective, written on rank 0.
 
     Group ``/branches/<name>`` has ``load`` (P,), ``r`` (P, m, 3), ``q`` (P, m, 4), every further field and scalar
-    with P rows, and the null vectors of its special points under ``special/<i>``.
+    with P rows, and under ``special/<i>`` the null vectors of its special points: displacement ``r``, ``rotation`` in
+    the space frame, and the change of ``q``.
     """
     import h5py
 
     samples = [follower.shape.sample(p.x) for p in branch.points]
-    modes = [[follower.shape.sample(v) for v in s.null_vectors] for s in branch.special]
+    motions = Motions(follower.system)
+    modes = [[motions.at(s.point.x, v) for v in s.null_vectors] for s in branch.special]
     if follower.system.comm.rank:
         return
     d = follower.system.fields.discretization
@@ -165,8 +168,7 @@ def save_states(branch: Branch, follower: Equilibria, path: Path, first: bool) -
         for i, vectors in enumerate(modes):
             for j, mode in enumerate(vectors):
                 target = group.create_group(f"special/{i}/null_vector_{j}")
-                for name in ("q", "r"):
-                    target[name] = mode[name]
+                target["r"], target["q"], target["rotation"] = mode.r, mode.q, mode.w
 
 
 def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc.Vec:

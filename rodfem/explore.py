@@ -33,8 +33,9 @@ BEYOND = 0.02
 class Plan:
     """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars.
 
-    ``spectrum`` left-most eigenvalues of every state are found besides its index; ``tries`` deflated iterations at each
-    of the loads ``at`` look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
+    ``spectrum`` left-most eigenvalues of every state are found besides its index; at the loads ``at`` states are judged
+    by ``method`` (where one is named), and their ``modes`` left-most modes are found; ``tries`` deflated iterations at
+    each of these loads look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
     special point in the plane of the load and that parameter.
     """
 
@@ -46,6 +47,8 @@ class Plan:
     spectrum: int = 0
     tries: int = 0
     locus: tuple[str, float, float] | None = None
+    method: str = ""
+    modes: int = 0
 
     def check(self, scene: Scene) -> None:
         """Raise :class:`SceneError` for a range that the scene does not admit, or a load outside the range."""
@@ -76,6 +79,12 @@ class Plan:
             raise SceneError(f"{self.tries} is not a number of tries: give 0 or more to --search.")
         if self.tries and not self.at:
             raise SceneError("A search needs loads to search at: give them with --at.")
+        if self.modes < 0:
+            raise SceneError(f"{self.modes} is not a number of modes: give 0 or more to --modes.")
+        if (self.modes or self.method) and not self.at:
+            raise SceneError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at: give them with --at.")
+        if self.modes and self.method == "count":
+            raise SceneError("Counting alone finds no modes: leave out --modes, or name another --method.")
         if self.spectrum < 0:
             raise SceneError(f"{self.spectrum} is not a number of eigenvalues: give 0 or more to --spectrum.")
 

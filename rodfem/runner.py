@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
 from rodfem import compat
-from rodfem.branch import BRANCH_POINT, FLUTTER, FOLD, Branch
+from rodfem.branch import BRANCH_POINT, FLUTTER, FOLD, USER, Branch
 from rodfem.clock import Clock
 from rodfem.continuation import Equilibria, Follower
 from rodfem.diagram import as_data, save_json, save_states
@@ -19,6 +21,9 @@ from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.sweep import Sweep
 from rodfem.system import System
+
+if TYPE_CHECKING:
+    from rodfem.mode_finder import ModeFinder
 
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
 """What a picture's caption shows for TeX names."""
@@ -69,6 +74,12 @@ def run(
             system = System(scene, discretization, comm, clock)
             follower = Follower(system, plan.spectrum) if scene.conservative else Equilibria(system)
         report.system(system)
+        finder = None
+        if plan.method or plan.modes:
+            from rodfem.mode_finder import ModeFinder
+
+            finder = ModeFinder(follower, plan.error_bars)
+            finder.judge.choose(plan.method or "auto", plan.modes)
         explorer: Explorer | Sweep
         if isinstance(follower, Follower):
             explorer = Explorer(follower, plan, report, lambda: _save(explorer, follower, clock, output))
@@ -81,6 +92,8 @@ def run(
     report.frequencies(branches, scene.load)
     report.timing(clock, sum(len(b.points) for b in branches))
     report.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
+    if finder is not None:
+        judge_users(branches, finder, plan, output, report, figures)
     if plan.locus is not None:
         _loci(branches, follower, plan, output, report, figures)
     if figures and comm.rank == 0:
@@ -98,6 +111,41 @@ def _save(explorer: Explorer | Sweep, follower: Equilibria, clock: Clock, output
 def _save_diagram(explorer: Explorer | Sweep, follower: Equilibria, clock: Clock, output: Path) -> None:
     if follower.system.comm.rank == 0:
         save_json(as_data(explorer.branches, follower.system, clock, explorer.plan.span), output / "diagram.json")
+
+
+def judge_users(
+    branches: list[Branch], finder: ModeFinder, plan: Plan, output: Path, report: Report, figures: bool
+) -> None:
+    """Judge the states at the loads of the plan; save and draw their modes, if they are wanted."""
+    from rodfem.modes import save_modes
+    from rodfem.plot_modes import draw_modes
+
+    system = finder.system
+    scene, d = system.scene, system.fields.discretization
+    about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load} | asdict(d)
+    report.say(f"\nIs it stable? (left-most eigenvalues mu = omega^2{'' if scene.conservative else ', nearest zero'})")
+    saved: list[tuple[str, int]] = []
+    for branch, special in ((b, s) for b in branches for s in b.special if s.kind == USER):
+        where = f"{scene.load} = {special.point.load:.10g}"
+        try:
+            if not plan.modes:
+                report.verdict(branch.name, where, finder.judge(special.point.x, plan.method))
+                continue
+            verdict, modes = finder(special.point.x, plan.modes, plan.method or "auto")
+        except (SceneError, ConvergenceError) as trouble:
+            report.warn(str(trouble))
+            continue
+        report.verdict(branch.name, where, verdict, modes)
+        if system.comm.rank == 0:
+            save_modes(modes, output / "modes.h5", branch.name, special.row, about, first=not saved)
+        saved.append((branch.name, special.row))
+    if not saved:
+        return
+    pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
+    for (name, row), picture in zip(saved, pictures, strict=False):
+        for suffix in (".png", ".gif") if system.comm.rank == 0 else ():
+            draw_modes(output / "modes.h5", name, row, output / f"{picture}{suffix}")
+    report.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")
 
 
 def _loci(

@@ -84,6 +84,7 @@ class System:
         self._residual_local = np.zeros(len(self.fields.u.x.array))
         self.metric = self._assemble_metric()
         self.phases: list[PETSc.Vec | None] = [None] * len(self.drifts)
+        self.broken: dict[int, np.ndarray] = {}
         self._phase_offset = [0.0] * len(self.drifts)
         self.lu = Factorizer("lu", comm, {8: 0})  # no scaling: a third of the time; Newton's method mends what it costs
 
@@ -239,6 +240,7 @@ class System:
         """
         count = len(self.drifts)
         self.phases, self._phase_offset, self.kept = [None] * count, [0.0] * count, np.eye(count)
+        self.broken = {}
         if reference is None or count == 0:
             return
         generators = [self.generator(reference, i) for i in range(count)]
@@ -250,6 +252,7 @@ class System:
             if square >= SYMMETRIC_STATE**2:
                 phase = combine(images, weights / square**0.5)
                 self.phases[i], self._phase_offset[i] = phase, np.real(phase.dot(reference))
+                self.broken[self.drifts[i]] = weights / square**0.5
 
     def equivalent_directions(self, x: PETSc.Vec, direction: PETSc.Vec) -> list[PETSc.Vec]:
         """Directions into which the symmetries that the state ``x`` has itself carry a direction, to first order.

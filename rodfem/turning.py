@@ -38,6 +38,10 @@ class ByQuaternion:
         """Changes of quaternions (..., 4) of changes of the field (..., size)."""
         return change
 
+    def functional(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Weights (..., 4) of changes of quaternions, of weights (..., size) of changes of the field."""
+        return weights
+
     def turned(self, values: np.ndarray, vector: np.ndarray) -> np.ndarray:
         """Values (..., size) turned by rotation vectors (..., 3) along the directors."""
         size = np.linalg.norm(vector, axis=-1, keepdims=True)
@@ -88,6 +92,10 @@ class ByAngle:
     def change(self, values: np.ndarray, change: np.ndarray) -> np.ndarray:
         """Changes of quaternions (..., 4) of changes of the field (..., size)."""
         return self.quaternion(values + np.pi) * change / 2
+
+    def functional(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Weights (..., 4) of changes of quaternions, of weights (..., size) of changes of the field."""
+        return 4 * self.change(values, weights)
 
     def turned(self, values: np.ndarray, vector: np.ndarray) -> np.ndarray:
         """Values (..., size) turned by rotation vectors (..., 3), of which the component along the normal counts."""

@@ -17,7 +17,7 @@ of the form ``(x, -i x)`` belong to the first kind.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from petsc4py import PETSc
@@ -47,12 +47,14 @@ EPS = float(np.finfo(float).eps)
 class Frequencies:
     """Eigenvalues ``mu = omega^2`` in ascending order of their real parts, and their backward errors.
 
-    ``kinds`` names the motion of each: see :mod:`rodfem.stability.character`.
+    ``kinds`` names the motion of each: see :mod:`rodfem.stability.character`.  ``vectors`` (n, k) are complex, with the
+    n unknowns of this rank.
     """
 
     values: np.ndarray
     errors: np.ndarray
     kinds: tuple[str, ...] = ()
+    vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
 
     def unstable(self, tolerance: float) -> int:
         """Number of eigenvalues with a negative real part or a non-zero imaginary part."""
@@ -127,7 +129,21 @@ class Vibration:
             np.array([found[i].value for i in order]),
             np.array([found[i].error for i in order]),
             tuple(kinds[i] for i in order),
+            np.stack(
+                [found[i].parts[0] + 1j * (0.0 if len(found[i].parts) < 2 else found[i].parts[1]) for i in order], 1
+            ),
         )
+
+    def left(self, number: int, target: complex) -> Frequencies:
+        """Return the same of the transposed pencil: ``vectors`` are left ones, ``z.S = mu z.M`` without conjugation."""
+        kept = self.matrix
+        self.matrix = kept.copy()
+        self.matrix.transpose()
+        try:
+            return self.near(number, target)
+        finally:
+            self.matrix.destroy()
+            self.matrix = kept
 
     def _dense(self) -> list[_Pair]:
         """All finite eigenvalues of a pencil that is small enough for dense matrices, the same on all ranks."""
