@@ -20,6 +20,7 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.continuation import Equilibria
 from rodfem.fields import Discretization, Fields
+from rodfem.scene import Scene
 
 DEGREES = range(4, 11)
 """Degrees to choose from."""
@@ -70,34 +71,44 @@ class Smoothness:
         return True
 
 
-def smoothness(solver: Equilibria, x: PETSc.Vec, directions: Sequence[PETSc.Vec] = ()) -> Smoothness:
-    """Smoothness of a state and of changes of it (null vectors), the least of all; collective."""
-    fields, shape = solver.system.fields, solver.shape
-    k = fields.discretization.degree
-    cells = slice(0, fields.owned_cells)
-    squares = np.zeros((fields.owned_cells, k))
-    for vector in (x, *directions):
-        solver.system.bring(vector)
-        values = fields.u.x.array.copy()
-        if vector is not x:
-            values[fields.number < 0] = 0.0  # a state is held there, a change of it is zero
-        for name, weights in _weights(fields):
-            local = values[fields.dofs[name][cells]]
-            degree = local.shape[1] - 1
-            inverse = np.linalg.inv(legendre.legvander(2 * compat.nodes(degree) - 1, degree))
-            series = np.einsum("jn,cni->jci", inverse, local)
-            if name == "q":
-                series = legendre.legder(series) * (2 / shape.size)[None, :, None]
-            squares += np.einsum("jci,i->cj", series**2, np.asarray(weights) ** 2) / (2 * np.arange(k) + 1)
-    starts, rows = shape.gather(shape.start), shape.gather(squares)
-    order = np.argsort(starts)
-    vertices = np.append(starts[order], solver.system.scene.interval[1])
-    return _decay(vertices, np.sqrt(rows[order]))
+class Gauge:
+    """Measures how smooth the states of one discretisation are; collective."""
+
+    def __init__(self, solver: Equilibria, weights: list[tuple[str, np.ndarray]]) -> None:
+        """Tabulate the transformation from nodal values to Legendre coefficients; ``weights`` by :func:`weights_of`."""
+        self.solver, self.weights = solver, weights
+        fields = solver.system.fields
+        self._cells = slice(0, fields.owned_cells)
+        degrees = {b.name: b.degree for b in fields.blocks}
+        self._series = {}
+        for name, _ in weights:
+            d = degrees[name]
+            series = np.linalg.inv(legendre.legvander(2 * compat.nodes(d) - 1, d))
+            series = legendre.legder(series, axis=0) if name == "q" else series
+            self._series[name] = series / np.sqrt(2 * np.arange(len(series)) + 1)[:, None]
+
+    def __call__(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec] = ()) -> Smoothness:
+        """Smoothness of a state and of changes of it (null vectors) together."""
+        fields, shape = self.solver.system.fields, self.solver.shape
+        squares = np.zeros((fields.owned_cells, fields.discretization.degree))
+        for vector in (x, *directions):
+            self.solver.system.bring(vector)
+            values = fields.u.x.array
+            if vector is not x:
+                values = np.where(fields.number < 0, 0.0, values)  # a state is held there, a change of it is zero
+            for name, weights in self.weights:
+                series = np.einsum("jn,cni->cji", self._series[name], values[fields.dofs[name][self._cells]])
+                if name == "q":
+                    series *= (2 / shape.size)[:, None, None]
+                squares += series**2 @ weights**2
+        starts, rows = shape.gather(shape.start), shape.gather(squares)
+        order = np.argsort(starts)
+        vertices = np.append(starts[order], self.solver.system.scene.interval[1])
+        return _decay(vertices, np.sqrt(rows[order]))
 
 
-def _weights(fields: Fields) -> list[tuple[str, np.ndarray]]:
+def weights_of(scene: Scene) -> list[tuple[str, np.ndarray]]:
     """Weights of curvature (as the derivative of q) and of free strains v: root of stiffness over least bending."""
-    scene = fields.scene
     stiffness = np.diag(scene.stiffness())
     free = len(scene.free_strains)
     bending = stiffness[free:].min()
@@ -149,7 +160,7 @@ def _place(fields: Fields, found: Smoothness, sizes: np.ndarray) -> np.ndarray:
     """Vertices of a mesh with elements of these sizes, one at each joint, and an element for each rank."""
     scene = fields.scene
     number = np.append(0.0, np.cumsum(np.diff(found.vertices) / sizes))
-    number *= max(1.0, max(2, fields.comm.size) / number[-1])
+    number *= max(1.0, (max(2, fields.comm.size) + 0.1) / number[-1])
     pieces = np.array([scene.interval[0], *scene.joints, scene.interval[1]])
     at = np.interp(pieces, found.vertices, number)
     out = [pieces[:1]]

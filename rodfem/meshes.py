@@ -20,7 +20,7 @@ from rodfem.accuracy import Richer
 from rodfem.branch import BRANCH_POINT, END, FOLD, Branch, Point, Special
 from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.grading import cheapest, cost, smoothness
+from rodfem.grading import Gauge, cheapest, cost, weights_of
 from rodfem.newton import correct
 from rodfem.report import Report
 from rodfem.scene import Scene
@@ -36,8 +36,8 @@ TRIES, MOST = 4, 16
 """Meshes tried at one place, and in a run."""
 SURE = 10.0
 """An error estimated by the decay of coefficients counts where it is this much better than the accuracy."""
-SELDOM = 10
-"""At the latest after this many points the error is computed again."""
+GROWN, SELDOM = 1.5, 10
+"""An error is computed again where the indicator has grown by this factor, and at the latest after so many points."""
 NEAR = 0.1
 """Points of a branch nearer to each other than this, in arclength, are at one place."""
 
@@ -77,6 +77,15 @@ class Meshes:
         self.followers = [follower]
         self.accuracy = accuracy
         self._richer: dict[int, Richer] = {}
+        self._gauges: dict[int, Gauge] = {}
+        if accuracy is not None:
+            self._weights = weights_of(follower.system.scene)
+
+    def gauge(self, number: int) -> Gauge:
+        """Gauge of the smoothness of states on a mesh."""
+        if number not in self._gauges:
+            self._gauges[number] = Gauge(self.followers[number], self._weights)
+        return self._gauges[number]
 
     def richer(self, number: int) -> Richer:
         """Companion of a mesh one degree richer, made when it is first asked for."""
@@ -96,7 +105,7 @@ class Meshes:
         assert self.accuracy is not None
         old = self.followers[trouble.point.mesh]
         error = trouble.error if isfinite(trouble.error) else 1e3 * self.accuracy
-        found = smoothness(old, trouble.point.x, trouble.directions)
+        found = self.gauge(old.mesh)(trouble.point.x, trouble.directions)
         gain = self.accuracy / (error * MARGIN * FURTHER**tries)
         indicator = max(found.indicator, 1e-300) * gain**trouble.order
         mesh = cheapest(old, found, indicator)
@@ -212,17 +221,17 @@ class Watch:
         """Estimate the error of a point, by computation where need be; raises :class:`TooCoarse`."""
         if self.meshes.accuracy is None:
             return
-        indicator = smoothness(follower, point.x).indicator
+        indicator = self.meshes.gauge(follower.mesh)(point.x).indicator
         last = self.checked
         if last is not None and last.since < SELDOM and not self._at_bound(point):
             point.estimate = last.error * max(1.0, indicator / last.indicator)
-            if point.estimate * SURE < self.accuracy or indicator < 1.5 * last.indicator:
+            if indicator < GROWN * last.indicator or point.estimate * SURE < self.accuracy:
                 last.since += 1
                 return
         with follower.system.clock.purpose("error bars"):
             point.estimate = self._computed(point)
         self.checked = Checked(max(indicator, 1e-30), point.estimate)
-        if point.estimate > self.accuracy and point.arclength > self.excused:
+        if point.estimate * GROWN > self.accuracy and point.arclength > self.excused:
             raise TooCoarse(point, point.estimate)
 
     def special(self, special: Special) -> None:
