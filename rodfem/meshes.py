@@ -28,7 +28,7 @@ from rodfem.system import System
 
 FINEST, COARSEST = 1e-11, 1e-1
 """Accuracies that can be asked for; round-off is near the first."""
-MARGIN = 10.0
+MARGIN = 100.0
 """A new mesh is made for an accuracy better than the one asked for by this factor: it is to last for a while."""
 FURTHER = 10.0
 """By this factor more at each further try at one place."""
@@ -52,7 +52,7 @@ def check_accuracy(accuracy: float) -> None:
 
 def first_mesh(scene: Scene, accuracy: float, comm: MPI.Comm) -> tuple[int, int]:
     """Elements and degree to start with: few, of a degree that grows with the digits asked for."""
-    return max(4, len(scene.joints) + 1, comm.size), min(max(round(3 - log10(accuracy) / 2), 4), 8)
+    return max(4, len(scene.joints) + 1, comm.size), min(max(round(4 - log10(accuracy) / 2), 4), 9)
 
 
 class TooCoarse(Exception):
@@ -161,6 +161,8 @@ class Meshes:
         system.set_phase(x)
         row = target.axis if fixed_load else target.row(guess.tangent)
         outcome = correct(system, x, row, reach=0.5)
+        if fixed_load and not outcome.converged:  # too far from a state on a far finer mesh: from the scene's start
+            x, outcome = target.first(point.load)
         if not outcome.converged:
             return None
         side = target.row(guess.tangent)
