@@ -35,10 +35,10 @@ check_installation()
 class Parser(argparse.ArgumentParser):
     """Argument parser whose complaints are one sentence, printed once under MPI."""
 
-    def flags(self, name: str) -> list[str]:
-        """Return the words that set an option, abbreviations included."""
+    def gives(self, name: str, words: Sequence[str]) -> bool:
+        """Whether the command line sets an option, by an abbreviation maybe."""
         full = next(action.option_strings[0] for action in self._actions if action.dest == name)
-        return [full[:end] for end in range(3, len(full) + 1)]
+        return any(word.split("=")[0] in [full[:end] for end in range(3, len(full) + 1)] for word in words)
 
     def error(self, message: str) -> NoReturn:
         """Print ``message`` and leave with status 2."""
@@ -93,6 +93,14 @@ def parser_for(
         metavar="{auto,reduced,pointwise}",
         help="reduced: no centreline, the contact force as scalars; pointwise: all fields "
         f"(default {formulation}: reduced where the scene allows it)",
+    )
+    group.add_argument(
+        "--accuracy",
+        type=float,
+        default=None,
+        metavar="EPS",
+        help="instead of elements and degree: choose meshes on the way such that loads and ordinates are in error by less "
+        "than EPS (relative to values greater than one)",
     )
     group = parser.add_argument_group("what to compute")
     group.add_argument(
@@ -190,7 +198,7 @@ def main(
     ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
     options = parser.parse_args(ours)
     for name, value in defaults(options).items() if defaults else ():
-        if not any(word.split("=")[0] in parser.flags(name) for word in ours):
+        if not parser.gives(name, ours):
             setattr(options, name, value)
     import petsc4py
 
@@ -205,6 +213,12 @@ def main(
 
         if petsc:  # once more, for a PETSc that was running already
             PETSc.Options().insertString(" ".join(petsc))
+        if options.accuracy is not None:
+            for name in ("elements", "degree"):
+                if parser.gives(name, ours):
+                    raise SceneError(
+                        f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy."
+                    )
         discretization = Discretization(options.formulation, options.elements, options.degree)
         scene = scene_of(options)
         span = tuple(options.span)
@@ -219,6 +233,7 @@ def main(
             locus=pair(options.locus),
             method=options.method,
             modes=options.modes,
+            accuracy=options.accuracy,
         )
         run(scene, discretization, plan, options.output, figures=options.figures)
     except KeyboardInterrupt:

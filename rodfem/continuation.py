@@ -63,8 +63,8 @@ class Equilibria:
     """Computes equilibria of one :class:`~rodfem.system.System` at given loads, and their shapes."""
 
     def __init__(self, system: System) -> None:
-        """Tabulate the shape."""
-        self.system = system
+        """Tabulate the shape; ``mesh`` is the number of this discretisation where there are several."""
+        self.system, self.mesh = system, 0
         self.shape = Shape(system)
         self.axis = system.load_axis()
 
@@ -190,6 +190,7 @@ class Follower(Equilibria):
             error=outcome.error if outcome else 0.0,
             spectrum=self._leftmost(x, index),
             negative_in_space=None if self.space is None else self.space.count(x).negative,
+            mesh=self.mesh,
         )
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:

@@ -9,6 +9,7 @@ no number at all: PETSc drops what is added to number -1, and no Dirichlet row e
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -42,12 +43,14 @@ class Discretization:
     """How a scene is discretised: ``formulation``, number of ``elements`` and polynomial ``degree``.
 
     ``reduced`` has no centreline, and the contact force as scalars; ``pointwise`` has all fields; ``auto`` is the first
-    where the scene allows it.
+    where the scene allows it.  ``vertices`` are the arclengths at which elements meet, both ends included; without
+    them all elements are of nearly equal size.
     """
 
     formulation: str = "auto"
     elements: int = 8
     degree: int = 6
+    vertices: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         """Check the values; raises :class:`SceneError`."""
@@ -57,6 +60,21 @@ class Discretization:
             raise SceneError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
         if not 1 <= self.degree <= 12:
             raise SceneError(f"Degree {self.degree} is not available: choose 1 to 12.")
+        if self.vertices is not None:
+            if len(self.vertices) != self.elements + 1:
+                raise SceneError(
+                    f"{len(self.vertices)} vertices do not bound {self.elements} elements: give {self.elements + 1}."
+                )
+            if not all(a < b for a, b in pairwise(self.vertices)):
+                raise SceneError("The vertices of a mesh must ascend along the rod: sort them, each once.")
+
+    def finer(self, factor: int, richer: int = 0) -> Discretization:
+        """Each element cut into ``factor`` equal ones, of a degree higher by ``richer``."""
+        vertices = self.vertices
+        if vertices is not None:
+            at = np.arange(factor * self.elements + 1) / factor
+            vertices = tuple(float(s) for s in np.interp(at, np.arange(self.elements + 1), vertices))
+        return replace(self, elements=factor * self.elements, degree=self.degree + richer, vertices=vertices)
 
 
 @dataclass(frozen=True)
@@ -184,9 +202,20 @@ class Fields:
         self._number(copies, names)
 
     def _mesh(self) -> Any:
-        """Mesh of elements of nearly equal size with boundaries at the scene's joints."""
-        scene, elements = self.scene, self.discretization.elements
+        """Mesh with the vertices that the discretisation gives, or of elements of nearly equal size; each at joints."""
+        scene, elements, given = self.scene, self.discretization.elements, self.discretization.vertices
         pieces = np.array([scene.interval[0], *scene.joints, scene.interval[1]])
+        mesh = compat.interval_mesh(self.comm, elements, *scene.interval)
+        uniform = np.linspace(*scene.interval, elements + 1)
+        if given is not None:
+            ends = (given[0], given[-1]) == tuple(scene.interval)
+            if not ends or any(abs(np.subtract(given, s)).min() > 1e-9 * scene.length for s in scene.joints):
+                raise SceneError(
+                    f"The vertices of the mesh must begin and end at {scene.interval[0]:g} and {scene.interval[1]:g} "
+                    "and hold every joint of the scene: add what is missing."
+                )
+            compat.move_vertices(mesh, uniform, np.array(given))
+            return mesh
         if elements < len(pieces) - 1:
             raise SceneError(
                 f"The rod has {len(pieces) - 1} pieces between joints, and needs an element for each: use more than "
@@ -199,11 +228,8 @@ class Fields:
         while counts.sum() < elements:
             counts[np.argmax(shares / counts)] += 1
         vertices = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
-        mesh = compat.interval_mesh(self.comm, elements, *scene.interval)
         if len(pieces) > 2:
-            compat.move_vertices(
-                mesh, np.linspace(*scene.interval, elements + 1), np.append(np.concatenate(vertices), pieces[-1])
-            )
+            compat.move_vertices(mesh, uniform, np.append(np.concatenate(vertices), pieces[-1]))
         return mesh
 
     def _block_dofs(self, part: int, size: int, cells: int) -> np.ndarray:

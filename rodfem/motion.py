@@ -89,8 +89,8 @@ class Motions(Shape):
 
     def _in_order(self, pieces: dict[str, np.ndarray], *, sort: bool = True) -> dict[str, np.ndarray]:
         """Values of all ranks' cells from left to right, with ``sort`` those of their nodes too."""
-        order = np.argsort(self._gather(self.start))
-        every = {name: self._gather(values)[order] for name, values in pieces.items()}
+        order = np.argsort(self.gather(self.start))
+        every = {name: self.gather(values)[order] for name, values in pieces.items()}
         return {name: values[:, self._order] for name, values in every.items()} if sort else every
 
     def _first(self, chord: np.ndarray) -> np.ndarray:

@@ -38,6 +38,17 @@ def _index(special: Special) -> str:
     return index if space is None else f"{index} (in space {space})"
 
 
+def _mesh(system: System) -> str:
+    """Discretisation in words: elements, the smallest and the largest where they differ, degree, unknowns."""
+    d = system.fields.discretization
+    words = f"{d.elements} elements of degree {d.degree}"
+    if d.vertices is not None:
+        sizes = np.diff(d.vertices)
+        if sizes.max() > 1.1 * sizes.min():
+            words += f", {sizes.min():.2g} to {sizes.max():.2g} long"
+    return f"{words}, {system.fields.unknowns} unknowns"
+
+
 def _roots(point: Point) -> dict[str, str]:
     """Frequencies of a point in words for each kind of motion; a complex pair of them once, with +-."""
     words: dict[str, list[str]] = {}
@@ -70,20 +81,31 @@ class Report:
         """Say why the first run takes longer."""
         self.say("Compiling the forms for the first time (some seconds; kept in ~/.cache/fenics for later runs) ...")
 
-    def system(self, system: System) -> None:
-        """Say what is solved, with how many unknowns, and what was left out."""
+    def system(self, system: System, accuracy: float | None = None) -> None:
+        """Say what is solved, with how many unknowns, what was left out, and the accuracy asked for."""
         scene, f = system.scene, system.fields
         d = f.discretization
         self.say(
             f"{scene.title or scene.name}: {scene.rod} rod, {d.formulation} formulation, "
             f"{d.elements} elements of degree {d.degree}, {f.unknowns} unknowns"
         )
+        if accuracy is not None:
+            self.say(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
         if not scene.conservative:
             loads = ", ".join(scene.without_potential())
             self.say(f"  not conservative ({loads}): stability is a matter of frequencies, not of an index")
         for line in f.left_out():
             self.say(f"  left out: {line}")
+
+    def mesh(self, system: System, load: float, why: str) -> None:
+        """Say that a branch goes on with another mesh, and why."""
+        self.say(f"  from {system.scene.load} = {load:.6g} on {_mesh(system)} ({why})")
+
+    def accuracy(self, used: Sequence[System], worst: float, asked: float) -> None:
+        """Say with which meshes a branch was traced, and the error of the worst of its points."""
+        word = "" if worst <= asked else f", above the {asked:g} asked for"
+        self.say(f"  largest estimated error {worst:.0e}{word}; {'; '.join(_mesh(system) for system in used)}")
 
     def branch(self, branch: Branch) -> None:
         """Head a new branch."""

@@ -135,8 +135,8 @@ class Shape:
             local["ends"] = np.einsum("g,cgi,c->ci", self.gauss.weights, slopes, self.size)
             local["inside"] = np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), slopes, self.size)
         out: dict[str, Any] = {"elements": f.discretization.elements}
-        order = np.argsort(all_cells := self._gather(local.pop("start")))
-        all_fields = {name: self._gather(values)[order] for name, values in local.items()}
+        order = np.argsort(all_cells := self.gather(local.pop("start")))
+        all_fields = {name: self.gather(values)[order] for name, values in local.items()}
         h = np.diff(np.append(all_cells[order], system.scene.interval[1]))
         out["s"] = self._unique(all_cells[order][:, None, None] + h[:, None, None] * self.nodes[None, :, None])[:, 0]
         for block in f.blocks:
@@ -178,8 +178,8 @@ class Shape:
         slopes = self._slopes()
         pieces = np.einsum("g,cgi,c->ci", self.gauss.weights, slopes, self.size)
         starts, inside = self.start, np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), slopes, self.size)
-        order = np.argsort(self._gather(starts))
-        steps = self._gather(pieces)[order]
+        order = np.argsort(self.gather(starts))
+        steps = self.gather(pieces)[order]
         before = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
         c = system.scene.constants(load)
         left, right = ([None if p is None else float(p) for p in end.held(c)] for end in system.scene.sides)
@@ -190,7 +190,7 @@ class Shape:
                 f.u.x.array[f.copies[:, i]] = (a if unknown.group == "a" else b)[unknown.component]
         if self.reduced:
             return
-        first = np.searchsorted(self._gather(starts)[order], starts)
+        first = np.searchsorted(self.gather(starts)[order], starts)
         r = a + before[:-1][first][:, None, :] + inside
         s = starts[:, None] + self.size[:, None] * self.nodes
         x = (s - system.scene.interval[0])[..., None] / system.scene.length
@@ -225,7 +225,7 @@ class Shape:
         basis = compat.lagrange_basis(own, local.ravel())[:, np.argsort(compat.nodes(own))]
         return np.einsum("pn,pni->pi", basis, table[cell.ravel()]).reshape(*x.shape, block.size)
 
-    def _gather(self, values: np.ndarray) -> np.ndarray:
+    def gather(self, values: np.ndarray) -> np.ndarray:
         return values if self.system.comm.size == 1 else np.concatenate(self.system.comm.allgather(values))
 
     @staticmethod

@@ -92,7 +92,7 @@ class System:
         """Symmetries of the scene; found with few elements, which have the same ones, where there are many."""
         fields, equations = self.fields, self.equations
         if fields.unknowns > FEW:
-            few = replace(fields.discretization, elements=max(6, 2 * len(self.scene.joints) + 2))
+            few = replace(fields.discretization, elements=max(6, 2 * len(self.scene.joints) + 2), vertices=None)
             fields = Fields(self.scene, few, MPI.COMM_SELF)
             _set_clamps(fields)
             equations = Equations(fields)
