@@ -14,7 +14,7 @@ from dataclasses import replace
 from petsc4py import PETSc
 
 from rodfem.branch import BRANCH_POINT, FOLD, Branch, Point, Special
-from rodfem.continuation import Follower, distance, hermite
+from rodfem.continuation import VERTICAL, Follower, distance, hermite
 from rodfem.errors import ConvergenceError
 from rodfem.locate import Located, across, locate, solve_at
 from rodfem.newton import correct
@@ -23,8 +23,6 @@ COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
 ROUND_OFF = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
-VERTICAL = 1e-8
-"""A branch along which the load changes by less than this (of its span a unit of arclength) is one of equal loads."""
 
 
 def special_at(follower: Follower, located: Located, arclength: float, still: Sequence[PETSc.Vec] = ()) -> Special:

@@ -31,6 +31,8 @@ from rodfem.system import System, combine
 LEVEL = 0.05
 """Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh, unless the
 correction was so small that it cannot have changed its sign."""
+VERTICAL = 1e-8
+"""A branch along which the load changes by less than this (of its span a unit of arclength) is one of equal loads."""
 STRAYED = 0.3
 """Distance from the start beyond which an equilibrium is not the one that the start stands for."""
 ON_BOUND = 1e-8
@@ -174,7 +176,6 @@ class Follower(Equilibria):
         system = self.system
         if index is None:
             index = decide(self.inertia, x).index
-        system.damping = self.inertia.tolerance if index.zero > system.active_drifts() else 0.0
         return Point(
             x=x,
             tangent=tangent,
@@ -229,6 +230,10 @@ class Follower(Equilibria):
             regular = regular and self.corrector.factor(x)
             tangent = self.corrector.tangent_along(row) if regular else self.tangent(row, at=x)
         return outcome, tangent, self.corrector.index(x) if regular else None
+
+    def damp(self, freedoms: int) -> None:
+        """Keep Newton's method from moving along families of equilibria at one load, where there are any."""
+        self.system.damping = self.inertia.tolerance if freedoms > 0 else 0.0
 
     def row(self, direction: PETSc.Vec) -> PETSc.Vec:
         """Row of the arclength equation for a direction: the metric times it, for a direction of unit size."""

@@ -12,9 +12,9 @@ from petsc4py import PETSc
 from scipy.optimize import brentq
 
 from rodfem.accuracy import zero_stretch
-from rodfem.bifurcation import VERTICAL, directions, find_special, midpoint, start_branch
+from rodfem.bifurcation import directions, find_special, midpoint, start_branch
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
-from rodfem.continuation import Follower, Steps, distance, follow, hermite
+from rodfem.continuation import VERTICAL, Follower, Steps, distance, follow, hermite
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError, SymmetryError
 from rodfem.locate import solve_at
@@ -203,6 +203,7 @@ class Explorer:
     def _switch(self, parent: Branch, i: int, special: Special) -> None:
         special.switched = True
         self._use(special.point.mesh)
+        self.follower.damp(special.point.zero - self.follower.system.active_drifts() - special.multiplicity)
         try:
             ways = directions(self.follower, special)
         except ConvergenceError as trouble:
@@ -272,6 +273,7 @@ class Explorer:
         self.report.branch(branch)
         self._use(branch.points[-1].mesh)
         self.watch = Watch(self.meshes, (self.low, self.high))
+        self.follower.damp(0)
         try:
             self._follow(branch)
         except ConvergenceError as trouble:
@@ -512,8 +514,12 @@ class Explorer:
     def _check_zeros(self, history: list[Point], point: Point) -> None:
         """Say once where eigenvalues stay zero without a symmetry: the state is one of a family at the same load."""
         extra = point.zero - self.follower.system.active_drifts()
+        if abs(point.slope) < VERTICAL * (self.high - self.low):
+            extra -= 1  # the branch itself is such a family
         recent = history[-4:]
-        if extra > 0 and len(recent) == 4 and all(p.zero == point.zero for p in recent) and not self.warned:
+        stay = extra > 0 and len(recent) == 4 and all(p.zero == point.zero for p in recent)
+        self.follower.damp(extra if stay else 0)
+        if stay and not self.warned:
             self.warned = True
             self.report.say(
                 f"  {extra} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "

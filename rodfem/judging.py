@@ -33,7 +33,7 @@ def judge_users(
     system = solvers[0].system
     scene = system.scene
     about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}
-    about |= asdict(system.fields.discretization)
+    about |= {k: v for k, v in asdict(system.fields.discretization).items() if k != "vertices"}
     report.say(f"\nIs it stable? (left-most eigenvalues mu = omega^2{'' if scene.conservative else ', nearest zero'})")
     finders: dict[int, ModeFinder] = {}
     saved: list[tuple[str, int]] = []
