@@ -16,7 +16,7 @@ from rodfem.bifurcation import directions, find_special, midpoint, start_branch
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
 from rodfem.continuation import VERTICAL, Follower, Steps, distance, follow, hermite
 from rodfem.ends import Ring
-from rodfem.errors import ConvergenceError, SceneError, SymmetryError
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.locate import solve_at
 from rodfem.meshes import Meshes, TooCoarse, Watch, check_accuracy, end_of
 from rodfem.pitchfork import law_of
@@ -506,9 +506,10 @@ class Explorer:
     def _check_symmetry(self, point: Point) -> None:
         if point.drift > 1e-6 * self.follower.inertia.scale:
             self.watch.drifting(point)
-            raise SymmetryError(
-                f"A symmetry of the scene is not one of its equations: the drift is {point.drift:.2g} at "
-                f"{self.scene.load} = {point.load:.6g} where it should vanish; use a richer discretisation."
+            raise ConvergenceError(
+                f"The mesh does not resolve a symmetry of the scene any more: the drift is {point.drift:.2g} at "
+                f"{self.scene.load} = {point.load:.6g} where it should vanish; use more elements, or ask for an "
+                "accuracy."
             )
 
     def _check_zeros(self, history: list[Point], point: Point) -> None:
