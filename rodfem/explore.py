@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 from rodfem.accuracy import zero_stretch
 from rodfem.bifurcation import directions, find_special, midpoint, start_branch
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
+from rodfem.checks import check_load
 from rodfem.continuation import VERTICAL, Follower, Steps, distance, follow, hermite
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError
@@ -62,6 +63,7 @@ class Plan:
     def check(self, scene: Scene) -> None:
         """Raise :class:`SceneError` for a range that the scene does not admit, or a load outside the range."""
         scene.check_span(self.span)
+        check_load(scene)
         if self.accuracy is not None:
             check_accuracy(self.accuracy)
             if not scene.conservative:

@@ -33,7 +33,7 @@ LOADS = 101
 SEEN = 0.5
 """A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
 SAME = 1e-9
-"""Loads that differ by less than this, relative to them, are one."""
+"""Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
 REAL = 1e-7
 """An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
 
@@ -265,15 +265,18 @@ def discriminant(
 ) -> tuple[float, float]:
     """Discriminant ``((mu1 - mu2)/2)^2`` of the two eigenvalues nearest to ``center`` at ``load``, and their mean.
 
-    ``guess`` is an equilibrium at a load nearby.
+    ``guess`` is an equilibrium at a load nearby.  Where the rod bends alike in all planes each eigenvalue comes twice,
+    its motion in any plane: of those no two equal ones are taken, and the names of the motions say nothing.
     """
     vibration.assemble(at_load(solver, guess, load))
     found = vibration.near(4, 0.97 * center)
     values = found.values
+    repeated = [sum(abs(p - v) < SAME * abs(p) for v in values) > 1 for p in values]
     best: tuple[float, complex, complex] | None = None
     for i, p in enumerate(values):
         for j, q in enumerate(values[i + 1 :], start=i + 1):
-            both_real = abs(p.imag) + abs(q.imag) < REAL * abs(p) and found.kinds[i] == found.kinds[j]
+            alike = found.kinds[i] == found.kinds[j] or (repeated[i] and repeated[j])
+            both_real = abs(p.imag) + abs(q.imag) < REAL * abs(p) and alike and abs(p - q) >= SAME * abs(p)
             conjugate = abs(p - q.conjugate()) < REAL * abs(p)
             if both_real or conjugate:
                 distance = abs((p + q) / 2 - center) + 0.1 * abs(p - q)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import pi
+from math import cos, cosh, pi
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import ufl
 from mpi4py import MPI
 from rods import run_demo
 
@@ -158,6 +159,16 @@ def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
         (held(right=free(ZERO)), "force on the right end is .*: give a function"),  # type: ignore[arg-type]
         ({"energy": lambda v, k: k[0]}, "no function of 3 argument"),
         ({"energy": lambda v, k, c: None}, "energy is None: return"),
+        ({"energy": lambda v, k, c: np.cosh(k[0])}, "stored energy fails with TypeError.*write it with UFL"),
+        ({"constraints": (integral(lambda x, c: x.k[2], 3.0),)}, "value of an integral constraint is 3"),  # type: ignore[arg-type]
+        ({"start": lambda s: (cos(s), 0.0, 0.0, 0.0)}, "start fails with TypeError.*array of arclengths"),
+        # kinds
+        ({"constraints": at(0.5, lambda x, c: x.r[0])}, r"constraints=\(at\("),
+        ({"attachments": Attachment(0.5)}, r"attachments=\(Attachment\("),
+        ({"breaks": 0.5}, r"breaks=\(0.5,\)"),
+        ({"parameters": ["F", "B"]}, "give a dictionary"),
+        ({"parameters": {"F": Parameter(0.0, admissible=(1.0, -1.0)), "B": 2.0}}, "give the lower bound first"),
+        ({"ordinate": Ordinate("r", s=0.0, of=lambda r, q: r)}, "ordinate fails with TypeError.*returns a number"),
         # sizes and shapes
         ({"energy": lambda v, k, c: k}, "energy has the shape"),
         ({"potential": lambda x, c: x.r}, "potential along the rod has the shape"),
@@ -204,6 +215,7 @@ def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
         ({"constraints": (at(-0.5, lambda x, c: x.r[0]),)}, "constraint at s = -0.5 is not on the rod"),
         ({"breaks": (2.0,)}, "break at s = 2 is not on the rod"),
         ({"planar": "e3"}, "planar across 'e3'"),
+        ({"planar": "e2"} | held(right=clamped(lambda c: (0.0, 0.2, 0.9))), "held at 0 and 0.2 along e2"),
         (
             {"planar": "e2"} | held(right=free(force=lambda c: (0.0, c.F, 0.0))),
             "force on the right end pushes the rod out",
@@ -220,6 +232,28 @@ def test_mistakes(change: dict, words: str, capfd: pytest.CaptureFixture[str]) -
     message = str(raised.value)
     assert message[0].isupper() and message.endswith(".") and "\n" not in message
     assert capfd.readouterr() == ("", "")
+
+
+def test_parameters_that_nothing_feels() -> None:
+    scene = Scene(**(GOOD | {"parameters": {"F": 0.0, "B": 2.0, "G": 1.0}}))
+    for load, locus, words in (("G", None, "depends on its load 'G'"), ("F", ("G", 0.0, 2.0), "depends on 'G'")):
+        with pytest.raises(SceneError, match=words):
+            Plan((0.0, 1.0), locus=locus).check(scene.varying(load, (0.0, 1.0)))
+
+
+def test_functions_that_a_number_satisfies_but_no_expression() -> None:
+    """``math.cosh`` takes the numbers of the first checks; the forms are more than numbers."""
+    scene = Scene(**(GOOD | {"energy": lambda v, k, c: GOOD["energy"](v, k, c) + cosh(k[0])}))
+    with pytest.raises(SceneError, match=r"stored energy fails with .*write it with UFL"):
+        System(scene, Discretization("reduced", 2, 2))
+
+
+def test_a_rod_squeezed_to_nothing() -> None:
+    """The energy is written in v3, not in v3 - 1: without a load the rod has no length."""
+    scene = Scene(**(GOOD | {"energy": lambda v, k, c: ufl.dot(v, v) + ufl.dot(k, k)}))
+    solver = Follower(System(scene, Discretization("reduced", 2, 2)))
+    with pytest.raises(SceneError, match=r"squeezed to a stretch.*v\[2\] - 1"):
+        Explorer(solver, Plan(scene.span, error_bars=False), Report(quiet=True), lambda: None).run()
 
 
 def turns(s: np.ndarray, count: int) -> np.ndarray:
