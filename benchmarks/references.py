@@ -20,10 +20,10 @@ from benchmarks.targets import TARGETS
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 
-import closed_form  # noqa: E402
-import exact  # noqa: E402
-import shooting  # noqa: E402
-from integration import Problem, Rod  # noqa: E402
+import closed_form
+import exact
+import shooting
+from integration import Problem, Rod
 
 K0 = 3 * pi
 CORD = Problem(Rod(intrinsic=(0.0, K0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])
@@ -57,7 +57,9 @@ def spectra() -> dict[str, Spectrum]:
             *("hemitropic", 0.2, "straight hemitropic rod, unit rotary inertia"),
             tuple(closed_form.spectrum(0.2, *HEMITROPIC)[:3]),
         ),
-        "follower": Spectrum("follower", 10.0, "rod under a follower load, mass 1, weak plane", beck, 1.0),
+        "follower": Spectrum(
+            "follower", 10.0, "rod under a follower load, mass 1, weak plane", beck, 1.0, (0.0, 0.0, 0.0)
+        ),
     }
 
 
