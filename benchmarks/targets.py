@@ -1,7 +1,8 @@
 """Numbers with independent references by which every program is judged, scene by scene and branch by branch.
 
 No finite element and no collocation code had a part in them: straight states solve transcendental equations, bent
-ones were shot with Runge-Kutta methods of order 8 (residuals below 1e-12).  :mod:`benchmarks.references` computes them again.
+ones were shot with Runge-Kutta methods of order 8 (residuals below 1e-12).  :mod:`benchmarks.references` computes them
+again.
 """
 
 from __future__ import annotations

@@ -23,19 +23,21 @@ def main() -> None:
     add("--quick", action="store_true", help="a few points, one run each, to check that all works")
     add("--resume", action="store_true", help="keep what an interrupted run has measured")
     add("--page", action="store_true", help="measure nothing: write the page from what is kept")
-    add("--results", type=Path, default=ROOT / "results" / "speed", metavar="DIR", help="(default results/speed)")
-    add("--output", type=Path, default=ROOT / "docs", metavar="DIR", help="for speed.md and figures (default docs)")
+    add("--results", type=Path, metavar="DIR", help="(default results/speed; with --quick results/speed-quick)")
+    add("--output", type=Path, metavar="DIR", help="for speed.md and figures (default docs; with --quick the results')")
     options = parser.parse_args()
-    store = Store(options.results / "measured.json", resume=options.resume or options.page)
+    results = options.results or ROOT / "results" / ("speed-quick" if options.quick else "speed")
+    output = options.output or (results if options.quick else ROOT / "docs")
+    store = Store(results / "measured.json", resume=options.resume or options.page)
     try:
         if not options.page:
             everything(store, QUICK if options.quick else Size())
     finally:
         if store.pieces:
-            options.output.mkdir(parents=True, exist_ok=True)
-            figures = draw(store, options.output)
-            write(store, options.output / "speed.md", figures)
-            print(f"{options.output / 'speed.md'}, measured in {store.took() / 60:.1f} minutes")
+            output.mkdir(parents=True, exist_ok=True)
+            figures = draw(store, output)
+            write(store, output / "speed.md", figures)
+            print(f"{output / 'speed.md'}, measured in {store.took() / 60:.1f} minutes")
 
 
 if __name__ == "__main__":

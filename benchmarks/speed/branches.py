@@ -14,6 +14,7 @@ from statistics import median
 from time import process_time
 from typing import Any
 
+from benchmarks.speed.run import PARTS
 from benchmarks.speed.scenes import loads, scene, value
 from benchmarks.targets import TARGETS
 from rodfem.branch import Branch
@@ -25,8 +26,6 @@ from rodfem.fields import Discretization
 from rodfem.report import Report
 from rodfem.sweep import Sweep
 from rodfem.system import System
-
-PARTS = ("assembly", "solve", "stability")
 
 
 class Timed(Explorer):

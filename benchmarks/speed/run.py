@@ -22,10 +22,13 @@ Grid = Mapping[int, Sequence[int]]
 PAPER = (150, 1)
 """Elements and degree of the discretisation of Kumar & Healey (2010): linear, by the midpoint rule."""
 
+PARTS = ("assembly", "solve", "stability")
+"""What rodfem's clock tells apart in following a branch."""
+
 
 @dataclass(frozen=True)
 class Size:
-    """How much is measured: elements by degree, runs, numbers of elements for growth and scaling, couplings of a map."""
+    """How much is measured: elements by degree, runs, loads for scipy, elements for growth and scaling, couplings."""
 
     reduced: Grid = field(
         default_factory=lambda: {
@@ -142,7 +145,7 @@ def auto(problem: str, runs: int) -> list[dict[str, Any]]:
 
 
 def bvp(store: Store, scene: str, branch: str, tolerance: float, number: int) -> list[dict[str, Any]]:
-    """One row: scipy's median time over at most ``number`` loads of rodfem's points, and the error at the reference's."""
+    """One row: scipy's median time over about ``number`` loads of rodfem's points, and its error."""
     (target,) = (t for t in TARGETS[scene][branch] if t.at is not None)
     traced = [r for r in store.rows(f"branches/{scene}") if r["branch"] == branch]
     if not traced:

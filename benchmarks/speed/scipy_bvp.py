@@ -2,7 +2,7 @@
 
     python -m benchmarks.speed.scipy_bvp cord "branch 1" 1e-6 60 49 40 36      # tolerance, loads in the order to solve
 
-The equations are those of `benchmarks/auto/rod.f90`: quaternion, moment and centreline, the unknown forces as parameters,
+The equations are those of `benchmarks/auto/rod.f90`: quaternion, moment and centreline, unknown forces as parameters,
 derivatives by scipy's finite differences.  From a shot state near the reference load each load in turn starts from the
 solution at the one before (natural continuation) on 41 even nodes: on scipy's own mesh, which only grows, it takes far
 longer.  A line of JSON for each tells time and ordinate.
