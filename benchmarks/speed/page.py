@@ -96,8 +96,8 @@ def minute(store: Store) -> str:
     return "\n".join(
         [
             table(["cache of forms", "to the first printed special point, s", "to the end, s"], rows),
-            f"Warm under 1.5 s: {'met' if warm <= 1.5 else 'missed'}, {digits(warm)} s. Of this {digits(total)} s are the",
-            "start of Python and imports; the rest is the set-up of the system and the computation. In this order they add:",
+            f"Warm under 1.5 s: {'met' if warm <= 1.5 else 'missed'}, {digits(warm)} s. Of this {digits(total)} s are",
+            "the start of Python and imports, the rest set-up and computation. In this order modules add:",
             "",
             table(["module", "ms"], added),
         ]

@@ -19,6 +19,8 @@ COLOURS = {1: "#d55e00", 2: "#e69f00", 3: "#f0c000", 4: "#009e73", 5: "#3aa6a0",
 """Colour for each degree."""
 FLOOR = 1e-14
 """An error of zero is drawn here."""
+COLUMNS = 4
+"""Columns of a legend."""
 AUTO_NAMES = {"follower": ("flutter",), "hemitropic": ("hemitropic", "hemitropic-half")}
 PEER_BRANCH = {"flutter": "mu1, mu2"}
 
@@ -81,11 +83,14 @@ def finish(figure: Figure, panels: Sequence[Axes], path: Path, time: str) -> str
     entries: dict[str, Any] = {}
     for axes in panels:
         axes.grid(True, which="major", linewidth=0.4)
-        axes.set(xlabel=time, ylabel="relative error")
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
+    figure.supxlabel(time, fontsize=10)
+    figure.supylabel("relative error", fontsize=10)
     order = sorted(entries, key=lambda x: (not x.startswith("rodfem"), "pointwise" in x, x))
-    figure.legend([entries[x] for x in order], order, loc="outside lower center", ncols=4, fontsize=8)
+    below = 0.2 * (1 + -(-len(order) // COLUMNS)) / figure.get_size_inches()[1]
+    figure.get_layout_engine().set(rect=(0, below, 1, 1 - below))
+    figure.legend([entries[x] for x in order], order, loc="lower center", ncols=COLUMNS, fontsize=8)
     figure.savefig(path)
     return path.name
 
@@ -125,7 +130,11 @@ def work_precision(store: Store, path: Path, special: bool) -> str | None:
         axes.set_title(f"{scene}, {branch}: {name}", fontsize=9)
     for axes in grid[len(panels) :]:
         axes.set_visible(False)
-    words = "ms for the whole branch, special points and index included" if special else "ms per accepted point"
+    words = (
+        "ms for the whole branch, special points and index included"
+        if special
+        else "ms per accepted point, index included"
+    )
     return finish(figure, grid[: len(panels)], path, words)
 
 
