@@ -79,7 +79,8 @@ def measured(module: str, *arguments: object, ranks: int = 1, limit: float = 300
     if process.returncode == 124:
         yield {"failed": f"stopped after {limit:g} s"}
     elif process.returncode:
-        yield {"failed": (trouble.strip().splitlines() or [f"status {process.returncode}"])[-1]}
+        words = [line for line in trouble.splitlines() if any(letter.isalpha() for letter in line)]
+        yield {"failed": (words or [f"status {process.returncode}"])[-1].strip()}
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

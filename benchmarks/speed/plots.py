@@ -8,6 +8,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from benchmarks.speed.run import PAPER
 from benchmarks.speed.store import Store
@@ -83,10 +84,13 @@ def finish(figure: Figure, panels: Sequence[Axes], path: Path, time: str) -> str
     entries: dict[str, Any] = {}
     for axes in panels:
         axes.grid(True, which="major", linewidth=0.4)
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.tick_params(labelsize=8)
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    figure.supxlabel(time, fontsize=10)
-    figure.supylabel("relative error", fontsize=10)
+    figure.suptitle(f"Relative error against {time}", fontsize=11)
     order = sorted(entries, key=lambda x: (not x.startswith("rodfem"), "pointwise" in x, x))
     below = 0.2 * (1 + -(-len(order) // COLUMNS)) / figure.get_size_inches()[1]
     figure.get_layout_engine().set(rect=(0, below, 1, 1 - below))
@@ -114,7 +118,7 @@ def work_precision(store: Store, path: Path, special: bool) -> str | None:
         return None
     columns = 4 if special else 3
     lines = -(-len(panels) // columns)
-    figure = Figure(figsize=(4.0 * columns, 3.1 * lines + 1.2), dpi=110, layout="constrained")
+    figure = Figure(figsize=(4.0 * columns, 3.0 * lines + 1.2), dpi=110, layout="constrained")
     grid = figure.subplots(lines, columns, squeeze=False).ravel()
     for axes, (scene, branch, target) in zip(grid, panels, strict=False):
         mine = [r for r in rows if r["scene"] == scene and r["branch"] == branch]
@@ -127,7 +131,7 @@ def work_precision(store: Store, path: Path, special: bool) -> str | None:
         auto(axes, store, scene, branch, cost, name)
         if not special:
             scipy(axes, store, scene, branch)
-        axes.set_title(f"{scene}, {branch}: {name}", fontsize=9)
+        axes.set_title(f"{scene}, {branch}\n{name}", fontsize=9)
     for axes in grid[len(panels) :]:
         axes.set_visible(False)
     words = (

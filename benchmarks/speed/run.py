@@ -22,6 +22,8 @@ Grid = Mapping[int, Sequence[int]]
 PAPER = (150, 1)
 """Elements and degree of the discretisation of Kumar & Healey (2010): linear, by the midpoint rule."""
 
+LIMIT = 200.0
+"""Seconds after which a process that measures is stopped; what it has measured counts."""
 PARTS = ("assembly", "solve", "stability")
 """What rodfem's clock tells apart in following a branch."""
 
@@ -129,7 +131,7 @@ def _rows(store: Store, prefix: str, module: str, arguments: tuple[object, ...])
 
 
 def _run(module: str, arguments: tuple[object, ...], ranks: int = 1) -> list[dict[str, Any]]:
-    return list(measured(f"benchmarks.speed.{module}", *arguments, ranks=ranks))
+    return list(measured(f"benchmarks.speed.{module}", *arguments, ranks=ranks, limit=LIMIT))
 
 
 def auto(problem: str, runs: int) -> list[dict[str, Any]]:
