@@ -149,8 +149,8 @@ def write(store: Store, path: Path, figures: dict[str, str]) -> None:
         lines += ["## First minute", words.MINUTE, minute(store)]
     if store.rows("branches"):
         lines += ["## All branches", tables.all_branches(store)]
-    if store.failures():
-        lines += ["## What failed", "\n".join(f"* {sentence}" for sentence in store.failures())]
+    if failures := store.failures():
+        lines += ["## Left out", "\n".join(f"* {', '.join(keys)}: {why}" for why, keys in failures.items())]
     path.write_text("\n\n".join(line.strip() for line in lines if line) + "\n")
 
 

@@ -53,10 +53,14 @@ class Store:
         """All rows of pieces that are lists of rows, without those that say what failed."""
         return [row for _, data in self.under(prefix) for row in data if "failed" not in row]
 
-    def failures(self) -> list[str]:
-        """Sentences on what failed."""
-        lists = [(key, piece["data"]) for key, piece in self.pieces.items() if isinstance(piece["data"], list)]
-        return [f"{key}: {row['failed']}" for key, data in lists for row in data if "failed" in row]
+    def failures(self) -> dict[str, list[str]]:
+        """Sentences on what failed, each with the pieces it is about."""
+        out: dict[str, list[str]] = {}
+        for key, piece in self.pieces.items():
+            for row in piece["data"] if isinstance(piece["data"], list) else []:
+                if "failed" in row:
+                    out.setdefault(row["failed"], []).append(key)
+        return out
 
     def loads(self) -> tuple[float, float]:
         """Least and greatest load of the machine beside the measurements."""
