@@ -18,16 +18,23 @@ IMPORTS = (*HEAVY, "ufl", "dolfinx.fem", "h5py", "rodfem.runner")
 
 
 def first_point(cache: Path | None, output: Path) -> dict[str, float]:
-    """Seconds from the start of the process to the first printed special point, and to its end."""
+    """Seconds from the start of the process to the first printed special point, and to its end.
+
+    Raises :class:`subprocess.SubprocessError` where the demo fails.
+    """
     command = [sys.executable, "demos/hemitropic.py", "--no-figures", "--output", str(output)]
     more = {} if cache is None else {"XDG_CACHE_HOME": str(cache)}
     started = perf_counter()
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT, env=environment(**more)) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=ROOT, env=environment(**more)
+    ) as process:
         assert process.stdout is not None
         seconds = float("nan")
         for line in process.stdout:
             if line.lstrip().startswith("BP") and seconds != seconds:
                 seconds = perf_counter() - started
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
     return {"first": seconds, "end": perf_counter() - started}
 
 

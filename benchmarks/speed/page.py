@@ -78,7 +78,7 @@ def scaling(store: Store) -> str:
 
 def many(store: Store) -> str:
     """The map on one rank and more."""
-    found = [data for _, data in store.under("map")]
+    found = store.rows("map")
     out = []
     for r in found:
         alone, work = found[0]["seconds"] - found[0]["again"], r["seconds"] - r["again"]
@@ -87,9 +87,8 @@ def many(store: Store) -> str:
     return table(["ranks", "rods", "s", "taken up again, s", "difference, s", "speed-up", "of the difference"], out)
 
 
-def minute(store: Store) -> str:
+def minute(data: Row) -> str:
     """First special point, cold and warm, and imports."""
-    data = store.pieces["first"]["data"]
     rows = [[name, digits(data[name]["first"]), digits(data[name]["end"])] for name in ("cold", "warm")]
     added = [[name, milliseconds(seconds)] for name, seconds in data["imports"].items()]
     warm, total = data["warm"]["first"], sum(data["imports"].values())
@@ -143,10 +142,10 @@ def write(store: Store, path: Path, figures: dict[str, str]) -> None:
         lines += [_figure(figures, "growth", "Cost against the number of unknowns"), growth(store)]
     if any(True for _ in store.under("scaling")):
         lines += ["### Ranks", words.RANKS, scaling(store)]
-    if any(True for _ in store.under("map")):
+    if store.rows("map"):
         lines += ["## Many rods", words.MANY, many(store)]
-    if "first" in store.pieces:
-        lines += ["## First minute", words.MINUTE, minute(store)]
+    for data in store.rows("first"):
+        lines += ["## First minute", words.MINUTE, minute(data)]
     if store.rows("branches"):
         lines += ["## All branches", tables.all_branches(store)]
     if failures := store.failures():

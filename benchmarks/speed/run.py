@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from statistics import median
+from subprocess import SubprocessError
 from typing import Any
 
 from benchmarks.auto.output import AutoError
@@ -54,7 +55,9 @@ class Size:
     )
     runs: int = 5
     loads: int = 16
-    growth: tuple[int, ...] = (100, 1000, 10_000, 100_000)
+    growth: Mapping[str, Sequence[int]] = field(
+        default_factory=lambda: {"reduced": (100, 1000, 10_000, 100_000), "pointwise": (100, 1000, 10_000, 45_000)}
+    )
     scaling: tuple[int, ...] = (10_000, 100_000)
     couplings: int = 12
 
@@ -66,9 +69,9 @@ QUICK = Size(
     spectra={1: (40, 150), 4: (8,), 6: (4, 8)},
     runs=1,
     loads=4,
-    growth=(100, 1000, 10_000),
-    scaling=(10_000,),
-    couplings=4,
+    growth={"reduced": (100, 1000, 3000), "pointwise": (100, 1000, 3000)},
+    scaling=(3000,),
+    couplings=2,
 )
 
 
@@ -110,8 +113,8 @@ def everything(store: Store, size: Size) -> None:
                 f"bvp/{scene}/{branch}/{accuracy:g}", partial(bvp, store, scene, branch, accuracy, size.loads)
             )
     for state in ("straight", "buckled"):
-        for formulation in ("reduced", "pointwise"):
-            for n in size.growth:
+        for formulation, sizes in size.growth.items():
+            for n in sizes:
                 key = f"growth/{state}/{formulation}/{n}"
                 store.measure(key, partial(_run, "growth", (state, formulation, n)))
     cores = os.cpu_count() or 1
@@ -120,9 +123,9 @@ def everything(store: Store, size: Size) -> None:
             for elements, kind in ((n, "strong"), (n * ranks // cores, "weak")):
                 key = f"scaling/{kind}/{n}/{ranks}"
                 store.measure(key, partial(_run, "growth", ("buckled", "reduced", elements), ranks))
-    store.measure("first", partial(first_minute, size.runs))
+    store.measure("first", partial(_if_it_runs, partial(first_minute, size.runs)))
     for ranks in range(1, cores + 1):
-        store.measure(f"map/{ranks}", partial(map_of_rods, size.couplings, ranks))
+        store.measure(f"map/{ranks}", partial(_if_it_runs, partial(map_of_rods, size.couplings, ranks)))
 
 
 def _rows(store: Store, prefix: str, module: str, arguments: tuple[object, ...]) -> None:
@@ -132,6 +135,13 @@ def _rows(store: Store, prefix: str, module: str, arguments: tuple[object, ...])
 
 def _run(module: str, arguments: tuple[object, ...], ranks: int = 1) -> list[dict[str, Any]]:
     return list(measured(f"benchmarks.speed.{module}", *arguments, ranks=ranks, limit=LIMIT))
+
+
+def _if_it_runs(work: Callable[[], dict[str, Any]]) -> list[dict[str, Any]]:
+    try:
+        return [work()]
+    except SubprocessError as trouble:
+        return [{"failed": str(trouble)}]
 
 
 def auto(problem: str, runs: int) -> list[dict[str, Any]]:

@@ -44,9 +44,9 @@ class Store:
         os.replace(new, self.path)
 
     def under(self, prefix: str) -> Iterator[tuple[str, Any]]:
-        """Rest of the key, and data, of all pieces whose keys begin with ``prefix/``."""
+        """Rest of the key, and data, of the piece ``prefix`` or all whose keys begin with ``prefix/``."""
         for key, piece in self.pieces.items():
-            if key.startswith(prefix + "/"):
+            if key == prefix or key.startswith(prefix + "/"):
                 yield key[len(prefix) + 1 :], piece["data"]
 
     def rows(self, prefix: str) -> list[dict[str, Any]]:
