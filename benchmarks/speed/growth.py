@@ -3,8 +3,8 @@
     python -m benchmarks.speed.growth buckled reduced 1000 10000
     mpirun -n 2 python -m benchmarks.speed.growth straight pointwise 100000
 
-prints a line of JSON for each number of elements: seconds of wall time (the median of three, after one that is not
-counted) of an equilibrium at a load a little off, of a count, and memory over all ranks.
+prints a line of JSON for each number of elements: seconds of processor and of wall time (medians of three, after one
+that is not counted) of an equilibrium at a load a little off and of a count, and memory over all ranks.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import resource
 import sys
 from collections.abc import Callable
 from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 from mpi4py import MPI
@@ -52,24 +52,24 @@ def first(solver: Follower, state: str) -> PETSc.Vec:
     return x
 
 
-def timed(work: Callable[[], Any]) -> float:
-    """Median wall time, the slowest rank's."""
+def timed(name: str, work: Callable[[], Any]) -> dict[str, float]:
+    """Median processor time of one rank, the busiest, and wall time until all are done."""
     work()
-    times = []
+    times, walls = [], []
     for _ in range(RUNS):
         COMM.barrier()
-        started = perf_counter()
+        started, wall = process_time(), perf_counter()
         work()
-        COMM.barrier()
-        times.append(perf_counter() - started)
-    return median(times)
+        times.append(COMM.allreduce(process_time() - started, op=MPI.MAX))
+        walls.append(perf_counter() - wall)
+    return {name: median(times), f"{name} wall": median(walls)}
 
 
 def measure(state: str, formulation: str, elements: int) -> dict[str, Any]:
     """Times in seconds and memory in MB."""
-    before, started = memory(), perf_counter()
+    before, started, wall = memory(), process_time(), perf_counter()
     solver = Follower(System(scene("cord"), Discretization(formulation, elements, DEGREE)))
-    setup = perf_counter() - started
+    setup = {"setup": process_time() - started, "setup wall": perf_counter() - wall}
     x = first(solver, state)
     corrections: list[int] = []
 
@@ -87,9 +87,9 @@ def measure(state: str, formulation: str, elements: int) -> dict[str, Any]:
         "degree": DEGREE,
         "unknowns": solver.system.fields.unknowns,
         "ranks": COMM.size,
-        "setup": setup,
-        "equilibrium": timed(equilibrium),
-        "count": timed(lambda: index.append(solver.inertia.count(x).negative)),
+        **setup,
+        **timed("equilibrium", equilibrium),
+        **timed("count", lambda: index.append(solver.inertia.count(x).negative)),
         "corrections": corrections[-1],
         "index": index[-1],
         "ordinate": solver.shape.ordinate(x),

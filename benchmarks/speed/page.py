@@ -13,6 +13,7 @@ from benchmarks.speed import tables, words
 from benchmarks.speed.store import Store
 
 Row = dict[str, Any]
+WORK = ("setup", "equilibrium", "count")
 FAR = 5000
 """Exponents are fitted from so many unknowns on."""
 
@@ -60,19 +61,17 @@ def scaling(store: Store) -> str:
         "speed-up",
         "of the index",
     ]
-    out, one = [], {}
-    for key, data in store.under("scaling"):
+    out: list[list[str]] = []
+    one: dict[tuple[str, str], Row] = {}
+    for key, data in sorted(store.under("scaling")):
         kind, n, ranks = key.split("/")
         for r in data:
             if "failed" in r:
                 out.append([kind, n, ranks, f"failed: {r['failed']}", "", "", "", "", ""])
                 continue
-            if r["ranks"] == 1:
-                one[kind, n] = r
-            base = one.get((kind, n))
-            out.append([kind, str(r["elements"]), ranks, digits(r["setup"]), digits(r["equilibrium"])])
-            out[-1] += [digits(r["count"]), digits(r["memory"])]
-            out[-1] += [digits(base[k] / r[k], 2) for k in ("equilibrium", "count")] if base else ["", ""]
+            base = one.setdefault((kind, n), r)
+            out.append([kind, str(r["elements"]), ranks, *(digits(r[f"{k} wall"]) for k in WORK), digits(r["memory"])])
+            out[-1] += [digits(base[f"{k} wall"] / r[f"{k} wall"], 2) for k in WORK[1:]]
     return table(head, out)
 
 

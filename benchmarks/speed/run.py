@@ -63,10 +63,10 @@ class Size:
 
 
 QUICK = Size(
-    reduced={1: (150,), 4: (8,), 6: (4, 8)},
+    reduced={1: (150,), 6: (4, 8)},
     pointwise={1: (150,), 6: (4,)},
     follower={1: (150,), 6: (2,)},
-    spectra={1: (40, 150), 4: (8,), 6: (4, 8)},
+    spectra={1: (150,), 6: (4, 8)},
     runs=1,
     loads=4,
     growth={"reduced": (100, 1000, 3000), "pointwise": (100, 1000, 3000)},

@@ -42,11 +42,12 @@ is assembly, index, eigenvalues and the certificate that none is missing (under 
 eigenvalues). AUTO and solve_bvp have nothing of the kind.
 """
 GROWTH = """
-The cord at lam = 40 with elements of degree 2. Wall time, medians of three; memory is what the rod adds to the process.
+The cord at lam = 40 with elements of degree 2. Medians of three; memory is what the rod adds to the process.
 An equilibrium is computed at a load a thousandth off; exponents are fitted from {far} unknowns on.
 """
 RANKS = """
-The buckled cord, wall time. Strong: the same number of elements on more ranks; weak: as many for each rank.
+The buckled cord, wall time. Strong: the same number of elements on more ranks; weak: as many for each rank, for which
+a speed-up of 1 is perfect.
 """
 MANY = """
 `demos/map.py` with fewer rods, wall time. Taken up again, when all is finished, it only starts, reads and draws.
