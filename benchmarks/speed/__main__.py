@@ -7,6 +7,7 @@ All that is measured is kept in results/speed/measured.json as it comes: --resum
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from benchmarks.common import ROOT
@@ -41,4 +42,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit("interrupted; go on with --resume")
