@@ -91,7 +91,8 @@ def mixed_space(mesh: Any, parts: Sequence[tuple[bool, int, int]]) -> Any:
         element = ufl.MixedElement(
             [ufl.VectorElement(e, dim=p[2]) if p[2] > 1 else e for e, p in zip(single, parts, strict=True)]
         )
-    return fem.functionspace(mesh, element) if hasattr(fem, "functionspace") else fem.FunctionSpace(mesh, element)
+    with _quiet():
+        return fem.functionspace(mesh, element) if hasattr(fem, "functionspace") else fem.FunctionSpace(mesh, element)
 
 
 def nodes(degree: int) -> np.ndarray:
