@@ -115,6 +115,10 @@ class Explorer:
 
     def run(self) -> list[Branch]:
         """Trace the start state's branch, then what leaves each branch point, breadth first."""
+        if self.meshes.accuracy != self.plan.accuracy:
+            self.report.say(
+                f"  computed to {self.meshes.accuracy:g}: a coarser mesh would break the ring's symmetry along itself"
+            )
         self.trace(self._primary())
         self._branch_off(0)
         for load in self.plan.at if self.plan.tries else ():
@@ -280,12 +284,15 @@ class Explorer:
                 history = self._remesh(branch, history, trouble)
 
     def _remesh(self, branch: Branch, history: list[Point], trouble: TooCoarse) -> list[Point]:
-        """Carry the last points of a branch to a mesh that resolves what was too coarse, and drop what lies beyond."""
+        """Points to go on from, carried to a mesh that resolves what was too coarse; what lies beyond is dropped.
+
+        Rows before the trouble stay what they are on the mesh that was made for them.
+        """
         follower = self.watch.another(trouble)
         if follower is not None:
             with self.follower.system.clock.purpose("location"):
                 pairs = self.meshes.carry(history, follower, branch.parent is not None)
-            moved = {id(old): new for old, new in pairs}
+            moved = {id(old): new for old, new in pairs if old is trouble.point}
             branch.points = [moved.get(id(p), p) for p in branch.points]
             history = [new for _, new in pairs]
             self.follower = follower
@@ -484,7 +491,7 @@ class Explorer:
 
     def _alike(self, a: Point, b: Point, tolerance: float) -> bool:
         """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
-        across = 0.0 if a.mesh == b.mesh or self.plan.accuracy is None else 30 * self.plan.accuracy
+        across = 0.0 if a.mesh == b.mesh or self.meshes.accuracy is None else 30 * self.meshes.accuracy
         return _equivalent(a, b, max(tolerance, across), across**0.5)
 
     def _check_symmetry(self, point: Point) -> None:

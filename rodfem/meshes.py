@@ -24,10 +24,13 @@ from rodfem.grading import Gauge, cheapest, cost, weights_of
 from rodfem.newton import correct
 from rodfem.report import Report
 from rodfem.scene import Scene
+from rodfem.symmetries import is_uniform_ring
 from rodfem.system import System
 
 FINEST, COARSEST = 1e-11, 1e-1
 """Accuracies that can be asked for; round-off is near the first."""
+OF_A_RING = 1e-8
+"""Accuracy with which a uniform ring is computed at least."""
 MARGIN = 100.0
 """A new mesh is made for an accuracy better than the one asked for by this factor: it is to last for a while."""
 FURTHER = 10.0
@@ -50,9 +53,15 @@ def check_accuracy(accuracy: float) -> None:
         )
 
 
+def internal_accuracy(scene: Scene, accuracy: float) -> float:
+    """Accuracy to work with: a mesh breaks the symmetry of a uniform ring along itself, which must not be seen."""
+    return min(accuracy, OF_A_RING) if is_uniform_ring(scene) else accuracy
+
+
 def first_mesh(scene: Scene, accuracy: float, comm: MPI.Comm) -> tuple[int, int]:
     """Elements and degree to start with: few, of a degree that grows with the digits asked for."""
-    return max(4, len(scene.joints) + 1, comm.size), min(max(round(4 - log10(accuracy) / 2), 4), 9)
+    degree = round(4 - log10(internal_accuracy(scene, accuracy)) / 2)
+    return max(4, len(scene.joints) + 1, comm.size), min(max(degree, 4), 9)
 
 
 class TooCoarse(Exception):
@@ -75,7 +84,7 @@ class Meshes:
     def __init__(self, follower: Follower, accuracy: float | None) -> None:
         """Begin with one mesh; None as accuracy: no other is made."""
         self.followers = [follower]
-        self.accuracy = accuracy
+        self.accuracy = None if accuracy is None else internal_accuracy(follower.system.scene, accuracy)
         self._richer: dict[int, Richer] = {}
         self._gauges: dict[int, Gauge] = {}
         if accuracy is not None:
