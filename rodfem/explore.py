@@ -288,7 +288,7 @@ class Explorer:
 
         Rows before the trouble stay what they are on the mesh that was made for them.
         """
-        follower = self.watch.another(trouble)
+        follower = self.watch.another(trouble, self.report)
         if follower is not None:
             with self.follower.system.clock.purpose("location"):
                 pairs = self.meshes.carry(history, follower, branch.parent is not None)

@@ -135,6 +135,29 @@ def _decay(vertices: np.ndarray, coefficients: np.ndarray) -> Smoothness:
     return Smoothness(vertices, degree, amplitude, decay)
 
 
+def pieces_of(scene: Scene) -> np.ndarray:
+    """Arclengths at which elements must meet: ends, joints, and where the ordinate is taken.
+
+    The centreline is as accurate as a load at vertices only, and far less inside of elements.
+    """
+    a, b = scene.interval
+    inner = [s for s in (*scene.joints, scene.ordinate.s) if min(s - a, b - s) > 1e-9 * scene.length]
+    out = [a]
+    for s in sorted(inner):
+        if s - out[-1] > 1e-9 * scene.length:
+            out.append(s)
+    return np.array([*out, b])
+
+
+def first_mesh(scene: Scene, formulation: str, elements: int, degree: int) -> Discretization:
+    """About so many elements of nearly equal size."""
+    pieces = pieces_of(scene)
+    counts = np.maximum(np.ceil(np.diff(pieces) / scene.length * elements - 1e-6).astype(int), 1)
+    inner = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
+    vertices = tuple(map(float, np.concatenate([pieces[:1], *inner])))
+    return Discretization(formulation, len(vertices) - 1, degree, vertices)
+
+
 def cost(fields: Fields, elements: int, degree: int) -> float:
     """Cost of a point of a branch with that many elements of a degree, in units of an unknown of degree zero."""
     unknowns = elements * degree * sum(b.size for b in fields.blocks)
@@ -157,11 +180,10 @@ def cheapest(solver: Equilibria, found: Smoothness, indicator: float) -> Discret
 
 
 def _place(fields: Fields, found: Smoothness, sizes: np.ndarray) -> np.ndarray:
-    """Vertices of a mesh with elements of these sizes, one at each joint, and an element for each rank."""
-    scene = fields.scene
+    """Vertices of a mesh with elements of these sizes, an element for each rank at least."""
     number = np.append(0.0, np.cumsum(np.diff(found.vertices) / sizes))
     number *= max(1.0, (max(2, fields.comm.size) + 0.1) / number[-1])
-    pieces = np.array([scene.interval[0], *scene.joints, scene.interval[1]])
+    pieces = pieces_of(fields.scene)
     at = np.interp(pieces, found.vertices, number)
     out = [pieces[:1]]
     for left, right, a, b in zip(pieces, pieces[1:], at, at[1:], strict=False):

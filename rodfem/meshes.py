@@ -20,15 +20,18 @@ from rodfem.accuracy import Richer
 from rodfem.branch import BRANCH_POINT, END, FOLD, Branch, Point, Special
 from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.grading import Gauge, cheapest, cost, weights_of
+from rodfem.fields import Discretization
+from rodfem.grading import Gauge, cheapest, cost, first_mesh, weights_of
 from rodfem.newton import correct
 from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.symmetries import is_uniform_ring
 from rodfem.system import System
 
-FINEST, COARSEST = 1e-11, 1e-1
+FINEST, COARSEST = 1e-10, 1e-1
 """Accuracies that can be asked for; round-off is near the first."""
+SHARP = 1e-9
+"""For a better accuracy than this points get one more step of Newton's method, to round-off."""
 OF_A_RING = 1e-8
 """Accuracy with which a uniform ring is computed at least."""
 MARGIN = 100.0
@@ -58,10 +61,10 @@ def internal_accuracy(scene: Scene, accuracy: float) -> float:
     return min(accuracy, OF_A_RING) if is_uniform_ring(scene) else accuracy
 
 
-def first_mesh(scene: Scene, accuracy: float, comm: MPI.Comm) -> tuple[int, int]:
-    """Elements and degree to start with: few, of a degree that grows with the digits asked for."""
+def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) -> Discretization:
+    """Discretisation to start with: few elements, of a degree that grows with the digits asked for."""
     degree = round(4 - log10(internal_accuracy(scene, accuracy)) / 2)
-    return max(4, len(scene.joints) + 1, comm.size), min(max(degree, 4), 9)
+    return first_mesh(scene, formulation, max(4, comm.size), min(max(degree, 4), 9))
 
 
 class TooCoarse(Exception):
@@ -232,6 +235,8 @@ class Watch:
         """Estimate the error of a point, by computation where need be; raises :class:`TooCoarse`."""
         if self.meshes.accuracy is None:
             return
+        if self.accuracy < SHARP:
+            self._polish(point, follower)
         indicator = self.meshes.gauge(follower.mesh)(point.x).indicator
         last = self.checked
         if last is not None and last.since < SELDOM and not self._at_bound(point):
@@ -283,8 +288,8 @@ class Watch:
         worst = max(p.estimate for p in branch.points if not isnan(p.estimate))
         report.accuracy(used, worst, self.meshes.accuracy)
 
-    def another(self, trouble: TooCoarse) -> Follower | None:
-        """Follower on a mesh for the state that was too coarse; None where further meshes do not help there."""
+    def another(self, trouble: TooCoarse, report: Report) -> Follower | None:
+        """Follower on a mesh for the state that was too coarse; None, which is reported, where no mesh helps there."""
         if abs(trouble.point.arclength - self.place) < NEAR:
             self.tries += 1
             helps = not isfinite(trouble.error) or trouble.error < 0.5 * self.error
@@ -294,8 +299,23 @@ class Watch:
         self.checked = None
         if not helps or self.tries >= TRIES or len(self.meshes.followers) >= MOST:
             self.excused = trouble.point.arclength + NEAR
+            why = "finer meshes do not lower the error" if not helps else f"{self.tries + 1} finer meshes did not do"
+            if len(self.meshes.followers) >= MOST:
+                why = f"{MOST} meshes are the most"
+            report.warn(f"The accuracy is not reached near load {trouble.point.load:.6g} ({trouble}): {why}.")
             return None
         return self.meshes.raised(trouble, self.tries)
+
+    def _polish(self, point: Point, follower: Follower) -> None:
+        """Solve a point once more where its last correction was not far below the accuracy."""
+        if point.tangent is None or point.error < 0.01 * self.accuracy or point.error == 0.0:
+            return
+        system = follower.system
+        row = follower.axis if self._at_bound(point) else follower.row(point.tangent)
+        system.set_phase(point.x)
+        point.error = correct(system, point.x, row, reach=1e-3).error
+        point.load, point.ordinate = system.scalar(point.x), follower.shape.ordinate(point.x)
+        point.energy, point.stretch = follower.energy(point.x), follower.shape.stretch(point.x)
 
     def _at_bound(self, point: Point) -> bool:
         return min(abs(point.load - bound) for bound in self.bounds) < 1e-9 * abs(self.bounds[1] - self.bounds[0])
@@ -304,7 +324,7 @@ class Watch:
         """Error of a point across its branch, or in the ordinate where its load is given; raises where the index errs."""
         richer = self.meshes.richer(point.mesh)
         try:
-            x = richer.again(point, fixed_load=self._at_bound(point))
+            x = richer.again(point, fixed_load=self._at_bound(point), sharp=self.accuracy < SHARP)
         except ConvergenceError:
             return float("inf")
         index, drifts = richer.follower.inertia.count(x), richer.system.active_drifts()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from mpi4py import MPI
@@ -18,7 +17,7 @@ from rodfem.errors import ConvergenceError, SceneError
 from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization
 from rodfem.loci.locus import locus
-from rodfem.meshes import first_mesh
+from rodfem.meshes import start_mesh
 from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.sweep import Sweep
@@ -69,8 +68,7 @@ def run(
     plan.check(scene)
     discretization = discretization or Discretization()
     if plan.accuracy is not None and discretization.vertices is None:
-        elements, degree = first_mesh(scene, plan.accuracy, comm)
-        discretization = replace(discretization, elements=elements, degree=degree)
+        discretization = start_mesh(scene, discretization.formulation, plan.accuracy, comm)
     writable(output, comm)
     report, clock = Report(comm, quiet), Clock()
     with compat.announce_compilation(report.compiling):
