@@ -129,9 +129,7 @@ def zero_stretch(follower: Follower, coarse: Point) -> Special:
     sample = follower.shape.sample(coarse.x)
     found: list[tuple[float, float, float, float]] = []
     for factor in (2, 4):
-        fine = Equilibria(
-            System(system.scene, d.finer(factor, richer=1), system.comm, system.clock)
-        )
+        fine = Equilibria(System(system.scene, d.finer(factor, richer=1), system.comm, system.clock))
         state = fine.shape.restore(sample)
 
         def stretch(load: float, fine: Equilibria = fine, guess: PETSc.Vec = state) -> float:

@@ -99,8 +99,8 @@ def parser_for(
         type=float,
         default=None,
         metavar="EPS",
-        help="instead of elements and degree: choose meshes on the way such that loads and ordinates are in error by less "
-        "than EPS (relative to values greater than one)",
+        help="instead of elements and degree: choose meshes on the way such that loads and ordinates are in error by "
+        "less than EPS (relative to values greater than one)",
     )
     group = parser.add_argument_group("what to compute")
     group.add_argument(
@@ -202,7 +202,9 @@ def main(
         if options.accuracy is not None:
             for name in ("elements", "degree"):
                 if parser.gives(name, ours):
-                    raise SceneError(f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy.")
+                    raise SceneError(
+                        f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy."
+                    )
         discretization = Discretization(options.formulation, options.elements, options.degree)
         scene = scene_of(options)
         span = tuple(options.span)

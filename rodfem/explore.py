@@ -18,7 +18,7 @@ from rodfem.continuation import Follower, Steps, distance, follow, hermite
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError, SymmetryError
 from rodfem.locate import solve_at
-from rodfem.meshes import Meshes, TooCoarse, Watch, check_accuracy, end_of
+from rodfem.meshes import Meshes, TooCoarse, check_accuracy
 from rodfem.pitchfork import law_of
 from rodfem.report import Report
 from rodfem.scene import Scene
@@ -26,6 +26,7 @@ from rodfem.search.deflation import further, starts, states_at
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.rank import rank_of
 from rodfem.topology import link
+from rodfem.watch import Watch
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
@@ -520,7 +521,7 @@ class Explorer:
             self._singular_end(branch, last)
             last = branch.points[-1]
         if not any(s.point is last for s in branch.special):
-            branch.special.append(end_of(last))
+            branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
             branch.renumber()
         if self.plan.error_bars or self.plan.accuracy:
             self._error_bars(branch)

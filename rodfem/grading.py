@@ -3,8 +3,8 @@ r"""Graded meshes: how smooth a state is along the rod, and the cheapest element
 On each element the Legendre coefficients of the strains (curvature and stretch, weighted as in the stored energy) decay
 like ``A rho^-j``, for singularities of the state at a distance ``h (rho - 1/rho) / 4`` across the rod (Trefethen,
 Approximation Theory and Approximation Practice, chapter 8).  With elements of degree k the strains are missed by
-``A rho^-k``, and loads and positions, being stationary, by the *square* of that, integrated along the rod; the factor in
-front is measured by a computation one degree richer.  On an element of another size the distance stays, and ``rho``
+``A rho^-k``, and loads and positions, being stationary, by the *square* of that, integrated along the rod; the factor
+in front is measured by a computation one degree richer.  On an element of another size the distance stays, and ``rho``
 follows: how large an element may be at each place is had in closed form.
 """
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -64,7 +65,7 @@ class Smoothness:
     def fulfilled_by(self, mesh: Discretization, vertices: np.ndarray, indicator: float) -> bool:
         """Whether elements with these vertices are nowhere larger than the indicator allows."""
         sizes = self.sizes(mesh.degree, indicator)
-        for a, b in zip(vertices, vertices[1:], strict=False):
+        for a, b in pairwise(vertices):
             over = (self.vertices[:-1] < b) & (self.vertices[1:] > a)
             if b - a > 1.05 * sizes[over].min():
                 return False
