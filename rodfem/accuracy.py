@@ -100,6 +100,7 @@ class Richer:
     def _again(self, special: Special) -> tuple[float, float]:
         """Load and ordinate of the special point on the richer discretisation."""
         follower, point = self.follower, special.point
+        self.system.damping = self.coarse.system.damping
         if special.kind not in (FOLD, BRANCH_POINT):
             return point.load, follower.shape.ordinate(self.again(point, fixed_load=True))
         if point.tangent is None:

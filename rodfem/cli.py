@@ -135,6 +135,20 @@ def parser_for(
         help="also compute the K left-most eigenvalues of every state with SLEPc",
     )
     group.add_argument(
+        "--method",
+        default="",
+        metavar="NAME",
+        help="judge the states at the loads of --at by auto, count, shift-invert, cayley, slicing, reduction or dense, "
+        "and print all that it says",
+    )
+    group.add_argument(
+        "--modes",
+        type=int,
+        default=0,
+        metavar="K",
+        help="find and draw the K left-most modes of the states at the loads of --at",
+    )
+    group.add_argument(
         "--search",
         type=int,
         default=0,
@@ -217,6 +231,8 @@ def main(
             steps=steps,
             tries=options.search,
             locus=pair(options.locus),
+            method=options.method,
+            modes=options.modes,
             accuracy=options.accuracy,
         )
         run(scene, discretization, plan, options.output, figures=options.figures)

@@ -19,7 +19,7 @@ class Clock:
         self.seconds: dict[str, float] = {}
         self.started = perf_counter()
         self._running: list[str] = []
-        self._purpose = ""
+        self._purpose = self._next = ""
         self._mark = self.started
 
     def _charge(self) -> None:
@@ -29,16 +29,20 @@ class Clock:
             self.seconds[name] = self.seconds.get(name, 0.0) + now - self._mark
         self._mark = now
 
-    @contextmanager
-    def __call__(self, name: str) -> Iterator[None]:
-        """Measure the block under ``name``."""
+    def __call__(self, name: str) -> Clock:
+        """Measure the block of a ``with`` statement under ``name``."""
+        self._next = name
+        return self
+
+    def __enter__(self) -> None:
+        """Begin a block."""
         self._charge()
-        self._running.append(self._purpose or name)
-        try:
-            yield
-        finally:
-            self._charge()
-            self._running.pop()
+        self._running.append(self._purpose or self._next)
+
+    def __exit__(self, *trouble: object) -> None:
+        """End a block, however it ends."""
+        self._charge()
+        self._running.pop()
 
     @contextmanager
     def purpose(self, name: str) -> Iterator[None]:

@@ -15,20 +15,26 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.spatial.transform import Rotation
 
 from rodfem.branch import Point
 from rodfem.convexity import Convexity
+from rodfem.corrector import SENSITIVE, Corrector
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.newton import Outcome, correct, relax
 from rodfem.shape import Shape
+from rodfem.stability.band import decide
 from rodfem.stability.in_space import InSpace
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.spectrum import Spectrum
 from rodfem.system import System, combine
 
 LEVEL = 0.05
-"""Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh."""
+"""Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh, unless the
+correction was so small that it cannot have changed its sign."""
+VERTICAL = 1e-8
+"""A branch along which the load changes by less than this (of its span a unit of arclength) is one of equal loads."""
+STRAYED = 0.3
+"""Distance from the start beyond which an equilibrium is not the one that the start stands for."""
 ON_BOUND = 1e-8
 """A load beyond a bound by less than this, of the span, is on it: branches of equal loads may lie there."""
 
@@ -71,14 +77,14 @@ class Equilibria:
         """
         system, f = self.system, self.system.fields
         x = f.coordinates(f.discretization.degree)
-        guess = system.scene.start
-        q = np.tile([1.0, 0.0, 0.0, 0.0], (x.size, 1)) if guess is None else np.asarray(guess(x.ravel()))
+        turned = f.turning.start(system.scene.start, x.ravel(), system.scene.interval)
         f.u.x.array[f.number >= 0] = 0.0
-        held = f.number[f.dofs["q"]] < 0
-        clamped = f.u.x.array[f.dofs["q"]]
+        dofs = f.dofs[f.turning.name]
+        held, clamped = f.number[dofs] < 0, f.u.x.array[dofs]
         if bent:
-            q = _bend(q, (x.ravel() - system.scene.interval[0]) / system.scene.length, bent)
-        f.u.x.array[f.dofs["q"]] = np.where(held, clamped, q.reshape(*x.shape, 4))
+            along = (x.ravel() - system.scene.interval[0]) / system.scene.length
+            turned = f.turning.turned(turned, bent * _bend(along))
+        f.u.x.array[dofs] = np.where(held, clamped, turned.reshape(*x.shape, -1))
         if "v" in f.dofs:
             f.u.x.array[f.dofs["v"]] = [1.0 if i == 2 else 0.0 for i in system.scene.free_strains]
         f.u.x.array[f.copies[:, -1]] = load
@@ -95,18 +101,38 @@ class Equilibria:
         return x, outcome
 
     def first(self, load: float) -> tuple[PETSc.Vec, Outcome]:
-        """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill."""
+        """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill.
+
+        Also where Newton's method ends at an unstable one that is nowhere near the start.
+        """
         guess = self.start(load)
         self.system.set_phase(guess)
         x, outcome = self.at_load(guess, load)
-        if not outcome.converged:
-            for bent in (0.0, 0.4, 0.8):
-                x = self.start(load, bent)
-                self.system.set_phase(x)
-                outcome = relax(self.system, x, self.axis)
-                if outcome.converged:
-                    break
-        return x, outcome
+        if outcome.converged and (outcome.moved < STRAYED or self.is_stable(x)):
+            return x, outcome
+        other = self.downhill(load)
+        return other if other[1].converged else (x, outcome)
+
+    def downhill(self, load: float) -> tuple[PETSc.Vec, Outcome]:
+        """Equilibrium at ``load`` by going downhill from the scene's start, and from there bent a little.
+
+        From a symmetrical start the way down may end on a saddle: a stable state is preferred.
+        """
+        first: tuple[PETSc.Vec, Outcome] | None = None
+        for bent in (0.0, 0.4, 0.8):
+            x = self.start(load, bent)
+            self.system.set_phase(x)
+            outcome = relax(self.system, x, self.axis)
+            if outcome.converged and self.is_stable(x):
+                return x, outcome
+            if first is None or (outcome.converged and not first[1].converged):
+                first = x, outcome
+        assert first is not None
+        return first
+
+    def is_stable(self, x: PETSc.Vec) -> bool:
+        """Whether an equilibrium is stable, as far as is known without counting."""
+        return True
 
     def energy(self, x: PETSc.Vec) -> float:
         """Stored energy of the state ``x``."""
@@ -125,15 +151,31 @@ class Follower(Equilibria):
         """Allocate matrices and tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
         super().__init__(system)
         self.inertia = Inertia(system)
+        self.corrector = Corrector(self.inertia)
         self.modes = spectrum
         self.spectrum = Spectrum(self.inertia) if spectrum else None
-        self.convexity = None if system.scene.is_quadratic() else Convexity(system)
-        self.space = InSpace(system) if system.scene.normal is not None else None
+        varies = not system.scene.is_quadratic() or system.scene.depends_on_s()
+        self.convexity = Convexity(system) if varies else None
+        self.space = (
+            None if system.scene.planar is None or system.scene.without_potential(in_space=True) else InSpace(system)
+        )
 
-    def point(self, x: PETSc.Vec, arclength: float, tangent: PETSc.Vec | None, outcome: Outcome | None = None) -> Point:
-        """Evaluate all records of the equilibrium ``x``."""
+    def is_stable(self, x: PETSc.Vec) -> bool:
+        """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
+        return self.inertia.count(x).negative == 0
+
+    def point(
+        self,
+        x: PETSc.Vec,
+        arclength: float,
+        tangent: PETSc.Vec | None,
+        outcome: Outcome | None = None,
+        index: Index | None = None,
+    ) -> Point:
+        """Evaluate all records of the equilibrium ``x``; its index is counted unless given."""
         system = self.system
-        index = self.inertia.count(x)
+        if index is None:
+            index = decide(self.inertia, x).index
         return Point(
             x=x,
             tangent=tangent,
@@ -157,14 +199,41 @@ class Follower(Equilibria):
         if self.spectrum is None:
             return []
         modes = self.spectrum.leftmost(x, self.modes)
-        negative = modes.negative(self.inertia.tolerance / self.system.scene.length)
-        if negative != min(index.negative, self.modes) or not modes.certified:
+        tolerance = self.inertia.tolerance / self.system.scene.length
+        least, most = modes.negative(tolerance), modes.negative(-tolerance)
+        if not least <= min(index.negative, self.modes) <= most or not modes.certified:
             raise ConvergenceError(
-                f"SLEPc finds {negative} negative eigenvalues at "
+                f"SLEPc finds {least} negative eigenvalues at "
                 f"{self.system.scene.load} = {self.system.scalar(x):.8g}, the inertia "
                 f"{index.negative}: ask for more eigenvalues, or use a richer discretisation."
             )
         return [float(value) for value in modes.values]
+
+    def correct(
+        self, x: PETSc.Vec, row: PETSc.Vec, reach: float, slope: float
+    ) -> tuple[Outcome, PETSc.Vec | None, Index | None]:
+        """Correct a prediction in place; also its unit tangent on the side of ``row``, and its index.
+
+        The tangent is None without convergence, the index where the factors that served the correction do not tell it.
+        ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at ``x``
+        itself and not at the prediction.
+        """
+        outcome = self.corrector.correct(x, row, most=8, reach=reach)
+        regular = outcome is not None
+        if outcome is None:
+            outcome = correct(self.system, x, row, most=8, reach=reach)
+        if not outcome.converged:
+            return outcome, None, None
+        tangent = self.corrector.tangent_along(row) if regular else self.tangent(row)
+        new, span = self.system.scalar(tangent), abs(self.system.scene.span[1] - self.system.scene.span[0])
+        if new * slope <= 0 or abs(new) < min(LEVEL, SENSITIVE * outcome.moved) * span:
+            regular = regular and self.corrector.factor(x)
+            tangent = self.corrector.tangent_along(row) if regular else self.tangent(row, at=x)
+        return outcome, tangent, self.corrector.index(x) if regular else None
+
+    def damp(self, freedoms: int) -> None:
+        """Keep Newton's method from moving along families of equilibria at one load, where there are any."""
+        self.system.damping = self.inertia.tolerance if freedoms > 0 else 0.0
 
     def row(self, direction: PETSc.Vec) -> PETSc.Vec:
         """Row of the arclength equation for a direction: the metric times it, for a direction of unit size."""
@@ -194,23 +263,23 @@ class Follower(Equilibria):
         return tangent
 
 
-def _bend(q: np.ndarray, x: np.ndarray, size: float) -> np.ndarray:
-    """Quaternions (m, 4) turned by a smooth rotation vector that vanishes at both ends; ``x`` in [0, 1]."""
-    w = size * (np.outer(np.sin(np.pi * x), (0.6, 0.8, 0.3)) + np.outer(np.sin(2 * np.pi * x), (0.5, -0.4, 0.2)))
-    turned = Rotation.from_rotvec(w) * Rotation.from_quat(np.roll(q, -1, axis=1))
-    out = np.roll(turned.as_quat(), 1, axis=1)
-    return np.asarray(out * np.sign(np.sum(out * q, axis=1, keepdims=True)))
+def _bend(x: np.ndarray) -> np.ndarray:
+    """Smooth rotation vector of size about one that vanishes at both ends, (m, 3); ``x`` (m,) in [0, 1]."""
+    return np.outer(np.sin(np.pi * x), (0.6, 0.8, 0.3)) + np.outer(np.sin(2 * np.pi * x), (0.5, -0.4, 0.2))
 
 
 def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
     """Weights of the values at ``nodes`` in their interpolating polynomial at ``s``, and in its derivative there."""
-    n = len(nodes)
-    value, slope = np.ones(n), np.zeros(n)
-    for j in range(n):
-        others = np.delete(nodes, j)
-        factors = (s - others) / (nodes[j] - others)
-        value[j] = np.prod(factors)
-        slope[j] = sum(np.prod(np.delete(factors, i)) / (nodes[j] - others[i]) for i in range(n - 1))
+    known = [float(x) for x in nodes]
+    value, slope = np.empty(len(known)), np.empty(len(known))
+    for j, node in enumerate(known):
+        p, dp, scale = 1.0, 0.0, 1.0
+        for i, other in enumerate(known):
+            if i != j:
+                dp = dp * (s - other) + p
+                p *= s - other
+                scale *= node - other
+        value[j], slope[j] = p / scale, dp / scale
     return value, slope
 
 
@@ -250,20 +319,17 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
     system, step = follower.system, min(steps.first, steps.largest)
     span = abs(system.scene.span[1] - system.scene.span[0])
     low, high = (bound + sign * ON_BOUND * span for bound, sign in zip(bounds, (-1, 1), strict=True))
+    follower.corrector.restart()
     while len(points) < steps.most:
         last = points[-1]
         x, direction = predict(points, last.arclength + step)
-        load, outcome, tangent = system.scalar(x), None, None
+        load, outcome, tangent, index = system.scalar(x), None, None, None
         if low <= load <= high:
             row = follower.row(direction)
             system.set_phase(x)
-            outcome = correct(system, x, row, most=8, reach=0.5 * step)
+            outcome, tangent, index = follower.correct(x, row, 0.5 * step, last.slope)
             if outcome.converged:
                 load = system.scalar(x)
-                tangent = follower.tangent(row)
-                slope = system.scalar(tangent)
-                if slope * last.slope <= 0 or abs(slope) < LEVEL * span:
-                    tangent = follower.tangent(row, at=x)
         if not low <= load <= high:
             point = _to_load(follower, points, load, bounds[0] if load < low else bounds[1], step)
             if point is not None:
@@ -271,7 +337,7 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
                 yield "end of range"
                 return
         elif outcome is not None and tangent is not None and row.dot(tangent) > 0.9:
-            yield follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome)
+            yield follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome, index)
             order = min(len(points) - 1, 3) + 1
             factor = (steps.aim / max(outcome.moved, 1e-12)) ** (1 / order)
             step = min(step * min(max(factor, 0.4), 1.6), steps.largest)

@@ -14,7 +14,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from petsc4py import PETSc
 
@@ -23,6 +22,7 @@ from rodfem.clock import Clock
 from rodfem.continuation import Equilibria
 from rodfem.errors import SceneError
 from rodfem.fields import Fields
+from rodfem.motion import Motions
 from rodfem.scene import Scene
 from rodfem.system import System
 
@@ -166,11 +166,16 @@ def save_states(branch: Branch, solvers: Sequence[Equilibria], path: Path, first
     """Append the states of a branch to an HDF5 file; collective, written on rank 0.
 
     Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
-    every further field and scalar with P rows, and the null vectors of its special points under ``special/<i>``.
-    ``solvers`` are those of the meshes that points name; the rows of a mesh with fewer nodes end in nan.
+    every further field and scalar with P rows, and under ``special/<i>`` the null vectors of its special points:
+    displacement ``r``, ``rotation`` in the space frame, and the change of ``q``.  ``solvers`` are those of the meshes
+    that points name; the rows of a mesh with fewer nodes end in nan.
     """
+    import h5py
+
     samples = [solvers[p.mesh].shape.sample(p.x) for p in branch.points]
-    modes = [[solvers[s.point.mesh].shape.sample(v) for v in s.null_vectors] for s in branch.special]
+    used = {s.point.mesh for s in branch.special}
+    motions = {i: Motions(solvers[i].system) for i in sorted(used)}
+    modes = [[motions[s.point.mesh].at(s.point.x, v) for v in s.null_vectors] for s in branch.special]
     system = solvers[0].system
     if system.comm.rank:
         return
@@ -186,8 +191,7 @@ def save_states(branch: Branch, solvers: Sequence[Equilibria], path: Path, first
         for i, vectors in enumerate(modes):
             for j, mode in enumerate(vectors):
                 target = group.create_group(f"special/{i}/null_vector_{j}")
-                for name in ("q", "r"):
-                    target[name] = mode[name]
+                target["r"], target["q"], target["rotation"] = mode.r, mode.q, mode.w
 
 
 def _stacked(rows: list[np.ndarray]) -> np.ndarray:
@@ -214,6 +218,8 @@ def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc
 
     Raises :class:`SceneError` where the file has no such row, or has it in the other formulation.
     """
+    import h5py
+
     wanted = follower.system.fields.discretization.formulation
     try:
         with h5py.File(path, "r") as file:

@@ -12,9 +12,9 @@ from petsc4py import PETSc
 from scipy.optimize import brentq
 
 from rodfem.accuracy import zero_stretch
-from rodfem.bifurcation import VERTICAL, directions, find_special, midpoint, start_branch
+from rodfem.bifurcation import directions, find_special, midpoint, start_branch
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
-from rodfem.continuation import Follower, Steps, distance, follow, hermite
+from rodfem.continuation import VERTICAL, Follower, Steps, distance, follow, hermite
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError, SymmetryError
 from rodfem.locate import solve_at
@@ -36,8 +36,9 @@ BEYOND = 0.02
 class Plan:
     """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars.
 
-    ``spectrum`` left-most eigenvalues of every state are found besides its index; ``tries`` deflated iterations at each
-    of the loads ``at`` look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
+    ``spectrum`` left-most eigenvalues of every state are found besides its index; at the loads ``at`` states are judged
+    by ``method`` (where one is named), and their ``modes`` left-most modes are found; ``tries`` deflated iterations at
+    each of these loads look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
     special point in the plane of the load and that parameter.  With an ``accuracy`` meshes are chosen and raised on the
     way such that every row's load and ordinate, and those of every special point, are in error by less than that
     (relative to values greater than one).
@@ -51,6 +52,8 @@ class Plan:
     spectrum: int = 0
     tries: int = 0
     locus: tuple[str, float, float] | None = None
+    method: str = ""
+    modes: int = 0
     accuracy: float | None = None
 
     def check(self, scene: Scene) -> None:
@@ -89,6 +92,12 @@ class Plan:
             raise SceneError(f"{self.tries} is not a number of tries: give 0 or more to --search.")
         if self.tries and not self.at:
             raise SceneError("A search needs loads to search at: give them with --at.")
+        if self.modes < 0:
+            raise SceneError(f"{self.modes} is not a number of modes: give 0 or more to --modes.")
+        if (self.modes or self.method) and not self.at:
+            raise SceneError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at: give them with --at.")
+        if self.modes and self.method == "count":
+            raise SceneError("Counting alone finds no modes: leave out --modes, or name another --method.")
         if self.spectrum < 0:
             raise SceneError(f"{self.spectrum} is not a number of eigenvalues: give 0 or more to --spectrum.")
 
@@ -159,6 +168,11 @@ class Explorer:
                 "load, give the scene a start nearer to one, or see whether constraints repeat each other or what an "
                 "end holds."
             )
+        if follower.convexity is not None and follower.convexity.lowest(x) <= 0:
+            raise SceneError(
+                f"The stored energy is not convex somewhere along the first state, at {self.scene.load} = {start:g}: "
+                "choose constants that make it so."
+            )
         follower.system.set_phase(x)
         point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
         if isinstance(self.scene.ends, Ring):
@@ -194,6 +208,7 @@ class Explorer:
     def _switch(self, parent: Branch, i: int, special: Special) -> None:
         special.switched = True
         self._use(special.point.mesh)
+        self.follower.damp(special.point.zero - self.follower.system.active_drifts() - special.multiplicity)
         try:
             ways = directions(self.follower, special)
         except ConvergenceError as trouble:
@@ -263,6 +278,7 @@ class Explorer:
         self.report.branch(branch)
         self._use(branch.points[-1].mesh)
         self.watch = Watch(self.meshes, (self.low, self.high))
+        self.follower.damp(0)
         try:
             self._follow(branch)
         except ConvergenceError as trouble:
@@ -291,6 +307,7 @@ class Explorer:
         """
         follower = self.watch.another(trouble, self.report)
         if follower is not None:
+            follower.damp(self.follower.system.damping > 0)
             with self.follower.system.clock.purpose("location"):
                 pairs = self.meshes.carry(history, follower, branch.parent is not None)
             moved = {id(old): new for old, new in pairs if old is trouble.point}
@@ -504,14 +521,18 @@ class Explorer:
             )
 
     def _check_zeros(self, history: list[Point], point: Point) -> None:
-        """Warn once where eigenvalues stay zero without a symmetry: the scene leaves the rod a freedom."""
+        """Say once where eigenvalues stay zero without a symmetry: the state is one of a family at the same load."""
         extra = point.zero - self.follower.system.active_drifts()
+        if abs(point.slope) < VERTICAL * (self.high - self.low):
+            extra -= 1  # the branch itself is such a family
         recent = history[-4:]
-        if extra > 0 and len(recent) == 4 and all(p.zero == point.zero for p in recent) and not self.warned:
+        stay = extra > 0 and len(recent) == 4 and all(p.zero == point.zero for p in recent)
+        self.follower.damp(extra if stay else 0)
+        if stay and not self.warned:
             self.warned = True
-            self.report.warn(
-                f"{extra} eigenvalue(s) stay zero that no symmetry of the scene explains: the rod may turn or move "
-                "freely; other eigenvalues that pass through zero may be missed: hold it."
+            self.report.say(
+                f"  {extra} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
+                "move freely at one and the same load"
             )
 
     def _finish(self, branch: Branch) -> None:

@@ -21,6 +21,7 @@ from rodfem.ends import Ring
 from rodfem.errors import SceneError
 from rodfem.places import needs_centreline
 from rodfem.scene import Scene
+from rodfem.turning import ByAngle, ByQuaternion, Turning
 
 FORMULATIONS = ("auto", "reduced", "pointwise")
 LOAD = "load"
@@ -86,10 +87,21 @@ class Unknown:
     multiplier: bool
 
 
+def turning_of(scene: Scene) -> Turning:
+    """How the rotation of a scene's rod is described."""
+    return ByQuaternion() if scene.normal is None else ByAngle(scene.normal)
+
+
 def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:
-    """Fields: ``q``, ``mu``, ``v`` where strains are free, ``r`` and ``n`` if pointwise, multipliers ``p0``.."""
+    """Fields: ``q`` and ``mu``, in a plane ``angle``; ``v`` where strains are free; ``r`` and ``n`` if pointwise.
+
+    Multipliers ``p0``.. belong to constraints that hold all along the rod.
+    """
     k = discretization.degree
-    blocks = [Block("q", 4, k, True, False), Block("mu", 1, k, True, True)]
+    turning = turning_of(scene)
+    blocks = [Block(turning.name, turning.size, k, True, False)]
+    if turning.name == "q":
+        blocks.append(Block("mu", 1, k, True, True))
     if scene.free_strains:
         blocks.append(Block("v", len(scene.free_strains), k - 1, False, False))
     if discretization.formulation == "pointwise":
@@ -121,9 +133,7 @@ def scalars_of(scene: Scene, discretization: Discretization) -> list[Unknown]:
     count = sum(x.kind != "pointwise" for x in scene.constraints)
     out += [Unknown(f"g{i + 1}", "g", i, True) for i in range(count)]
     if isinstance(scene.ends, Ring):
-        out += [
-            Unknown(f"t{i + 1}", "t", i, True) for i in (range(4) if scene.normal is None else (0, scene.normal + 1))
-        ]
+        out += [Unknown(f"t{i + 1}", "t", i, True) for i in range(turning_of(scene).size)]
         if discretization.formulation == "pointwise":
             out += [Unknown(f"f{i + 1}", "f", i, True) for i in inside]
     return out
@@ -175,6 +185,7 @@ class Fields:
                 f"The reduced formulation has no centreline, which {reason} needs: use --formulation pointwise."
             )
         self.scene, self.discretization, self.comm = scene, discretization, comm
+        self.turning = turning_of(scene)
         self.blocks = blocks_of(scene, discretization)
         self.unknown_scalars = scalars_of(scene, discretization)
         self.forces = [x.component for x in self.unknown_scalars if x.group == "n"]
@@ -247,8 +258,8 @@ class Fields:
                         found.append(at_end.ravel())
                 elif end.fixed_rotation is not None:
                     found.append(at_end.ravel())
-                elif ring and block.name != "q" and s == self.scene.interval[1]:
-                    found.append(at_end.ravel())  # the norm of q(l) = +-q(0), or any other equation, is that of q(0)
+                elif ring and block.name == "mu" and s == self.scene.interval[1]:
+                    found.append(at_end.ravel())  # the norm of q(l) = +-q(0) is that of q(0)
         return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
 
     def out_of_plane(self) -> dict[str, np.ndarray]:
@@ -257,7 +268,6 @@ class Fields:
         if normal is None:
             return {}
         components = {
-            "q": [i + 1 for i in range(3) if i != normal],
             "r": [normal],
             "n": [normal],
             "v": [place for place, i in enumerate(self.scene.free_strains) if i == normal],
@@ -307,6 +317,10 @@ class Fields:
         b = np.array([q if q is not None else p or 0.0 for p, q in zip(left, right, strict=True)])
         return np.asarray((1 - x) * a + x * b)
 
+    def rotations(self) -> np.ndarray:
+        """Quaternions at the nodes of the state that ``u`` holds, (cells, nodes, 4)."""
+        return self.turning.quaternion(self.u.x.array[self.dofs[self.turning.name]])
+
     def coordinates(self, degree: int) -> np.ndarray:
         """Arclengths of the nodes of a field of that degree in each local cell, (cells, degree + 1)."""
         a, b = self.vertices[:, :1], self.vertices[:, 1:]
@@ -315,7 +329,7 @@ class Fields:
     def constraints(self) -> int:
         """Number of constraint equations: free multipliers, fields and scalars (drift scalars not counted)."""
         multipliers = [self.dofs[b.name].ravel() for b in self.blocks if b.multiplier]
-        mine = np.unique(np.concatenate(multipliers))
+        mine = np.unique(np.concatenate([np.array([], dtype=int), *multipliers]))
         owned = mine[(mine < self.space.dofmap.index_map.size_local) & (self.number[mine] >= 0)]
         return self.comm.allreduce(len(owned)) + sum(x.multiplier for x in self.unknown_scalars)
 
@@ -323,6 +337,7 @@ class Fields:
         """Fields and scalars in words, for the terminal."""
         names = {
             "q": "rotation q",
+            "angle": "angle of rotation",
             "mu": "unit-norm multiplier mu",
             "v": "strain v",
             "r": "centreline r",
@@ -350,7 +365,12 @@ class Fields:
         fixed = [i for i in range(3) if i not in scene.free_strains]
         lines = []
         if scene.normal is not None:
-            lines.append(f"rotations, displacement, force and strain out of the plane across {scene.planar}")
+            lines.append(
+                f"rotations, displacement, force and strain out of the plane across {scene.planar}: "
+                "one angle is left of the rotation"
+            )
+            if scene.conservative and (loads := scene.without_potential(in_space=True)):
+                lines.append(f"the index in space: no potential there has the {loads[0]}")
         if fixed:
             lines.append(f"strain {', '.join(f'v{i + 1}' for i in fixed)}: the rod is {scene.rod}")
         if self.discretization.formulation == "reduced":

@@ -20,7 +20,7 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.continuation import Equilibria
-from rodfem.fields import Discretization, Fields
+from rodfem.fields import Discretization, Fields, turning_of
 from rodfem.scene import Scene
 
 DEGREES = range(4, 11)
@@ -85,7 +85,7 @@ class Gauge:
         for name, _ in weights:
             d = degrees[name]
             series = np.linalg.inv(legendre.legvander(2 * compat.nodes(d) - 1, d))
-            series = legendre.legder(series, axis=0) if name == "q" else series
+            series = legendre.legder(series, axis=0) if name == fields.turning.name else series
             self._series[name] = series / np.sqrt(2 * np.arange(len(series)) + 1)[:, None]
 
     def __call__(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec] = ()) -> Smoothness:
@@ -99,7 +99,7 @@ class Gauge:
                 values = np.where(fields.number < 0, 0.0, values)  # a state is held there, a change of it is zero
             for name, weights in self.weights:
                 series = np.einsum("jn,cni->cji", self._series[name], values[fields.dofs[name][self._cells]])
-                if name == "q":
+                if name == fields.turning.name:
                     series *= (2 / shape.size)[:, None, None]
                 squares += series**2 @ weights**2
         starts, rows = shape.gather(shape.start), shape.gather(squares)
@@ -109,11 +109,12 @@ class Gauge:
 
 
 def weights_of(scene: Scene) -> list[tuple[str, np.ndarray]]:
-    """Weights of curvature (as the derivative of q) and of free strains v: root of stiffness over least bending."""
+    """Weights of curvature (derivative of q or an angle) and of free strains v: root of stiffness over bending."""
     stiffness = np.diag(scene.stiffness())
     free = len(scene.free_strains)
     bending = stiffness[free:].min()
-    out = [("q", np.full(4, scene.length))]
+    turning = turning_of(scene)
+    out = [(turning.name, np.full(turning.size, scene.length * (1.0 if turning.name == "q" else 0.5)))]
     return [*out, ("v", scene.length * np.sqrt(abs(stiffness[:free] / bending)))] if free else out
 
 

@@ -12,6 +12,8 @@ from mpi4py import MPI
 
 from rodfem.branch import BRANCH_POINT, END, FLUTTER, FOLD, USER, Branch, Point, Special
 from rodfem.clock import Clock
+from rodfem.modes import Modes
+from rodfem.stability.judge import Verdict
 from rodfem.system import System
 
 LABELS = {FOLD: "LP", BRANCH_POINT: "BP", FLUTTER: "HB", USER: "UZ", END: "EP"}
@@ -192,6 +194,31 @@ class Report:
             self.say(f"  {p.load:10.4f}  {words}".rstrip())
         if "torsion" not in widths:
             self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
+
+    def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:
+        """Print what a judgement says of one state, with its modes where they were found."""
+        unstable = "stable" if found.stable else f"unstable in {found.negative} direction{'s'[: found.negative != 1]}"
+        zero = f", {found.zero} zero" if found.zero else ""
+        self.say(f"  {name}, {load}: {unstable}{zero}")
+        motions = ("",) * len(found.values) if modes is None else modes.motion
+        errors = np.full(len(found.values), np.nan) if modes is None else modes.error
+        values, residuals = (found.values, found.errors) if modes is None else (modes.value, modes.residual)
+        for value, residual, error, motion in zip(values, residuals, errors, motions, strict=True):
+            doubt = f" ({error:.0e})" if isfinite(error) else ""
+            number = f"{value.real:.10g}" if value.imag == 0 else f"{complex(value):.9g}"
+            known = f"residual {residual:.0e}" if isfinite(residual) else ""
+            self.say(f"    mu = {number + doubt:<28} {known:<15} {motion}".rstrip())
+        proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
+        self.say(
+            f"    {found.method} ({found.reason}){proof}; {found.factorisations} factorisations, "
+            f"{1e3 * found.seconds:.1f} ms"
+        )
+        if found.band:
+            inside = ", ".join(f"{m:.3g} +- {u:.0e}" for m, u in zip(found.inside, found.uncertainty, strict=True))
+            self.say(
+                f"    inertia decides beyond {found.band:.1e} (in the metric of rotations)"
+                + (f"; inside: {inside}" if inside else "")
+            )
 
     def warn(self, sentence: str) -> None:
         """Say what went wrong without stopping."""

@@ -16,7 +16,6 @@ from rodfem.diagram import as_data, save_json, save_states
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization
-from rodfem.loci.locus import locus
 from rodfem.meshes import start_mesh
 from rodfem.report import Report
 from rodfem.scene import Scene
@@ -75,6 +74,10 @@ def run(
             system = System(scene, discretization, comm, clock)
             follower = Follower(system, plan.spectrum) if scene.conservative else Equilibria(system)
         report.system(system, plan.accuracy)
+        if plan.method or plan.modes:
+            from rodfem.judging import check_method
+
+            check_method(follower, plan)
         explorer: Explorer | Sweep
         if isinstance(follower, Follower):
             explorer = Explorer(follower, plan, report, lambda: _save(explorer, clock, output))
@@ -87,6 +90,10 @@ def run(
     report.frequencies(branches, scene.load)
     report.timing(clock, sum(len(b.points) for b in branches))
     report.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
+    if plan.method or plan.modes:
+        from rodfem.judging import judge_users
+
+        judge_users(branches, explorer.solvers, plan, output, report, figures)
     if plan.locus is not None:
         _loci(branches, explorer.solvers, plan, output, report, figures)
     if figures and comm.rank == 0:
@@ -114,6 +121,7 @@ def _loci(
 
     Each on the mesh on which it was found.
     """
+    from rodfem.loci.locus import locus
     from rodfem.plot_locus import draw_locus
 
     if plan.locus is None:

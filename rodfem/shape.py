@@ -21,10 +21,40 @@ from rodfem.fields import LOAD
 from rodfem.system import System
 
 
+def spin(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+    """Infinitesimal rotation ``2 vec(dq conj(q)) / |q|^2`` in the space frame: (..., 4) -> (..., 3)."""
+    a, v, da, dv = q[..., :1], q[..., 1:], dq[..., :1], dq[..., 1:]
+    return np.asarray(2 * (a * dv - da * v + np.cross(v, dv)) / np.sum(q * q, axis=-1, keepdims=True))
+
+
 def directors(q: np.ndarray) -> np.ndarray:
     """Rotation matrices of quaternions (..., 4), scalar first, of any length: (..., 3, 3)."""
     flat = np.asarray(q).reshape(-1, 4)
     return Rotation.from_quat(flat[:, [1, 2, 3, 0]]).as_matrix().reshape(*np.shape(q)[:-1], 3, 3)
+
+
+def minimum(powers: list[float], t: float, spacing: float) -> float:
+    """Value of a polynomial, given by rising powers, at its minimum within ``spacing`` of ``t`` in [-1, 1].
+
+    By Newton's method for its slope; the value somewhere nearby where there is no such minimum.
+    """
+    low, high = max(t - spacing, -1.0), min(t + spacing, 1.0)
+    slopes = [i * p for i, p in enumerate(powers)][1:]
+    bends = [i * p for i, p in enumerate(slopes)][1:]
+    for _ in range(6):
+        bend = horner(bends, t)
+        if bend <= 0:
+            break
+        t = min(max(t - horner(slopes, t) / bend, low), high)
+    return horner(powers, t)
+
+
+def horner(powers: list[float], t: float) -> float:
+    """Value at ``t`` of the polynomial with these coefficients of rising powers."""
+    value = 0.0
+    for p in reversed(powers):
+        value = value * t + p
+    return value
 
 
 class Gauss:
@@ -59,7 +89,7 @@ class Shape:
         self._q_at_gauss = compat.lagrange_basis(k, self.gauss.points)
         self._v_at_gauss = compat.lagrange_basis(k - 1, self.gauss.points)
         self._v_dense = compat.lagrange_basis(k - 1, np.linspace(0, 1, 4 * k + 1))
-        self._v_to_legendre = np.linalg.inv(legendre.legvander(2 * compat.nodes(k - 1) - 1, k - 1))
+        self._v_to_powers = np.linalg.inv(np.vander(2 * compat.nodes(k - 1) - 1, k, increasing=True))
         self._probe_weights = self._position_weights(system.scene.ordinate.s)
         self._cells = cells
         self.reduced = f.discretization.formulation == "reduced"
@@ -74,24 +104,19 @@ class Shape:
     def stretch(self, x: PETSc.Vec) -> float:
         """Smallest stretch ``v3`` along the rod; 1 for an inextensible rod.
 
-        The least value at many points picks an element, and the minimum of the polynomial there is found from the
-        roots of its slope.
+        The least value at many points picks an element and a place; Newton's method finds the minimum of the polynomial
+        nearby.
         """
         f = self.system.fields
         if 2 not in self.system.scene.free_strains:
             return 1.0
         self.system.bring(x)
         nodal = f.u.x.array[f.dofs["v"][self._cells]][:, :, -1]
-        lowest = nodal[np.argmin((nodal @ self._v_dense.T).min(axis=1))]
-        polynomial = self._v_to_legendre @ lowest
-        turns = (
-            legendre.legroots(legendre.legder(polynomial))
-            if len(polynomial) > 2 and abs(polynomial[2:]).max() > 1e-12
-            else np.array([])
-        )
-        inside = np.clip(turns[abs(np.imag(turns)) < 1e-6].real, -1, 1) if len(turns) else turns
-        mine = legendre.legval(np.array([-1.0, 1.0, *inside]), polynomial).min()
-        return float(self.system.comm.allreduce(mine, op=MPI.MIN))
+        dense = nodal @ self._v_dense.T
+        cell, place = divmod(int(dense.argmin()), dense.shape[1])
+        spacing = 2.0 / (dense.shape[1] - 1)
+        turn = minimum((self._v_to_powers @ nodal[cell]).tolist(), -1.0 + spacing * place, spacing)
+        return float(self.system.comm.allreduce(min(float(dense[cell, place]), turn), op=MPI.MIN))
 
     def sample(self, x: PETSc.Vec) -> dict[str, Any]:
         """All of a state in natural order on every rank, independent of the number of ranks.
@@ -123,6 +148,7 @@ class Shape:
             out["r"] = self._anchor(load, ends[-1]) + self._unique(ends[:-1, None, :] + all_fields["inside"])
         else:
             out["r"] = out["r"] + self.system.fields.lift(out["s"], load)
+        out["q"] = f.turning.quaternion(out[f.turning.name])
         for name in system.scalars:
             out[name] = system.scalar(x, name)
         return out
@@ -211,7 +237,8 @@ class Shape:
     def _slopes(self) -> np.ndarray:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""
         f = self.system.fields
-        q = np.einsum("gn,cni->cgi", self._q_at_gauss, f.u.x.array[f.dofs["q"][self._cells]])
+        turned = np.einsum("gn,cni->cgi", self._q_at_gauss, f.u.x.array[f.dofs[f.turning.name][self._cells]])
+        q = f.turning.quaternion(turned)
         v = np.broadcast_to(np.array(UNDEFORMED), (*q.shape[:2], 3)).copy()
         free = list(self.system.scene.free_strains)
         if free:
@@ -234,7 +261,8 @@ class Shape:
         integral, value = self._probe_weights
         u = f.u.x.array
         parts = np.zeros((3, 4))
-        parts[0] = np.einsum("cn,cni->i", value, u[f.dofs["q"][self._cells]])
+        size = f.turning.size
+        parts[0, :size] = np.einsum("cn,cni->i", value, u[f.dofs[f.turning.name][self._cells]])
         if self.reduced:
             slopes = self._slopes()
             parts[1, :3] = np.einsum("cg,cgi->i", integral, slopes)
@@ -247,7 +275,8 @@ class Shape:
         r = parts[1, :3] + (
             self._anchor(load, parts[2, :3]) if self.reduced else self.system.fields.lift(np.array(s), load)
         )
-        return r, parts[0] / np.linalg.norm(parts[0])
+        q = f.turning.quaternion(parts[0, :size])
+        return r, q / np.linalg.norm(q)
 
     def _anchor(self, load: float, chord: np.ndarray) -> np.ndarray:
         """Position of the left end: where it is held, or else a chord back from where the right end is held."""

@@ -12,6 +12,7 @@ The space of such ``a`` is the null space of a matrix with one row for each of a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from dolfinx import fem
@@ -47,9 +48,21 @@ class Symmetry:
     def change(self, fields: Fields) -> np.ndarray:
         """Change of the state that ``fields.u`` holds: local values, consistent on all ranks; zero for the load."""
         out = np.zeros(len(fields.u.x.array))
+        for target, (matrix, constant) in self._targets.items():
+            add_change(fields, target, matrix, constant, out)
+        return out
+
+    @cached_property
+    def _targets(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Sum of all parts with a weight, for each target."""
+        out: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         for weight, part in zip(self.weights, self.parts, strict=True):
             if weight:
-                add_change(fields, part, weight, out)
+                matrix, constant = out.get(part.target, (0.0, 0.0))
+                out[part.target] = (
+                    matrix + weight * np.array(part.matrix),
+                    constant + weight * np.array(part.constant),
+                )
         return out
 
 
@@ -98,7 +111,10 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
     out = []
     sizes = {g: sum(x.group == g for x in fields.unknown_scalars) for g in vectors}
     for axis in AXES:
-        out += [Elementary("q", m(axis), (0.0,) * 4) for m in (left, right)]
+        if fields.scene.normal is None:
+            out += [Elementary("q", m(axis), (0.0,) * 4) for m in (left, right)]
+        elif axis == AXES[fields.scene.normal]:
+            out.append(Elementary("angle", ((0.0,),), (1.0,)))
         for target in sorted(vectors | ({"r", "n"} & blocks)):
             if target in ("ma", "mb") and sizes[target] == 2:
                 continue
@@ -116,22 +132,22 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
     return tuple(out)
 
 
-def add_change(fields: Fields, part: Elementary, weight: float, out: np.ndarray) -> None:
-    """Add ``weight`` times the change under an elementary generator, at the state that ``fields.u`` holds."""
-    u, matrix, constant = fields.u.x.array, np.array(part.matrix), np.array(part.constant)
+def add_change(fields: Fields, target: str, matrix: np.ndarray, constant: np.ndarray, out: np.ndarray) -> None:
+    """Add the change ``matrix value + constant`` of one target, at the state that ``fields.u`` holds."""
+    u = fields.u.x.array
     load = float(u[fields.copies[0, -1]])
-    if part.target in fields.dofs:
-        dofs = fields.dofs[part.target]
+    if target in fields.dofs:
+        dofs = fields.dofs[target]
         values = u[dofs]
-        if part.target == "r":
+        if target == "r":
             values = values + fields.lift(fields.coordinates(fields.discretization.degree), load)
-        out[dofs] += weight * (values @ matrix.T + constant)
+        out[dofs] = values @ matrix.T + constant
         return
-    members = [(i, x.component) for i, x in enumerate(fields.unknown_scalars) if x.group == part.target]
-    values = _known(fields, part.target, load, len(constant))
+    members = [(i, x.component) for i, x in enumerate(fields.unknown_scalars) if x.group == target]
+    values = np.zeros(len(constant)) if len(members) == len(constant) else _known(fields, target, load, len(constant))
     for i, component in members:
         values[component] = u[fields.copies[0, i]]
-    change = weight * (matrix @ values + constant)
+    change = matrix @ values + constant
     for i, component in members:
         out[fields.copies[:, i]] += change[component]
 
@@ -214,6 +230,9 @@ def _random_state(fields: Fields, kept: np.ndarray, seed: int) -> None:
         if isinstance(scene.ends, Ring) and block.continuous:
             turns = np.pi * (1 if scene.ends.odd and block.name == "q" else 2)
             values = a * np.cos(turns * x[..., None]) + b * np.sin(3 * turns * x[..., None] + 6.0 * p)
+            if block.name == "angle":
+                first, last = fields.turning.start(scene.start, np.array(scene.interval), scene.interval)
+                values = values + (last - first) * x[..., None]
         if block.name == "v":
             values = 0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains]
         u[fields.dofs[block.name]] = values

@@ -43,6 +43,10 @@ class System:
         Symmetric matrix of the squared size of a change of state: rotations, centreline, and the load over its span.
     lu
         LU factors of the last Jacobian given to :meth:`factor`.
+    damping
+        Multiple of the metric added to every Jacobian.  Not zero where a state belongs to a family of equilibria at one
+        and the same load that no symmetry explains: the Jacobian is singular there, and Newton's method must not move
+        along the family.
     """
 
     def __init__(
@@ -54,7 +58,7 @@ class System:
         mesh: Any = None,
     ) -> None:
         """Compile the forms and allocate all matrices once; on a given mesh if there is one."""
-        self.scene, self.comm = scene, comm
+        self.scene, self.comm, self.damping = scene, comm, 0.0
         self.clock = clock or Clock()
         self.fields = Fields(scene, discretization, comm, mesh)
         self.equations = Equations(self.fields)
@@ -67,11 +71,11 @@ class System:
         self.has_scalars = comm.rank == comm.size - 1
         without_load = np.where(number == self.load_index, -1, number).astype(PETSc.IntType)
         self._columns = {True: number.astype(PETSc.IntType), False: without_load}
-        all_map = PETSc.LGMap().create(self._columns[True], comm=comm)
+        self._all = PETSc.LGMap().create(self._columns[True], comm=comm)
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
         self._equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self._pattern = bordered_pattern(self.fields)
-        self.matrix = new_matrix(self.fields, self._pattern, self._no_load, all_map)
+        self.matrix = self.state_matrix(load=True)
         self.x_local = PETSc.Vec().createSeq(int((number >= 0).sum()), comm=PETSc.COMM_SELF)
         self._numbered = np.flatnonzero(number >= 0)
         self.workspace = self.matrix.createVecRight()
@@ -80,6 +84,7 @@ class System:
         self._residual_local = np.zeros(len(self.fields.u.x.array))
         self.metric = self._assemble_metric()
         self.phases: list[PETSc.Vec | None] = [None] * len(self.drifts)
+        self.broken: dict[int, np.ndarray] = {}
         self._phase_offset = [0.0] * len(self.drifts)
         self.lu = Factorizer("lu", comm, {8: 0})  # no scaling: a third of the time; Newton's method mends what it costs
 
@@ -134,8 +139,7 @@ class System:
         x, f = self.new_vector(), self.fields
         x.array[: len(f.free_owned)] = f.u.x.array[f.free_owned]
         if self.has_scalars:
-            for position, name in enumerate(name for name in self.scalars if not name.startswith("drift")):
-                x.setValue(self.scalars[name], f.u.x.array[f.copies[0, position]])
+            x.array[len(f.free_owned) : len(f.free_owned) + f.copies.shape[1]] = f.u.x.array[f.copies[0]]
         x.assemble()
         return x
 
@@ -198,7 +202,7 @@ class System:
 
     def factor(self, row: PETSc.Vec, damping: float = 0.0) -> None:
         """Assemble and factor the Jacobian at the state last brought, with ``damping`` times the metric added."""
-        matrix = self.jacobian(row)
+        matrix, damping = self.jacobian(row), damping or self.damping
         if damping:
             matrix.axpy(damping, self.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
             matrix.stateIncrease()
@@ -213,9 +217,9 @@ class System:
             self.lu.ksp.solve(right, out)
             return bool(self.lu.ksp.getConvergedReason() > 0)
 
-    def state_matrix(self) -> PETSc.Mat:
-        """Allocate a matrix for the second variation at fixed load (row and column of the load empty)."""
-        return new_matrix(self.fields, self._pattern, self._no_load, self._no_load)
+    def state_matrix(self, *, load: bool = False) -> PETSc.Mat:
+        """Allocate a matrix for the second variation at fixed load (row of the load empty, column unless ``load``)."""
+        return new_matrix(self.fields, self._pattern, self._no_load, self._all if load else self._no_load)
 
     # --- symmetry ----------------------------------------------------------------------------------------------
 
@@ -236,6 +240,7 @@ class System:
         """
         count = len(self.drifts)
         self.phases, self._phase_offset, self.kept = [None] * count, [0.0] * count, np.eye(count)
+        self.broken = {}
         if reference is None or count == 0:
             return
         generators = [self.generator(reference, i) for i in range(count)]
@@ -247,6 +252,7 @@ class System:
             if square >= SYMMETRIC_STATE**2:
                 phase = combine(images, weights / square**0.5)
                 self.phases[i], self._phase_offset[i] = phase, np.real(phase.dot(reference))
+                self.broken[self.drifts[i]] = weights / square**0.5
 
     def equivalent_directions(self, x: PETSc.Vec, direction: PETSc.Vec) -> list[PETSc.Vec]:
         """Directions into which the symmetries that the state ``x`` has itself carry a direction, to first order.
@@ -285,7 +291,8 @@ def _set_clamps(fields: Fields) -> None:
     x = fields.coordinates(fields.discretization.degree)
     for end, s in zip(scene.sides, scene.interval, strict=True):
         if end.fixed_rotation is not None:
-            u[fields.dofs["q"][np.isclose(x, s, rtol=0, atol=1e-9 * scene.length)]] = end.fixed_rotation
+            here = fields.dofs[fields.turning.name][np.isclose(x, s, rtol=0, atol=1e-9 * scene.length)]
+            u[here] = fields.turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)
 
 
 def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:
@@ -348,6 +355,10 @@ class Factorizer:
         if status < 0 and status != -10:  # -10 is a singular matrix, which the solve reports
             raise ConvergenceError(f"MUMPS could not factor the bordered matrix: its status INFOG(1) is {status}.")
         return self.factor
+
+    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
+        """Solve for all columns of a dense matrix at once, with the last factors."""
+        self.ksp.getPC().getFactorMatrix().matSolve(right, out)
 
     def _prepare(self, matrix: PETSc.Mat) -> None:
         self.ksp.reset()

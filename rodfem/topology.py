@@ -10,8 +10,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.integrate import trapezoid
-from scipy.interpolate import CubicSpline
 
 from rodfem.errors import SceneError
 
@@ -36,6 +34,9 @@ def writhe(r: np.ndarray) -> float:
 
 def twist(s: np.ndarray, q: np.ndarray) -> float:
     """Twist ``1/(2 pi) int k3 ds`` of directors given by quaternions ``q`` (m, 4) at ascending ``s`` (m,)."""
+    from scipy.integrate import trapezoid
+    from scipy.interpolate import CubicSpline
+
     unit = q / np.linalg.norm(q, axis=1, keepdims=True)
     spline = CubicSpline(s, unit)
     fine = np.linspace(s[0], s[-1], 8 * len(s) + 1)
@@ -50,6 +51,8 @@ def link(sample: dict[str, Any], points: int = 400) -> tuple[int, float, float]:
     Raises :class:`SceneError` where the sum of the last two is not near an integer: the rod is not closed, or touches
     itself.
     """
+    from scipy.interpolate import CubicSpline
+
     s, r = np.asarray(sample["s"]), np.asarray(sample["r"])
     fine = np.linspace(s[0], s[-1], points + 1)[:-1]
     closed = r.copy()

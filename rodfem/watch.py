@@ -148,6 +148,7 @@ class Watch:
     def _computed(self, point: Point) -> float:
         """Error of a point across its branch, or at its load on a bound; :class:`TooCoarse` where its index errs."""
         richer = self.meshes.richer(point.mesh)
+        richer.follower.damp(self.meshes.followers[point.mesh].system.damping > 0)
         try:
             x = richer.again(point, fixed_load=self._at_bound(point), sharp=self.accuracy < SHARP)
         except ConvergenceError:

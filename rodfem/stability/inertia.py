@@ -48,12 +48,18 @@ class Inertia:
 
     Eigenvalues ``mu`` are relative to the system's metric.  ``tolerance`` is the half width of what counts as zero, the
     larger of 1e-7 of the rod's lowest bending eigenvalue and of ``resolution``: what the arithmetic resolves.
+    ``border`` is the derivative of the equations in the load at the state last assembled.
     """
 
     def __init__(self, system: System) -> None:
         """Allocate the matrix and its LDL^t factors once."""
         self.system = system
-        self.matrix = system.state_matrix()
+        self.matrix = system.state_matrix(load=True)
+        self.border = system.new_vector()
+        self._axis = system.load_axis()
+        self._without_load = system.new_vector()
+        self._without_load.set(1.0)
+        system.set_load(self._without_load, 0.0)
         self.metric = system.metric.copy()
         if system.has_scalars:  # the load is no part of a perturbation
             self.metric.setValue(system.load_index, system.load_index, 0.0)
@@ -66,15 +72,18 @@ class Inertia:
         self._vectors: list[PETSc.Vec] = []
 
     def assemble(self, x: PETSc.Vec) -> None:
-        """Assemble ``S`` at ``x``, with the phase conditions that are active."""
+        """Assemble ``S`` at ``x``, with the phase conditions that are active, and ``border``."""
         system = self.system
         with system.clock("assembly"):
             system.bring(x)
             self.matrix.zeroEntries()
-            system.assemble_into(self.matrix, system.equations.jacobian)
-            if system.has_scalars:
-                self.matrix.setValue(system.load_index, system.load_index, 1.0, addv=True)
+            system.assemble_into(self.matrix, system.equations.jacobian, load=True)
             system.add_drifts(self.matrix)
+            self.matrix.assemble()
+            self.matrix.mult(self._axis, self.border)
+            self.matrix.diagonalScale(R=self._without_load)
+            if system.has_scalars:
+                self.matrix.setValue(system.load_index, system.load_index, 1.0)
             self.matrix.assemble()
         self.shift = 0.0
         if not self.resolution:
@@ -86,7 +95,8 @@ class Inertia:
     def below(self, sigma: float) -> int:
         """Number of eigenvalues below ``sigma`` at the state last assembled; symmetry modes not counted."""
         with self.system.clock("stability"):
-            self.matrix.axpy(self.shift - sigma, self.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            if sigma != self.shift:
+                self.matrix.axpy(self.shift - sigma, self.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
             self.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
             self.shift = sigma
             negative, zero, _ = self.factors(self.matrix).getInertia()

@@ -1,0 +1,179 @@
+r"""One factorisation a point: Newton's method, the tangent, and the index from the same symmetric factors.
+
+At fixed load the saddle matrix ``S`` of a conservative rod is symmetric; with ``F_lam`` the derivative of the equations
+in the load and ``row`` the arclength equation Newton's matrix is ``J = (S F_lam; row)``.  Block elimination of the load
+(Keller 1977) solves with ``J`` by the LDL^t factors of ``S`` alone,
+
+    z = (-S^-1 F_lam, 1),    J^-1 (r, 0) = y - z (row . y) / (row . z),    y = (S^-1 r, 0),
+
+``z`` is a tangent of the branch, and the inertia of the factors is the index (see :mod:`rodfem.stability.inertia`).
+``S`` is singular at a fold, and a count says nothing about eigenvalues within its tolerance: both show in the same
+solves.  A block of vectors ``v`` is carried along the branch and iterated inversely, once a point; the least
+``|v| / |S^-1 M v|`` is an upper bound of the distance of the nearest eigenvalue from zero, and an estimate as good as
+the block is rich in its vector: 1e-3 of a vector that has a bit of everything is mixed in every time, and a vector
+whose eigenvalue is within the tolerance, 1e-7 of the usual, grows by 1e7.  Where that is not safely away from zero a
+state is computed by LU factors of ``J``, and counted by two shifts.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from petsc4py import PETSc
+
+from rodfem.errors import ConvergenceError
+from rodfem.newton import ROUND_OFF, TOLERANCE, Outcome
+from rodfem.stability.inertia import Index, Inertia
+
+BLOCK = 2
+"""Number of vectors that are iterated along a branch."""
+FRESH = 1e-3
+"""How much of a vector with a bit of everything is added to each before it is iterated."""
+NEAR = 1e-3
+"""An eigenvalue nearer zero than this, in units of the lowest bending eigenvalue, is left to the two shifts."""
+SENSITIVE = 100.0
+"""What an eigenvalue may change by when the state moves by one radian, in the same units."""
+
+
+class Corrector:
+    """Newton's method with the factors of ``S`` at the states of one :class:`~rodfem.stability.inertia.Inertia`.
+
+    Attributes
+    ----------
+    tangent
+        Unit tangent at the state last factored, on the side of increasing load.
+    nearest
+        Estimated distance of the eigenvalue nearest zero from zero, at the state last factored.
+    """
+
+    def __init__(self, inertia: Inertia) -> None:
+        """Allocate right-hand sides, solutions and the block of vectors."""
+        self.inertia, self.system = inertia, inertia.system
+        system = self.system
+        rows = (system.fields.local_unknowns, system.fields.unknowns)
+        self._right = PETSc.Mat().createDense((rows, (None, BLOCK + 2)), comm=system.comm)
+        self._right.setUp()
+        self._right.assemble()
+        self._solved = self._right.duplicate()
+        self._equations, self._step, self._image = (system.new_vector() for _ in range(3))
+        self._factored = system.new_vector()
+        self._fresh = [inertia.seed(i) for i in range(BLOCK)]
+        self._fresh_images = [inertia.metric * v for v in self._fresh]
+        self._below = 0
+        self.tangent = system.new_vector()
+        self.nearest = 0.0
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin a branch: nothing is known about its eigenvectors."""
+        self._block = [v.copy() for v in self._fresh]
+        self._images = [v.copy() for v in self._fresh_images]
+        self._started = False
+
+    def factor(self, x: PETSc.Vec, right: PETSc.Vec | None = None) -> bool:
+        """Factor ``S`` at ``x``; solve for the tangent, the block, and ``right`` (into ``_step``).
+
+        False where an eigenvalue is so near zero that its factors serve neither Newton's method nor the count.
+        """
+        inertia = self.inertia
+        inertia.assemble(x)
+        try:
+            self._below = inertia.below(0.0)
+        except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong
+            return False
+        x.copy(self._factored)
+        for _ in range(1 if self._started else 3):
+            for i in range(BLOCK):
+                self._block[i].axpy(FRESH, self._fresh[i])
+                self._images[i].axpy(FRESH, self._fresh_images[i])
+            self._solve(right)
+        self._started = True
+        if not self.nearest > NEAR * inertia.scale:
+            self.restart()
+            return False
+        return True
+
+    def _solve(self, right: PETSc.Vec | None) -> None:
+        """Solve for all right-hand sides at once: it is the call that costs, not the column."""
+        system, inertia = self.system, self.inertia
+        with system.clock("solve"):
+            columns = self._right.getDenseArray()
+            columns[:, 0] = 0.0 if right is None else right.array_r
+            columns[:, 1] = inertia.border.array_r
+            sizes = []
+            for i, (v, image) in enumerate(zip(self._block, self._images, strict=True)):
+                columns[:, 2 + i] = image.array_r
+                sizes.append(image.dot(v) ** 0.5)
+            inertia.factors.solve_all(self._right, self._solved)
+            solved = self._solved.getDenseArray()
+            self._step.array[:] = solved[:, 0]
+            self.tangent.array[:] = -solved[:, 1]
+            system.set_load(self.tangent, 1.0)
+            self.tangent.scale(1.0 / system.norm(self.tangent))
+            growth = 0.0
+            for i, (v, image, size) in enumerate(zip(self._block, self._images, sizes, strict=True)):
+                v.array[:] = solved[:, 2 + i]
+                inertia.metric.mult(v, image)
+                grown = max(image.dot(v), 1e-300) ** 0.5
+                growth = max(growth, grown / size) if isfinite(grown) else float("inf")
+                v.scale(1.0 / grown)
+                image.scale(1.0 / grown)
+                for j in range(i):
+                    along = image.dot(self._block[j])
+                    v.axpy(-along, self._block[j])
+                    image.axpy(-along, self._images[j])
+            self.nearest = 1.0 / growth
+
+    def _chord(self, right: PETSc.Vec) -> None:
+        with self.system.clock("solve"):
+            self.inertia.factors.ksp.solve(right, self._step)
+
+    def correct(self, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3) -> Outcome | None:
+        """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
+
+        As :func:`rodfem.newton.correct`, but done as soon as what the observed rate of convergence leaves is below the
+        tolerance; ``error`` is that.  None, with ``x`` as it was, where ``S`` is too near singular.
+        """
+        system, equations, origin = self.system, self._equations, x.copy()
+        previous, size, refactor = float("inf"), float("inf"), True
+        iteration = 0
+        for iteration in range(1, most + 1):
+            system.residual(x, equations)
+            if not isfinite(equations.norm()):
+                break
+            fresh = refactor
+            if fresh and not self.factor(x, equations):
+                origin.copy(x)
+                return None
+            if not fresh:
+                self._chord(equations)
+            step = self._step
+            step.axpy(-row.dot(step) / row.dot(self.tangent), self.tangent)
+            x.axpy(-1.0, step)
+            size = max(system.norm(step), step.norm() / (1.0 + x.norm()))
+            if not isfinite(size) or size > reach:
+                break
+            left = size if fresh else min(2.0 * size / previous, 1.0) * size
+            if left < TOLERANCE or (fresh and ROUND_OFF > size > 0.5 * previous):
+                origin.aypx(-1.0, x)
+                return Outcome(True, iteration, left, system.norm(origin))
+            refactor = size > 0.02 or size > 0.1 * previous
+            previous = size
+        origin.aypx(-1.0, x)
+        return Outcome(False, iteration, size, float("inf"))
+
+    def tangent_along(self, row: PETSc.Vec) -> PETSc.Vec:
+        """Unit tangent at the state last factored, on the side to which ``row`` points."""
+        tangent = self.tangent.copy()
+        if row.dot(tangent) < 0:
+            tangent.scale(-1.0)
+        return tangent
+
+    def index(self, x: PETSc.Vec) -> Index | None:
+        """Index of ``x``, a state near the one last factored; None where an eigenvalue may vanish in between."""
+        scale, drifts = self.inertia.scale, self.system.active_drifts()
+        self._image.waxpy(-1.0, self._factored, x)
+        moved = self.system.norm(self._image)
+        if self.nearest < (NEAR + SENSITIVE * moved) * scale + 10 * self.inertia.tolerance:
+            return None
+        return Index(self._below, drifts)
