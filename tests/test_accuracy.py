@@ -58,6 +58,7 @@ def claimed(branches: list[Branch]) -> float:
     return max(rows)
 
 
+@pytest.mark.alone
 @ACCURACIES
 def test_cord(accuracy: float) -> None:
     found = explored(scenes.scene("cord"), accuracy, at=(40.0,))
@@ -68,6 +69,7 @@ def test_cord(accuracy: float) -> None:
     assert claimed(found.branches) <= accuracy
 
 
+@pytest.mark.alone
 @ACCURACIES
 def test_hemitropic(accuracy: float) -> None:
     found = explored(rods.scene(), accuracy, at=(0.5,))
