@@ -18,7 +18,7 @@ from rodfem.continuation import VERTICAL, Follower, Steps, distance, follow, her
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError, SymmetryError
 from rodfem.locate import solve_at
-from rodfem.meshes import Meshes, TooCoarse, Watch, check_accuracy, end_of
+from rodfem.meshes import Meshes, TooCoarse, check_accuracy
 from rodfem.pitchfork import law_of
 from rodfem.report import Report
 from rodfem.scene import Scene
@@ -26,6 +26,7 @@ from rodfem.search.deflation import further, starts, states_at
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.rank import rank_of
 from rodfem.topology import link
+from rodfem.watch import Watch
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
@@ -124,6 +125,10 @@ class Explorer:
 
     def run(self) -> list[Branch]:
         """Trace the start state's branch, then what leaves each branch point, breadth first."""
+        if self.meshes.accuracy != self.plan.accuracy:
+            self.report.say(
+                f"  computed to {self.meshes.accuracy:g}: a coarser mesh would break the ring's symmetry along itself"
+            )
         self.trace(self._primary())
         self._branch_off(0)
         for load in self.plan.at if self.plan.tries else ():
@@ -296,12 +301,16 @@ class Explorer:
                 history = self._remesh(branch, history, trouble)
 
     def _remesh(self, branch: Branch, history: list[Point], trouble: TooCoarse) -> list[Point]:
-        """Carry the last points of a branch to a mesh that resolves what was too coarse, and drop what lies beyond."""
-        follower = self.watch.another(trouble)
+        """Points to go on from, carried to a mesh that resolves what was too coarse; what lies beyond is dropped.
+
+        Rows before the trouble stay what they are on the mesh that was made for them.
+        """
+        follower = self.watch.another(trouble, self.report)
         if follower is not None:
+            follower.damp(self.follower.system.damping > 0)
             with self.follower.system.clock.purpose("location"):
                 pairs = self.meshes.carry(history, follower, branch.parent is not None)
-            moved = {id(old): new for old, new in pairs}
+            moved = {id(old): new for old, new in pairs if old is trouble.point}
             branch.points = [moved.get(id(p), p) for p in branch.points]
             history = [new for _, new in pairs]
             self.follower = follower
@@ -500,7 +509,7 @@ class Explorer:
 
     def _alike(self, a: Point, b: Point, tolerance: float) -> bool:
         """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
-        across = 0.0 if a.mesh == b.mesh or self.plan.accuracy is None else 30 * self.plan.accuracy
+        across = 0.0 if a.mesh == b.mesh or self.meshes.accuracy is None else 30 * self.meshes.accuracy
         return _equivalent(a, b, max(tolerance, across), across**0.5)
 
     def _check_symmetry(self, point: Point) -> None:
@@ -533,7 +542,7 @@ class Explorer:
             self._singular_end(branch, last)
             last = branch.points[-1]
         if not any(s.point is last for s in branch.special):
-            branch.special.append(end_of(last))
+            branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
             branch.renumber()
         if self.plan.error_bars or self.plan.accuracy:
             self._error_bars(branch)

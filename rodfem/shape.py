@@ -226,6 +226,7 @@ class Shape:
         return np.einsum("pn,pni->pi", basis, table[cell.ravel()]).reshape(*x.shape, block.size)
 
     def gather(self, values: np.ndarray) -> np.ndarray:
+        """Rows of all ranks, one for each element, in the order of the ranks."""
         return values if self.system.comm.size == 1 else np.concatenate(self.system.comm.allgather(values))
 
     @staticmethod
