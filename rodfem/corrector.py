@@ -76,9 +76,11 @@ class Corrector:
     def factor(self, x: PETSc.Vec, right: PETSc.Vec | None = None) -> bool:
         """Factor ``S`` at ``x``; solve for the tangent, the block, and ``right`` (into ``_step``).
 
-        False where an eigenvalue is so near zero that its factors serve neither Newton's method nor the count.
+        False where they do not serve: an eigenvalue is too near zero, or a load has no potential.
         """
         inertia, self.regular = self.inertia, False
+        if not self.system.scene.conservative:  # S is not symmetric
+            return False
         inertia.assemble(x)
         try:
             self._below = inertia.below(0.0)
