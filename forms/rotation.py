@@ -13,6 +13,20 @@ from ufl.core.expr import Expr
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
 
 
+def turn(angle: Expr, axis: int) -> Expr:
+    """Quaternion of the rotation by ``angle`` about ``e1``, ``e2`` or ``e3`` (``axis`` 0, 1, 2), shape (4,)."""
+    return _in_plane(ufl.cos(angle / 2), ufl.sin(angle / 2), axis)
+
+
+def turn_change(angle: Expr, change: Expr, axis: int) -> Expr:
+    """Change of :func:`turn` with a small ``change`` of the angle, shape (4,)."""
+    return _in_plane(-ufl.sin(angle / 2) * change / 2, ufl.cos(angle / 2) * change / 2, axis)
+
+
+def _in_plane(scalar: Expr, along: Expr, axis: int) -> Expr:
+    return ufl.as_vector([scalar, *(along if i == axis else 0 for i in range(3))])
+
+
 def product(p: Expr, q: Expr) -> Expr:
     """Hamilton product ``p q`` of two quaternions, each of shape (4,)."""
     return ufl.as_vector(

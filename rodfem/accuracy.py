@@ -19,6 +19,7 @@ from rodfem.branch import BRANCH_POINT, END, FOLD, Point, Special
 from rodfem.continuation import Equilibria, Follower
 from rodfem.errors import ConvergenceError
 from rodfem.locate import WINDOW, refine
+from rodfem.newton import correct
 from rodfem.system import System
 
 
@@ -82,18 +83,29 @@ class Richer:
         at_a_load = special.kind not in (FOLD, BRANCH_POINT)
         special.error_estimate = special.ordinate_error if at_a_load else max(abs(load - special.point.load), floor)
 
+    def again(self, point: Point, *, fixed_load: bool) -> PETSc.Vec:
+        """State of a point on the richer discretisation, at its load or across its tangent.
+
+        Raises :class:`ConvergenceError` where there is none.
+        """
+        x = self.transfer(point.x, state=True)
+        row = self.follower.axis
+        if not fixed_load and point.tangent is not None:
+            row = self.follower.row(self.transfer(point.tangent, state=False))
+        self.system.set_phase(x)
+        if not correct(self.system, x, row, reach=1.0).converged:
+            raise ConvergenceError(f"the richer discretisation has no equilibrium near load {point.load:.8g}")
+        return x
+
     def _again(self, special: Special) -> tuple[float, float]:
         """Load and ordinate of the special point on the richer discretisation."""
         follower, point = self.follower, special.point
-        x = self.transfer(point.x, state=True)
+        self.system.damping = self.coarse.system.damping
         if special.kind not in (FOLD, BRANCH_POINT):
-            self.system.set_phase(x)
-            x, outcome = follower.at_load(x, point.load, reach=1.0)
-            if not outcome.converged:
-                raise ConvergenceError(f"the richer discretisation has no equilibrium near load {point.load:.8g}")
-            return point.load, follower.shape.ordinate(x)
+            return point.load, follower.shape.ordinate(self.again(point, fixed_load=True))
         if point.tangent is None:
             raise ConvergenceError("the branch has no tangent there")
+        x = self.transfer(point.x, state=True)
         tangent = self.transfer(point.tangent, state=False)
         mode = self.transfer(special.null_vectors[0], state=False)
         mode.scale(1.0 / self.system.norm(mode))
@@ -118,11 +130,7 @@ def zero_stretch(follower: Follower, coarse: Point) -> Special:
     sample = follower.shape.sample(coarse.x)
     found: list[tuple[float, float, float, float]] = []
     for factor in (2, 4):
-        fine = Equilibria(
-            System(
-                system.scene, replace(d, elements=factor * d.elements, degree=d.degree + 1), system.comm, system.clock
-            )
-        )
+        fine = Equilibria(System(system.scene, d.finer(factor, richer=1), system.comm, system.clock))
         state = fine.shape.restore(sample)
 
         def stretch(load: float, fine: Equilibria = fine, guess: PETSc.Vec = state) -> float:

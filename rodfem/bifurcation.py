@@ -8,26 +8,28 @@ and ``F_lam`` the derivative of the equations in the load, ``phi . F_lam != 0`` 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from petsc4py import PETSc
 
 from rodfem.branch import BRANCH_POINT, FOLD, Branch, Point, Special
-from rodfem.continuation import Follower, distance, hermite
+from rodfem.continuation import VERTICAL, Follower, distance, hermite
 from rodfem.errors import ConvergenceError
-from rodfem.locate import Located, locate, solve_at
+from rodfem.locate import Located, across, locate, solve_at
 from rodfem.newton import correct
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
 ROUND_OFF = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
-VERTICAL = 1e-8
-"""A branch along which the load changes by less than this (of its span a unit of arclength) is one of equal loads."""
 
 
-def special_at(follower: Follower, located: Located, arclength: float) -> Special:
-    """Evaluate and classify a located point: multiplicity, null vectors, coupling to the load, kind."""
+def special_at(follower: Follower, located: Located, arclength: float, still: Sequence[PETSc.Vec] = ()) -> Special:
+    """Evaluate and classify a located point: multiplicity, null vectors, coupling to the load, kind.
+
+    Vectors of eigenvalues that are zero on the whole branch (``still``) are none of its null vectors.
+    """
     system, inertia = follower.system, follower.inertia
     x = located.x
     system.set_phase(x)
@@ -36,6 +38,7 @@ def special_at(follower: Follower, located: Located, arclength: float) -> Specia
     point = follower.point(x, arclength, tangent)
     null_count = max(point.zero - system.active_drifts(), 1)
     _, vectors = inertia.nearest(null_count, accuracy=1e-8)
+    vectors = across(system, vectors, still)
     coupling = max(coupling_of(follower, x, v) for v in vectors)
     turning = abs(system.scalar(tangent)) < 1e-3 * abs(system.scene.span[1] - system.scene.span[0])
     kind = FOLD if turning and coupling > COUPLED else BRANCH_POINT
@@ -71,8 +74,9 @@ def find_special(follower: Follower, a: Point, b: Point) -> list[Special]:
         if found[0].kind == FOLD:
             own = min(found[0].negative_before, found[0].negative_after)
             crossing = [order for order in crossing if order != own]
+    still = _still(follower, a, b) if crossing else []
     while crossing:
-        special = _special(follower, a, b, crossing[0], "mu")
+        special = _special(follower, a, b, crossing[0], "mu", still)
         found.append(special)
         del crossing[: special.multiplicity]
     return sorted(found, key=lambda s: s.point.arclength)
@@ -92,21 +96,41 @@ def midpoint(follower: Follower, a: Point, b: Point) -> Point | None:
 
 
 def _crossing(follower: Follower, a: Point, b: Point) -> list[int]:
-    """Numbers of the eigenvalues that have changed sign from ``a`` to ``b``; one that is zero at either has not."""
-    drifts = follower.system.active_drifts()
-    (low_a, high_a), (low_b, high_b) = ((p.negative, p.negative + max(p.zero - drifts, 0)) for p in (a, b))
+    """Numbers of the eigenvalues that have changed sign from ``a`` to ``b``; one that is zero at either has not.
+
+    Those that are zero at both are not counted: they stay zero.
+    """
+    extra_a, extra_b = (_extra(follower, p) for p in (a, b))
+    stay = min(extra_a, extra_b)
+    (low_a, high_a), (low_b, high_b) = ((p.negative, p.negative + e - stay) for p, e in ((a, extra_a), (b, extra_b)))
     return list(range(high_a, low_b)) or list(range(high_b, low_a))
 
 
-def _special(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -> Special:
-    located = locate(follower, a, b, order, zero_of)
+def _extra(follower: Follower, point: Point) -> int:
+    """Number of zero eigenvalues of a point that are not its symmetries'."""
+    return max(point.zero - follower.system.active_drifts(), 0)
+
+
+def _still(follower: Follower, a: Point, b: Point) -> list[PETSc.Vec]:
+    """Vectors of the eigenvalues that are zero at both points, at the first one."""
+    count = min(_extra(follower, a), _extra(follower, b))
+    if not count:
+        return []
+    follower.inertia.count(a.x)
+    return [v.copy() for v in follower.inertia.nearest(count, accuracy=1e-8)[1]]
+
+
+def _special(
+    follower: Follower, a: Point, b: Point, order: int, zero_of: str, still: Sequence[PETSc.Vec] = ()
+) -> Special:
+    located = locate(follower, a, b, order, zero_of, still)
     margin = 0.01 * (b.arclength - a.arclength)
     if not a.arclength - margin <= located.s <= b.arclength + margin:
         raise ConvergenceError(
             f"A special point between loads {a.load:.8g} and {b.load:.8g} slipped out of its bracket: "
             "use smaller steps (--step)."
         )
-    special = special_at(follower, located, located.s)
+    special = special_at(follower, located, located.s, still)
     special.zero_of = zero_of
     return special
 

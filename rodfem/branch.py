@@ -14,7 +14,8 @@ class Point:
     """One equilibrium: state ``x``, unit ``tangent``, ``arclength`` from the start of the branch, and records.
 
     ``slope`` is the load's component of the tangent, ``drift`` the largest drift scalar (zero but for round-off),
-    ``error`` the last Newton correction.
+    ``error`` the last Newton correction, ``mesh`` the number of the discretisation that ``x`` belongs to, and
+    ``estimate`` the error of the discretisation in load and ordinate, where an accuracy was asked for.
     """
 
     x: PETSc.Vec
@@ -33,6 +34,8 @@ class Point:
     omega2: list[list[float]] = field(default_factory=list)
     motion: list[str] = field(default_factory=list)
     negative_in_space: int | None = None
+    mesh: int = 0
+    estimate: float = float("nan")
 
 
 @dataclass

@@ -86,6 +86,24 @@ def check_shapes(scene: Scene) -> None:
         check_scalar(what, function(known, c))
 
 
+def check_plane(scene: Scene) -> None:
+    """Check that the forces on a planar rod are in its plane, and moments about the normal."""
+    normal = scene.normal
+    if normal is None:
+        return
+    for what, function, wanted in functions_of(scene):
+        if wanted != "f(c)" or not ("force" in what or "moment" in what):
+            continue
+        out = [i for i in range(3) if (i == normal) != ("moment" in what)]
+        for s in scene.samples():
+            values = [float(x) for x in function(scene.constants(max(scene.span, key=abs), s))]
+            if any(values[i] for i in out):
+                raise SceneError(
+                    f"The {what} pushes the rod out of its plane across {scene.planar}, with {values}: "
+                    "leave that component out, or planar out of the scene."
+                )
+
+
 def functions_of_places(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], Any]]:
     """Functions of a place, each with a place of the kind that it will be given: some rotation, strains, position."""
     q = ufl.as_vector([0.5, 0.1, 0.7, 0.5])
@@ -161,6 +179,7 @@ def check_scene(scene: Scene) -> None:
     check_places(scene)
     check_shapes(scene)
     check_supports(scene)
+    check_plane(scene)
     check_start(scene)
     check_convexity(scene)
     check_inertia(scene)

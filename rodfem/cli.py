@@ -35,10 +35,10 @@ check_installation()
 class Parser(argparse.ArgumentParser):
     """Argument parser whose complaints are one sentence, printed once under MPI."""
 
-    def flags(self, name: str) -> list[str]:
-        """Return the words that set an option, abbreviations included."""
+    def gives(self, name: str, words: Sequence[str]) -> bool:
+        """Whether the command line sets an option, by an abbreviation maybe."""
         full = next(action.option_strings[0] for action in self._actions if action.dest == name)
-        return [full[:end] for end in range(3, len(full) + 1)]
+        return any(word.split("=")[0] in [full[:end] for end in range(3, len(full) + 1)] for word in words)
 
     def error(self, message: str) -> NoReturn:
         """Print ``message`` and leave with status 2."""
@@ -94,6 +94,14 @@ def parser_for(
         help="reduced: no centreline, the contact force as scalars; pointwise: all fields "
         f"(default {formulation}: reduced where the scene allows it)",
     )
+    group.add_argument(
+        "--accuracy",
+        type=float,
+        default=None,
+        metavar="EPS",
+        help="instead of elements and degree: choose meshes on the way such that loads and ordinates are in error by less "
+        "than EPS (relative to values greater than one)",
+    )
     group = parser.add_argument_group("what to compute")
     group.add_argument(
         "--range",
@@ -125,6 +133,20 @@ def parser_for(
         default=0,
         metavar="K",
         help="also compute the K left-most eigenvalues of every state with SLEPc",
+    )
+    group.add_argument(
+        "--method",
+        default="",
+        metavar="NAME",
+        help="judge the states at the loads of --at by auto, count, shift-invert, cayley, slicing, reduction or dense, "
+        "and print all that it says",
+    )
+    group.add_argument(
+        "--modes",
+        type=int,
+        default=0,
+        metavar="K",
+        help="find and draw the K left-most modes of the states at the loads of --at",
     )
     group.add_argument(
         "--search",
@@ -176,7 +198,7 @@ def main(
     ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
     options = parser.parse_args(ours)
     for name, value in defaults(options).items() if defaults else ():
-        if not any(word.split("=")[0] in parser.flags(name) for word in ours):
+        if not parser.gives(name, ours):
             setattr(options, name, value)
     import petsc4py
 
@@ -191,12 +213,28 @@ def main(
 
         if petsc:  # once more, for a PETSc that was running already
             PETSc.Options().insertString(" ".join(petsc))
+        if options.accuracy is not None:
+            for name in ("elements", "degree"):
+                if parser.gives(name, ours):
+                    raise SceneError(
+                        f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy."
+                    )
         discretization = Discretization(options.formulation, options.elements, options.degree)
         scene = scene_of(options)
         span = tuple(options.span)
         steps = Steps(largest=options.step)
         at = tuple(options.at)
-        plan = Plan(span, at, spectrum=options.spectrum, steps=steps, tries=options.search, locus=pair(options.locus))
+        plan = Plan(
+            span,
+            at,
+            spectrum=options.spectrum,
+            steps=steps,
+            tries=options.search,
+            locus=pair(options.locus),
+            method=options.method,
+            modes=options.modes,
+            accuracy=options.accuracy,
+        )
         run(scene, discretization, plan, options.output, figures=options.figures)
     except KeyboardInterrupt:
         from mpi4py import MPI

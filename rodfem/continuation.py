@@ -15,7 +15,6 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.spatial.transform import Rotation
 
 from rodfem.branch import Point
 from rodfem.convexity import Convexity
@@ -23,6 +22,7 @@ from rodfem.corrector import SENSITIVE, Corrector
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.newton import TOLERANCE, Outcome, correct, relax
 from rodfem.shape import Shape
+from rodfem.stability.band import decide
 from rodfem.stability.in_space import InSpace
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.spectrum import Spectrum
@@ -31,6 +31,10 @@ from rodfem.system import System, combine
 LEVEL = 0.05
 """Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh, unless the
 correction was so small that it cannot have changed its sign."""
+VERTICAL = 1e-8
+"""A branch along which the load changes by less than this (of its span a unit of arclength) is one of equal loads."""
+STRAYED = 0.3
+"""Distance from the start beyond which an equilibrium is not the one that the start stands for."""
 ON_BOUND = 1e-8
 """A load beyond a bound by less than this, of the span, is on it: branches of equal loads may lie there."""
 
@@ -61,8 +65,8 @@ class Equilibria:
     """Computes equilibria of one :class:`~rodfem.system.System` at given loads, and their shapes."""
 
     def __init__(self, system: System) -> None:
-        """Tabulate the shape."""
-        self.system = system
+        """Tabulate the shape; ``mesh`` is the number of this discretisation where there are several."""
+        self.system, self.mesh = system, 0
         self.shape = Shape(system)
         self.axis = system.load_axis()
 
@@ -73,14 +77,14 @@ class Equilibria:
         """
         system, f = self.system, self.system.fields
         x = f.coordinates(f.discretization.degree)
-        guess = system.scene.start
-        q = np.tile([1.0, 0.0, 0.0, 0.0], (x.size, 1)) if guess is None else np.asarray(guess(x.ravel()))
+        turned = f.turning.start(system.scene.start, x.ravel(), system.scene.interval)
         f.u.x.array[f.number >= 0] = 0.0
-        held = f.number[f.dofs["q"]] < 0
-        clamped = f.u.x.array[f.dofs["q"]]
+        dofs = f.dofs[f.turning.name]
+        held, clamped = f.number[dofs] < 0, f.u.x.array[dofs]
         if bent:
-            q = _bend(q, (x.ravel() - system.scene.interval[0]) / system.scene.length, bent)
-        f.u.x.array[f.dofs["q"]] = np.where(held, clamped, q.reshape(*x.shape, 4))
+            along = (x.ravel() - system.scene.interval[0]) / system.scene.length
+            turned = f.turning.turned(turned, bent * _bend(along))
+        f.u.x.array[dofs] = np.where(held, clamped, turned.reshape(*x.shape, -1))
         if "v" in f.dofs:
             f.u.x.array[f.dofs["v"]] = [1.0 if i == 2 else 0.0 for i in system.scene.free_strains]
         f.u.x.array[f.copies[:, -1]] = load
@@ -97,18 +101,38 @@ class Equilibria:
         return x, outcome
 
     def first(self, load: float) -> tuple[PETSc.Vec, Outcome]:
-        """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill."""
+        """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill.
+
+        Also where Newton's method ends at an unstable one that is nowhere near the start.
+        """
         guess = self.start(load)
         self.system.set_phase(guess)
         x, outcome = self.at_load(guess, load)
-        if not outcome.converged:
-            for bent in (0.0, 0.4, 0.8):
-                x = self.start(load, bent)
-                self.system.set_phase(x)
-                outcome = relax(self.system, x, self.axis)
-                if outcome.converged:
-                    break
-        return x, outcome
+        if outcome.converged and (outcome.moved < STRAYED or self.is_stable(x)):
+            return x, outcome
+        other = self.downhill(load)
+        return other if other[1].converged else (x, outcome)
+
+    def downhill(self, load: float) -> tuple[PETSc.Vec, Outcome]:
+        """Equilibrium at ``load`` by going downhill from the scene's start, and from there bent a little.
+
+        From a symmetrical start the way down may end on a saddle: a stable state is preferred.
+        """
+        first: tuple[PETSc.Vec, Outcome] | None = None
+        for bent in (0.0, 0.4, 0.8):
+            x = self.start(load, bent)
+            self.system.set_phase(x)
+            outcome = relax(self.system, x, self.axis)
+            if outcome.converged and self.is_stable(x):
+                return x, outcome
+            if first is None or (outcome.converged and not first[1].converged):
+                first = x, outcome
+        assert first is not None
+        return first
+
+    def is_stable(self, x: PETSc.Vec) -> bool:
+        """Whether an equilibrium is stable, as far as is known without counting."""
+        return True
 
     def energy(self, x: PETSc.Vec) -> float:
         """Stored energy of the state ``x``."""
@@ -130,8 +154,15 @@ class Follower(Equilibria):
         self.corrector = Corrector(self.inertia)
         self.modes = spectrum
         self.spectrum = Spectrum(self.inertia) if spectrum else None
-        self.convexity = None if system.scene.is_quadratic() else Convexity(system)
-        self.space = InSpace(system) if system.scene.normal is not None else None
+        varies = not system.scene.is_quadratic() or system.scene.depends_on_s()
+        self.convexity = Convexity(system) if varies else None
+        self.space = (
+            None if system.scene.planar is None or system.scene.without_potential(in_space=True) else InSpace(system)
+        )
+
+    def is_stable(self, x: PETSc.Vec) -> bool:
+        """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
+        return self.inertia.count(x).negative == 0
 
     def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, Outcome]:
         """As for any equilibria, but with the symmetric factors where they serve."""
@@ -151,7 +182,7 @@ class Follower(Equilibria):
         """Evaluate all records of the equilibrium ``x``; its index is counted unless given."""
         system = self.system
         if index is None:
-            index = self.inertia.count(x)
+            index = decide(self.inertia, x).index
         return Point(
             x=x,
             tangent=tangent,
@@ -167,6 +198,7 @@ class Follower(Equilibria):
             error=outcome.error if outcome else 0.0,
             spectrum=self._leftmost(x, index),
             negative_in_space=None if self.space is None else self.space.count(x).negative,
+            mesh=self.mesh,
         )
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:
@@ -174,10 +206,11 @@ class Follower(Equilibria):
         if self.spectrum is None:
             return []
         modes = self.spectrum.leftmost(x, self.modes)
-        negative = modes.negative(self.inertia.tolerance / self.system.scene.length)
-        if negative != min(index.negative, self.modes) or not modes.certified:
+        tolerance = self.inertia.tolerance / self.system.scene.length
+        least, most = modes.negative(tolerance), modes.negative(-tolerance)
+        if not least <= min(index.negative, self.modes) <= most or not modes.certified:
             raise ConvergenceError(
-                f"SLEPc finds {negative} negative eigenvalues at "
+                f"SLEPc finds {least} negative eigenvalues at "
                 f"{self.system.scene.load} = {self.system.scalar(x):.8g}, the inertia "
                 f"{index.negative}: ask for more eigenvalues, or use a richer discretisation."
             )
@@ -204,6 +237,10 @@ class Follower(Equilibria):
             tangent = self.tangent(row, at=x)
             regular = self.corrector.regular
         return outcome, tangent, self.corrector.index(x) if regular else None
+
+    def damp(self, freedoms: int) -> None:
+        """Keep Newton's method from moving along families of equilibria at one load, where there are any."""
+        self.system.damping = self.inertia.tolerance if freedoms > 0 else 0.0
 
     def row(self, direction: PETSc.Vec) -> PETSc.Vec:
         """Row of the arclength equation for a direction: the metric times it, for a direction of unit size."""
@@ -235,12 +272,9 @@ class Follower(Equilibria):
         return tangent
 
 
-def _bend(q: np.ndarray, x: np.ndarray, size: float) -> np.ndarray:
-    """Quaternions (m, 4) turned by a smooth rotation vector that vanishes at both ends; ``x`` in [0, 1]."""
-    w = size * (np.outer(np.sin(np.pi * x), (0.6, 0.8, 0.3)) + np.outer(np.sin(2 * np.pi * x), (0.5, -0.4, 0.2)))
-    turned = Rotation.from_rotvec(w) * Rotation.from_quat(np.roll(q, -1, axis=1))
-    out = np.roll(turned.as_quat(), 1, axis=1)
-    return np.asarray(out * np.sign(np.sum(out * q, axis=1, keepdims=True)))
+def _bend(x: np.ndarray) -> np.ndarray:
+    """Smooth rotation vector of size about one that vanishes at both ends, (m, 3); ``x`` (m,) in [0, 1]."""
+    return np.outer(np.sin(np.pi * x), (0.6, 0.8, 0.3)) + np.outer(np.sin(2 * np.pi * x), (0.5, -0.4, 0.2))
 
 
 def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:

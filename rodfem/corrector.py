@@ -156,8 +156,9 @@ class Corrector:
             step = self._step
             step.axpy(-row.dot(step) / row.dot(self.tangent), self.tangent)
             x.axpy(-1.0, step)
-            size = max(system.norm(step), step.norm() / (1.0 + x.norm()))
-            if not isfinite(size) or size > reach:
+            distance = system.norm(step)
+            size = max(distance, step.norm() / (1.0 + x.norm()))
+            if not isfinite(size) or distance > reach:
                 break
             left = size if fresh else min(2.0 * size / previous, 1.0) * size
             if size < TOLERANCE or left < tolerance or (fresh and ROUND_OFF > size > 0.5 * previous):

@@ -21,14 +21,27 @@ from rodfem.branch import Branch, Special
 from rodfem.clock import Clock
 from rodfem.continuation import Equilibria
 from rodfem.errors import SceneError
+from rodfem.fields import Fields
+from rodfem.motion import Motions
 from rodfem.scene import Scene
 from rodfem.system import System
 
-COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error")
+COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error", "mesh")
 
 
-def as_data(branches: Sequence[Branch], system: System, clock: Clock, span: tuple[float, float]) -> dict[str, Any]:
-    """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene)."""
+def as_data(
+    branches: Sequence[Branch],
+    systems: Sequence[System],
+    clock: Clock,
+    span: tuple[float, float],
+    accuracy: float | None = None,
+) -> dict[str, Any]:
+    """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene).
+
+    ``systems`` are those of the meshes that the points name by their number; ``discretization`` is the one with most
+    unknowns, and ``meshes`` has all.
+    """
+    system = max(systems, key=lambda s: s.fields.unknowns)
     scene, d = system.scene, system.fields.discretization
     s = clock.seconds
     points = sum(len(b.points) for b in branches)
@@ -49,6 +62,8 @@ def as_data(branches: Sequence[Branch], system: System, clock: Clock, span: tupl
             "degree": d.degree,
             "unknowns": system.fields.unknowns,
         },
+        "accuracy": accuracy,
+        "meshes": [_mesh_data(s.fields) for s in systems],
         "branches": [_branch_data(b) for b in branches],
         "timing": {
             "assembly_s": s.get("assembly", 0.0),
@@ -71,8 +86,20 @@ def _clamped(scene: Scene) -> str:
     return {(True, True): "both", (True, False): "start", (False, True): "end"}.get((left, right), "none")
 
 
+def _mesh_data(fields: Fields) -> dict[str, Any]:
+    d = fields.discretization
+    return {
+        "elements": d.elements,
+        "degree": d.degree,
+        "unknowns": fields.unknowns,
+        "vertices": None if d.vertices is None else list(d.vertices),
+    }
+
+
 def _branch_data(branch: Branch) -> dict[str, Any]:
     columns: dict[str, list[Any]] = {name: [_plain(getattr(p, name)) for p in branch.points] for name in COLUMNS}
+    if any(np.isfinite(p.estimate) for p in branch.points):
+        columns["estimate"] = [_plain(p.estimate) for p in branch.points]
     if any(p.spectrum for p in branch.points):
         columns["spectrum"] = [p.spectrum for p in branch.points]
     if any(p.negative_in_space is not None for p in branch.points):
@@ -135,38 +162,55 @@ def load_json(path: Path) -> dict[str, Any]:
     return data
 
 
-def save_states(branch: Branch, follower: Equilibria, path: Path, first: bool) -> None:
+def save_states(branch: Branch, solvers: Sequence[Equilibria], path: Path, first: bool) -> None:
     """Append the states of a branch to an HDF5 file; collective, written on rank 0.
 
-    Group ``/branches/<name>`` has ``load`` (P,), ``r`` (P, m, 3), ``q`` (P, m, 4), every further field and scalar
-    with P rows, and the null vectors of its special points under ``special/<i>``.
+    Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
+    every further field and scalar with P rows, and under ``special/<i>`` the null vectors of its special points:
+    displacement ``r``, ``rotation`` in the space frame, and the change of ``q``.  ``solvers`` are those of the meshes
+    that points name; the rows of a mesh with fewer nodes end in nan.
     """
     import h5py
 
-    samples = [follower.shape.sample(p.x) for p in branch.points]
-    modes = [[follower.shape.sample(v) for v in s.null_vectors] for s in branch.special]
-    if follower.system.comm.rank:
+    samples = [solvers[p.mesh].shape.sample(p.x) for p in branch.points]
+    used = {s.point.mesh for s in branch.special}
+    motions = {i: Motions(solvers[i].system) for i in sorted(used)}
+    modes = [[motions[s.point.mesh].at(s.point.x, v) for v in s.null_vectors] for s in branch.special]
+    system = solvers[0].system
+    if system.comm.rank:
         return
-    d = follower.system.fields.discretization
     with h5py.File(path, "w" if first else "a") as file:
         file.attrs.update(
-            scene=follower.system.scene.name,
-            parameter=follower.system.scene.load,
-            formulation=d.formulation,
-            elements=d.elements,
-            degree=d.degree,
+            scene=system.scene.name,
+            parameter=system.scene.load,
+            formulation=system.fields.discretization.formulation,
         )
-        if first:
-            file["s"] = samples[0]["s"]
         group = file.create_group(f"branches/{branch.name}")
         for name in samples[0]:
-            if name not in ("s", "elements"):
-                group[name] = np.array([s[name] for s in samples])
+            group[name] = _stacked([np.asarray(s[name]) for s in samples])
         for i, vectors in enumerate(modes):
             for j, mode in enumerate(vectors):
                 target = group.create_group(f"special/{i}/null_vector_{j}")
-                for name in ("q", "r"):
-                    target[name] = mode[name]
+                target["r"], target["q"], target["rotation"] = mode.r, mode.q, mode.w
+
+
+def _stacked(rows: list[np.ndarray]) -> np.ndarray:
+    """Arrays of equal or different shapes as the rows of one, filled up with nan."""
+    shape = tuple(np.max([row.shape for row in rows], axis=0).astype(int))
+    if all(row.shape == shape for row in rows):
+        return np.array(rows)
+    out = np.full((len(rows), *shape), np.nan)
+    for place, row in zip(out, rows, strict=True):
+        place[tuple(map(slice, row.shape))] = row
+    return out
+
+
+def _trimmed(row: Any) -> Any:
+    """Array without the slices at the ends of its axes that hold nothing but nan."""
+    for axis in range(np.ndim(row)):
+        others = tuple(i for i in range(np.ndim(row)) if i != axis)
+        row = np.compress(~np.isnan(row).all(axis=others), row, axis=axis)
+    return row
 
 
 def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc.Vec:
@@ -184,8 +228,7 @@ def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc
                     f"{path} holds states of the {file.attrs['formulation']} formulation: choose that, not {wanted}."
                 )
             group = file[f"branches/{branch}"]
-            sample = {name: value[row] for name, value in group.items() if isinstance(value, h5py.Dataset)}
-            sample["s"], sample["elements"] = file["s"][:], int(file.attrs["elements"])
+            sample = {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
     except (OSError, KeyError, IndexError, ValueError) as trouble:
         if isinstance(trouble, SceneError):
             raise

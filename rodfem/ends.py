@@ -62,9 +62,9 @@ class End:
         ``follower(c)``, force on a free end by its components along the directors, with which it turns.  Not
         conservative.
     moment
-        ``moment(c)``, moment about axes fixed in space.  Not conservative, but where the end turns about one axis.
+        ``moment(c)``, moment about axes fixed in space.  Not conservative, but for a planar rod.
     follower_moment
-        ``follower_moment(c)``, moment by its components along the directors.  Not conservative.
+        ``follower_moment(c)``, moment by its components along the directors.  Not conservative, but for a planar rod.
     energy
         ``energy(x, c)``, potential energy of what else acts on the end: springs, a semi-tangential moment.
         Conservative.

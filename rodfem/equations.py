@@ -59,15 +59,16 @@ class Equations:
         along = self._along(f, c, v)
         W = scene.energy(v, along.k, c)
         L = (self._rod(f, c, W, along) + self._along_loads(f, c, along)) * dx
-        L += lagrangian.unit_norm(f.mu, f.q) * dx_nodes
+        if f.mu is not None:
+            L += lagrangian.unit_norm(f.mu, f.q) * dx_nodes
         for i, constraint in enumerate(x for x in scene.constraints if x.kind == "pointwise"):
             L += f.fields[f"p{i}"] * constraint.of(along, c) * (dx_nodes if constraint.continuous else dx)
         L += self._points(f)
 
-        a, b = self._named(ufl.split(test)), self._named(ufl.split(trial))
+        a, b = self._named(ufl.split(test), f.turned), self._named(ufl.split(trial), f.turned)
         first = ufl.derivative(L, u, test) - self._virtual_work(f, a, c, dx)
         second = ufl.derivative(first, u, trial)
-        metric = inertia.rotation_metric(a.q, b.q) / length
+        metric = (inertia.rotation_metric(a.q, b.q) if scene.normal is None else a.turned * b.turned) / length
         if f.r is not None:
             metric += ufl.dot(a.r, b.r) / length**3
         kinetic = inertia.rotary(f.q, a.q, b.q, tuple(scene.inertia.rho_I(c))) * dx
@@ -133,6 +134,11 @@ class Equations:
                 out += -sum(end.applied(c)[i] * x.r[i] for i in free if i != scene.normal) * ds
             if end.energy is not None:
                 out += end.energy(x, c) * ds
+            if scene.normal is not None:
+                moments = [
+                    moment(c)[scene.normal] for moment in (end.moment, end.follower_moment) if moment is not None
+                ]
+                out += sum(-moment * f.turned * ds for moment in moments)
             if end.turned is not None:
                 g = loads.misalignment(x.q, end.turned(c))
                 for i, direction in enumerate(across(end.hinge, scene.normal)):
@@ -152,15 +158,24 @@ class Equations:
         return out
 
     def _closure(self, f: Any, sign: float) -> Any:
-        """Both ends of a ring joined: ``q(l) = +-q(0)`` and, with a centreline, ``r(l) = r(0)``."""
+        """Both ends of a ring joined: ``q(l) = +-q(0)`` and, with a centreline, ``r(l) = r(0)``.
+
+        In a plane the angle grows by the whole number of turns that the scene's start makes.
+        """
 
         def closing(letter: str) -> list[tuple[str, Any]]:
             return [(name, x) for name, x in f.scalars.items() if name[0] == letter]
 
+        scene, turned = self.fields.scene, f.turned if f.turned.ufl_shape else ufl.as_vector([f.turned])
         out = 0
-        for s, weights in zip(self.fields.scene.interval, ((-sign, -1.0), (1.0, 1.0)), strict=True):
+        if scene.normal is not None:
+            first, last = self.fields.turning.start(scene.start, np.array(scene.interval), scene.interval)[:, 0]
+            whole = fem.Constant(self.fields.mesh, 2 * np.pi * np.round((last - first) / (2 * np.pi)))
+            sign = 1.0
+            out += -f.scalars["t1"] * whole * self.measures(scene.interval[1])[0]
+        for s, weights in zip(scene.interval, ((-sign, -1.0), (1.0, 1.0)), strict=True):
             ds = self.measures(s)[0]
-            out += weights[0] * sum(x * f.q[int(name[1]) - 1] for name, x in closing("t")) * ds
+            out += weights[0] * sum(x * turned[int(name[1]) - 1] for name, x in closing("t")) * ds
             if f.r is not None:
                 out += weights[1] * sum(x * f.r[int(name[1]) - 1] for name, x in closing("f")) * ds
         return out
@@ -191,6 +206,8 @@ class Equations:
             _, c, _, ds = self._at(f, s)
             if end.follower is not None:
                 work += loads.follower_work(rotation(f.q), end.follower(c), a.r) * ds
+            if scene.normal is not None:
+                continue
             if end.moment is not None:
                 work += loads.moment_work(f.q, end.moment(c), a.q) * ds
             if end.follower_moment is not None:
@@ -226,13 +243,20 @@ class Equations:
         self.base.value[:] = np.where(chosen, 0.0, values)
         self.direction.value[:] = chosen
 
-    def _named(self, parts: Any) -> SimpleNamespace:
-        """Fields and scalars of a mixed function by name; ``r`` and ``n`` are None where there are none."""
+    def _named(self, parts: Any, at: Any = None) -> SimpleNamespace:
+        """Fields and scalars of a mixed function by name; ``r`` and ``n`` are None where there are none.
+
+        ``turned`` is the field of the rotation, ``q`` the quaternion that it stands for; of a variation its change
+        where the field is ``at``.
+        """
         fields = {block.name: part for block, part in zip(self.fields.blocks, parts, strict=False)}
         values = self._components(parts[-1], len(self.fields.unknown_scalars) + 1)
         scalars = {x.name: value for x, value in zip(self.fields.unknown_scalars, values, strict=False)}
-        named = {name: fields.get(name) for name in ("q", "mu", "v", "r", "n")}
-        return SimpleNamespace(**named, fields=fields, scalars=scalars, load=values[-1])
+        named = {name: fields.get(name) for name in ("mu", "v", "r", "n")}
+        turning = self.fields.turning
+        turned = fields[turning.name]
+        q = turning.expression(turned) if at is None else turning.variation(at, turned)
+        return SimpleNamespace(**named, q=q, turned=turned, fields=fields, scalars=scalars, load=values[-1])
 
     @staticmethod
     def _components(part: Any, size: int) -> list[Any]:

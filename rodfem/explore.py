@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from math import isnan
 
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.accuracy import Richer, zero_stretch
-from rodfem.bifurcation import VERTICAL, directions, find_special, midpoint, start_branch
+from rodfem.accuracy import zero_stretch
+from rodfem.bifurcation import directions, find_special, midpoint, start_branch
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
-from rodfem.continuation import Follower, Steps, distance, follow, hermite
+from rodfem.continuation import VERTICAL, Follower, Steps, distance, follow, hermite
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError, SymmetryError
 from rodfem.locate import solve_at
+from rodfem.meshes import Meshes, TooCoarse, Watch, check_accuracy, end_of
 from rodfem.pitchfork import law_of
 from rodfem.report import Report
 from rodfem.scene import Scene
@@ -33,9 +35,12 @@ BEYOND = 0.02
 class Plan:
     """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars.
 
-    ``spectrum`` left-most eigenvalues of every state are found besides its index; ``tries`` deflated iterations at each
-    of the loads ``at`` look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
-    special point in the plane of the load and that parameter.
+    ``spectrum`` left-most eigenvalues of every state are found besides its index; at the loads ``at`` states are judged
+    by ``method`` (where one is named), and their ``modes`` left-most modes are found; ``tries`` deflated iterations at
+    each of these loads look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
+    special point in the plane of the load and that parameter.  With an ``accuracy`` meshes are chosen and raised on the
+    way such that every row's load and ordinate, and those of every special point, are in error by less than that
+    (relative to values greater than one).
     """
 
     span: tuple[float, float]
@@ -46,10 +51,20 @@ class Plan:
     spectrum: int = 0
     tries: int = 0
     locus: tuple[str, float, float] | None = None
+    method: str = ""
+    modes: int = 0
+    accuracy: float | None = None
 
     def check(self, scene: Scene) -> None:
         """Raise :class:`SceneError` for a range that the scene does not admit, or a load outside the range."""
         scene.check_span(self.span)
+        if self.accuracy is not None:
+            check_accuracy(self.accuracy)
+            if not scene.conservative:
+                raise SceneError(
+                    f"An accuracy is kept along branches of equilibria, and {scene.name} is swept for its frequencies: "
+                    "give elements and degree instead, and see the error printed beside each flutter load."
+                )
         low, high = sorted(self.span)
         for load in self.at:
             if not low <= load <= high:
@@ -76,6 +91,12 @@ class Plan:
             raise SceneError(f"{self.tries} is not a number of tries: give 0 or more to --search.")
         if self.tries and not self.at:
             raise SceneError("A search needs loads to search at: give them with --at.")
+        if self.modes < 0:
+            raise SceneError(f"{self.modes} is not a number of modes: give 0 or more to --modes.")
+        if (self.modes or self.method) and not self.at:
+            raise SceneError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at: give them with --at.")
+        if self.modes and self.method == "count":
+            raise SceneError("Counting alone finds no modes: leave out --modes, or name another --method.")
         if self.spectrum < 0:
             raise SceneError(f"{self.spectrum} is not a number of eigenvalues: give 0 or more to --spectrum.")
 
@@ -93,8 +114,13 @@ class Explorer:
         self.scene = follower.system.scene
         self.low, self.high = sorted(plan.span)
         self.branches: list[Branch] = []
-        self.richer: Richer | None = None
+        self.meshes = Meshes(follower, plan.accuracy)
         self.warned = False
+
+    @property
+    def solvers(self) -> Sequence[Follower]:
+        """Followers by the number of their mesh."""
+        return self.meshes.followers
 
     def run(self) -> list[Branch]:
         """Trace the start state's branch, then what leaves each branch point, breadth first."""
@@ -108,7 +134,9 @@ class Explorer:
         """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
         self.report.say()
         with self.follower.system.clock.purpose("search"):
-            known = states_at(self.follower, self.branches, load)
+            self._use(max(self.meshes.followers, key=lambda f: f.system.fields.unknowns).mesh)
+            here = [replace(b, points=[self._here(p) for p in b.points]) for b in self.branches]
+            known = states_at(self.follower, here, load)
             found = further(self.follower, load, known, self.plan.tries, report=self.report)
         before = len(self.branches)
         for i, point in enumerate(found):
@@ -135,6 +163,11 @@ class Explorer:
                 "load, give the scene a start nearer to one, or see whether constraints repeat each other or what an "
                 "end holds."
             )
+        if follower.convexity is not None and follower.convexity.lowest(x) <= 0:
+            raise SceneError(
+                f"The stored energy is not convex somewhere along the first state, at {self.scene.load} = {start:g}: "
+                "choose constants that make it so."
+            )
         follower.system.set_phase(x)
         point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
         if isinstance(self.scene.ends, Ring):
@@ -159,8 +192,18 @@ class Explorer:
         names = [words[u.group[0]].format(u.component + 1) for u in scalars]
         rank_of(Blocks(self.follower.system, "full").assemble(x), names)
 
+    def _use(self, mesh: int) -> None:
+        """Go on with the follower of that mesh."""
+        self.follower = self.meshes.followers[mesh]
+
+    def _here(self, point: Point) -> Point:
+        """Point on the mesh in use."""
+        return self.meshes.here(point, self.follower)
+
     def _switch(self, parent: Branch, i: int, special: Special) -> None:
         special.switched = True
+        self._use(special.point.mesh)
+        self.follower.damp(special.point.zero - self.follower.system.active_drifts() - special.multiplicity)
         try:
             ways = directions(self.follower, special)
         except ConvergenceError as trouble:
@@ -168,9 +211,11 @@ class Explorer:
             return
         before = len(self.branches)
         for direction in ways:
+            self._use(special.point.mesh)
             self._law(special, direction)
             first: Point | None = None
             for sign in (1.0, -1.0):
+                self._use(special.point.mesh)
                 way = direction.copy()
                 way.scale(sign)
                 name = self._name(parent)
@@ -216,7 +261,7 @@ class Explorer:
         a, b = branch.points[1], special.point
         for other in self.branches:
             for end in other.special:
-                if end.meets is not None and _equivalent(end.point, b, 1e-6):
+                if end.meets is not None and self._alike(end.point, b, 1e-6):
                     before = other.points[max(end.row - 2, 0) : end.row]
                     if any(_near(a, p) for p in before):
                         return True
@@ -226,6 +271,9 @@ class Explorer:
         """Follow a branch to its end, insert its special points, estimate errors, hand it on as finished."""
         self.branches.append(branch)
         self.report.branch(branch)
+        self._use(branch.points[-1].mesh)
+        self.watch = Watch(self.meshes, (self.low, self.high))
+        self.follower.damp(0)
         try:
             self._follow(branch)
         except ConvergenceError as trouble:
@@ -234,14 +282,44 @@ class Explorer:
         self._finish(branch)
 
     def _follow(self, branch: Branch) -> None:
-        self._first_users(branch)
-        history = list(branch.points)
+        """Follow a branch to its end; where its mesh is too coarse, from there on with another."""
+        history, begun = list(branch.points), False
+        while True:
+            try:
+                self.watch.row(history[-1], self.follower)
+                if not begun:
+                    self._first_users(branch)
+                    begun = True
+                self._advance(branch, history)
+                return
+            except TooCoarse as trouble:
+                history = self._remesh(branch, history, trouble)
+
+    def _remesh(self, branch: Branch, history: list[Point], trouble: TooCoarse) -> list[Point]:
+        """Carry the last points of a branch to a mesh that resolves what was too coarse, and drop what lies beyond."""
+        follower = self.watch.another(trouble)
+        if follower is not None:
+            with self.follower.system.clock.purpose("location"):
+                pairs = self.meshes.carry(history, follower, branch.parent is not None)
+            moved = {id(old): new for old, new in pairs}
+            branch.points = [moved.get(id(p), p) for p in branch.points]
+            history = [new for _, new in pairs]
+            self.follower = follower
+            self.report.mesh(follower.system, trouble.point.load, str(trouble))
+        last = history[-1].arclength
+        branch.points = [p for p in branch.points if p.arclength <= last]
+        branch.special = [s for s in branch.special if s.point.arclength <= last]
+        return history
+
+    def _advance(self, branch: Branch, history: list[Point]) -> None:
+        """Append points until the branch ends, which :attr:`Branch.ended` then says."""
         for item in follow(self.follower, history, self.plan.steps, (self.low, self.high)):
             if isinstance(item, str):
                 branch.ended = item
                 return
             previous = history[-1]
             self._check_symmetry(item)
+            self.watch.row(item, self.follower)
             self._check_zeros(history, item)
             if item.stretch <= 0:
                 self._end_at_zero_stretch(branch, previous, item)
@@ -269,6 +347,8 @@ class Explorer:
         specials = [] if a is branch.points[0] and branch.parent else self._special_between(a, b)
         pieces = [a, *(s.point for s in specials), b]
         users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
+        for special in specials + users:
+            self.watch.special(special)
         for special in sorted(specials + users, key=lambda s: s.point.arclength):
             if special.kind == BRANCH_POINT:
                 reason = self._meeting(branch, special)
@@ -316,8 +396,9 @@ class Explorer:
         """User points between the special point that a branch leaves and its first point, if they are on the branch."""
         if len(branch.points) != 2 or branch.parent is None:
             return
-        a, b = branch.points
+        a, b = map(self._here, branch.points)
         for special in self._users(branch, a, b, a, b):
+            self.watch.special(special)
             p, system = special.point, self.follower.system
             guess = hermite(a, b, p.arclength)[0]
             if distance(system, guess, p.x) < 0.5 * distance(system, a.x, p.x):  # not fallen back to the trunk
@@ -339,7 +420,7 @@ class Explorer:
             for i, known in enumerate(other.special):
                 if other is branch and special.point.arclength - known.point.arclength < 0.5:
                     continue  # a neighbour on this branch: a nearly double eigenvalue
-                if known.kind == BRANCH_POINT and _equivalent(known.point, special.point, 1e-6):
+                if known.kind == BRANCH_POINT and self._alike(known.point, special.point, 1e-6):
                     special.meets = (other.name, i)
                     special.switched = known.switched = True
                     if branch.parent == special.meets:
@@ -373,6 +454,8 @@ class Explorer:
                     special = zero_stretch(self.follower, last)
             except ConvergenceError as trouble:
                 special.note = f"no error estimate: {trouble}"
+            else:
+                self.watch.judge(special)
         branch.points.append(special.point)
         branch.special.append(special)
 
@@ -380,7 +463,7 @@ class Explorer:
         """Report a branch point on the very end of the range, located on a piece of the branch that goes past it."""
         parameter, load = self.scene.parameters[self.scene.load], last.load
         beyond = load + BEYOND * (load - sum(self.plan.span) / 2)
-        previous = branch.points[-2]
+        previous = self._here(branch.points[-2])
         if not parameter.admissible[0] < beyond < parameter.admissible[1] or previous.x is last.x:
             return
         try:
@@ -408,29 +491,39 @@ class Explorer:
             return False
         first = branch.points[1]
         if max(abs(a.slope), abs(b.slope)) < VERTICAL * (self.high - self.low):  # equal loads: compare the states
-            return distance(self.follower.system, b.x, branch.points[0].x) < b.arclength - a.arclength
+            return distance(self.follower.system, b.x, self._here(branch.points[0]).x) < b.arclength - a.arclength
         if (a.load - first.load) * (b.load - first.load) > 0 or not _near(first, a, 4) or a.slope * first.slope <= 0:
             return False
         s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
         point = self._user(hermite(a, b, s)[0], first.load, s, increasing=b.load > a.load)
-        return _equivalent(point, first, 1e-7)
+        return self._alike(point, first, 1e-7)
+
+    def _alike(self, a: Point, b: Point, tolerance: float) -> bool:
+        """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
+        across = 0.0 if a.mesh == b.mesh or self.plan.accuracy is None else 30 * self.plan.accuracy
+        return _equivalent(a, b, max(tolerance, across), across**0.5)
 
     def _check_symmetry(self, point: Point) -> None:
         if point.drift > 1e-6 * self.follower.inertia.scale:
+            self.watch.drifting(point)
             raise SymmetryError(
                 f"A symmetry of the scene is not one of its equations: the drift is {point.drift:.2g} at "
                 f"{self.scene.load} = {point.load:.6g} where it should vanish; use a richer discretisation."
             )
 
     def _check_zeros(self, history: list[Point], point: Point) -> None:
-        """Warn once where eigenvalues stay zero without a symmetry: the scene leaves the rod a freedom."""
+        """Say once where eigenvalues stay zero without a symmetry: the state is one of a family at the same load."""
         extra = point.zero - self.follower.system.active_drifts()
+        if abs(point.slope) < VERTICAL * (self.high - self.low):
+            extra -= 1  # the branch itself is such a family
         recent = history[-4:]
-        if extra > 0 and len(recent) == 4 and all(p.zero == point.zero for p in recent) and not self.warned:
+        stay = extra > 0 and len(recent) == 4 and all(p.zero == point.zero for p in recent)
+        self.follower.damp(extra if stay else 0)
+        if stay and not self.warned:
             self.warned = True
-            self.report.warn(
-                f"{extra} eigenvalue(s) stay zero that no symmetry of the scene explains: the rod may turn or move "
-                "freely; other eigenvalues that pass through zero may be missed: hold it."
+            self.report.say(
+                f"  {extra} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
+                "move freely at one and the same load"
             )
 
     def _finish(self, branch: Branch) -> None:
@@ -440,25 +533,27 @@ class Explorer:
             self._singular_end(branch, last)
             last = branch.points[-1]
         if not any(s.point is last for s in branch.special):
-            branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
+            branch.special.append(end_of(last))
             branch.renumber()
-        if self.plan.error_bars:
+        if self.plan.error_bars or self.plan.accuracy:
             self._error_bars(branch)
         self.report.finished(branch)
+        self.watch.summary(branch, self.report)
         self.finished()
 
     def _error_bars(self, branch: Branch) -> None:
         with self.follower.system.clock.purpose("error bars"):
-            if self.richer is None:
-                self.richer = Richer(self.follower)
             for special in branch.special:
-                self.richer.estimate(special)
+                if isnan(special.error_estimate):
+                    self.meshes.richer(special.point.mesh).estimate(special)
+                self.watch.label(special)
 
 
-def _equivalent(a: Point, b: Point, tolerance: float = 1e-8) -> bool:
+def _equivalent(a: Point, b: Point, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:
     """Whether two points agree in all that a symmetry leaves alone: load, energy and stretch."""
-    pairs = ((a.load, b.load), (a.energy, b.energy), (a.stretch, b.stretch))
-    return all(abs(p - q) <= tolerance * max(1.0, abs(p), abs(q)) for p, q in pairs)
+    strain = max(tolerance, of_strain)
+    pairs = ((a.load, b.load, tolerance), (a.energy, b.energy, tolerance), (a.stretch, b.stretch, strain))
+    return all(abs(p - q) <= allowed * max(1.0, abs(p), abs(q)) for p, q, allowed in pairs)
 
 
 def _near(a: Point, b: Point, steps: float = 2.0) -> bool:

@@ -9,6 +9,7 @@ no number at all: PETSc drops what is added to number -1, and no Dirichlet row e
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from rodfem.ends import Ring
 from rodfem.errors import SceneError
 from rodfem.places import needs_centreline
 from rodfem.scene import Scene
+from rodfem.turning import ByAngle, ByQuaternion, Turning
 
 FORMULATIONS = ("auto", "reduced", "pointwise")
 LOAD = "load"
@@ -41,12 +43,14 @@ class Discretization:
     """How a scene is discretised: ``formulation``, number of ``elements`` and polynomial ``degree``.
 
     ``reduced`` has no centreline, and the contact force as scalars; ``pointwise`` has all fields; ``auto`` is the first
-    where the scene allows it.
+    where the scene allows it.  ``vertices`` are the arclengths at which elements meet, both ends included; without
+    them all elements are of nearly equal size.
     """
 
     formulation: str = "auto"
     elements: int = 8
     degree: int = 6
+    vertices: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         """Check the values; raises :class:`SceneError`."""
@@ -56,6 +60,21 @@ class Discretization:
             raise SceneError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
         if not 1 <= self.degree <= 12:
             raise SceneError(f"Degree {self.degree} is not available: choose 1 to 12.")
+        if self.vertices is not None:
+            if len(self.vertices) != self.elements + 1:
+                raise SceneError(
+                    f"{len(self.vertices)} vertices do not bound {self.elements} elements: give {self.elements + 1}."
+                )
+            if not all(a < b for a, b in pairwise(self.vertices)):
+                raise SceneError("The vertices of a mesh must ascend along the rod: sort them, each once.")
+
+    def finer(self, factor: int, richer: int = 0) -> Discretization:
+        """Each element cut into ``factor`` equal ones, of a degree higher by ``richer``."""
+        vertices = self.vertices
+        if vertices is not None:
+            at = np.arange(factor * self.elements + 1) / factor
+            vertices = tuple(float(s) for s in np.interp(at, np.arange(self.elements + 1), vertices))
+        return replace(self, elements=factor * self.elements, degree=self.degree + richer, vertices=vertices)
 
 
 @dataclass(frozen=True)
@@ -68,10 +87,21 @@ class Unknown:
     multiplier: bool
 
 
+def turning_of(scene: Scene) -> Turning:
+    """How the rotation of a scene's rod is described."""
+    return ByQuaternion() if scene.normal is None else ByAngle(scene.normal)
+
+
 def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:
-    """Fields: ``q``, ``mu``, ``v`` where strains are free, ``r`` and ``n`` if pointwise, multipliers ``p0``.."""
+    """Fields: ``q`` and ``mu``, in a plane ``angle``; ``v`` where strains are free; ``r`` and ``n`` if pointwise.
+
+    Multipliers ``p0``.. belong to constraints that hold all along the rod.
+    """
     k = discretization.degree
-    blocks = [Block("q", 4, k, True, False), Block("mu", 1, k, True, True)]
+    turning = turning_of(scene)
+    blocks = [Block(turning.name, turning.size, k, True, False)]
+    if turning.name == "q":
+        blocks.append(Block("mu", 1, k, True, True))
     if scene.free_strains:
         blocks.append(Block("v", len(scene.free_strains), k - 1, False, False))
     if discretization.formulation == "pointwise":
@@ -103,9 +133,7 @@ def scalars_of(scene: Scene, discretization: Discretization) -> list[Unknown]:
     count = sum(x.kind != "pointwise" for x in scene.constraints)
     out += [Unknown(f"g{i + 1}", "g", i, True) for i in range(count)]
     if isinstance(scene.ends, Ring):
-        out += [
-            Unknown(f"t{i + 1}", "t", i, True) for i in (range(4) if scene.normal is None else (0, scene.normal + 1))
-        ]
+        out += [Unknown(f"t{i + 1}", "t", i, True) for i in range(turning_of(scene).size)]
         if discretization.formulation == "pointwise":
             out += [Unknown(f"f{i + 1}", "f", i, True) for i in inside]
     return out
@@ -157,6 +185,7 @@ class Fields:
                 f"The reduced formulation has no centreline, which {reason} needs: use --formulation pointwise."
             )
         self.scene, self.discretization, self.comm = scene, discretization, comm
+        self.turning = turning_of(scene)
         self.blocks = blocks_of(scene, discretization)
         self.unknown_scalars = scalars_of(scene, discretization)
         self.forces = [x.component for x in self.unknown_scalars if x.group == "n"]
@@ -173,9 +202,20 @@ class Fields:
         self._number(copies, names)
 
     def _mesh(self) -> Any:
-        """Mesh of elements of nearly equal size with boundaries at the scene's joints."""
-        scene, elements = self.scene, self.discretization.elements
+        """Mesh with the vertices that the discretisation gives, or of elements of nearly equal size; each at joints."""
+        scene, elements, given = self.scene, self.discretization.elements, self.discretization.vertices
         pieces = np.array([scene.interval[0], *scene.joints, scene.interval[1]])
+        mesh = compat.interval_mesh(self.comm, elements, *scene.interval)
+        uniform = np.linspace(*scene.interval, elements + 1)
+        if given is not None:
+            ends = (given[0], given[-1]) == tuple(scene.interval)
+            if not ends or any(abs(np.subtract(given, s)).min() > 1e-9 * scene.length for s in scene.joints):
+                raise SceneError(
+                    f"The vertices of the mesh must begin and end at {scene.interval[0]:g} and {scene.interval[1]:g} "
+                    "and hold every joint of the scene: add what is missing."
+                )
+            compat.move_vertices(mesh, uniform, np.array(given))
+            return mesh
         if elements < len(pieces) - 1:
             raise SceneError(
                 f"The rod has {len(pieces) - 1} pieces between joints, and needs an element for each: use more than "
@@ -188,11 +228,8 @@ class Fields:
         while counts.sum() < elements:
             counts[np.argmax(shares / counts)] += 1
         vertices = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
-        mesh = compat.interval_mesh(self.comm, elements, *scene.interval)
         if len(pieces) > 2:
-            compat.move_vertices(
-                mesh, np.linspace(*scene.interval, elements + 1), np.append(np.concatenate(vertices), pieces[-1])
-            )
+            compat.move_vertices(mesh, uniform, np.append(np.concatenate(vertices), pieces[-1]))
         return mesh
 
     def _block_dofs(self, part: int, size: int, cells: int) -> np.ndarray:
@@ -221,8 +258,8 @@ class Fields:
                         found.append(at_end.ravel())
                 elif end.fixed_rotation is not None:
                     found.append(at_end.ravel())
-                elif ring and block.name != "q" and s == self.scene.interval[1]:
-                    found.append(at_end.ravel())  # the norm of q(l) = +-q(0), or any other equation, is that of q(0)
+                elif ring and block.name == "mu" and s == self.scene.interval[1]:
+                    found.append(at_end.ravel())  # the norm of q(l) = +-q(0) is that of q(0)
         return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
 
     def out_of_plane(self) -> dict[str, np.ndarray]:
@@ -231,7 +268,6 @@ class Fields:
         if normal is None:
             return {}
         components = {
-            "q": [i + 1 for i in range(3) if i != normal],
             "r": [normal],
             "n": [normal],
             "v": [place for place, i in enumerate(self.scene.free_strains) if i == normal],
@@ -281,6 +317,10 @@ class Fields:
         b = np.array([q if q is not None else p or 0.0 for p, q in zip(left, right, strict=True)])
         return np.asarray((1 - x) * a + x * b)
 
+    def rotations(self) -> np.ndarray:
+        """Quaternions at the nodes of the state that ``u`` holds, (cells, nodes, 4)."""
+        return self.turning.quaternion(self.u.x.array[self.dofs[self.turning.name]])
+
     def coordinates(self, degree: int) -> np.ndarray:
         """Arclengths of the nodes of a field of that degree in each local cell, (cells, degree + 1)."""
         a, b = self.vertices[:, :1], self.vertices[:, 1:]
@@ -289,7 +329,7 @@ class Fields:
     def constraints(self) -> int:
         """Number of constraint equations: free multipliers, fields and scalars (drift scalars not counted)."""
         multipliers = [self.dofs[b.name].ravel() for b in self.blocks if b.multiplier]
-        mine = np.unique(np.concatenate(multipliers))
+        mine = np.unique(np.concatenate([np.array([], dtype=int), *multipliers]))
         owned = mine[(mine < self.space.dofmap.index_map.size_local) & (self.number[mine] >= 0)]
         return self.comm.allreduce(len(owned)) + sum(x.multiplier for x in self.unknown_scalars)
 
@@ -297,6 +337,7 @@ class Fields:
         """Fields and scalars in words, for the terminal."""
         names = {
             "q": "rotation q",
+            "angle": "angle of rotation",
             "mu": "unit-norm multiplier mu",
             "v": "strain v",
             "r": "centreline r",
@@ -324,7 +365,12 @@ class Fields:
         fixed = [i for i in range(3) if i not in scene.free_strains]
         lines = []
         if scene.normal is not None:
-            lines.append(f"rotations, displacement, force and strain out of the plane across {scene.planar}")
+            lines.append(
+                f"rotations, displacement, force and strain out of the plane across {scene.planar}: "
+                "one angle is left of the rotation"
+            )
+            if scene.conservative and (loads := scene.without_potential(in_space=True)):
+                lines.append(f"the index in space: no potential there has the {loads[0]}")
         if fixed:
             lines.append(f"strain {', '.join(f'v{i + 1}' for i in fixed)}: the rod is {scene.rod}")
         if self.discretization.formulation == "reduced":

@@ -7,7 +7,7 @@ smooth functions of arclength, are interpolated at spectral accuracy.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ from rodfem.branch import Point
 from rodfem.continuation import Follower, hermite
 from rodfem.errors import ConvergenceError
 from rodfem.newton import correct
-from rodfem.system import combine
+from rodfem.system import System, combine
 
 NODES = 6
 WINDOW = 0.02
@@ -63,12 +63,35 @@ def solve_beside(follower: Follower, curve: Curve, s: float, aside: float) -> tu
         return solve_at(follower, curve, s + aside), s + aside
 
 
-def eigenvalue(follower: Follower, x: PETSc.Vec, order: int) -> tuple[float, PETSc.Vec]:
-    """Eigenvalue number ``order`` (0 is the left-most) of the state ``x``, one of those near zero, and its vector."""
+def across(system: System, vectors: Sequence[PETSc.Vec], still: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
+    """Orthonormal vectors (in the metric) of what a space of ``vectors`` has beside the one that ``still`` spans."""
+    known, out = list(still), []
+    for vector in vectors:
+        rest = vector.copy()
+        for _ in range(2):
+            for k in known:
+                rest.axpy(-(system.metric * k).dot(rest), k)
+        if (size := system.norm(rest)) > 0.5 * system.norm(vector) or not still:
+            rest.scale(1.0 / size)
+            out.append(rest)
+            known.append(rest)
+    return out
+
+
+def eigenvalue(
+    follower: Follower, x: PETSc.Vec, order: int, still: Sequence[PETSc.Vec] = ()
+) -> tuple[float, PETSc.Vec]:
+    """Eigenvalue number ``order`` (0 is the left-most) of the state ``x``, one of those near zero, and its vector.
+
+    Eigenvalues of the vectors ``still``, zero on the whole branch, are not numbered.
+    """
     below = follower.inertia.count(x).negative
     position = order - below if order >= below else below - 1 - order
     for wanted in (position + 1, position + 3, position + 6, position + 12):
-        values, vectors = follower.inertia.nearest(wanted, accuracy=1e-4)
+        values, vectors = follower.inertia.nearest(wanted + len(still), accuracy=1e-4)
+        if still:
+            moving = [i for i, v in enumerate(vectors) if across(follower.system, [v], still)]
+            values, vectors = values[moving], [vectors[i] for i in moving]
         side = np.flatnonzero(
             values >= -follower.inertia.tolerance if order >= below else values < -follower.inertia.tolerance
         )
@@ -187,7 +210,9 @@ def _slopes(samples: list[Sample]) -> list[float]:
     return [(b.load - a.load) / (b.s - a.s), (z.load - y.load) / (z.s - y.s)]
 
 
-def locate(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -> Located:
+def locate(
+    follower: Follower, a: Point, b: Point, order: int, zero_of: str, still: Sequence[PETSc.Vec] = ()
+) -> Located:
     """Locate the zero of eigenvalue ``order`` (or of the load's slope) between two points of a branch."""
 
     def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
@@ -200,7 +225,7 @@ def locate(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -> 
         ends = a.arclength + 1e-3 * h, b.arclength - 1e-3 * h
 
         def mu(s: float) -> float:
-            return eigenvalue(follower, solve_beside(follower, curve, s, 1e-3 * h)[0], order)[0]
+            return eigenvalue(follower, solve_beside(follower, curve, s, 1e-3 * h)[0], order, still)[0]
 
         left, right = mu(ends[0]), mu(ends[1])
         if left * right > 0:
@@ -212,5 +237,5 @@ def locate(follower: Follower, a: Point, b: Point, order: int, zero_of: str) -> 
         follower.inertia.count(x)
         mode = follower.inertia.nearest(1, accuracy=1e-2)[1][0].copy()
     else:
-        mode = eigenvalue(follower, x, order)[1]
+        mode = eigenvalue(follower, x, order, still)[1]
     return refine(follower, curve, guess, min(WINDOW, 0.45 * h), mode, zero_of)

@@ -36,7 +36,7 @@ def correct(
 
     A Jacobian is factored first, and again only while corrections do not shrink tenfold from one to the next:
     near a solution the old factors cost one solve where new ones cost five.  Fails, leaving ``x`` where it got
-    to, after ``most`` iterations, at a singular matrix, or when ``x`` has moved further than ``reach``.
+    to, after ``most`` iterations, at a singular matrix, or when ``x`` has moved further than ``reach`` in the metric.
     """
     equations, step, origin = system.new_vector(), system.new_vector(), x.copy()
     previous, size, refactor = float("inf"), float("inf"), True
@@ -51,8 +51,9 @@ def correct(
         if not system.solve(equations, step):
             break
         x.axpy(-1.0, step)
-        size = max(system.norm(step), step.norm() / (1.0 + x.norm()))
-        if not isfinite(size) or size > reach:
+        distance = system.norm(step)
+        size = max(distance, step.norm() / (1.0 + x.norm()))
+        if not isfinite(size) or distance > reach:
             break
         if size < TOLERANCE or (fresh and ROUND_OFF > size > 0.5 * previous):
             origin.aypx(-1.0, x)

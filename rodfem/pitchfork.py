@@ -11,9 +11,8 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.bifurcation import VERTICAL
 from rodfem.branch import Law, Special
-from rodfem.continuation import Follower
+from rodfem.continuation import VERTICAL, Follower
 from rodfem.newton import correct
 
 AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)

@@ -109,7 +109,8 @@ def _read(states: Path, branch: str, row: int, count: int = 800) -> tuple[Floats
                 raise ValueError(f"{states} has no branch {branch!r}: try one of {sorted(branches)}")
             if not 0 <= row <= (last := len(branches[branch]["r"]) - 1):
                 raise ValueError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
-            s, load, r, q = (file["s"][:], *(branches[branch][key][row] for key in ("load", "r", "q")))
+            load, s, r, q = (branches[branch][key][row] for key in ("load", "s", "r", "q"))
+            s, r, q = (values[np.isfinite(s)] for values in (s, r, q))
             symbol = {"lam": "λ"}.get(file.attrs["parameter"], file.attrs["parameter"])
             caption = f"{file.attrs['scene']} rod, {branch}, {symbol} = {load:.4g}"
     except (KeyError, OSError) as error:

@@ -7,10 +7,13 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import TextIO
 
+import numpy as np
 from mpi4py import MPI
 
 from rodfem.branch import BRANCH_POINT, END, FLUTTER, FOLD, USER, Branch, Point, Special
 from rodfem.clock import Clock
+from rodfem.modes import Modes
+from rodfem.stability.judge import Verdict
 from rodfem.system import System
 
 LABELS = {FOLD: "LP", BRANCH_POINT: "BP", FLUTTER: "HB", USER: "UZ", END: "EP"}
@@ -33,6 +36,17 @@ def _index(special: Special) -> str:
     index = f"{before}->{after}" if before != after else f"{special.point.negative}"
     space = special.point.negative_in_space
     return index if space is None else f"{index} (in space {space})"
+
+
+def _mesh(system: System) -> str:
+    """Discretisation in words: elements, the smallest and the largest where they differ, degree, unknowns."""
+    d = system.fields.discretization
+    words = f"{d.elements} elements of degree {d.degree}"
+    if d.vertices is not None:
+        sizes = np.diff(d.vertices)
+        if sizes.max() > 1.1 * sizes.min():
+            words += f", {sizes.min():.2g} to {sizes.max():.2g} long"
+    return f"{words}, {system.fields.unknowns} unknowns"
 
 
 def _roots(point: Point) -> dict[str, str]:
@@ -67,20 +81,31 @@ class Report:
         """Say why the first run takes longer."""
         self.say("Compiling the forms for the first time (some seconds; kept in ~/.cache/fenics for later runs) ...")
 
-    def system(self, system: System) -> None:
-        """Say what is solved, with how many unknowns, and what was left out."""
+    def system(self, system: System, accuracy: float | None = None) -> None:
+        """Say what is solved, with how many unknowns, what was left out, and the accuracy asked for."""
         scene, f = system.scene, system.fields
         d = f.discretization
         self.say(
             f"{scene.title or scene.name}: {scene.rod} rod, {d.formulation} formulation, "
             f"{d.elements} elements of degree {d.degree}, {f.unknowns} unknowns"
         )
+        if accuracy is not None:
+            self.say(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
         if not scene.conservative:
             loads = ", ".join(scene.without_potential())
             self.say(f"  not conservative ({loads}): stability is a matter of frequencies, not of an index")
         for line in f.left_out():
             self.say(f"  left out: {line}")
+
+    def mesh(self, system: System, load: float, why: str) -> None:
+        """Say that a branch goes on with another mesh, and why."""
+        self.say(f"  from {system.scene.load} = {load:.6g} on {_mesh(system)} ({why})")
+
+    def accuracy(self, used: Sequence[System], worst: float, asked: float) -> None:
+        """Say with which meshes a branch was traced, and the error of the worst of its points."""
+        word = "" if worst <= asked else f", above the {asked:g} asked for"
+        self.say(f"  largest estimated error {worst:.0e}{word}; {'; '.join(_mesh(system) for system in used)}")
 
     def branch(self, branch: Branch) -> None:
         """Head a new branch."""
@@ -169,6 +194,31 @@ class Report:
             self.say(f"  {p.load:10.4f}  {words}".rstrip())
         if "torsion" not in widths:
             self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
+
+    def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:
+        """Print what a judgement says of one state, with its modes where they were found."""
+        unstable = "stable" if found.stable else f"unstable in {found.negative} direction{'s'[: found.negative != 1]}"
+        zero = f", {found.zero} zero" if found.zero else ""
+        self.say(f"  {name}, {load}: {unstable}{zero}")
+        motions = ("",) * len(found.values) if modes is None else modes.motion
+        errors = np.full(len(found.values), np.nan) if modes is None else modes.error
+        values, residuals = (found.values, found.errors) if modes is None else (modes.value, modes.residual)
+        for value, residual, error, motion in zip(values, residuals, errors, motions, strict=True):
+            doubt = f" ({error:.0e})" if isfinite(error) else ""
+            number = f"{value.real:.10g}" if value.imag == 0 else f"{complex(value):.9g}"
+            known = f"residual {residual:.0e}" if isfinite(residual) else ""
+            self.say(f"    mu = {number + doubt:<28} {known:<15} {motion}".rstrip())
+        proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
+        self.say(
+            f"    {found.method} ({found.reason}){proof}; {found.factorisations} factorisations, "
+            f"{1e3 * found.seconds:.1f} ms"
+        )
+        if found.band:
+            inside = ", ".join(f"{m:.3g} +- {u:.0e}" for m, u in zip(found.inside, found.uncertainty, strict=True))
+            self.say(
+                f"    inertia decides beyond {found.band:.1e} (in the metric of rotations)"
+                + (f"; inside: {inside}" if inside else "")
+            )
 
     def warn(self, sentence: str) -> None:
         """Say what went wrong without stopping."""

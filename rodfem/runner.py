@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from mpi4py import MPI
@@ -15,6 +17,7 @@ from rodfem.diagram import as_data, save_json, save_states
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.explore import Explorer, Plan
 from rodfem.fields import Discretization
+from rodfem.meshes import first_mesh
 from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.sweep import Sweep
@@ -52,58 +55,75 @@ def run(
 ) -> list[Branch]:
     """Explore a scene and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
-    By default 8 elements of degree 6, the scene's own span, and the folder ``results/<name>``.  Files are brought up to
-    date after every branch, so that an interrupted run loses no finished one.  Raises
+    By default 8 elements of degree 6 (few elements to start with where the plan has an accuracy), the scene's own span,
+    and the folder ``results/<name>``.  Files are brought up to date after every branch, so that an interrupted run loses
+    no finished one.  Raises
     :class:`~rodfem.errors.SceneError` for bad input, before any computation, and
     :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
     """
-    discretization, plan = discretization or Discretization(), plan or Plan(scene.span)
+    plan = plan or Plan(scene.span)
     output = output or Path("results") / scene.name
     if scene.conservative:
         compat.require_real_petsc()
     plan.check(scene)
+    discretization = discretization or Discretization()
+    if plan.accuracy is not None and discretization.vertices is None:
+        elements, degree = first_mesh(scene, plan.accuracy, comm)
+        discretization = replace(discretization, elements=elements, degree=degree)
     writable(output, comm)
     report, clock = Report(comm, quiet), Clock()
     with compat.announce_compilation(report.compiling):
         with clock("setup"):
             system = System(scene, discretization, comm, clock)
             follower = Follower(system, plan.spectrum) if scene.conservative else Equilibria(system)
-        report.system(system)
+        report.system(system, plan.accuracy)
+        if plan.method or plan.modes:
+            from rodfem.judging import check_method
+
+            check_method(follower, plan)
         explorer: Explorer | Sweep
         if isinstance(follower, Follower):
-            explorer = Explorer(follower, plan, report, lambda: _save(explorer, follower, clock, output))
+            explorer = Explorer(follower, plan, report, lambda: _save(explorer, clock, output))
         else:
-            explorer = Sweep(follower, plan, report, lambda: _save(explorer, follower, clock, output))
+            explorer = Sweep(follower, plan, report, lambda: _save(explorer, clock, output))
         branches = explorer.run()
-    _save_diagram(explorer, follower, clock, output)
+    _save_diagram(explorer, clock, output)
     report.table(branches, system)
     report.spectra(branches)
     report.frequencies(branches, scene.load)
     report.timing(clock, sum(len(b.points) for b in branches))
     report.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
+    if plan.method or plan.modes:
+        from rodfem.judging import judge_users
+
+        judge_users(branches, explorer.solvers, plan, output, report, figures)
     if plan.locus is not None:
-        _loci(branches, follower, plan, output, report, figures)
+        _loci(branches, explorer.solvers, plan, output, report, figures)
     if figures and comm.rank == 0:
         _draw(output, report)
     comm.barrier()
     return branches
 
 
-def _save(explorer: Explorer | Sweep, follower: Equilibria, clock: Clock, output: Path) -> None:
+def _save(explorer: Explorer | Sweep, clock: Clock, output: Path) -> None:
     with clock("files"):
-        _save_diagram(explorer, follower, clock, output)
-        save_states(explorer.branches[-1], follower, output / "states.h5", first=len(explorer.branches) == 1)
+        _save_diagram(explorer, clock, output)
+        save_states(explorer.branches[-1], explorer.solvers, output / "states.h5", first=len(explorer.branches) == 1)
 
 
-def _save_diagram(explorer: Explorer | Sweep, follower: Equilibria, clock: Clock, output: Path) -> None:
-    if follower.system.comm.rank == 0:
-        save_json(as_data(explorer.branches, follower.system, clock, explorer.plan.span), output / "diagram.json")
+def _save_diagram(explorer: Explorer | Sweep, clock: Clock, output: Path) -> None:
+    systems, plan = [solver.system for solver in explorer.solvers], explorer.plan
+    if systems[0].comm.rank == 0:
+        save_json(as_data(explorer.branches, systems, clock, plan.span, plan.accuracy), output / "diagram.json")
 
 
 def _loci(
-    branches: list[Branch], follower: Equilibria, plan: Plan, output: Path, report: Report, figures: bool
+    branches: list[Branch], solvers: Sequence[Equilibria], plan: Plan, output: Path, report: Report, figures: bool
 ) -> None:
-    """Follow all special points in the plane of two parameters; each into a file of its own, all into one picture."""
+    """Follow all special points in the plane of two parameters; each into a file of its own, all into one picture.
+
+    Each on the mesh on which it was found.
+    """
     from rodfem.loci.locus import locus
     from rodfem.plot_locus import draw_locus
 
@@ -116,17 +136,19 @@ def _loci(
         for special in branch.special:
             if special.kind not in (FOLD, BRANCH_POINT, FLUTTER) or special.meets is not None:
                 continue
+            if plan.accuracy is not None:
+                report.say("\nA locus stays on the mesh of its special point: its own estimate says how accurate it is")
             report.say(f"\nLocus of the {special.kind} of {branch.name} at {special.point.load:.8g}")
             try:
-                found = locus(follower, special, name, (load, (low, high)))
+                found = locus(solvers[special.point.mesh], special, name, (load, (low, high)))
             except (SceneError, ConvergenceError) as trouble:
                 report.warn(str(trouble))
                 continue
             report.say(found.text())
             saved.append(found.data())
-            if follower.system.comm.rank == 0:
+            if solvers[0].system.comm.rank == 0:
                 found.save(output / f"locus-{len(saved)}.json")
-    if saved and figures and follower.system.comm.rank == 0:
+    if saved and figures and solvers[0].system.comm.rank == 0:
         draw_locus(saved, output / "locus.png")
         report.say(f"Loci in {output}{os.sep}: locus-1.json ..., locus.png")
 

@@ -174,10 +174,10 @@ class Scene:
         return tuple(sorted(s for s in places if self.interval[0] + close < s < self.interval[1] - close))
 
     def samples(self) -> list[float]:
-        """Arclengths at which the material is checked: ends, middle, and both sides of all breaks."""
+        """Arclengths at which the material is checked: nine from end to end, and both sides of all breaks."""
         a, b = self.interval
         eps = 1e-6 * self.length
-        return sorted({a + eps, (a + b) / 2, b - eps, *(s + d for s in self.joints for d in (-eps, eps))})
+        return sorted({*np.linspace(a + eps, b - eps, 9).tolist(), *(s + d for s in self.joints for d in (-eps, eps))})
 
     def varying(self, load: str, span: tuple[float, float], **values: float) -> Scene:
         """Return the same scene with another parameter as its load, over ``span``, and other constants."""
@@ -197,11 +197,19 @@ class Scene:
         """Whether all loads have a potential, so that stability is a matter of the second variation alone."""
         return not self.without_potential()
 
-    def without_potential(self) -> list[str]:
-        """Loads that have no potential, in words."""
+    def in_space(self) -> Scene:
+        """Return the same rod, free to leave its plane."""
+        return replace(self, planar=None)
+
+    def without_potential(self, *, in_space: bool = False) -> list[str]:
+        """Loads that have no potential, in words; for a planar rod those that have none while it stays in its plane."""
         found = []
         for side, end in zip(("left", "right"), self.sides, strict=True):
-            kinds = {"follower force": end.follower, "moment": end.moment, "follower moment": end.follower_moment}
+            kinds = {"follower force": end.follower}
+            if (
+                self.planar is None or in_space
+            ):  # in a plane all moments are about its normal: their potential is -M times the angle
+                kinds |= {"moment": end.moment, "follower moment": end.follower_moment}
             found += [f"{kind} on the {side} end" for kind, load in kinds.items() if load is not None]
         if self.follower is not None:
             found.append("distributed follower force")

@@ -21,6 +21,12 @@ from rodfem.fields import LOAD
 from rodfem.system import System
 
 
+def spin(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+    """Infinitesimal rotation ``2 vec(dq conj(q)) / |q|^2`` in the space frame: (..., 4) -> (..., 3)."""
+    a, v, da, dv = q[..., :1], q[..., 1:], dq[..., :1], dq[..., 1:]
+    return np.asarray(2 * (a * dv - da * v + np.cross(v, dv)) / np.sum(q * q, axis=-1, keepdims=True))
+
+
 def directors(q: np.ndarray) -> np.ndarray:
     """Rotation matrices of quaternions (..., 4), scalar first, of any length: (..., 3, 3)."""
     flat = np.asarray(q).reshape(-1, 4)
@@ -130,8 +136,8 @@ class Shape:
             local["ends"] = np.einsum("g,cgi,c->ci", self.gauss.weights, slopes, self.size)
             local["inside"] = np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), slopes, self.size)
         out: dict[str, Any] = {"elements": f.discretization.elements}
-        order = np.argsort(all_cells := self._gather(local.pop("start")))
-        all_fields = {name: self._gather(values)[order] for name, values in local.items()}
+        order = np.argsort(all_cells := self.gather(local.pop("start")))
+        all_fields = {name: self.gather(values)[order] for name, values in local.items()}
         h = np.diff(np.append(all_cells[order], system.scene.interval[1]))
         out["s"] = self._unique(all_cells[order][:, None, None] + h[:, None, None] * self.nodes[None, :, None])[:, 0]
         for block in f.blocks:
@@ -143,6 +149,7 @@ class Shape:
             out["r"] = self._anchor(load, ends[-1]) + self._unique(ends[:-1, None, :] + all_fields["inside"])
         else:
             out["r"] = out["r"] + self.system.fields.lift(out["s"], load)
+        out["q"] = f.turning.quaternion(out[f.turning.name])
         for name in system.scalars:
             out[name] = system.scalar(x, name)
         return out
@@ -172,8 +179,8 @@ class Shape:
         slopes = self._slopes()
         pieces = np.einsum("g,cgi,c->ci", self.gauss.weights, slopes, self.size)
         starts, inside = self.start, np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), slopes, self.size)
-        order = np.argsort(self._gather(starts))
-        steps = self._gather(pieces)[order]
+        order = np.argsort(self.gather(starts))
+        steps = self.gather(pieces)[order]
         before = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
         c = system.scene.constants(load)
         left, right = ([None if p is None else float(p) for p in end.held(c)] for end in system.scene.sides)
@@ -184,7 +191,7 @@ class Shape:
                 f.u.x.array[f.copies[:, i]] = (a if unknown.group == "a" else b)[unknown.component]
         if self.reduced:
             return
-        first = np.searchsorted(self._gather(starts)[order], starts)
+        first = np.searchsorted(self.gather(starts)[order], starts)
         r = a + before[:-1][first][:, None, :] + inside
         s = starts[:, None] + self.size[:, None] * self.nodes
         x = (s - system.scene.interval[0])[..., None] / system.scene.length
@@ -219,7 +226,7 @@ class Shape:
         basis = compat.lagrange_basis(own, local.ravel())[:, np.argsort(compat.nodes(own))]
         return np.einsum("pn,pni->pi", basis, table[cell.ravel()]).reshape(*x.shape, block.size)
 
-    def _gather(self, values: np.ndarray) -> np.ndarray:
+    def gather(self, values: np.ndarray) -> np.ndarray:
         return values if self.system.comm.size == 1 else np.concatenate(self.system.comm.allgather(values))
 
     @staticmethod
@@ -231,7 +238,8 @@ class Shape:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""
         f = self.system.fields
         u = f.u.x.array
-        R = directors(self._q_at_gauss @ u[f.dofs["q"][self._cells]])
+        turned = self._q_at_gauss @ u[f.dofs[f.turning.name][self._cells]]
+        R = directors(f.turning.quaternion(turned))
         free = list(self.system.scene.free_strains)
         slopes = R @ self._held_strains
         if free:
@@ -255,7 +263,8 @@ class Shape:
         integral, value = self._probe_weights
         u = f.u.x.array
         parts = np.zeros((3, 4))
-        parts[0] = value.ravel() @ u[f.dofs["q"][self._cells]].reshape(-1, 4)
+        size = f.turning.size
+        parts[0, :size] = value.ravel() @ u[f.dofs[f.turning.name][self._cells]].reshape(-1, size)
         if self.reduced:
             slopes = self._slopes()
             parts[1, :3] = integral.ravel() @ slopes.reshape(-1, 3)
@@ -268,7 +277,8 @@ class Shape:
         r = parts[1, :3] + (
             self._anchor(load, parts[2, :3]) if self.reduced else self.system.fields.lift(np.array(s), load)
         )
-        return r, parts[0] / np.linalg.norm(parts[0])
+        q = f.turning.quaternion(parts[0, :size])
+        return r, q / np.linalg.norm(q)
 
     def _anchor(self, load: float, chord: np.ndarray) -> np.ndarray:
         """Position of the left end: where it is held, or else a chord back from where the right end is held."""

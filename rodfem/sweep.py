@@ -9,7 +9,7 @@ interpolation, at spectral accuracy and without ever solving at the double eigen
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -44,6 +44,11 @@ class Sweep:
         self.number = plan.spectrum or 6
         self.pairs: list[complex] = []
         self.branches: list[Branch] = []
+
+    @property
+    def solvers(self) -> Sequence[Equilibria]:
+        """The one solver, as the points' mesh number 0 names it."""
+        return [self.solver]
 
     def run(self) -> list[Branch]:
         """Sweep, locate flutter, estimate errors."""

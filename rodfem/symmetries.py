@@ -111,7 +111,10 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
     out = []
     sizes = {g: sum(x.group == g for x in fields.unknown_scalars) for g in vectors}
     for axis in AXES:
-        out += [Elementary("q", m(axis), (0.0,) * 4) for m in (left, right)]
+        if fields.scene.normal is None:
+            out += [Elementary("q", m(axis), (0.0,) * 4) for m in (left, right)]
+        elif axis == AXES[fields.scene.normal]:
+            out.append(Elementary("angle", ((0.0,),), (1.0,)))
         for target in sorted(vectors | ({"r", "n"} & blocks)):
             if target in ("ma", "mb") and sizes[target] == 2:
                 continue
@@ -227,6 +230,9 @@ def _random_state(fields: Fields, kept: np.ndarray, seed: int) -> None:
         if isinstance(scene.ends, Ring) and block.continuous:
             turns = np.pi * (1 if scene.ends.odd and block.name == "q" else 2)
             values = a * np.cos(turns * x[..., None]) + b * np.sin(3 * turns * x[..., None] + 6.0 * p)
+            if block.name == "angle":
+                first, last = fields.turning.start(scene.start, np.array(scene.interval), scene.interval)
+                values = values + (last - first) * x[..., None]
         if block.name == "v":
             values = 0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains]
         u[fields.dofs[block.name]] = values

@@ -43,6 +43,10 @@ class System:
         Symmetric matrix of the squared size of a change of state: rotations, centreline, and the load over its span.
     lu
         LU factors of the last Jacobian given to :meth:`factor`.
+    damping
+        Multiple of the metric added to every Jacobian.  Not zero where a state belongs to a family of equilibria at one
+        and the same load that no symmetry explains: the Jacobian is singular there, and Newton's method must not move
+        along the family.
     """
 
     def __init__(
@@ -54,7 +58,7 @@ class System:
         mesh: Any = None,
     ) -> None:
         """Compile the forms and allocate all matrices once; on a given mesh if there is one."""
-        self.scene, self.comm = scene, comm
+        self.scene, self.comm, self.damping = scene, comm, 0.0
         self.clock = clock or Clock()
         self.fields = Fields(scene, discretization, comm, mesh)
         self.equations = Equations(self.fields)
@@ -81,6 +85,7 @@ class System:
         self._residual_local = np.zeros(len(self.fields.u.x.array))
         self.metric = self._assemble_metric()
         self.phases: list[PETSc.Vec | None] = [None] * len(self.drifts)
+        self.broken: dict[int, np.ndarray] = {}
         self._phase_offset = [0.0] * len(self.drifts)
         self.lu = Factorizer("lu", comm, {8: 0})  # no scaling: a third of the time; Newton's method mends what it costs
 
@@ -88,7 +93,7 @@ class System:
         """Symmetries of the scene; found with few elements, which have the same ones, where there are many."""
         fields, equations = self.fields, self.equations
         if fields.unknowns > FEW:
-            few = replace(fields.discretization, elements=max(6, 2 * len(self.scene.joints) + 2))
+            few = replace(fields.discretization, elements=max(6, 2 * len(self.scene.joints) + 2), vertices=None)
             fields = Fields(self.scene, few, MPI.COMM_SELF)
             _set_clamps(fields)
             equations = Equations(fields)
@@ -198,7 +203,7 @@ class System:
 
     def factor(self, row: PETSc.Vec, damping: float = 0.0) -> None:
         """Assemble and factor the Jacobian at the state last brought, with ``damping`` times the metric added."""
-        matrix = self.jacobian(row)
+        matrix, damping = self.jacobian(row), damping or self.damping
         if damping:
             matrix.axpy(damping, self.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
             matrix.stateIncrease()
@@ -236,6 +241,7 @@ class System:
         """
         count = len(self.drifts)
         self.phases, self._phase_offset, self.kept = [None] * count, [0.0] * count, np.eye(count)
+        self.broken = {}
         if reference is None or count == 0:
             return
         generators = [self.generator(reference, i) for i in range(count)]
@@ -247,6 +253,7 @@ class System:
             if square >= SYMMETRIC_STATE**2:
                 phase = combine(images, weights / square**0.5)
                 self.phases[i], self._phase_offset[i] = phase, np.real(phase.dot(reference))
+                self.broken[self.drifts[i]] = weights / square**0.5
 
     def equivalent_directions(self, x: PETSc.Vec, direction: PETSc.Vec) -> list[PETSc.Vec]:
         """Directions into which the symmetries that the state ``x`` has itself carry a direction, to first order.
@@ -285,7 +292,8 @@ def _set_clamps(fields: Fields) -> None:
     x = fields.coordinates(fields.discretization.degree)
     for end, s in zip(scene.sides, scene.interval, strict=True):
         if end.fixed_rotation is not None:
-            u[fields.dofs["q"][np.isclose(x, s, rtol=0, atol=1e-9 * scene.length)]] = end.fixed_rotation
+            here = fields.dofs[fields.turning.name][np.isclose(x, s, rtol=0, atol=1e-9 * scene.length)]
+            u[here] = fields.turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)
 
 
 def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:

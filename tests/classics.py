@@ -126,6 +126,12 @@ def euler(supports: str) -> Scene:
     return column(supports, SUPPORTS[supports], (0.0, 45.0))
 
 
+def turning_in_plane() -> Scene:
+    """Pinned ends, in the plane across e2: the straight rod may turn about its axis, and buckles in the plane only."""
+    kept = (everywhere(lambda x, c: x.r[1], strain=False),)
+    return column("turning", SUPPORTS["pinned-pinned"], (0.0, 90.0), constraints=kept)
+
+
 def elastica(most: float) -> Scene:
     return column("elastica", SUPPORTS["clamped-free"], (0.0, most))
 
@@ -235,6 +241,21 @@ def lateral(planar: str | None = None) -> Scene:
 def planar_column() -> Scene:
     """Stiff about d2: what buckles in the plane is not what buckles first."""
     return column("planar", SUPPORTS["clamped-free"], (0.0, 12.0), constants={"B2": 2.0}, planar="e2")
+
+
+def rolled(kind: str) -> Scene:
+    """A moment on the end of a cantilever that stays in its plane, where every moment has a potential."""
+    ends = (clamped(), End(**{kind: lambda c: (0.0, c.P, 0.0)}))
+    return column("rolled", ends, (0.0, 8 * pi), planar="e2")
+
+
+def chain(planar: str | None) -> Scene:
+    """A heavy cable of length 1 between supports 0.8 apart, that bends ever more easily."""
+    return column(
+        "chain", (pinned(), pinned(lambda c: (0.0, 0.0, 0.8))), (1e-2, 1e-5), load="k", planar=planar,
+        constants={"k": 1e-2}, energy=lambda v, k, c: bending(k, (c.k, c.k, c.k)),
+        distributed=lambda c: (1.0, 0.0, 0.0), ordinate=Ordinate("sag", s=0.5, of=lambda r, q: r[0]),
+    )  # fmt: skip
 
 
 def softening() -> Scene:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from io import StringIO
 from math import pi
 
+import classics
 import numpy as np
 import pytest
 import rods
@@ -96,6 +97,16 @@ def test_hemitropic() -> None:
                 x = orbit.at(angle)
                 assert search.nearest_known(x) < 1e-9
                 assert force(follower, x) < 1e-9
+
+
+def test_ring_in_its_plane() -> None:
+    """Moved, turned, or run around along itself it is the same ring: a circle, and beyond 3 the pressed one."""
+    follower = Follower(System(classics.pressed_ring(), Discretization("auto", 12, 6)))
+    found = Deflation(follower, 4.0).run(10)
+    assert sorted(p.negative for p in found) == [0, 2]
+    circle, pressed = sorted(found, key=lambda p: -p.negative)
+    assert circle.energy == pytest.approx(np.pi, rel=1e-9)
+    assert (circle.zero, pressed.zero) == (3, 4)  # two translations, a rotation; and the shift, which a circle turns by
 
 
 def test_ruler() -> None:

@@ -204,6 +204,14 @@ def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
         ({"constraints": (at(-0.5, lambda x, c: x.r[0]),)}, "constraint at s = -0.5 is not on the rod"),
         ({"breaks": (2.0,)}, "break at s = 2 is not on the rod"),
         ({"planar": "e3"}, "planar across 'e3'"),
+        (
+            {"planar": "e2"} | held(right=free(force=lambda c: (0.0, c.F, 0.0))),
+            "force on the right end pushes the rod out",
+        ),
+        (
+            {"planar": "e2"} | held(right=End(moment=lambda c: (0.0, 1.0, c.F))),
+            "moment on the right end pushes the rod out",
+        ),
     ],
 )
 def test_mistakes(change: dict, words: str, capfd: pytest.CaptureFixture[str]) -> None:

@@ -25,7 +25,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isfinite
 
-import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation import Follower
@@ -118,8 +117,8 @@ class DeflatedNewton:
         system, f = self.system, self.system.fields
         drifts = [system.scalar(x, f"drift{i}") for i in range(len(system.drifts))]
         system.bring(x)
-        u, dofs = f.u.x.array, f.dofs["q"]
-        u[dofs] /= np.linalg.norm(u[dofs], axis=-1, keepdims=True)
+        u, dofs = f.u.x.array, f.dofs[f.turning.name]
+        u[dofs] = f.turning.normalised(u[dofs])
         system.take().copy(x)
         if system.has_scalars:
             for i, value in enumerate(drifts):

@@ -28,6 +28,7 @@ from rodfem.report import Report
 from rodfem.search.deflated import FLOW, MOST, DeflatedNewton
 from rodfem.search.guesses import turned_state
 from rodfem.search.mirror import mirrors
+from rodfem.symmetries import is_uniform_ring
 from rodfem.system import combine
 
 SAME = 1e-5
@@ -103,6 +104,8 @@ class Deflation(DeflatedNewton):
         self.mirrors = mirrors(self.system, self.start)
         self.bases: list[PETSc.Vec] = []
         self.found: list[Point] = []
+        self.energies: list[float] = []
+        self.slides = is_uniform_ring(scene)  # then states shifted along the rod are one, and known by their energy
         self.tally = Tally(f"{scene.load} = {load:.10g}", mirrors=[str(m) for m in self.mirrors])
         for point in known:
             self._deflate(point.x)
@@ -136,6 +139,7 @@ class Deflation(DeflatedNewton):
     def _deflate(self, x: PETSc.Vec) -> None:
         """Add a state and its images to what is known."""
         self.bases.append(x)
+        self.energies.append(self.follower.energy(x))
         for image in [x, *(mirror(self.system, x) for mirror in self.mirrors)]:
             if self.nearest_known(image) > SAME:
                 self.known.add(image)
@@ -154,6 +158,8 @@ class Deflation(DeflatedNewton):
             point = follower.point(x, 0.0, follower.load_tangent(x, True), outcome)
         except ConvergenceError:  # an index that cannot be counted
             return None, FAILED
+        if self.slides and any(abs(point.energy - e) <= 1e-6 * max(abs(e), 1e-12) for e in self.energies):
+            return None, KNOWN
         if point.drift > DRIFT * follower.inertia.scale or not point.stretch > 0:
             return None, INADMISSIBLE
         return point, NEW

@@ -24,10 +24,10 @@ def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[i
     dense = _waves(np.linspace(0.0, 1.0, 401), left, right)
     size = float(np.sqrt(np.mean(np.sum((dense @ weights) ** 2, axis=-1))))
     system.bring(base)
-    u, dofs = f.u.x.array, f.dofs["q"]
+    u, dofs = f.u.x.array, f.dofs[f.turning.name]
     held = f.number < 0
     clamped = u[held]
-    u[dofs] = _turned(u[dofs], waves @ weights * (amplitude / size))
+    u[dofs] = f.turning.turned(u[dofs], waves @ weights * (amplitude / size))
     out = system.take()
     u[held] = clamped
     return out
@@ -40,7 +40,7 @@ def _clamped(system: System) -> list[bool]:
     here = []
     for s in system.scene.interval:
         at_end = np.isclose(x, s, rtol=0, atol=1e-9 * system.scene.length)
-        here.append(bool((f.number[f.dofs["q"][at_end]] < 0).any()))
+        here.append(bool((f.number[f.dofs[f.turning.name][at_end]] < 0).any()))
     return [any(side) for side in zip(*system.comm.allgather(here), strict=True)]
 
 
@@ -53,11 +53,3 @@ def _waves(x: np.ndarray, left: bool, right: bool) -> np.ndarray:
     if left or right:
         return np.sin(np.pi * (k - 0.5) * (x if left else 1 - x))
     return np.where(k % 2, np.sin(2 * np.pi * ((k + 1) // 2) * x), np.cos(2 * np.pi * ((k + 1) // 2) * x))
-
-
-def _turned(q: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) times the rotations of rotation vectors (..., 3) in the body frame."""
-    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
-    w, u = np.cos(angle / 2), vector * np.sinc(angle / (2 * np.pi)) / 2
-    q0, p = q[..., :1], q[..., 1:]
-    return np.concatenate([q0 * w - np.sum(p * u, axis=-1, keepdims=True), q0 * u + w * p + np.cross(p, u)], axis=-1)

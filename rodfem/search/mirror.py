@@ -38,11 +38,12 @@ class Mirror:
         words = "diag(" + ", ".join(f"{s:+d}" for s in self.signs) + ")"
         return words + " and reversal of the rod" if self.reversal else words
 
-    def weights(self, field: str, components: tuple[int, ...]) -> np.ndarray:
-        """Signs of the components of a field, or of scalar contact forces (``n``)."""
+    def weights(self, field: str, components: tuple[int, ...], normal: int | None = None) -> np.ndarray:
+        """Signs of the components of a field, or of scalar contact forces (``n``); ``normal`` that of the plane."""
         s = np.array(self.signs, dtype=float)
         full = {
             "q": np.concatenate([[1.0], s.prod() * s]),
+            "angle": (s.prod() * s)[[normal or 0]],
             "mu": np.ones(1),
             "r": s,
             "v": -s if self.reversal else s,
@@ -61,7 +62,7 @@ class Mirror:
             values = u[f.dofs[block.name]]
             if self.reversal:
                 values = _reversed(system, values, block.degree)
-            values = values * self.weights(block.name, components)
+            values = values * self.weights(block.name, components, system.scene.normal)
             if block.name == "r" and self.reversal:
                 values = values - _misfit(system, values)
             u[f.dofs[block.name]] = values

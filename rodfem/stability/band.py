@@ -45,7 +45,10 @@ class Decision:
 
 
 def decide(inertia: Inertia, x: PETSc.Vec) -> Decision:
-    """Count at the state ``x``; eigenvalues within the band are decided by their Rayleigh quotients."""
+    """Count at the state ``x``; eigenvalues within the band are decided by their Rayleigh quotients.
+
+    Factorisations are those of the count alone, the last of which serves :meth:`~Inertia.nearest` here and afterwards.
+    """
     index = inertia.count(x)
     known = inertia.system.active_drifts()
     inside = index.zero - known
@@ -54,10 +57,8 @@ def decide(inertia: Inertia, x: PETSc.Vec) -> Decision:
         return Decision(index, inertia.tolerance, np.zeros(0), np.zeros(0))
     theta, vectors = inertia.nearest(inside + SPARE)
     nearest = np.argsort(abs(theta))[:inside]
-    theta = theta[nearest]
-    inertia.below(0.0)  # puts S itself into the matrix again
     doubt = np.array([max(quotient_error(inertia.matrix, vectors[i]), least) for i in nearest])
-    theta = np.array([vectors[i].dot(inertia.matrix * vectors[i]) for i in nearest])
+    theta = np.array([vectors[i].dot(inertia.matrix * vectors[i]) for i in nearest]) + inertia.shift
     negative = int((theta < -doubt).sum())
     zero = int((abs(theta) <= doubt).sum())
     return Decision(Index(index.negative + negative, zero + known), inertia.tolerance, theta, doubt)

@@ -106,7 +106,7 @@ class Blocks:
         for numbers, multiplier in ((primal, False), (dual, True)):
             scalars = [fields.scalars[x.name] for x in fields.unknown_scalars if x.multiplier == multiplier]
             numbers["scalars" if multiplier else "ends"] = np.array(scalars if system.has_scalars else [], dtype=int)
-        if coordinates != "full":
+        if coordinates != "full" and "mu" in dual:
             del dual["mu"]
         self.rows, self.columns = (np.sort(np.concatenate(list(d.values()))) for d in (primal, dual))
         self._numbers = primal | dual
@@ -130,8 +130,12 @@ class Blocks:
             else np.searchsorted(self.columns, n) + self._first_column
             for name, n in self._numbers.items()
         }
+        full = Pencil(K, C, M, None, where, self.place, symmetric)
         if self.coordinates == "full":
-            return Pencil(K, C, M, None, where, self.place, symmetric)
+            return full
+        if "angle" in where:  # a spin about the normal already
+            where["theta"] = where.pop("angle")
+            return full if self.coordinates == "tangent" or "v" not in where else self._compatible(full)
         T = self._tangent_map()
         spins = np.zeros(len(self.rows), dtype=bool)
         spins[self._quads[:, 1:].ravel()] = True
@@ -160,7 +164,7 @@ class Blocks:
     def _find_quaternions(self) -> None:
         """Positions in ``rows`` of the four components of each free quaternion (nodes, 4), and their local dofs."""
         f = self.system.fields
-        dofs = f.dofs["q"].reshape(-1, 4)
+        dofs = f.dofs["q"].reshape(-1, 4) if "q" in f.dofs else np.zeros((0, 4), dtype=int)
         first = f.number[dofs[:, 0]]
         mine = np.flatnonzero((first >= f.offset) & (first < f.offset + len(f.free_owned)))
         mine = mine[np.unique(first[mine], return_index=True)[1]]

@@ -12,21 +12,23 @@ PURE = 0.99
 KINDS = ("bending about d1", "bending about d2", "torsion")
 
 
-def shares(system: System, q: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
+def shares(system: System, turned: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
     """Shares of the rotations about the three directors in a mode, (3,), summing to one; collective.
 
-    ``q`` (cells, nodes, 4) are the nodal quaternions of the state, ``parts`` the real and the imaginary part of the
-    mode as values of this rank's unknowns.  The rotation is the spin ``w = 2 vec(conj(q) dq)`` at the nodes.
+    ``turned`` (cells, nodes, components) is the rotation field of the state, ``parts`` the real and the imaginary part
+    of the mode as values of this rank's unknowns.  The rotation is the spin ``w = 2 vec(conj(q) dq)`` at the nodes.
     """
     f = system.fields
     cells = slice(0, f.owned_cells)
     size = (f.vertices[cells, 1] - f.vertices[cells, 0])[:, None, None]
     square = np.zeros(3)
+    q = f.turning.quaternion(turned)
     vector = system.new_vector()
     for part in parts:
         vector.array[:] = part
         system.bring(vector)
-        dq = np.where(f.number[f.dofs["q"][cells]] < 0, 0.0, f.u.x.array[f.dofs["q"][cells]])
+        dofs = f.dofs[f.turning.name][cells]
+        dq = f.turning.change(turned[cells], np.where(f.number[dofs] < 0, 0.0, f.u.x.array[dofs]))
         scalar, v = q[cells][..., :1], q[cells][..., 1:]
         w = scalar * dq[..., 1:] - dq[..., :1] * v - np.cross(v, dq[..., 1:])
         square += (w**2 * size).sum(axis=(0, 1))

@@ -181,7 +181,7 @@ class Judge:
         except ConvergenceError:
             rank_of(self._pencil(x, "full"))
             raise
-        self._made += 2 + (len(found.inside) > 0)
+        self._made += 2
         return found
 
     # --- symmetric pencils -------------------------------------------------------------------------------------
@@ -333,7 +333,7 @@ class Judge:
             return pencil
         comm = self.system.comm
         images = []
-        for weighed in weighed_modes(self.system, modes, blocks.mass).values():
+        for _, weighed in weighed_modes(self.system, modes, blocks.mass).values():
             full = weighed.array_r[blocks.rows - self.system.fields.offset].copy()
             image = PETSc.Vec().createWithArray(full, comm=comm)
             if pencil.T is not None:

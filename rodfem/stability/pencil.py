@@ -11,7 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from rodfem.system import DENSE_ROWS, Factorizer, System, prefer_options
+from rodfem.system import DENSE_ROWS, Factorizer, System, combine, prefer_options
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
@@ -31,22 +31,34 @@ def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc
 
 
 def symmetry_modes(system: System, x: PETSc.Vec) -> dict[int, PETSc.Vec]:
-    """Generators at ``x`` of the symmetries that have a phase condition, by their drift scalar's global number."""
-    pairs = zip(system.drifts, system.phases, strict=True)
-    return {index: system.generator(x, i) for i, (index, phase) in enumerate(pairs) if phase is not None}
+    """Generators at ``x`` of the symmetries that it breaks, by the global number of their drift scalars."""
+    if not system.broken:
+        return {}
+    generators = [system.generator(x, i) for i in range(len(system.drifts))]
+    return {index: combine(generators, weights) for index, weights in system.broken.items()}
 
 
-def weighed_modes(system: System, modes: dict[int, PETSc.Vec], mass: PETSc.Mat) -> dict[int, PETSc.Vec]:
-    """``M g`` for each symmetry mode ``g``, scaled; where that is a motion without inertia, the metric's product."""
+def weighed_modes(
+    system: System, modes: dict[int, PETSc.Vec], mass: PETSc.Mat
+) -> dict[int, tuple[PETSc.Vec, PETSc.Vec]]:
+    """Basis ``g`` of the symmetry modes that is orthonormal in the mass, and ``M g``.
+
+    What moves nothing that has inertia is orthonormal in the metric instead, and comes with the metric's product.
+    """
+    given = list(modes.values())
+    images = [mass * mode for mode in given]
+    squares, turn = np.linalg.eigh(
+        np.array([[np.real(g.dot(m)) for m in images] for g in given]).reshape(len(given), len(given))
+    )
     out = {}
-    for index, mode in modes.items():
-        image = mass * mode
-        square = float(np.real(image.dot(mode)))
+    for index, square, weights in zip(modes, squares, turn.T, strict=True):
+        mode, image = combine(given, weights), combine(images, weights)
         if square < MASSLESS * mass.norm(PETSc.NormType.INFINITY) * system.norm(mode) ** 2:
             image = system.metric * mode
             square = float(np.real(image.dot(mode)))
+        mode.scale(1.0 / np.sqrt(square))
         image.scale(1.0 / np.sqrt(square))
-        out[index] = image
+        out[index] = mode, image
     return out
 
 
@@ -55,7 +67,7 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
 
     ``g`` being an eigenvector (of ``mu = 0``), what they leave of the spectrum is all the rest of it, unchanged.
     """
-    for index, image in weighed_modes(system, modes, mass).items():
+    for index, (_, image) in weighed_modes(system, modes, mass).items():
         begin, end = image.getOwnershipRange()
         own = np.arange(begin, end, dtype=PETSc.IntType)
         if system.has_scalars:

@@ -17,7 +17,7 @@ of the form ``(x, -i x)`` belong to the first kind.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from petsc4py import PETSc
@@ -47,12 +47,14 @@ EPS = float(np.finfo(float).eps)
 class Frequencies:
     """Eigenvalues ``mu = omega^2`` in ascending order of their real parts, and their backward errors.
 
-    ``kinds`` names the motion of each: see :mod:`rodfem.stability.character`.
+    ``kinds`` names the motion of each: see :mod:`rodfem.stability.character`.  ``vectors`` (n, k) are complex, with the
+    n unknowns of this rank.
     """
 
     values: np.ndarray
     errors: np.ndarray
     kinds: tuple[str, ...] = ()
+    vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
 
     def unstable(self, tolerance: float) -> int:
         """Number of eigenvalues with a negative real part or a non-zero imaginary part."""
@@ -75,13 +77,14 @@ class Vibration:
         """Allocate the matrices of the pencil once."""
         self.system = system
         self.matrix, self.mass = system.state_matrix(), system.state_matrix()
-        self.q = np.zeros((0, 0, 4))
+        self.turned = np.zeros((0, 0, 4))
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Assemble the pencil at the state ``x``."""
         with self.system.clock("assembly"):
             assemble_pencil(self.system, x, self.matrix, self.mass)
-            self.q = self.system.fields.u.x.array[self.system.fields.dofs["q"]]
+            f = self.system.fields
+            self.turned = f.u.x.array[f.dofs[f.turning.name]]
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
@@ -120,13 +123,27 @@ class Vibration:
             found = sorted(found, key=lambda p: abs(p.value - target))[: number + 2]
             third = abs(found[min(2, len(found) - 1)].value - target)
             found = [p for p in found if abs(p.value - target) <= FAR * third]
-            kinds = [character.name(character.shares(self.system, self.q, p.parts)) for p in found]
+            kinds = [character.name(character.shares(self.system, self.turned, p.parts)) for p in found]
         order = sorted(range(len(found)), key=lambda i: (round(found[i].value.real, 9), found[i].value.imag))
         return Frequencies(
             np.array([found[i].value for i in order]),
             np.array([found[i].error for i in order]),
             tuple(kinds[i] for i in order),
+            np.stack(
+                [found[i].parts[0] + 1j * (0.0 if len(found[i].parts) < 2 else found[i].parts[1]) for i in order], 1
+            ),
         )
+
+    def left(self, number: int, target: complex) -> Frequencies:
+        """Return the same of the transposed pencil: ``vectors`` are left ones, ``z.S = mu z.M`` without conjugation."""
+        kept = self.matrix
+        self.matrix = kept.copy()
+        self.matrix.transpose()
+        try:
+            return self.near(number, target)
+        finally:
+            self.matrix.destroy()
+            self.matrix = kept
 
     def _dense(self) -> list[_Pair]:
         """All finite eigenvalues of a pencil that is small enough for dense matrices, the same on all ranks."""

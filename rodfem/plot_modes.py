@@ -1,0 +1,221 @@
+"""Pictures and animations of modes, drawn from ``modes.h5`` alone: the equilibrium in grey, the moving rod over it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.animation import PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from rodfem.errors import SceneError
+from rodfem.modes import SYMMETRY, Modes, heading, load_modes
+from rodfem.plot import DPI, STYLE
+
+__all__ = ["draw_modes", "main"]
+
+Floats = NDArray[np.float64]
+PANEL, COLUMNS = (3.6, 2.3), 3  # inches
+LARGEST = 0.14, 0.9
+"""Drawn displacement over the rod's size, and rotation in radian, of which the one that is reached first holds."""
+POINTS, SIDES, SLENDER = (240, 100), (14, 10), 75.0
+"""Points along and around a tube, in a picture and in an animation; the rod's size over the tube's radius."""
+FRAMES, RATE, PERIODS, FAINTEST = 40, 16, 2.0, 0.06
+"""Of an animation: pictures, pictures a second, periods of an oscillation, amplitude at which a growing mode starts."""
+REST, UNSTABLE, STABLE, FREE = "#B4B4B4", "#D55E00", "#0072B2", "#009E73"
+
+
+def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence[int] = ()) -> Path:
+    """Draw the modes of one state, each in a panel of its own.
+
+    Parameters
+    ----------
+    path
+        The file ``modes.h5``.
+    branch, row
+        The state, as in ``states.h5``.
+    output
+        Picture to write; an animation where its suffix is .gif, in which unstable modes grow like ``exp(sqrt(-mu) t)``
+        and stable ones oscillate, each in a time of its own.
+    chosen
+        Numbers of the modes, from 1 on; all where none is given.
+
+    Returns
+    -------
+    output
+        The picture written; its folder is created where it is missing.
+
+    Raises
+    ------
+    SceneError
+        If the file has no such modes.
+    """
+    modes, output = load_modes(path, branch, row), Path(output)
+    count = len(modes.value)
+    for number in chosen:
+        if not 1 <= number <= count:
+            raise SceneError(f"There is no mode {number} of {branch!r}, row {row}: choose 1 to {count}.")
+    numbers = [n - 1 for n in chosen] or list(range(count))
+    columns = min(COLUMNS, len(numbers)) if len(numbers) != 4 else 2
+    rows = ceil(len(numbers) / columns)
+    moving = output.suffix.lower() == ".gif"
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with rc_context(STYLE | {"axes.grid": False}):
+        figure = Figure(figsize=(columns * PANEL[0], rows * PANEL[1] + 0.4), dpi=DPI // 2 if moving else DPI)
+        FigureCanvasAgg(figure)
+        figure.subplots_adjust(0.01, 0.01, 0.99, 1 - 0.75 / (rows * PANEL[1] + 0.4), 0.04, 0.28)
+        figure.suptitle(f"{heading(path)}{branch}, load {modes.load:.6g}", fontsize=11)
+        places = [figure.add_subplot(rows, columns, i + 1) for i in range(len(numbers))]
+        panels = [_Panel(axes, modes, n, moving) for axes, n in zip(places, numbers, strict=True)]
+        if not moving:
+            for panel in panels:
+                panel.draw(1.0)
+            figure.savefig(output)
+            return output
+        writer = PillowWriter(fps=RATE)
+        writer.setup(figure, str(output), figure.dpi)
+        for frame in range(FRAMES):
+            for panel in panels:
+                panel.draw(frame / (FRAMES - 1))
+            writer.grab_frame()
+        writer.finish()
+    return output
+
+
+class _Panel:
+    """One mode in its axes, seen across the plane in which most of it happens."""
+
+    def __init__(self, axes: Axes, modes: Modes, number: int, moving: bool) -> None:
+        self.axes, self.sides = axes, SIDES[moving]
+        self.shown: PolyCollection | None = None
+        s, mu = modes.s, complex(modes.value[number])
+        fine = np.linspace(s[0], s[-1], POINTS[moving])
+        turns = np.where(np.sum(modes.q[1:] * modes.q[:-1], axis=1) < 0, -1.0, 1.0)  # q and -q are the same rotation
+        q = modes.q * np.append(1.0, np.cumprod(turns))[:, None]
+        self.r = CubicSpline(s, modes.r)(fine)
+        self.frames = Rotation.from_quat(CubicSpline(s, q)(fine)[:, [1, 2, 3, 0]]).as_matrix()
+        u, w = (CubicSpline(s, part[number].astype(complex))(fine) for part in (modes.displacement, modes.rotation))
+        span = float(np.linalg.norm(np.ptp(self.r, axis=0)))
+        moved, turned = (float(np.linalg.norm(abs(part), axis=1).max()) for part in (u, w))
+        size = min(LARGEST[0] * span / max(moved, 1e-9 * span), LARGEST[1] / max(turned, 1e-9))
+        self.u, self.w, self.radius = size * u, size * w, min(span, s[-1] - s[0]) / SLENDER
+        self.root = np.sqrt(-mu)
+        zero = abs(mu) <= (modes.error[number] if np.isfinite(modes.error[number]) else 0.0)
+        self.free = modes.motion[number] == SYMMETRY or zero
+        self.color = FREE if self.free else UNSTABLE if self.root.real > 1e-9 * abs(self.root) else STABLE
+        self._title(modes, number, mu)
+        self._look()
+        self._tube(self.r, self.frames, REST, 0)
+        self._triad()
+        axes.set_xlim(*self.limits[0])
+        axes.set_ylim(*self.limits[1])
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+
+    def _title(self, modes: Modes, number: int, mu: complex) -> None:
+        kind, error = modes.motion[number], float(modes.error[number])
+        doubt = f" ({error:.0e})" if np.isfinite(error) else ""
+        value = f"{mu.real:.6g}" if mu.imag == 0 else f"{mu.real:.5g} {'+' if mu.imag > 0 else '-'} {abs(mu.imag):.5g}i"
+        what = {FREE: "zero", STABLE: "stable", UNSTABLE: "unstable" if mu.imag == 0 else "flutter"}[self.color]
+        self.axes.set_title(f"{number + 1}: $\\mu$ = {value}{doubt}\n{what}: {kind}", fontsize=9, color=self.color)
+
+    def _look(self) -> None:
+        """Axes of the picture: to the right along the rod, upwards along most of the rest, and the viewer's."""
+        span = np.ptp(self.r, axis=0).max()
+        moves = [k * part for part in (self.u.real, self.u.imag) for k in (-1.0, 1.0)]
+        points = np.concatenate([self.r + move for move in moves])
+        bias = span * np.array([3e-3, 2e-3, 1e-3])  # where all directions are alike
+        _, up, right = np.linalg.eigh(np.cov(points.T) + np.diag(bias**2))[1].T
+        right = right * np.sign(right @ (self.r[-1] - self.r[0] + bias))
+        up = up * np.sign(up @ (np.real(self.u)[np.argmax(np.linalg.norm(self.u, axis=1))] + 1e-3 * bias))
+        back = np.cross(right, up)
+        tilt = np.radians(20.0)
+        self.view = np.array([right, np.cos(tilt) * up - np.sin(tilt) * back, np.cos(tilt) * back + np.sin(tilt) * up])
+        seen = points @ self.view[:2].T
+        low, high = seen.min(axis=0) - 3 * self.radius, seen.max(axis=0) + 3 * self.radius
+        low[0] -= 0.2 * (high - low)[0]  # room for the triad
+        middle, half = (low + high) / 2, (high - low) / 2
+        half = np.maximum(
+            half, half[::-1] * np.array([PANEL[0], PANEL[1] - 0.6]) / np.array([PANEL[1] - 0.6, PANEL[0]])
+        )
+        self.limits = np.stack([middle - half, middle + half], axis=1)
+
+    def draw(self, time: float) -> None:
+        """Draw the rod at a time between 0 and 1, at which the amplitude is greatest."""
+        factor = self._amplitude(time)
+        u, w = np.real(self.u * factor), np.real(self.w * factor)
+        if self.shown is not None:
+            self.shown.remove()
+        self.shown = self._tube(self.r + u, Rotation.from_rotvec(w).as_matrix() @ self.frames, self.color, 1)
+
+    def _amplitude(self, time: float) -> complex:
+        """Growth, decay or oscillation in the mode's own time; 1 at the end."""
+        if self.free or self.color == STABLE:
+            return complex(np.cos(2 * np.pi * time))
+        most = np.log(1 / FAINTEST) / self.root.real
+        if self.root.imag:
+            most = min(most, PERIODS * 2 * np.pi / abs(self.root.imag))
+        return complex(np.exp(self.root * most * (time - 1)))
+
+    def _tube(self, centres: Floats, frames: Floats, color: str, order: int) -> PolyCollection:
+        """Tube with a stripe along d1: the facets that face the viewer, far ones first, lit from above."""
+        angles = np.linspace(0, 2 * np.pi, self.sides + 1) - np.pi / self.sides
+        normals = np.einsum("nik,ka->nai", frames[:, :, :2], np.array([np.cos(angles), np.sin(angles)]))
+        surface = (centres[:, None] + self.radius * normals) @ self.view.T
+        corners = np.stack([surface[:-1, :-1], surface[1:, :-1], surface[1:, 1:], surface[:-1, 1:]], axis=2)
+        across = np.cross(corners[:, :, 2] - corners[:, :, 0], corners[:, :, 1] - corners[:, :, 3])
+        across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-300)
+        base = np.tile(np.array(to_rgb(color)), (*across.shape[:2], 1))
+        base[:, 0] *= 0.35  # the stripe
+        light = 0.55 + 0.45 * np.clip(across @ np.array([-0.25, 0.75, 0.6]), 0, 1)
+        flat, shades = corners.reshape(-1, 4, 3), (base * light[..., None]).reshape(-1, 3)
+        near = np.argsort(flat[:, :, 2].mean(axis=1))
+        near = near[across.reshape(-1, 3)[near, 2] > 0]
+        shades = np.clip(shades[near], 0, 1)
+        drawn = PolyCollection(flat[near, :, :2], facecolors=shades, edgecolors=shades, linewidths=0.3, zorder=order)
+        self.axes.add_collection(drawn)
+        return drawn
+
+    def _triad(self) -> None:
+        """The directions e1, e2, e3, in the lower left corner."""
+        size = 0.07 * np.ptp(self.limits[0])
+        corner = self.limits[:, 0] + 1.6 * size
+        for i, axis in enumerate(self.view[:2].T):
+            tip = corner + size * axis
+            self.axes.plot(*np.stack([corner, tip], axis=1), color="0.45", lw=0.9, zorder=3)
+            if np.linalg.norm(axis) > 0.5:
+                self.axes.text(*(corner + 1.35 * size * axis), f"e{i + 1}", fontsize=6.5, color="0.35", ha="center",
+                               va="center", zorder=3)  # fmt: skip
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Draw the modes named on the command line; returns 0, or 2 after one sentence on standard error."""
+    parser = argparse.ArgumentParser(prog="python -m rodfem.plot_modes", description="Draw the modes of a state.")
+    parser.add_argument("modes", type=Path, help="modes.h5 of a run with --modes")
+    parser.add_argument("--branch", required=True, help="name of the branch")
+    parser.add_argument("--row", required=True, type=int, help="row of the state, as in states.h5")
+    parser.add_argument("--mode", type=int, nargs="+", default=[], help="numbers of modes, from 1 on (default all)")
+    parser.add_argument("--output", type=Path, default=Path("modes.png"), help=".png, .pdf, .svg; .gif: an animation")
+    options = parser.parse_args(arguments)
+    try:
+        print(draw_modes(options.modes, options.branch, options.row, options.output, options.mode))
+    except (SceneError, OSError, ValueError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,72 @@
+"""Right and left eigenvectors of a rod under loads without a potential, paired."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rodfem.errors import ConvergenceError
+from rodfem.stability.vibration import Vibration
+
+SAME = 1e-6
+"""A left and a right eigenvalue that differ by less than this, relative, are the same."""
+
+
+@dataclass(frozen=True)
+class BothSides:
+    """Eigenvalues nearest zero with imaginary part not negative, by real part (k,), their errors and motions.
+
+    ``right`` X and ``left`` Z (n, k), this rank's n unknowns: ``X^* M X = 1`` for each, ``X^t M X`` real and positive,
+    ``Z^t M X`` the unit matrix.  ``weighed`` is ``M Z``.
+    """
+
+    values: np.ndarray
+    errors: np.ndarray
+    kinds: tuple[str, ...]
+    right: np.ndarray
+    left: np.ndarray
+    weighed: np.ndarray
+
+
+def both_sides(vibration: Vibration, number: int) -> BothSides:
+    """Find ``number`` of them at the state last assembled; :class:`ConvergenceError` where the sides do not match."""
+    right, left = (find(2 * number + 2, 0.0) for find in (vibration.near, vibration.left))
+    upper = right.values.imag > -SAME * abs(right.values)  # one of each pair
+    nearest = [i for i in np.argsort(abs(right.values), kind="stable") if upper[i]][:number]
+    chosen = sorted(nearest, key=lambda i: right.values[i].real)
+    partners: list[int] = []
+    for value in right.values[chosen]:
+        distance = abs(left.values - value)
+        distance[partners] = np.inf
+        partners.append(int(np.argmin(distance)))
+        if distance[partners[-1]] > SAME * abs(value):
+            raise ConvergenceError(
+                f"The left mode of the eigenvalue {value:.6g} was not found: ask for fewer modes, or change the load."
+            )
+    comm = vibration.system.comm
+    X, Z = right.vectors[:, chosen], left.vectors[:, partners]
+    X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * weighed(vibration, X), axis=0)).real)
+    X = X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * weighed(vibration, X), axis=0))))
+    Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ weighed(vibration, X)).T)
+    return BothSides(
+        right.values[chosen],
+        right.errors[chosen],
+        tuple(right.kinds[i] for i in chosen),
+        X,
+        Z,
+        weighed(vibration, Z),
+    )
+
+
+def weighed(vibration: Vibration, vectors: np.ndarray) -> np.ndarray:
+    """``M X`` for complex vectors (n, k), with any PETSc."""
+    out = np.empty_like(vectors)
+    x = vibration.system.new_vector()
+    for i, column in enumerate(vectors.T):
+        parts = []
+        for part in (column.real, column.imag):
+            x.array[:] = part
+            parts.append((vibration.mass * x).array_r.real)
+        out[:, i] = parts[0] + 1j * parts[1]
+    return out

@@ -1,0 +1,126 @@
+"""How nodal unknowns stand for the rotation of a rod: a quaternion at each node, or one angle for a rod in a plane."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from forms.rotation import IDENTITY, turn, turn_change
+
+Start = Callable[[np.ndarray], np.ndarray] | None
+TWICE = 4 * np.pi
+"""Angle after which a quaternion comes back to itself."""
+
+
+@dataclass(frozen=True)
+class ByQuaternion:
+    """Four components of a quaternion ``q``, whose unit length is a constraint."""
+
+    name = "q"
+    size = 4
+
+    def expression(self, value: Any) -> Any:
+        """Quaternion of the field, as a UFL expression."""
+        return value
+
+    def variation(self, value: Any, change: Any) -> Any:
+        """Change of the quaternion with the field, as a UFL expression."""
+        return change
+
+    def quaternion(self, values: np.ndarray) -> np.ndarray:
+        """Quaternions (..., 4) of values of the field (..., size)."""
+        return values
+
+    def change(self, values: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Changes of quaternions (..., 4) of changes of the field (..., size)."""
+        return change
+
+    def functional(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Weights (..., 4) of changes of quaternions, of weights (..., size) of changes of the field."""
+        return weights
+
+    def turned(self, values: np.ndarray, vector: np.ndarray) -> np.ndarray:
+        """Values (..., size) turned by rotation vectors (..., 3) along the directors."""
+        size = np.linalg.norm(vector, axis=-1, keepdims=True)
+        w, u = np.cos(size / 2), vector * np.sinc(size / (2 * np.pi)) / 2
+        q0, p = values[..., :1], values[..., 1:]
+        scalar = q0 * w - np.sum(p * u, axis=-1, keepdims=True)
+        return np.concatenate([scalar, q0 * u + w * p + np.cross(p, u)], axis=-1)
+
+    def normalised(self, values: np.ndarray) -> np.ndarray:
+        """Values of unit quaternions."""
+        return np.asarray(values / np.linalg.norm(values, axis=-1, keepdims=True))
+
+    def start(self, start: Start, s: np.ndarray, interval: tuple[float, float]) -> np.ndarray:
+        """Values (m, size) at arclengths (m,) of a scene's start, a straight rod without one."""
+        return np.tile(IDENTITY, (s.size, 1)) if start is None else np.asarray(start(s), dtype=float)
+
+    def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
+        """Value (size,) at an end at ``s`` that is clamped with the given unit quaternion."""
+        return np.array(rotation)
+
+
+@dataclass(frozen=True)
+class ByAngle:
+    """The angle about the normal of the plane, e1 or e2 (``normal`` 0 or 1), from the undeformed state.
+
+    It is not confined to one turn: a quaternion tells angles apart up to ``4 pi``, and the number of turns beyond is
+    that of the scene's start.
+    """
+
+    normal: int
+    name = "angle"
+    size = 1
+
+    def expression(self, value: Any) -> Any:
+        """Quaternion of the field, as a UFL expression."""
+        return turn(value, self.normal)
+
+    def variation(self, value: Any, change: Any) -> Any:
+        """Change of the quaternion with the field, as a UFL expression."""
+        return turn_change(value, change, self.normal)
+
+    def quaternion(self, values: np.ndarray) -> np.ndarray:
+        """Quaternions (..., 4) of values of the field (..., size)."""
+        q = np.zeros((*values.shape[:-1], 4))
+        q[..., 0], q[..., self.normal + 1] = np.cos(values[..., 0] / 2), np.sin(values[..., 0] / 2)
+        return q
+
+    def change(self, values: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Changes of quaternions (..., 4) of changes of the field (..., size)."""
+        return self.quaternion(values + np.pi) * change / 2
+
+    def functional(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Weights (..., 4) of changes of quaternions, of weights (..., size) of changes of the field."""
+        return 4 * self.change(values, weights)
+
+    def turned(self, values: np.ndarray, vector: np.ndarray) -> np.ndarray:
+        """Values (..., size) turned by rotation vectors (..., 3), of which the component along the normal counts."""
+        return np.asarray(values + vector[..., [self.normal]])
+
+    def normalised(self, values: np.ndarray) -> np.ndarray:
+        """Values as they are."""
+        return values
+
+    def start(self, start: Start, s: np.ndarray, interval: tuple[float, float]) -> np.ndarray:
+        """Values (m, size) at arclengths (m,) of a scene's start, continuous along the rod from its left end."""
+        if start is None:
+            return np.zeros((s.size, 1))
+        every, place = np.unique(np.append(np.linspace(*interval, 1001), s), return_inverse=True)
+        angles = np.unwrap(self._angle(np.asarray(start(every), dtype=float)), period=TWICE)
+        return np.asarray(angles[place.ravel()[1001:], None])
+
+    def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
+        """Value (size,) at an end at ``s`` that is clamped with a unit quaternion: the one next to the start."""
+        angle = self._angle(np.array(rotation))
+        near = self.start(start, np.array([s]), interval)[0]
+        return np.asarray(angle + TWICE * np.round((near - angle) / TWICE))
+
+    def _angle(self, q: np.ndarray) -> np.ndarray:
+        return np.asarray(2 * np.arctan2(q[..., self.normal + 1], q[..., 0]))
+
+
+Turning = ByQuaternion | ByAngle
