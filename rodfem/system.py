@@ -74,6 +74,7 @@ class System:
         self._all = PETSc.LGMap().create(self._columns[True], comm=comm)
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
         self._equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
+        self._equation_numbers = number[self._equation_targets].astype(PETSc.IntType)
         self._pattern = bordered_pattern(self.fields)
         self.matrix = self.state_matrix(load=True)
         self.x_local = PETSc.Vec().createSeq(int((number >= 0).sum()), comm=PETSc.COMM_SELF)
@@ -109,7 +110,7 @@ class System:
 
     def scalar(self, x: PETSc.Vec, name: str = LOAD) -> float:
         """Value of a scalar unknown, the same on all ranks."""
-        value = float(np.real(x.getValue(self.scalars[name]))) if self.has_scalars else 0.0
+        value = float(x.getValue(self.scalars[name]).real) if self.has_scalars else 0.0
         return self.comm.bcast(value, root=self.comm.size - 1) if self.comm.size > 1 else value
 
     def set_load(self, x: PETSc.Vec, value: float) -> None:
@@ -127,7 +128,7 @@ class System:
     def norm(self, d: PETSc.Vec) -> float:
         """Size of a change of state in the metric."""
         self.metric.mult(d, self.workspace)
-        return float(max(np.real(self.workspace.dot(d)), 0.0)) ** 0.5
+        return float(max(self.workspace.dot(d).real, 0.0)) ** 0.5
 
     def bring(self, x: PETSc.Vec) -> None:
         """Put ``x`` into the dolfinx function on which the forms are assembled."""
@@ -152,8 +153,8 @@ class System:
             self._residual_local[:] = 0.0
             fem.assemble_vector(self._residual_local, self.equations.residual)
             out.set(0.0)
-            targets = self._equation_targets
-            out.setValues(self.fields.number[targets], self._residual_local[targets], addv=PETSc.InsertMode.ADD_VALUES)
+            values = self._residual_local[self._equation_targets]
+            out.setValues(self._equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)
             out.assemble()
             for i, (phase, index) in enumerate(zip(self.phases, self.drifts, strict=True)):
                 drift = self.scalar(x, f"drift{i}")
