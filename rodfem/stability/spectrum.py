@@ -31,6 +31,8 @@ HIT = 1e-8
 EXTRA = (2, 6, 14)
 """How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
 
+CONVERGED = 1e-7
+"""A pair with a greater backward error than this is none: the space broke down."""
 NOISE = 1e-6
 """Size of what is added to the modes of the state before, which may span an invariant space without the lowest one."""
 
@@ -147,7 +149,7 @@ class Spectrum:
         known = int((values < cut).sum())
         values, vectors = values[:number], vectors[:number]
         errors = self.backward_errors(values, vectors)
-        return Modes(values, vectors, errors, self.below(cut) == known)
+        return Modes(values, vectors, errors, self.below(cut) == known and errors.max() < CONVERGED)
 
     def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec]]:
         """Solve by SLEPc, for ``number`` eigenvalues or all there are."""
