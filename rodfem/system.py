@@ -34,6 +34,10 @@ SYMMETRIC_STATE = 1e-6
 """A generator smaller than this (in the metric) is zero: the state has the symmetry itself."""
 
 
+MESH = 10.0
+"""Times the mismatch of a mesh with the motion of a ring along itself, below which a generator is the mesh's error."""
+
+
 class System:
     """Residual, Jacobian and metric of a scene at a discretisation, and their borders.
 
@@ -246,14 +250,27 @@ class System:
             return
         generators = [self.generator(reference, i) for i in range(count)]
         images = [self.metric * g for g in generators]
-        gram = np.array([[np.real(g.dot(m)) for m in images] for g in generators])
-        squares, combinations = np.linalg.eigh(gram)
-        self.kept = combinations[:, squares < SYMMETRIC_STATE**2].T
-        for i, (square, weights) in enumerate(zip(squares, combinations.T, strict=True)):
-            if square >= SYMMETRIC_STATE**2:
-                phase = combine(images, weights / square**0.5)
-                self.phases[i], self._phase_offset[i] = phase, np.real(phase.dot(reference))
-                self.broken[self.drifts[i]] = weights / square**0.5
+        exact = [i for i, s in enumerate(self.symmetries) if not isinstance(s, Shift)]
+        gram = np.array([[np.real(generators[i].dot(images[j])) for j in exact] for i in exact])
+        squares, turn = np.linalg.eigh(gram.reshape(len(exact), len(exact)))
+        combinations, sizes = list((np.eye(count)[:, exact] @ turn).T), list(np.sqrt(np.maximum(squares, 0.0)))
+        least = [SYMMETRIC_STATE] * len(exact)
+        last = self.symmetries[-1]
+        if isinstance(last, Shift):  # what of the motion along itself the exact ones do not do as well
+            rest = np.eye(count)[-1]
+            for weights, size in zip(combinations, sizes, strict=True):
+                if size >= SYMMETRIC_STATE:
+                    rest = rest - weights / size**2 * np.real(combine(images, weights).dot(generators[-1]))
+            combinations.append(rest / np.linalg.norm(rest))
+            sizes.append(self.norm(combine(generators, combinations[-1])))
+            self.bring(reference)
+            least.append(max(MESH * last.mismatch(self.fields), SYMMETRIC_STATE))
+        broken = np.array(sizes) >= least
+        self.kept = np.array(combinations)[~broken]
+        for i in np.flatnonzero(broken):
+            phase = combine(images, combinations[i] / sizes[i])
+            self.phases[i], self._phase_offset[i] = phase, np.real(phase.dot(reference))
+            self.broken[self.drifts[i]] = combinations[i] / sizes[i]
 
     def equivalent_directions(self, x: PETSc.Vec, direction: PETSc.Vec) -> list[PETSc.Vec]:
         """Directions into which the symmetries that the state ``x`` has itself carry a direction, to first order.
