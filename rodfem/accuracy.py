@@ -94,7 +94,9 @@ class Richer:
             row = self.follower.row(self.transfer(point.tangent, state=False))
         self.system.set_phase(x)
         if not all(correct(self.system, x, row, reach=1.0).converged for _ in range(1 + sharp)):
-            raise ConvergenceError(f"the richer discretisation has no equilibrium near load {point.load:.8g}")
+            raise ConvergenceError(
+                f"the richer discretisation has no equilibrium near load {point.load:.8g}: use more elements"
+            )
         return x
 
     def _again(self, special: Special) -> tuple[float, float]:

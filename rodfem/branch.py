@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 
 from petsc4py import PETSc
 
-FOLD, BRANCH_POINT, FLUTTER, USER, END = "fold", "branch point", "flutter", "user", "end"
+FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
+FLUTTER, DIVERGENCE = "flutter", "divergence"
+"""Under loads without a potential: a pair of frequencies becomes complex; one becomes imaginary."""
 
 
 @dataclass

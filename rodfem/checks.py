@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +11,9 @@ import numpy as np
 import ufl
 
 from forms.kinematics import UNDEFORMED
-from forms.rotation import IDENTITY, rotation
-from rodfem.ends import End, Ring, check_vector
+from rodfem.ends import Attachment, Constraint, End, Ring, check_vector
 from rodfem.errors import SceneError
-from rodfem.places import NoCentreline, place
+from rodfem.functions import asked_for, asks_where, functions_of, functions_of_places
 
 if TYPE_CHECKING:
     from rodfem.scene import Scene
@@ -26,6 +25,15 @@ def check_kinds(scene: Scene) -> None:
         isinstance(scene.ends, (tuple, list)) and len(scene.ends) == 2 and all(isinstance(e, End) for e in scene.ends)
     ):
         raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
+    for what, given, kind, example in (
+        ("attachments", scene.attachments, Attachment, "(Attachment(0.5, force=...),)"),
+        ("constraints", scene.constraints, Constraint, "(at(1.0, lambda x, c: x.r[0]),)"),
+        ("breaks", scene.breaks, Real, "(0.5,)"),
+    ):
+        if not (isinstance(given, (tuple, list)) and all(isinstance(x, kind) for x in given)):
+            raise SceneError(f"The {what} are {given!r}: give a tuple of them, as in {what}={example}.")
+    if not isinstance(scene.parameters, Mapping):
+        raise SceneError(f"The parameters are {scene.parameters!r}: give a dictionary, as in {{'P': Parameter(0.0)}}.")
     for what, pair in (("interval", scene.interval), ("span", scene.span)):
         if not (isinstance(pair, Sequence) and len(pair) == 2 and all(isinstance(x, Real) for x in pair)):
             raise SceneError(f"The {what} is {pair!r}: give two numbers.")
@@ -46,39 +54,12 @@ def check_kinds(scene: Scene) -> None:
             raise SceneError(f"The {what} is no function of {count} argument(s): give {wanted}.") from None
 
 
-def functions_of(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], str]]:
-    """All functions of a scene that are given: what each is in words, the function, how it is called."""
-    along: list[tuple[str, Any, str]] = [
-        ("stored energy", scene.energy, "W(v, k, c)"),
-        ("start", scene.start, "start(s)"),
-        ("ordinate", scene.ordinate.of, "of(r, q)"),
-        ("distributed force", scene.distributed, "f(c)"),
-        ("distributed follower force", scene.follower, "f(c)"),
-        ("potential along the rod", scene.potential, "f(x, c)"),
-        ("mass per length", scene.inertia.rho_A, "f(c)"),
-        ("rotary inertia per length", scene.inertia.rho_I, "f(c)"),
-    ]
-    for side, end in zip(("left", "right"), scene.sides, strict=True):
-        of_constants = {"position of": end.position, "force on": end.force, "follower force on": end.follower}
-        of_constants |= {"moment on": end.moment, "follower moment on": end.follower_moment}
-        along += [(f"{what} the {side} end", f, "f(c)") for what, f in of_constants.items()]
-        along.append((f"energy of the {side} end", end.energy, "f(x, c)"))
-    for x in scene.attachments:
-        of_constants = {"force": x.force, "follower force": x.follower, "mass": x.mass, "inertia": x.rotary_inertia}
-        along += [(f"{what} of an attachment", f, "f(c)") for what, f in of_constants.items()]
-        along.append(("energy of an attachment", x.energy, "f(x, c)"))
-    along += [("constraint", x.of, "f(x, c)") for x in scene.constraints]
-    for what, function, wanted in along:
-        if function is not None:
-            yield what, function, wanted
-
-
 def check_shapes(scene: Scene) -> None:
     """Check that forces and moments are vectors, and energies and constraints scalars."""
     c = scene.constants()
     for what, function, wanted in functions_of(scene):
         if wanted.endswith("f(c)") and "position" not in what:
-            if "mass" in what:
+            if "mass" in what or "value" in what:
                 check_scalar(what, function(c))
             else:
                 check_vector(what, function(c), 3)
@@ -87,10 +68,17 @@ def check_shapes(scene: Scene) -> None:
 
 
 def check_plane(scene: Scene) -> None:
-    """Check that the forces on a planar rod are in its plane, and moments about the normal."""
+    """Check that the ends of a planar rod and the forces on it are in one plane, and moments about the normal."""
     normal = scene.normal
     if normal is None:
         return
+    for load in scene.span:
+        left, right = (end.held(scene.constants(load))[normal] for end in scene.sides)
+        if left is not None and right is not None and float(left) != float(right):
+            raise SceneError(
+                f"The ends are held at {float(left):g} and {float(right):g} along {scene.planar}, across which the rod "
+                "is planar: hold both at the same, or leave planar out."
+            )
     for what, function, wanted in functions_of(scene):
         if wanted != "f(c)" or not ("force" in what or "moment" in what):
             continue
@@ -104,18 +92,22 @@ def check_plane(scene: Scene) -> None:
                 )
 
 
-def functions_of_places(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], Any]]:
-    """Functions of a place, each with a place of the kind that it will be given: some rotation, strains, position."""
-    q = ufl.as_vector([0.5, 0.1, 0.7, 0.5])
-    R = rotation(q)
-    r, strains = ufl.as_vector([0.2, 0.3, 0.4]), (ufl.as_vector([0.01, 0.02, 1.01]), ufl.as_vector([0.1, 0.2, 0.3]))
-    point = place(q, R, scene.interval[0], r, length=scene.length)
-    rod = place(q, R, scene.interval[0], r, dr=ufl.dot(R, strains[0]), v=strains[0], k=strains[1], length=scene.length)
-    for what, function, wanted in functions_of(scene):
-        if wanted == "f(x, c)" and what != "constraint":
-            yield what, function, rod if "along" in what else point
-    for x in scene.constraints:
-        yield "constraint", getattr(x.of, "of", x.of), point if x.kind == "point" else rod
+def check_load(scene: Scene) -> None:
+    """Raise where nothing in the scene depends on its load, so that there is nothing to trace."""
+    if scene.load not in asked_for(scene):
+        raise SceneError(
+            f"Nothing in the scene depends on its load {scene.load!r}: use c.{scene.load} in an end, a load or the "
+            "energy, or choose another load."
+        )
+
+
+def check_ordinate(scene: Scene) -> None:
+    """Raise where the ordinate is no number, at some place where it need not be defined but of the right type."""
+    try:
+        scene.ordinate.of(np.array([0.2, 0.3, 0.4]), np.array([0.5, 0.1, 0.7, 0.5]))
+    except SceneError as trouble:
+        if isinstance(trouble.__cause__, (TypeError, LookupError, AttributeError, NameError)):
+            raise
 
 
 def check_scalar(what: str, value: Any) -> None:
@@ -183,6 +175,7 @@ def check_scene(scene: Scene) -> None:
     check_start(scene)
     check_convexity(scene)
     check_inertia(scene)
+    check_ordinate(scene)
 
 
 def check_convexity(scene: Scene) -> None:
@@ -250,17 +243,6 @@ def check_drift(scene: Scene) -> None:
                 f"The rod can drift away along e{i + 1}: hold that component of the position at one end at least, "
                 "or attach a spring."
             )
-
-
-def asks_where(function: Callable[..., Any], c: Any) -> bool:
-    """Whether a function of a place depends on where the rod is."""
-    q = ufl.as_vector([ufl.as_ufl(x) for x in IDENTITY])
-    strains = {"v": ufl.as_vector(UNDEFORMED), "k": ufl.as_vector([0.0, 0.0, 0.0]), "length": 1.0}
-    try:
-        function(place(q, rotation(q), 0.0, **strains), c)
-    except NoCentreline:
-        return True
-    return False
 
 
 def check_reach(scene: Scene) -> None:

@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rodfem.errors import ConvergenceError, EnvironmentTrouble, SceneError, SymmetryError
+from rodfem.errors import ConvergenceError, EnvironmentTrouble, SceneError
 
 NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
 
@@ -242,7 +242,7 @@ def main(
         if MPI.COMM_WORLD.rank == 0:
             sys.stderr.write(f"\ninterrupted; the branches that were finished are in {options.output}\n")
         sys.exit(130)
-    except (SceneError, EnvironmentTrouble, SymmetryError, ConvergenceError) as trouble:
+    except (SceneError, EnvironmentTrouble, ConvergenceError) as trouble:
         complain(str(trouble))
     except PETSc.Error as trouble:
         complain(f"PETSc gave up ({str(trouble).splitlines()[0]}): try other constants or another discretisation.")

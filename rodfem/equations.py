@@ -104,10 +104,17 @@ class Equations:
         return lagrangian.reduced(W, along.R, along.v, ufl.as_vector(force), ufl.as_vector(chord) / self.length)
 
     def _ends(self, f: Any, c: Any) -> list[list[Any]]:
-        """Positions of the ends in the reduced formulation: held, a scalar unknown, or None (known force there)."""
+        """Positions of the ends in the reduced formulation: held, a scalar unknown, or None (known force there).
+
+        Across the plane of a planar rod an end that nothing holds is where the plane is: at zero.
+        """
+        scene = self.fields.scene
         return [
-            [f.scalars.get(f"{letter}{i + 1}") if x is None else x for i, x in enumerate(end.held(c))]
-            for letter, end in zip("ab", self.fields.scene.sides, strict=True)
+            [
+                x if x is not None else f.scalars.get(f"{letter}{i + 1}", 0.0 if i == scene.normal else None)
+                for i, x in enumerate(end.held(c))
+            ]
+            for letter, end in zip("ab", scene.sides, strict=True)
         ]
 
     def _along_loads(self, f: Any, c: Any, along: Place) -> Any:

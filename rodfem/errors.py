@@ -11,9 +11,5 @@ class ConvergenceError(RuntimeError):
     """Newton's method found no equilibrium where one was needed; says at which load and what to try."""
 
 
-class SymmetryError(RuntimeError):
-    """A symmetry that a scene states is not one of its equations."""
-
-
 class EnvironmentTrouble(RuntimeError):
     """A missing or unfit installation (complex PETSc, no dolfinx, a locked form cache); says what to do."""

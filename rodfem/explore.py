@@ -16,7 +16,8 @@ from rodfem.bifurcation import directions, find_special, midpoint, start_branch
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
 from rodfem.continuation import VERTICAL, Follower, Steps, distance, follow, hermite
 from rodfem.ends import Ring
-from rodfem.errors import ConvergenceError, SceneError, SymmetryError
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.functions import asked_for
 from rodfem.locate import solve_at
 from rodfem.meshes import Meshes, TooCoarse, check_accuracy
 from rodfem.pitchfork import law_of
@@ -30,6 +31,9 @@ from rodfem.watch import Watch
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
+
+COLLAPSED = 1e-6
+"""A first state whose smallest stretch is below this is no rod."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,10 @@ class Plan:
             name, a, b = self.locus
             if name == scene.load or name not in scene.parameters:
                 others = ", ".join(n for n in scene.parameters if n != scene.load)
-                raise SceneError(f"{name!r} is no second parameter: choose one of {others}.")
+                choose = f"choose one of {others}" if others else "the scene has none beside its load, so add one"
+                raise SceneError(f"{name!r} is no second parameter: {choose}.")
+            if name not in asked_for(scene):
+                raise SceneError(f"Nothing in the scene depends on {name!r}: choose another parameter for the locus.")
             if not a <= scene.parameters[name].value <= b or a == b:
                 raise SceneError(
                     f"The interval of {name} from {a:g} to {b:g} does not hold its value "
@@ -175,6 +182,11 @@ class Explorer:
             )
         follower.system.set_phase(x)
         point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
+        if point.stretch < COLLAPSED:
+            raise SceneError(
+                f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
+                f"{start:g}: write the energy of stretch in v[2] - 1 (zero in the undeformed rod), or push less."
+            )
         if isinstance(self.scene.ends, Ring):
             number, Tw, Wr = link(follower.shape.sample(x))
             self.report.say(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
@@ -515,9 +527,10 @@ class Explorer:
     def _check_symmetry(self, point: Point) -> None:
         if point.drift > 1e-6 * self.follower.inertia.scale:
             self.watch.drifting(point)
-            raise SymmetryError(
-                f"A symmetry of the scene is not one of its equations: the drift is {point.drift:.2g} at "
-                f"{self.scene.load} = {point.load:.6g} where it should vanish; use a richer discretisation."
+            raise ConvergenceError(
+                f"The mesh does not resolve a symmetry of the scene any more: the drift is {point.drift:.2g} at "
+                f"{self.scene.load} = {point.load:.6g} where it should vanish; use more elements, or ask for an "
+                "accuracy."
             )
 
     def _check_zeros(self, history: list[Point], point: Point) -> None:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 from petsc4py import PETSc
-from scipy.optimize import brentq
 
 from rodfem.branch import Point
 from rodfem.continuation import Follower, hermite
@@ -210,6 +209,34 @@ def _slopes(samples: list[Sample]) -> list[float]:
     return [(b.load - a.load) / (b.s - a.s), (z.load - y.load) / (z.s - y.s)]
 
 
+def bracket(
+    follower: Follower, curve: Curve, ends: tuple[float, float], order: int, still: Sequence[PETSc.Vec]
+) -> float:
+    """Where on a piece of a branch eigenvalue ``order`` changes its sign, to a tenth of what is interpolated.
+
+    By bisection with counts: they know the number of an eigenvalue however many others lie nearer to zero.  The end
+    where it is negative is returned: on the other side it may have changed its number with positive ones that stay
+    near zero (torsion of a taut string, say).  Where the counts at both ends agree it is zero next to an end: the one
+    at which it is smaller.
+    """
+    low, high = ends
+    h = high - low
+
+    def passed(s: float) -> bool:
+        return follower.inertia.count(solve_beside(follower, curve, s, 1e-3 * h)[0]).negative > order
+
+    first = passed(low)
+    if first == passed(high):
+        left, right = (
+            eigenvalue(follower, solve_beside(follower, curve, s, 1e-3 * h)[0], order, still)[0] for s in ends
+        )
+        return low if abs(left) < abs(right) else high
+    while high - low > 0.1 * min(WINDOW, h):
+        middle = (low + high) / 2
+        low, high = (middle, high) if passed(middle) == first else (low, middle)
+    return low if first else high
+
+
 def locate(
     follower: Follower, a: Point, b: Point, order: int, zero_of: str, still: Sequence[PETSc.Vec] = ()
 ) -> Located:
@@ -222,16 +249,7 @@ def locate(
     if zero_of == "slope":
         guess = a.arclength + h * a.slope / (a.slope - b.slope)
     else:
-        ends = a.arclength + 1e-3 * h, b.arclength - 1e-3 * h
-
-        def mu(s: float) -> float:
-            return eigenvalue(follower, solve_beside(follower, curve, s, 1e-3 * h)[0], order, still)[0]
-
-        left, right = mu(ends[0]), mu(ends[1])
-        if left * right > 0:
-            guess = ends[0] if abs(left) < abs(right) else ends[1]
-        else:
-            guess = float(brentq(mu, *ends, xtol=0.1 * min(WINDOW, h)))
+        guess = bracket(follower, curve, (a.arclength + 1e-3 * h, b.arclength - 1e-3 * h), order, still)
     x, guess = solve_beside(follower, curve, guess, 1e-3 * h)
     if zero_of == "slope":
         follower.inertia.count(x)

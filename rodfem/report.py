@@ -4,26 +4,35 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from math import isfinite
+from math import ceil, floor, isfinite, log10
 from typing import TextIO
 
 import numpy as np
 from mpi4py import MPI
 
-from rodfem.branch import BRANCH_POINT, END, FLUTTER, FOLD, USER, Branch, Point, Special
+from rodfem.branch import BRANCH_POINT, DIVERGENCE, END, FLUTTER, FOLD, USER, Branch, Point, Special
 from rodfem.clock import Clock
 from rodfem.modes import Modes
 from rodfem.stability.judge import Verdict
 from rodfem.system import System
 
-LABELS = {FOLD: "LP", BRANCH_POINT: "BP", FLUTTER: "HB", USER: "UZ", END: "EP"}
+LABELS = {FOLD: "LP", BRANCH_POINT: "BP", FLUTTER: "HB", DIVERGENCE: "BP", USER: "UZ", END: "EP"}
 """AUTO's two-letter labels."""
 
 
+def rounded_up(error: float) -> float:
+    """Return an error with one digit, never smaller than it is (but for a thousandth of itself)."""
+    if not (isfinite(error) and error > 0):
+        return error
+    power = floor(log10(error))
+    return float(f"{ceil(error / 10.0**power - 1e-3)}e{power}")
+
+
 def number(value: float, error: float) -> str:
-    """Write a number with the digits that its error supports, and the error: ``0.3216501(2.1e-07)``."""
+    """Write a number with the digits that its error supports, and the error rounded up: ``0.3216501 (3e-07)``."""
     if not isfinite(error):
         return f"{value:.8g} (no estimate)"
+    error = rounded_up(error)
     digits = 0
     while 10.0 ** (-digits) > error and digits < 13:
         digits += 1
@@ -55,7 +64,7 @@ def _roots(point: Point) -> dict[str, str]:
     for value, kind in zip(point.omega2, point.motion, strict=True):
         w = complex(*value) ** 0.5
         if value[1] >= 0:
-            text = f"{w.real:.4f}" if value[1] == 0 and w.real else f"{abs(w.imag):.4f}i"
+            text = f"{w.real:.4f}" if value[0] >= 0 else f"{abs(w.imag):.4f}i"
             words.setdefault(kind, []).append(text if value[1] == 0 else f"{w.real:.4f}+-{abs(w.imag):.4f}i")
     return {kind: "  ".join(texts[:4]) + (" ..." if len(texts) > 4 else "") for kind, texts in words.items()}
 
@@ -105,7 +114,9 @@ class Report:
     def accuracy(self, used: Sequence[System], worst: float, asked: float) -> None:
         """Say with which meshes a branch was traced, and the error of the worst of its points."""
         word = "" if worst <= asked else f", above the {asked:g} asked for"
-        self.say(f"  largest estimated error {worst:.0e}{word}; {'; '.join(_mesh(system) for system in used)}")
+        self.say(
+            f"  largest estimated error {rounded_up(worst):.0e}{word}; {'; '.join(_mesh(system) for system in used)}"
+        )
 
     def branch(self, branch: Branch) -> None:
         """Head a new branch."""
@@ -204,7 +215,7 @@ class Report:
         errors = np.full(len(found.values), np.nan) if modes is None else modes.error
         values, residuals = (found.values, found.errors) if modes is None else (modes.value, modes.residual)
         for value, residual, error, motion in zip(values, residuals, errors, motions, strict=True):
-            doubt = f" ({error:.0e})" if isfinite(error) else ""
+            doubt = f" ({rounded_up(error):.0e})" if isfinite(error) else ""
             number = f"{value.real:.10g}" if value.imag == 0 else f"{complex(value):.9g}"
             known = f"residual {residual:.0e}" if isfinite(residual) else ""
             self.say(f"    mu = {number + doubt:<28} {known:<15} {motion}".rstrip())

@@ -21,6 +21,7 @@ from forms.kinematics import RODS, UNDEFORMED
 from rodfem.checks import check_kinds, check_scene
 from rodfem.ends import Attachment, Constants, Constraint, End, OfConstants, OfPlace, Ring, Vector
 from rodfem.errors import SceneError
+from rodfem.guard import guards_of
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,8 @@ class Parameter:
     def check(self, name: str, value: float) -> None:
         """Raise :class:`SceneError` unless ``value`` is a finite number inside the admissible interval."""
         low, high = self.admissible
+        if not low < high:
+            raise SceneError(f"No {name} is admissible between {low:g} and {high:g}: give the lower bound first.")
         if not isfinite(value):
             raise SceneError(f"{name} = {value:g} is not a finite number: give one.")
         if not low < value < high:
@@ -135,6 +138,8 @@ class Scene:
     def __post_init__(self) -> None:
         """Check all that can be checked before any computation; raises :class:`SceneError`."""
         check_kinds(self)
+        for field_name, value in guards_of(self).items():
+            object.__setattr__(self, field_name, value)
         named = {n: p if isinstance(p, Parameter) else Parameter(float(p)) for n, p in self.parameters.items()}
         object.__setattr__(self, "parameters", named)
         a, b = self.interval

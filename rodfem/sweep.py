@@ -1,10 +1,11 @@
-"""Frequencies against the load for a rod under loads without a potential, and the loads at which it flutters.
+"""Frequencies against the load for a rod under loads without a potential, and the loads at which they become unstable.
 
 At each load the equilibrium is solved for, and the left-most eigenvalues ``mu = omega^2`` of its pencil are
 found.  Where two real ones collide and become a complex pair, the square of half their difference ``D = ((mu1 -
 mu2)/2)^2`` passes through zero.  Unlike the eigenvalues, which have a square root there, ``D`` is a smooth
 function of the load: the discriminant of the pencil projected on the two of them.  Its zero is found by Chebyshev
-interpolation, at spectral accuracy and without ever solving at the double eigenvalue.
+interpolation, at spectral accuracy and without ever solving at the double eigenvalue.  Where a single real one
+passes through zero the rod diverges: the eigenvalue itself is smooth there.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.polynomial import chebyshev
 from petsc4py import PETSc
+from scipy.optimize import brentq, newton
 
 from rodfem.accuracy import Transfer
-from rodfem.branch import END, FLUTTER, USER, Branch, Point, Special
+from rodfem.branch import DIVERGENCE, END, FLUTTER, USER, Branch, Point, Special
 from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError
 from rodfem.explore import Plan
@@ -30,6 +32,8 @@ LOADS = 101
 """Number of loads at which a range is sampled."""
 SEEN = 0.5
 """A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
+SAME = 1e-9
+"""Loads that differ by less than this, relative to them, are one."""
 REAL = 1e-7
 """An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
 
@@ -86,13 +90,7 @@ class Sweep:
         return self.branches
 
     def _state(self, guess: PETSc.Vec, load: float) -> PETSc.Vec:
-        self.solver.system.set_phase(None)
-        x, outcome = self.solver.at_load(guess, load)
-        if not outcome.converged:
-            raise ConvergenceError(
-                f"No equilibrium at {self.solver.system.scene.load} = {load:g}: use a smaller range."
-            )
-        return x
+        return at_load(self.solver, guess, load)
 
     def _point(self, x: PETSc.Vec) -> Point:
         solver, system = self.solver, self.solver.system
@@ -138,9 +136,10 @@ class Sweep:
         return Frequencies(np.array(values), np.array(errors), kinds)
 
     def _between(self, branch: Branch, a: Point, b: Point, before: list[complex], after: list[complex]) -> None:
-        """Locate flutter between two loads, where the number of complex pairs changes."""
+        """Locate flutter between two loads, where the number of complex pairs changes; else divergence."""
         pairs = [before, after]
         if len(before) == len(after):
+            self._diverging(branch, a, b)
             return
         with self.solver.system.clock.purpose("location"):
             few, many = sorted(pairs, key=len)
@@ -165,6 +164,45 @@ class Sweep:
         branch.points.append(point)
         self._special(branch, special)
 
+    def _diverging(self, branch: Branch, a: Point, b: Point) -> None:
+        """Locate the loads between two at which a real eigenvalue passes through zero; equal ones are one point."""
+        pairs, loads = len(self.pairs), sorted((a.load, b.load))
+        first, last = (p.negative - 2 * pairs for p in (a, b))
+        with self.solver.system.clock.purpose("location"):
+            found: list[float] = []
+            for number in range(min(first, last), max(first, last)):
+
+                def mu(load: float, number: int = number) -> float:
+                    return self._real(a.x, load)[number]
+
+                try:
+                    load = float(brentq(mu, *loads, xtol=1e-12 * max(map(abs, loads))))
+                except (ConvergenceError, IndexError, ValueError):
+                    self.report.warn(
+                        f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
+                    )
+                    return
+                found.append(load)
+            groups: list[list[float]] = []
+            for load in sorted(found, reverse=b.load < a.load):
+                if groups and abs(load - groups[-1][0]) < SAME * max(1.0, abs(load)):
+                    groups[-1].append(load)
+                else:
+                    groups.append([load])
+            before, kept = a.negative, self.pairs
+            for group in groups:
+                point = self._point(self._state(a.x, group[0]))
+                after = before + (len(group) if last > first else -len(group))
+                branch.points.append(point)
+                located_to = 1e-11 * max(1.0, abs(point.load))
+                self._special(branch, Special(DIVERGENCE, point, before, after, located_to, omega2=0.0))
+                before = after
+            self.pairs = kept
+
+    def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
+        """Real eigenvalues at a load near the origin, in ascending order."""
+        return sorted(v.real for v in self._leftmost(self._state(guess, load)).values if v.imag == 0)
+
     def _special(self, branch: Branch, special: Special) -> None:
         branch.special.append(special)
         self.report.special(branch, special)
@@ -179,23 +217,47 @@ class Sweep:
             vibration, transfer = Vibration(richer.system), Transfer(system, richer.system)
             for s in branch.special:
                 floor = max(s.located_to, 1e-12 * max(1.0, abs(s.point.load)))
-                s.error_estimate = s.ordinate_error = floor
+                guess = transfer(s.point.x, state=True)
+                x = at_load(richer, guess, s.point.load)
+                s.ordinate_error = max(abs(richer.shape.ordinate(x) - s.point.ordinate), floor)
+                s.error_estimate = s.ordinate_error
                 if s.kind == FLUTTER:
-                    load, _, mu = self._richer_flutter(richer, vibration, transfer, s)
+                    load, _, mu = self._richer_flutter(richer, vibration, guess, s)
                     s.error_estimate = max(abs(load - s.point.load), floor)
                     s.omega2_error = max(abs(mu - s.omega2), 1e-12 * abs(mu))
+                elif s.kind == DIVERGENCE:
+                    s.error_estimate = max(abs(_zero(richer, vibration, x, s.point.load) - s.point.load), floor)
 
     @staticmethod
     def _richer_flutter(
-        richer: Equilibria, vibration: Vibration, transfer: Transfer, s: Special
+        richer: Equilibria, vibration: Vibration, guess: PETSc.Vec, s: Special
     ) -> tuple[float, float, float]:
         """Flutter load on the richer discretisation, its uncertainty, and the double eigenvalue."""
-        guess = transfer(s.point.x, state=True)
 
         def f(load: float, center: float) -> tuple[float, float]:
             return discriminant(richer, vibration, load, center, guess)
 
         return locate_flutter(f, s.point.load, 0.05 * abs(s.point.load), s.omega2)
+
+
+def at_load(solver: Equilibria, guess: PETSc.Vec, load: float) -> PETSc.Vec:
+    """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none."""
+    solver.system.set_phase(None)
+    x, outcome = solver.at_load(guess, load)
+    if not outcome.converged:
+        raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
+    return x
+
+
+def _zero(solver: Equilibria, vibration: Vibration, guess: PETSc.Vec, load: float) -> float:
+    """Load near ``load`` at which the eigenvalue nearest to the origin vanishes."""
+
+    def mu(load: float) -> float:
+        vibration.assemble(at_load(solver, guess, load))
+        values = vibration.near(2, 0.0).values
+        return float(values[np.argmin(abs(values))].real)
+
+    return float(newton(mu, load, x1=load + 1e-4 * max(1.0, abs(load)), tol=1e-12 * max(1.0, abs(load))))
 
 
 def discriminant(
@@ -205,11 +267,7 @@ def discriminant(
 
     ``guess`` is an equilibrium at a load nearby.
     """
-    solver.system.set_phase(None)
-    x, outcome = solver.at_load(guess, load)
-    if not outcome.converged:
-        raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g} while locating flutter.")
-    vibration.assemble(x)
+    vibration.assemble(at_load(solver, guess, load))
     found = vibration.near(4, 0.97 * center)
     values = found.values
     best: tuple[float, complex, complex] | None = None
