@@ -17,8 +17,9 @@ from forms.energy import hemitropic
 from rodfem.branch import BRANCH_POINT, USER
 from rodfem.continuation import Follower
 from rodfem.ends import clamped
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
 from rodfem.fields import Discretization
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Ordinate, Parameter, Scene
 from rodfem.sharing import many

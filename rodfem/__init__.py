@@ -41,7 +41,7 @@ that breaks one has a zero eigenvalue for it, which is counted as zero.
 
 Data flows, and imports go, one way: ``ends``, ``scene`` -> ``fields`` -> ``equations`` -> ``symmetries``, ``system``
 (the bordered saddle point) -> ``newton``, ``stability`` -> ``continuation`` -> ``locate``, ``bifurcation`` ->
-``accuracy`` -> ``explore``, ``sweep``, ``loci``, ``search``, ``mode_finder`` -> ``diagram``, ``runner`` -> ``cli``.
+``accuracy`` -> ``tracer``, ``explore``, ``sweep``, ``loci``, ``search``, ``mode_finder`` -> ``diagram``, ``runner`` -> ``cli``.
 ``plot``, ``plot_modes`` and ``render`` draw from saved files alone. The mathematics is in the package ``forms``.
 
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
@@ -64,7 +64,7 @@ _HOMES = {
     "Ordinate": "scene",
     "Inertia": "scene",
     "Discretization": "fields",
-    "Plan": "explore",
+    "Plan": "plan",
     "Steps": "continuation",
     "run": "runner",
     "many": "sharing",

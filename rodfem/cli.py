@@ -207,8 +207,8 @@ def main(
 
     try:
         from rodfem.continuation import Steps
-        from rodfem.explore import Plan
         from rodfem.fields import Discretization
+        from rodfem.plan import Plan
         from rodfem.runner import run
 
         if petsc:  # once more, for a PETSc that was running already

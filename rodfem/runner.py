@@ -14,9 +14,10 @@ from rodfem.clock import Clock
 from rodfem.continuation import Equilibria, Follower
 from rodfem.diagram import as_data, save_json, save_states
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.meshes import start_mesh
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.sweep import Sweep

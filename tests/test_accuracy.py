@@ -23,9 +23,10 @@ from rodfem.branch import BRANCH_POINT, FOLD, USER, Branch
 from rodfem.continuation import Follower
 from rodfem.diagram import load_state
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
 from rodfem.fields import Discretization, Fields
 from rodfem.meshes import start_mesh
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.runner import run
 from rodfem.scene import Scene

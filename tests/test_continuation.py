@@ -14,7 +14,8 @@ from rods import DEFAULT, explored, follower, specials, user_points
 from rodfem.continuation import Steps
 from rodfem.diagram import load_state, save_states
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
+from rodfem.plan import Plan
 from rodfem.report import Report
 
 HALF = DEFAULT[3]

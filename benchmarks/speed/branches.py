@@ -22,8 +22,9 @@ from rodfem.branch import Branch
 from rodfem.clock import Clock
 from rodfem.continuation import Equilibria, Follower
 from rodfem.errors import ConvergenceError
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
 from rodfem.fields import Discretization
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.sweep import Sweep
 from rodfem.system import System
