@@ -186,7 +186,7 @@ class Tracer:
         """User points between the special point that a branch leaves and its first point, if they are on the branch."""
         if len(branch.points) != 2 or branch.parent is None:
             return
-        a, b = map(self._here, branch.points)
+        a, b = map(self.here, branch.points)
         for special in self._users(branch, a, b, a, b):
             self.watch.special(special)
             p, system = special.point, self.follower.system
