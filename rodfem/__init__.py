@@ -41,8 +41,8 @@ that breaks one has a zero eigenvalue for it, which is counted as zero.
 
 Data flows, and imports go, one way: ``ends``, ``scene`` -> ``fields`` -> ``equations`` -> ``symmetries``, ``system``
 (the bordered saddle point) -> ``newton``, ``stability`` -> ``continuation`` -> ``locate``, ``bifurcation`` ->
-``accuracy`` -> ``tracer``, ``explore``, ``sweep``, ``loci``, ``search``, ``mode_finder`` -> ``diagram``, ``runner`` -> ``cli``.
-``plot``, ``plot_modes`` and ``render`` draw from saved files alone. The mathematics is in the package ``forms``.
+``accuracy`` -> ``tracer``, ``explore``, ``sweep``, ``loci``, ``search``, ``mode_finder`` -> ``diagram``, ``runner`` ->
+``cli``. ``plot``, ``plot_modes`` and ``render`` draw from saved files alone. The mathematics is in ``forms``.
 
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
 """
