@@ -21,12 +21,6 @@ from rodfem.fields import LOAD
 from rodfem.system import System
 
 
-def spin(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-    """Infinitesimal rotation ``2 vec(dq conj(q)) / |q|^2`` in the space frame: (..., 4) -> (..., 3)."""
-    a, v, da, dv = q[..., :1], q[..., 1:], dq[..., :1], dq[..., 1:]
-    return np.asarray(2 * (a * dv - da * v + np.cross(v, dv)) / np.sum(q * q, axis=-1, keepdims=True))
-
-
 def directors(q: np.ndarray) -> np.ndarray:
     """Rotation matrices of quaternions (..., 4), scalar first, of any length: (..., 3, 3)."""
     flat = np.asarray(q).reshape(-1, 4)
