@@ -28,6 +28,9 @@ ROUND_OFF = 1e-12
 SHARP = 1e-11
 """Uncertainty of a load, for the given mesh, at which a special point needs no sharper interpolation."""
 
+NARROWER = 6
+"""How many times a bracket is narrowed until the eigenvalue that crosses is found among those nearest to zero."""
+
 Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
 
 
@@ -209,10 +212,35 @@ def _slopes(samples: list[Sample]) -> list[float]:
     return [(b.load - a.load) / (b.s - a.s), (z.load - y.load) / (z.s - y.s)]
 
 
-def bracket(
+def crossing_mode(
     follower: Follower, curve: Curve, ends: tuple[float, float], order: int, still: Sequence[PETSc.Vec]
+) -> tuple[float, PETSc.Vec]:
+    """Where on a piece of a branch eigenvalue ``order`` changes its sign, nearly, and its vector there.
+
+    To a tenth of what is interpolated, or so near that it is among the eigenvalues nearest to zero.
+    """
+    width = 0.1 * min(WINDOW, ends[1] - ends[0])
+    for _ in range(NARROWER):
+        x, s = solve_beside(follower, curve, bracket(follower, curve, ends, order, still, width), 1e-3 * width)
+        try:
+            return s, eigenvalue(follower, x, order, still)[1]
+        except ConvergenceError:
+            width /= 16
+    raise ConvergenceError(
+        f"Eigenvalue number {order} is not among those nearest zero near load {follower.system.scalar(x):.8g}; use "
+        "smaller steps (--step)."
+    )
+
+
+def bracket(
+    follower: Follower,
+    curve: Curve,
+    ends: tuple[float, float],
+    order: int,
+    still: Sequence[PETSc.Vec],
+    width: float,
 ) -> float:
-    """Where on a piece of a branch eigenvalue ``order`` changes its sign, to a tenth of what is interpolated.
+    """Where on a piece of a branch eigenvalue ``order`` changes its sign, to ``width``.
 
     By bisection with counts: they know the number of an eigenvalue however many others lie nearer to zero.  The end
     where it is negative is returned: on the other side it may have changed its number with positive ones that stay
@@ -231,7 +259,7 @@ def bracket(
             eigenvalue(follower, solve_beside(follower, curve, s, 1e-3 * h)[0], order, still)[0] for s in ends
         )
         return low if abs(left) < abs(right) else high
-    while high - low > 0.1 * min(WINDOW, h):
+    while high - low > width:
         middle = (low + high) / 2
         low, high = (middle, high) if passed(middle) == first else (low, middle)
     return low if first else high
@@ -247,13 +275,10 @@ def locate(
 
     h = b.arclength - a.arclength
     if zero_of == "slope":
-        guess = a.arclength + h * a.slope / (a.slope - b.slope)
-    else:
-        guess = bracket(follower, curve, (a.arclength + 1e-3 * h, b.arclength - 1e-3 * h), order, still)
-    x, guess = solve_beside(follower, curve, guess, 1e-3 * h)
-    if zero_of == "slope":
+        x, guess = solve_beside(follower, curve, a.arclength + h * a.slope / (a.slope - b.slope), 1e-3 * h)
         follower.inertia.count(x)
         mode = follower.inertia.nearest(1, accuracy=1e-2)[1][0].copy()
     else:
-        mode = eigenvalue(follower, x, order, still)[1]
+        piece = a.arclength + 1e-3 * h, b.arclength - 1e-3 * h
+        guess, mode = crossing_mode(follower, curve, piece, order, still)
     return refine(follower, curve, guess, min(WINDOW, 0.45 * h), mode, zero_of)

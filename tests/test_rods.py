@@ -1,0 +1,226 @@
+"""Rods of all kinds against closed forms, transcendental equations and exponentials of constant matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import acos, exp, hypot, pi, sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from classics import FORMULATIONS, ON_AXIS, RIGID, column, explore, push, sweep
+from scipy.linalg import expm
+from scipy.optimize import brentq
+from scipy.special import fresnel
+
+from forms import loads
+from forms.energy import bending, logarithmic_stretch
+from rodfem import Inertia, Ordinate, Ring, Scene, at, clamped, elastic, free, hinged, pinned, sliding
+from rodfem.report import number, rounded_up
+
+Found = Callable[[float], float]
+MASS = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0))
+AWAY = Ordinate("distance", s=1.0, of=lambda r, q: float(np.linalg.norm(r)))
+
+
+def zeros(f: Found, a: float, b: float, pieces: int) -> list[float]:
+    """Zeros of a function between ``a`` and ``b``, on so many pieces."""
+    x = np.linspace(a, b, pieces + 1)
+    y = [f(t) for t in x]
+    return [brentq(f, x[i], x[i + 1], xtol=1e-14) for i in range(pieces) if y[i] * y[i + 1] < 0]
+
+
+def cross(a: Any) -> np.ndarray:
+    """Matrix of ``a x``."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def linearized(stiffness: Any, k: Any, m: Any, n: Any) -> np.ndarray:
+    """Kirchhoff's equations ``m' + k x m + d3 x n = 0`` about a helix, linearised in spin and moment: (6, 6)."""
+    B, out = np.diag([1.0 / x for x in stiffness]), np.zeros((6, 6))
+    out[:3, :3], out[:3, 3:] = -cross(k), B
+    out[3:, :3], out[3:, 3:] = -cross((0.0, 0.0, 1.0)) @ cross(n), -cross(k) + cross(m) @ B
+    return expm(out)
+
+
+# --- many eigenvalues nearer to zero than the one that crosses ------------------------------------------------------
+
+
+@pytest.mark.parametrize("EI", [1e-3, 1e-6])
+def test_whirling_string(EI: float) -> None:
+    """Pulled by T, spinning at sqrt(P): ``P = EI (n pi)^4 + T (n pi)^2``, twice each; torsion is softer by far."""
+    T, P = 100.0, lambda n: EI * (n * pi) ** 4 + 100.0 * (n * pi) ** 2
+    string = column(
+        "string", (pinned(), pinned(ON_AXIS, lambda c: (0.0, 0.0, T))), (0.0, 4200.0),
+        energy=lambda v, k, c: bending(k, (EI, EI, EI)),
+        potential=lambda x, c: -c.P / 2 * (x.r[0] ** 2 + x.r[1] ** 2),
+    )  # fmt: skip
+    found = explore(string)
+    assert found.loads() == pytest.approx([P(1), P(2)], rel=1e-10)
+    assert [(s.negative_before, s.negative_after) for s in found.special()] == [(0, 2), (2, 4)]
+
+
+# --- loads without a potential --------------------------------------------------------------------------------------
+
+
+def test_divergence_under_a_force_that_turns_partly() -> None:
+    """Of a thrust P a part ``a < 1/2`` turns with the tip: ``cos sqrt(P/EI) = -a/(1 - a)``, no flutter before."""
+    a = 0.3
+    w = acos(-a / (1 - a))
+    rod = column(
+        "partly", (clamped(), free(lambda c: (0, 0, -(1 - a) * c.P), follower=lambda c: (0, 0, -a * c.P))), (0.0, 20.0),
+        inertia=MASS, constants={"B2": 3.0},
+    )  # fmt: skip
+    found = sweep(rod).special("divergence")
+    assert [s.point.load for s in found] == pytest.approx([w**2, 3 * w**2, (2 * pi - w) ** 2], rel=1e-10)
+    assert [(s.negative_before, s.negative_after) for s in found] == [(0, 1), (1, 2), (2, 3)]
+    after = [p for p in found[0].point.omega2 if p[0] < 1e-6]
+    assert len(after) == 1
+
+
+def test_beck_on_a_foundation() -> None:
+    """An elastic foundation does not change the load of flutter (Smith & Herrmann 1972)."""
+    rod = column(
+        "paradox", (clamped(), free(follower=push)), (15.0, 25.0), inertia=MASS, constants={"B2": 3.0},
+        potential=lambda x, c: loads.spring(x.r, (50.0, 50.0, 0.0)),
+    )  # fmt: skip
+    assert sweep(rod).loads("flutter") == pytest.approx([20.0509536], rel=1e-8)
+
+
+# --- planar rods with more than dead forces at an end ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_planar_rod_against_an_incline(formulation: str) -> None:
+    """The tip slides on ``x + z = 1`` without friction: to first order it does not move, as on a pin."""
+    rod = column(
+        "incline", (clamped(), free(push)), (0.0, 25.0), planar="e2", constants={"B1": 3.0, "B2": 1.0},
+        constraints=(at(1.0, lambda x, c: x.r[0] + x.r[2] - 1),),
+    )  # fmt: skip
+    assert explore(rod, formulation).loads() == pytest.approx([20.1907285564], rel=4e-9)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_planar_column_with_a_spring(formulation: str) -> None:
+    """``tan w / w = 1 - w^2 / k`` with ``P = w^2``, as for a column in space."""
+    w = brentq(lambda w: np.tan(w) / w - 1 + w * w / 10, 1.6, 4.0, xtol=1e-14)
+    ends = clamped(), elastic(lambda c: (10.0, 10.0, 0.0), force=push)
+    rod = column("sprung", ends, (0.0, 15.0), planar="e2", constants={"B2": 1.0})
+    assert explore(rod, formulation).loads() == pytest.approx([w * w], rel=4e-9)
+
+
+# --- coupled, curved and twisted rods -------------------------------------------------------------------------------
+
+
+def coupled() -> tuple[Scene, list[float]]:
+    """Shear and bending coupled by g: shear and curvature follow from the force ``-P theta`` and the moment."""
+    GA, g = 20.0, 3.0
+
+    def moment(P: float, g: float = g, EI: float = 1.0) -> float:
+        A = np.linalg.inv([[GA, g], [g, EI]])
+        return float(expm(np.array([[-P * A[1, 0], A[1, 1]], [-P * P * A[0, 0] - P, P * A[0, 1]]]))[1, 1])
+
+    def energy(v: Any, k: Any, c: Any) -> Any:
+        return GA / 2 * (v[0] ** 2 + v[1] ** 2) + g * v[1] * k[0] + bending(k, (1.0, 2.0, 1.0))
+
+    rod = column("shear and bending", (clamped(), free(push)), (0.0, 6.0), rod="inextensible", energy=energy)
+    return rod, zeros(moment, 0.05, 6.0, 40) + zeros(lambda P: moment(P, 0.0, 2.0), 0.05, 6.0, 40)
+
+
+def softening() -> tuple[Scene, list[float]]:
+    """With ``n3 = EA log v3`` a long rod buckles, and is straight again when short: ``P exp(-P/EA) = EI pi^2``."""
+    EA = 30.0
+    rod = column(
+        "log", (pinned(), pinned(ON_AXIS, push)), (0.0, 60.0), rod="unshearable", constants={"B2": 3.0},
+        energy=lambda v, k, c: logarithmic_stretch(v, EA) + bending(k, (c.B1, c.B2, c.C)),
+    )  # fmt: skip
+    return rod, zeros(lambda P: P * exp(-P / EA) - pi**2, 1.0, 60.0, 60)
+
+
+def strip() -> tuple[Scene, list[float]]:
+    """A strip twisted by a whole turn in its natural state, compressed: no moment at the tip of the linearised rod."""
+    tau, B = 2 * pi, (1.0, 5.0, 1.0)
+
+    def tip(P: float) -> float:
+        return float(np.linalg.det(linearized(B, (0, 0, tau), (0, 0, 0), (0, 0, -P))[3:, 3:]))
+
+    rod = column(
+        "strip", (clamped(), free(push)), (0.0, 30.0), energy=lambda v, k, c: bending((k[0], k[1], k[2] - tau), B)
+    )
+    return rod, zeros(tip, 0.1, 30.0, 300)
+
+
+def hinges() -> tuple[Scene, list[float]]:
+    """Hinges at 45 degrees to both principal axes: what is bent about one is held by the other."""
+
+    def determinant(P: float) -> float:
+        rows, w = [], [sqrt(P / B) for B in (1.0, 2.0)]
+        for s in (0.0, 1.0):
+            angle = [np.array([np.cos(x * s), np.sin(x * s), 1.0]) for x in w]
+            moment = [B * x * np.array([-np.sin(x * s), np.cos(x * s), 0.0]) for B, x in zip((1, 2), w, strict=True)]
+            rows += [np.r_[angle[0], -angle[1]], np.r_[moment[0], moment[1]]]
+        mean = [np.array([np.sin(x) / x, (1 - np.cos(x)) / x, 1.0]) for x in w]
+        return float(np.linalg.det([*rows, np.r_[mean[0], np.zeros(3)], np.r_[np.zeros(3), mean[1]]]))
+
+    axis = (1.0, 1.0, 0.0)
+    return column("hinges", (hinged(axis), hinged(axis, ON_AXIS, force=push)), (0.0, 60.0)), zeros(
+        determinant, 1.0, 60.0, 300
+    )
+
+
+def turned_end() -> tuple[Scene, list[float]]:
+    """An end turned about e1 without force, past a turn and two: conjugate points of a spinning top."""
+    B = (1.0, 2.0, 0.7)
+
+    def spin(P: float) -> float:
+        return float(np.linalg.det(linearized(B, (P, 0, 0), (B[0] * P, 0, 0), (0, 0, 0))[:3, 3:]))
+
+    turned = sliding(lambda c: (None, None, None), lambda c: (ufl.cos(c.P / 2), ufl.sin(c.P / 2), 0.0, 0.0))
+    rod = column("turned", (clamped(), turned), (0.0, 15.0), energy=lambda v, k, c: bending(k, B), ordinate=AWAY)
+    return rod, zeros(spin, 0.5, 15.0, 3000)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("make", [coupled, softening, strip, hinges, turned_end])
+def test_critical_loads(make: Callable[[], tuple[Scene, list[float]]], formulation: str) -> None:
+    rod, expected = make()
+    assert len(expected) > 1
+    assert explore(rod, formulation).loads() == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_ring_with_too_much_curvature(n: int) -> None:
+    """``m^2 - (B + C) m - B C (n^2 - 1) = 0`` for the moment ``m = 1 - k0`` of a ring that is curved by k0 when cut."""
+    B, C = 1.0, 0.7
+    k0 = 1 - ((B + C) - sqrt((B + C) ** 2 + 4 * B * C * (n * n - 1))) / 2
+    ring = Scene(
+        "overcurved", (0.0, 2 * pi), RIGID, lambda v, k, c: bending((k[0], k[1] - c.k0, k[2]), (B, 1.0, C)),
+        {"k0": k0 - 0.4}, "k0", Ring(), Ordinate("width", s=pi, of=lambda r, q: hypot(*r)), (k0 - 0.4, k0 + 0.3),
+        start=lambda s: np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1),
+    )  # type: ignore[arg-type]  # fmt: skip
+    assert explore(ring, elements=10).loads() == pytest.approx([k0], rel=1e-9)
+
+
+@pytest.mark.parametrize("planar", [None, "e2"])
+def test_clothoid(planar: str | None) -> None:
+    """A rod whose natural curvature grows along it rolls up to Euler's spiral: Fresnel's integrals."""
+    a = 30.0
+    rod = column(
+        "clothoid", (clamped(), free()), (0.0, a), planar=planar, ordinate=AWAY,
+        energy=lambda v, k, c: bending((k[0], k[1] - c.P * c.s, k[2]), (1.0, 1.0, 1.0)),
+    )  # fmt: skip
+    last = explore(rod).branches[0].points[-1]
+    assert (last.load, last.negative) == (a, 0)
+    assert last.ordinate == pytest.approx(hypot(*fresnel(sqrt(a / pi))) / sqrt(a / pi), rel=1e-8)
+
+
+# --- error bars -----------------------------------------------------------------------------------------------------
+
+
+def test_error_bars_are_rounded_up() -> None:
+    for error in 10.0 ** np.random.default_rng(3).uniform(-14, 3, 200):
+        assert error * 0.998 <= rounded_up(error) <= 2 * error
+    assert number(1.2345678, 2.4e-5) == "1.23457 (3e-05)"
+    assert number(1.5, 9.5e-3) == "1.50 (1e-02)"
+    assert rounded_up(3e-7) == 3e-7
