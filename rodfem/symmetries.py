@@ -89,9 +89,9 @@ class Shift:
         return change
 
     def mismatch(self, fields: Fields) -> float:
-        """Greatest jump between elements of the quaternion's derivative: how far the mesh is from the symmetry."""
-        block = next(b for b in fields.blocks if b.name == "q")
-        dofs, slopes = fields.dofs["q"].ravel(), self._slopes(fields, block).ravel()
+        """Greatest jump between elements of the rotation's derivative: how far the mesh is from the symmetry."""
+        block = next(b for b in fields.blocks if b.name == fields.turning.name)
+        dofs, slopes = fields.dofs[block.name].ravel(), self._slopes(fields, block).ravel()
         low, high = np.full(len(fields.number), np.inf), np.full(len(fields.number), -np.inf)
         np.minimum.at(low, dofs, slopes)
         np.maximum.at(high, dofs, slopes)
