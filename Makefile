@@ -47,8 +47,9 @@ lint: setup ## check style and types
 figures: setup ## run all demos
 	@set -e; for demo in demos/*.py; do echo "$$demo"; $(PYTHON) "$$demo"; done
 
-bench: setup ## measure every way to judge a state: docs/stability.md (about ten minutes)
-	$(PYTHON) benchmarks/stability.py
+bench: setup ## measure speed against error and every way to judge a state: docs/speed.md, docs/stability.md (half an hour)
+	$(PYTHON) -m benchmarks.speed
+	$(PYTHON) -m benchmarks.stability
 
 clean: ## remove what the commands above made, but not .venv
 	rm -rf results build *.egg-info .mypy_cache .ruff_cache .pytest_cache

@@ -8,10 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
 import resource
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -23,20 +20,21 @@ import scipy
 import scipy.sparse.linalg as spl
 from petsc4py import PETSc
 
-ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+from benchmarks.common import ROOT, exponent, load, machine, measured, milliseconds, table, versions
+from rodfem.continuation import Equilibria
+from rodfem.fields import Discretization
+from rodfem.stability.band import decide, quotient_error
+from rodfem.stability.blocks import Blocks
+from rodfem.stability.inertia import Inertia
+from rodfem.stability.judge import Judge
+from rodfem.stability.matrices import gathered
+from rodfem.stability.rank import rank_of
+from rodfem.system import System
 
-import scenes  # noqa: E402
+sys.path.append(str(ROOT / "tests"))
 
-from rodfem.continuation import Equilibria  # noqa: E402
-from rodfem.fields import Discretization  # noqa: E402
-from rodfem.stability.band import decide, quotient_error  # noqa: E402
-from rodfem.stability.blocks import Blocks  # noqa: E402
-from rodfem.stability.inertia import Inertia  # noqa: E402
-from rodfem.stability.judge import Judge  # noqa: E402
-from rodfem.stability.matrices import gathered  # noqa: E402
-from rodfem.stability.rank import rank_of  # noqa: E402
-from rodfem.system import System  # noqa: E402
+import scenes
+import states
 
 LOAD, NUMBER = 20.0, 4
 ELEMENTS = (100, 1000, 10_000, 100_000)
@@ -101,34 +99,13 @@ def measure(method: str, formulation: str, elements: int, degree: int) -> dict[s
     return {"seconds": float(np.median(times)), "memory": memory, "first": first, "unknowns": system.fields.unknowns}
 
 
-def in_a_process(*arguments: object, limit: float = 50.0) -> dict[str, Any] | None:
+def in_a_process(*arguments: object) -> dict[str, Any] | None:
     """Measure in a new process; None where it fails or takes too long."""
-    command = [sys.executable, __file__, "--measure", *map(str, arguments)]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=True)
-    except (subprocess.TimeoutExpired, subprocess.CalledProcessError) as trouble:
-        print(arguments, type(trouble).__name__, str(trouble.stderr)[-300:], file=sys.stderr)
+    (found,) = list(measured("benchmarks.stability", "--measure", *arguments, limit=50.0)) or [{"failed": "nothing"}]
+    if "failed" in found:
+        print(arguments, found["failed"], file=sys.stderr)
         return None
-    return dict(json.loads(done.stdout.splitlines()[-1]))
-
-
-def exponent(elements: list[int], seconds: list[float]) -> float:
-    """Slope of log time over log elements from 1000 elements on."""
-    far = [i for i, n in enumerate(elements) if n >= 1000]
-    if len(far) < 2:
-        return float("nan")
-    return float(np.polyfit(np.log([elements[i] for i in far]), np.log([seconds[i] for i in far]), 1)[0])
-
-
-def table(head: list[str], rows: list[list[str]]) -> str:
-    """A table in Markdown."""
-    lines = ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]]
-    return "\n".join(lines) + "\n"
-
-
-def milliseconds(seconds: float) -> str:
-    """Three digits of a time in ms."""
-    return f"{float(f'{1e3 * seconds:.3g}'):g}"
+    return found
 
 
 def times(formulation: str, progress: Callable[[str], None]) -> tuple[str, str, str]:
@@ -146,7 +123,7 @@ def times(formulation: str, progress: Callable[[str], None]) -> tuple[str, str, 
         if found[2] and found[2]["first"] is not None:
             first.append(f"{method} {found[2]['first']:.9f}")
         good = [(n, f) for n, f in zip(ELEMENTS, found, strict=True) if f]
-        slope = exponent([n for n, _ in good], [f["seconds"] for _, f in good])
+        slope = exponent([n for n, _ in good], [f["seconds"] for _, f in good], 1000)
         rows.append(
             [
                 method,
@@ -199,8 +176,6 @@ def ranks() -> str:
     for elements in (25, 50, 100, 200, 400, 1000, 10_000):
         row = [str(elements)]
         for name, coordinates in (("cord", "tangent"), ("hemitropic", "tangent"), ("hemitropic", "compatible")):
-            import states  # the hemitropic demo needs its own set-up
-
             system = System(states.scene(name), Discretization("pointwise", elements, 1))
             pencil = Blocks(system, coordinates).assemble(Equilibria(system).start(20.0 if name == "cord" else 0.1))
             h = system.scene.length / elements
@@ -208,14 +183,6 @@ def ranks() -> str:
             row += [f"{sigma:.4e}", f"{sigma / h:.5f}"]
         rows.append(row)
     return table(["n", "cord", "/h", "hemitropic", "/h", "hemitropic, compatible", "/h"], rows)
-
-
-def processor() -> str:
-    """Name of the processor."""
-    names = [
-        line.split(":")[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line
-    ]
-    return f"{names[0]}, {len(names)} cores" if names else platform.processor()
 
 
 def write(path: Path) -> None:
@@ -229,11 +196,10 @@ def write(path: Path) -> None:
     pointwise, pointwise_memory, pointwise_first = times("pointwise", progress)
     few = rich(progress)
     band, rank = bands(), ranks()
-    versions = f"PETSc {'.'.join(map(str, PETSc.Sys.getVersion()))}, numpy {np.__version__}, scipy {scipy.__version__}"
     path.write_text(f"""# Every way to answer "is it stable?", and what it costs
 
-Written by `make bench` (`benchmarks/stability.py`) in {(perf_counter() - started) / 60:.0f} minutes on {processor()},
-Python {platform.python_version()}, {versions}, one thread, load {os.getloadavg()[0]:.1f}.
+Written by `make bench` (`python -m benchmarks.stability`) in {(perf_counter() - started) / 60:.0f} minutes on
+{machine()}; {versions("petsc4py", "slepc4py", "numpy", "scipy")}; one thread, load {load():.1f}.
 
 The state is the straight telephone cord at lam = {LOAD:g}; {NUMBER} left-most eigenvalues are asked for. A time is the
 median of repeated judgements after a first one, which makes the symbolic factorisation (as along a branch), and

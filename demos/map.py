@@ -1,8 +1,9 @@
 r"""A stability map: how a compressed hemitropic rod behaves for every coupling of stretch and twist.
 
 For each of a grid of couplings A the whole diagram of demos/hemitropic.py is traced, and read at a grid of compressions
-lam: the index of the straight rod, and the displacement of the middle of the stable state.  Rods are independent, so
-that ranks share them: mpirun -n 2 .venv/bin/python demos/map.py.  What is finished is kept: started again, it goes on.
+lam: the displacement of the middle of the stable state; lines are where the straight rod's index changes.  Rods are
+independent, so that ranks share them: mpirun -n 2 .venv/bin/python demos/map.py.  What is finished is kept: started
+again, it goes on.
 """
 
 from math import hypot, inf
@@ -13,10 +14,12 @@ from mpi4py import MPI
 
 import rodfem.cli as cli
 from forms.energy import hemitropic
+from rodfem.branch import BRANCH_POINT, USER
 from rodfem.continuation import Follower
 from rodfem.ends import clamped
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
 from rodfem.fields import Discretization
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Ordinate, Parameter, Scene
 from rodfem.sharing import many
@@ -26,7 +29,7 @@ from rodfem.system import System
 def scene(A: float, highest: float) -> Scene:
     """The rod of demos/hemitropic.py with the coupling A."""
     return Scene(
-        name="map",
+        name="stability map",
         interval=(-3.0, 3.0),
         rod="unshearable",
         energy=lambda v, k, c: hemitropic(v, k, stretching=10.0, coupling=c.A, twisting=1.0, bending=1.0),
@@ -39,19 +42,19 @@ def scene(A: float, highest: float) -> Scene:
 
 
 def read(rod: Scene, loads: np.ndarray) -> dict:
-    """Index of the straight rod, and least displacement of a stable state (nan where there is none), at each load."""
+    """Where the straight rod's index changes, and least displacement of a stable state (None: no such) at each load."""
     follower = Follower(System(rod, Discretization("reduced", 8, 6), MPI.COMM_SELF))
     plan = Plan(rod.span, at=tuple(loads), depth=1, error_bars=False)
     branches = Explorer(follower, plan, Report(MPI.COMM_SELF, quiet=True), lambda: None).run()
-    index, stable = np.full(len(loads), -1), np.full(len(loads), np.nan)
-    for branch in branches:
-        for s in (s for s in branch.special if s.kind == "user"):
-            i = int(np.argmin(abs(loads - s.point.load)))
-            if branch.depth == 0:
-                index[i] = s.point.negative
-            if s.point.negative == 0:
-                stable[i] = np.fmin(stable[i], s.point.ordinate)
-    return {"index": index.tolist(), "stable": [None if np.isnan(x) else x for x in stable]}
+    stable = np.full(len(loads), np.nan)
+    for s in (s for branch in branches for s in branch.special if s.kind == USER and s.point.negative == 0):
+        i = int(np.argmin(abs(loads - s.point.load)))
+        stable[i] = np.fmin(stable[i], s.point.ordinate)
+    changes = [s for s in branches[0].special if s.kind == BRANCH_POINT]
+    return {
+        "changes": [[s.negative_before, s.negative_after, s.point.load] for s in changes],
+        "stable": [None if np.isnan(x) else x for x in stable],
+    }
 
 
 def draw(couplings: np.ndarray, loads: np.ndarray, results: list[dict], path: Path) -> None:
@@ -59,14 +62,18 @@ def draw(couplings: np.ndarray, loads: np.ndarray, results: list[dict], path: Pa
     from matplotlib.figure import Figure
 
     stable = np.array([[np.nan if x is None else x for x in r["stable"]] for r in results]).T
-    index = np.array([r["index"] for r in results]).T
     figure = Figure(figsize=(7.5, 5.0), dpi=200, layout="constrained")
     axes = figure.subplots()
     picture = axes.pcolormesh(couplings, loads, stable, shading="nearest", cmap="viridis")
-    lines = axes.contour(couplings, loads, index, levels=[1, 3], colors=["white", "black"], linewidths=1.5)
-    axes.clabel(lines, fmt={1: "0|2", 3: "2|4"})
+    for pair in sorted({(a, b) for r in results for a, b, _ in r["changes"]}):
+        places = [[load for a, b, load in r["changes"] if (a, b) == pair] for r in results]
+        line = np.array([found[0] if found else np.nan for found in places])
+        axes.plot(couplings, line, color="white", linewidth=1.5)
+        middle = int(np.nanargmin(abs(couplings)))
+        label = f"{pair[0]} | {pair[1]}"
+        axes.annotate(label, (couplings[middle], line[middle]), (0, -12), textcoords="offset points", color="white")
     figure.colorbar(picture, label="mid-point displacement of the stable state")
-    axes.set(xlabel="$A$", ylabel=r"$\lambda$", title="Compressed hemitropic rod: lines are the straight rod's index")
+    axes.set(xlabel="$A$", ylabel=r"$\lambda$", title="Compressed hemitropic rod; lines: index of the straight one")
     figure.savefig(path)
 
 

@@ -31,7 +31,8 @@ finds and classifies the points where it is lost, follows what branches off, and
 * **Parameters**: any of them can be the load, :meth:`Scene.varying`; :func:`locus` follows a special point in the plane
   of two of them.
 * **Plane**: ``planar="e2"`` keeps the rod in the plane across e2, and records its index in space besides.
-* **Is it stable?**: :func:`judge` answers for one state by any of six methods, and says how far to trust it.
+* **Is it stable?**: :func:`judge` answers for one state by any of six methods, and says how far to trust it;
+  :class:`ModeFinder` finds how the rod moves in its left-most modes, and what a controller needs to know of them.
 * **Many rods**: :func:`many` shares a list of scenes among the ranks, into files, restartable.
 * **What is not connected**: :func:`further` looks for other equilibria at a load by deflation.
 
@@ -40,8 +41,8 @@ that breaks one has a zero eigenvalue for it, which is counted as zero.
 
 Data flows, and imports go, one way: ``ends``, ``scene`` -> ``fields`` -> ``equations`` -> ``symmetries``, ``system``
 (the bordered saddle point) -> ``newton``, ``stability`` -> ``continuation`` -> ``locate``, ``bifurcation`` ->
-``accuracy`` -> ``explore``, ``sweep``, ``loci``, ``search`` -> ``diagram``, ``runner`` -> ``cli``. ``plot`` and
-``render`` draw from saved files alone. The mathematics is in the package ``forms``.
+``accuracy`` -> ``tracer``, ``explore``, ``sweep``, ``loci``, ``search``, ``mode_finder`` -> ``diagram``, ``runner`` ->
+``cli``. ``plot``, ``plot_modes`` and ``render`` draw from saved files alone. The mathematics is in ``forms``.
 
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
 """
@@ -63,11 +64,14 @@ _HOMES = {
     "Ordinate": "scene",
     "Inertia": "scene",
     "Discretization": "fields",
-    "Plan": "explore",
+    "Plan": "plan",
     "Steps": "continuation",
     "run": "runner",
     "many": "sharing",
     "judge": "stability.judge",
+    "ModeFinder": "mode_finder",
+    "Modes": "modes",
+    "load_modes": "modes",
     "further": "search.deflation",
     "states_at": "search.deflation",
     "SceneError": "errors",

@@ -83,8 +83,8 @@ class Richer:
         at_a_load = special.kind not in (FOLD, BRANCH_POINT)
         special.error_estimate = special.ordinate_error if at_a_load else max(abs(load - special.point.load), floor)
 
-    def again(self, point: Point, *, fixed_load: bool) -> PETSc.Vec:
-        """State of a point on the richer discretisation, at its load or across its tangent.
+    def again(self, point: Point, *, fixed_load: bool, sharp: bool = False) -> PETSc.Vec:
+        """State of a point on the richer discretisation, at its load or across its tangent, ``sharp`` to round-off.
 
         Raises :class:`ConvergenceError` where there is none.
         """
@@ -93,7 +93,7 @@ class Richer:
         if not fixed_load and point.tangent is not None:
             row = self.follower.row(self.transfer(point.tangent, state=False))
         self.system.set_phase(x)
-        if not correct(self.system, x, row, reach=1.0).converged:
+        if not all(correct(self.system, x, row, reach=1.0).converged for _ in range(1 + sharp)):
             raise ConvergenceError(
                 f"the richer discretisation has no equilibrium near load {point.load:.8g}: use more elements"
             )

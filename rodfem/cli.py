@@ -99,8 +99,8 @@ def parser_for(
         type=float,
         default=None,
         metavar="EPS",
-        help="instead of elements and degree: choose meshes on the way such that loads and ordinates are in error by less "
-        "than EPS (relative to values greater than one)",
+        help="instead of elements and degree: choose meshes on the way such that loads and ordinates are in error by "
+        "less than EPS (relative to values greater than one)",
     )
     group = parser.add_argument_group("what to compute")
     group.add_argument(
@@ -207,8 +207,8 @@ def main(
 
     try:
         from rodfem.continuation import Steps
-        from rodfem.explore import Plan
         from rodfem.fields import Discretization
+        from rodfem.plan import Plan
         from rodfem.runner import run
 
         if petsc:  # once more, for a PETSc that was running already

@@ -20,7 +20,7 @@ from rodfem.branch import Point
 from rodfem.convexity import Convexity
 from rodfem.corrector import SENSITIVE, Corrector
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.newton import Outcome, correct, relax
+from rodfem.newton import TOLERANCE, Outcome, correct, relax
 from rodfem.shape import Shape
 from rodfem.stability.band import decide
 from rodfem.stability.in_space import InSpace
@@ -164,6 +164,13 @@ class Follower(Equilibria):
         """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
         return self.inertia.count(x).negative == 0
 
+    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, Outcome]:
+        """As for any equilibria, but with the symmetric factors where they serve."""
+        x = guess.copy()
+        self.system.set_load(x, load)
+        outcome = self.corrector.correct(x, self.axis, reach=reach)
+        return (x, outcome) if outcome is not None else super().at_load(guess, load, reach)
+
     def point(
         self,
         x: PETSc.Vec,
@@ -218,7 +225,7 @@ class Follower(Equilibria):
         ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at ``x``
         itself and not at the prediction.
         """
-        outcome = self.corrector.correct(x, row, most=8, reach=reach)
+        outcome = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)
         regular = outcome is not None
         if outcome is None:
             outcome = correct(self.system, x, row, most=8, reach=reach)
@@ -227,8 +234,8 @@ class Follower(Equilibria):
         tangent = self.corrector.tangent_along(row) if regular else self.tangent(row)
         new, span = self.system.scalar(tangent), abs(self.system.scene.span[1] - self.system.scene.span[0])
         if new * slope <= 0 or abs(new) < min(LEVEL, SENSITIVE * outcome.moved) * span:
-            regular = regular and self.corrector.factor(x)
-            tangent = self.corrector.tangent_along(row) if regular else self.tangent(row, at=x)
+            tangent = self.tangent(row, at=x)
+            regular = self.corrector.regular
         return outcome, tangent, self.corrector.index(x) if regular else None
 
     def damp(self, freedoms: int) -> None:
@@ -244,10 +251,12 @@ class Follower(Equilibria):
     def tangent(self, row: PETSc.Vec, at: PETSc.Vec | None = None) -> PETSc.Vec:
         """Unit tangent of the branch on the side to which ``row`` points.
 
-        From the factors of the last correction, which belong to a state nearby; with ``at`` from new ones at that
-        very state.
+        From the LU factors of the last correction, which belong to a state nearby; with ``at`` from new ones at that
+        very state, symmetric where they serve.
         """
         if at is not None:
+            if self.corrector.factor(at):
+                return self.corrector.tangent_along(row)
             self.system.residual(at, self.system.new_vector())
             self.system.factor(row)
         tangent = self.system.new_vector()

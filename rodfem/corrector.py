@@ -44,6 +44,8 @@ class Corrector:
         Unit tangent at the state last factored, on the side of increasing load.
     nearest
         Estimated distance of the eigenvalue nearest zero from zero, at the state last factored.
+    regular
+        Whether that is far enough for the factors to serve.
     """
 
     def __init__(self, inertia: Inertia) -> None:
@@ -62,6 +64,7 @@ class Corrector:
         self._below = 0
         self.tangent = system.new_vector()
         self.nearest = 0.0
+        self.regular = False
         self.restart()
 
     def restart(self) -> None:
@@ -73,9 +76,11 @@ class Corrector:
     def factor(self, x: PETSc.Vec, right: PETSc.Vec | None = None) -> bool:
         """Factor ``S`` at ``x``; solve for the tangent, the block, and ``right`` (into ``_step``).
 
-        False where an eigenvalue is so near zero that its factors serve neither Newton's method nor the count.
+        False where they do not serve: an eigenvalue is too near zero, or a load has no potential.
         """
-        inertia = self.inertia
+        inertia, self.regular = self.inertia, False
+        if not self.system.scene.conservative:  # S is not symmetric
+            return False
         inertia.assemble(x)
         try:
             self._below = inertia.below(0.0)
@@ -87,11 +92,10 @@ class Corrector:
                 self._block[i].axpy(FRESH, self._fresh[i])
                 self._images[i].axpy(FRESH, self._fresh_images[i])
             self._solve(right)
-        self._started = True
-        if not self.nearest > NEAR * inertia.scale:
+        self._started = self.regular = self.nearest > NEAR * inertia.scale
+        if not self.regular:
             self.restart()
-            return False
-        return True
+        return self.regular
 
     def _solve(self, right: PETSc.Vec | None) -> None:
         """Solve for all right-hand sides at once: it is the call that costs, not the column."""
@@ -128,11 +132,13 @@ class Corrector:
         with self.system.clock("solve"):
             self.inertia.factors.ksp.solve(right, self._step)
 
-    def correct(self, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3) -> Outcome | None:
+    def correct(
+        self, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3, tolerance: float = 0.0
+    ) -> Outcome | None:
         """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
 
-        As :func:`rodfem.newton.correct`, but done as soon as what the observed rate of convergence leaves is below the
-        tolerance; ``error`` is that.  None, with ``x`` as it was, where ``S`` is too near singular.
+        As :func:`rodfem.newton.correct`, but done too when what the observed rate of convergence leaves is below
+        ``tolerance``; ``error`` is that.  None, with ``x`` as it was, where ``S`` is too near singular.
         """
         system, equations, origin = self.system, self._equations, x.copy()
         previous, size, refactor = float("inf"), float("inf"), True
@@ -150,11 +156,12 @@ class Corrector:
             step = self._step
             step.axpy(-row.dot(step) / row.dot(self.tangent), self.tangent)
             x.axpy(-1.0, step)
-            size = max(system.norm(step), step.norm() / (1.0 + x.norm()))
-            if not isfinite(size) or size > reach:
+            distance = system.norm(step)
+            size = max(distance, step.norm() / (1.0 + x.norm()))
+            if not isfinite(size) or distance > reach:
                 break
             left = size if fresh else min(2.0 * size / previous, 1.0) * size
-            if left < TOLERANCE or (fresh and ROUND_OFF > size > 0.5 * previous):
+            if size < TOLERANCE or left < tolerance or (fresh and ROUND_OFF > size > 0.5 * previous):
                 origin.aypx(-1.0, x)
                 return Outcome(True, iteration, left, system.norm(origin))
             refactor = size > 0.02 or size > 0.1 * previous

@@ -9,6 +9,7 @@ import dolfinx.mesh
 import numpy as np
 import ufl
 from dolfinx import fem
+from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 
 from forms import inertia, lagrangian, loads
 from forms.kinematics import curvature, strain
@@ -33,6 +34,8 @@ class Equations:
         ``(4/l) int dq.dq + (1/l^3) int dr.dr``, the squared size of a change of state (about the mean square rotation).
     kinetic
         Kinetic metric of the spectrum, ``int rho_A dr.dr + w . rho_I w`` with the spin ``w``.
+    massless
+        Whether that is without any term.
     energy
         Stored energy ``int W ds``.
     """
@@ -75,6 +78,7 @@ class Equations:
         if f.r is not None:
             kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c)) * dx
         kinetic += self._attached_inertia(f, a, b)
+        self.massless = apply_algebra_lowering(kinetic).empty()
         forms = [first, second, W * dx, metric * dx, kinetic]
         self.residual, self.jacobian, self.energy, self.metric, self.kinetic = compat.compile_forms(forms)
 

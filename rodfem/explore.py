@@ -1,138 +1,40 @@
-"""The whole diagram: tracing a branch with its special points, and what leaves from those, to a set depth."""
+"""The whole diagram: the branch of the start state, and what leaves from its special points, to a set depth."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
-from math import isnan
+from dataclasses import replace
 
 from petsc4py import PETSc
-from scipy.optimize import brentq
 
-from rodfem.accuracy import zero_stretch
-from rodfem.bifurcation import directions, find_special, midpoint, start_branch
-from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
-from rodfem.checks import check_load
-from rodfem.continuation import VERTICAL, Follower, Steps, distance, follow, hermite
+from rodfem.bifurcation import directions, start_branch
+from rodfem.branch import BRANCH_POINT, Branch, Point, Special
+from rodfem.continuation import Follower
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.functions import asked_for
-from rodfem.locate import solve_at
-from rodfem.meshes import Meshes, TooCoarse, Watch, check_accuracy, end_of
 from rodfem.pitchfork import law_of
+from rodfem.plan import Plan
 from rodfem.report import Report
-from rodfem.scene import Scene
 from rodfem.search.deflation import further, starts, states_at
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.rank import rank_of
 from rodfem.topology import link
-
-BEYOND = 0.02
-"""How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
+from rodfem.tracer import Tracer, equivalent, near
 
 COLLAPSED = 1e-6
 """A first state whose smallest stretch is below this is no rod."""
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars.
-
-    ``spectrum`` left-most eigenvalues of every state are found besides its index; at the loads ``at`` states are judged
-    by ``method`` (where one is named), and their ``modes`` left-most modes are found; ``tries`` deflated iterations at
-    each of these loads look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
-    special point in the plane of the load and that parameter.  With an ``accuracy`` meshes are chosen and raised on the
-    way such that every row's load and ordinate, and those of every special point, are in error by less than that
-    (relative to values greater than one).
-    """
-
-    span: tuple[float, float]
-    at: tuple[float, ...] = ()
-    depth: int = 2
-    steps: Steps = field(default_factory=Steps)
-    error_bars: bool = True
-    spectrum: int = 0
-    tries: int = 0
-    locus: tuple[str, float, float] | None = None
-    method: str = ""
-    modes: int = 0
-    accuracy: float | None = None
-
-    def check(self, scene: Scene) -> None:
-        """Raise :class:`SceneError` for a range that the scene does not admit, or a load outside the range."""
-        scene.check_span(self.span)
-        check_load(scene)
-        if self.accuracy is not None:
-            check_accuracy(self.accuracy)
-            if not scene.conservative:
-                raise SceneError(
-                    f"An accuracy is kept along branches of equilibria, and {scene.name} is swept for its frequencies: "
-                    "give elements and degree instead, and see the error printed beside each flutter load."
-                )
-        low, high = sorted(self.span)
-        for load in self.at:
-            if not low <= load <= high:
-                raise SceneError(
-                    f"The load {load:g} asked for is outside the range {low:g} to {high:g}: "
-                    "widen the range or leave it out."
-                )
-        if self.locus is not None:
-            name, a, b = self.locus
-            if name == scene.load or name not in scene.parameters:
-                others = ", ".join(n for n in scene.parameters if n != scene.load)
-                choose = f"choose one of {others}" if others else "the scene has none beside its load, so add one"
-                raise SceneError(f"{name!r} is no second parameter: {choose}.")
-            if name not in asked_for(scene):
-                raise SceneError(f"Nothing in the scene depends on {name!r}: choose another parameter for the locus.")
-            if not a <= scene.parameters[name].value <= b or a == b:
-                raise SceneError(
-                    f"The interval of {name} from {a:g} to {b:g} does not hold its value "
-                    f"{scene.parameters[name].value:g}: choose one that does."
-                )
-            for value in (a, b):
-                try:
-                    scene.varying(scene.load, scene.span, **{name: value})
-                except SceneError as trouble:
-                    raise SceneError(f"The locus cannot reach {name} = {value:g}. {trouble}") from None
-        if self.tries < 0:
-            raise SceneError(f"{self.tries} is not a number of tries: give 0 or more to --search.")
-        if self.tries and not self.at:
-            raise SceneError("A search needs loads to search at: give them with --at.")
-        if self.modes < 0:
-            raise SceneError(f"{self.modes} is not a number of modes: give 0 or more to --modes.")
-        if (self.modes or self.method) and not self.at:
-            raise SceneError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at: give them with --at.")
-        if self.modes and self.method == "count":
-            raise SceneError("Counting alone finds no modes: leave out --modes, or name another --method.")
-        if self.spectrum < 0:
-            raise SceneError(f"{self.spectrum} is not a number of eigenvalues: give 0 or more to --spectrum.")
-
-
-class Explorer:
-    """Explores the equilibria of a scene from its start state.
-
-    ``branches`` grows as the run goes; ``finished`` is called after each branch that is complete, so that nothing
-    is lost.
-    """
-
-    def __init__(self, follower: Follower, plan: Plan, report: Report, finished: Callable[[], None]) -> None:
-        """Start with no branch; the plan must have passed its :meth:`Plan.check`."""
-        self.follower, self.plan, self.report, self.finished = follower, plan, report, finished
-        self.scene = follower.system.scene
-        self.low, self.high = sorted(plan.span)
-        self.branches: list[Branch] = []
-        self.meshes = Meshes(follower, plan.accuracy)
-        self.warned = False
-
-    @property
-    def solvers(self) -> Sequence[Follower]:
-        """Followers by the number of their mesh."""
-        return self.meshes.followers
+class Explorer(Tracer):
+    """Explores the equilibria of a scene from its start state: what to trace, and in which order."""
 
     def run(self) -> list[Branch]:
         """Trace the start state's branch, then what leaves each branch point, breadth first."""
+        if self.meshes.accuracy != self.plan.accuracy:
+            self.report.say(
+                f"  computed to {self.meshes.accuracy:g}: a coarser mesh would break the ring's symmetry along itself"
+            )
         self.trace(self._primary())
         self._branch_off(0)
         for load in self.plan.at if self.plan.tries else ():
@@ -143,8 +45,8 @@ class Explorer:
         """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
         self.report.say()
         with self.follower.system.clock.purpose("search"):
-            self._use(max(self.meshes.followers, key=lambda f: f.system.fields.unknowns).mesh)
-            here = [replace(b, points=[self._here(p) for p in b.points]) for b in self.branches]
+            self.use(max(self.meshes.followers, key=lambda f: f.system.fields.unknowns).mesh)
+            here = [replace(b, points=[self.here(p) for p in b.points]) for b in self.branches]
             known = states_at(self.follower, here, load)
             found = further(self.follower, load, known, self.plan.tries, report=self.report)
         before = len(self.branches)
@@ -206,17 +108,9 @@ class Explorer:
         names = [words[u.group[0]].format(u.component + 1) for u in scalars]
         rank_of(Blocks(self.follower.system, "full").assemble(x), names)
 
-    def _use(self, mesh: int) -> None:
-        """Go on with the follower of that mesh."""
-        self.follower = self.meshes.followers[mesh]
-
-    def _here(self, point: Point) -> Point:
-        """Point on the mesh in use."""
-        return self.meshes.here(point, self.follower)
-
     def _switch(self, parent: Branch, i: int, special: Special) -> None:
         special.switched = True
-        self._use(special.point.mesh)
+        self.use(special.point.mesh)
         self.follower.damp(special.point.zero - self.follower.system.active_drifts() - special.multiplicity)
         try:
             ways = directions(self.follower, special)
@@ -225,11 +119,11 @@ class Explorer:
             return
         before = len(self.branches)
         for direction in ways:
-            self._use(special.point.mesh)
+            self.use(special.point.mesh)
             self._law(special, direction)
             first: Point | None = None
             for sign in (1.0, -1.0):
-                self._use(special.point.mesh)
+                self.use(special.point.mesh)
                 way = direction.copy()
                 way.scale(sign)
                 name = self._name(parent)
@@ -239,7 +133,7 @@ class Explorer:
                         f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}."
                     )
                     continue
-                if first is not None and _equivalent(first, branch.points[1]):
+                if first is not None and equivalent(first, branch.points[1]):
                     continue  # the mirror image of the branch just traced
                 first = branch.points[1]
                 if special.meets is None and self._traced_already(branch, special):
@@ -275,308 +169,11 @@ class Explorer:
         a, b = branch.points[1], special.point
         for other in self.branches:
             for end in other.special:
-                if end.meets is not None and self._alike(end.point, b, 1e-6):
+                if end.meets is not None and self.alike(end.point, b, 1e-6):
                     before = other.points[max(end.row - 2, 0) : end.row]
-                    if any(_near(a, p) for p in before):
+                    if any(near(a, p) for p in before):
                         return True
         return False
-
-    def trace(self, branch: Branch) -> None:
-        """Follow a branch to its end, insert its special points, estimate errors, hand it on as finished."""
-        self.branches.append(branch)
-        self.report.branch(branch)
-        self._use(branch.points[-1].mesh)
-        self.watch = Watch(self.meshes, (self.low, self.high))
-        self.follower.damp(0)
-        try:
-            self._follow(branch)
-        except ConvergenceError as trouble:
-            branch.ended = f"no convergence: {trouble}"
-            self.report.warn(str(trouble))
-        self._finish(branch)
-
-    def _follow(self, branch: Branch) -> None:
-        """Follow a branch to its end; where its mesh is too coarse, from there on with another."""
-        history, begun = list(branch.points), False
-        while True:
-            try:
-                self.watch.row(history[-1], self.follower)
-                if not begun:
-                    self._first_users(branch)
-                    begun = True
-                self._advance(branch, history)
-                return
-            except TooCoarse as trouble:
-                history = self._remesh(branch, history, trouble)
-
-    def _remesh(self, branch: Branch, history: list[Point], trouble: TooCoarse) -> list[Point]:
-        """Carry the last points of a branch to a mesh that resolves what was too coarse, and drop what lies beyond."""
-        follower = self.watch.another(trouble)
-        if follower is not None:
-            with self.follower.system.clock.purpose("location"):
-                pairs = self.meshes.carry(history, follower, branch.parent is not None)
-            moved = {id(old): new for old, new in pairs}
-            branch.points = [moved.get(id(p), p) for p in branch.points]
-            history = [new for _, new in pairs]
-            self.follower = follower
-            self.report.mesh(follower.system, trouble.point.load, str(trouble))
-        last = history[-1].arclength
-        branch.points = [p for p in branch.points if p.arclength <= last]
-        branch.special = [s for s in branch.special if s.point.arclength <= last]
-        return history
-
-    def _advance(self, branch: Branch, history: list[Point]) -> None:
-        """Append points until the branch ends, which :attr:`Branch.ended` then says."""
-        for item in follow(self.follower, history, self.plan.steps, (self.low, self.high)):
-            if isinstance(item, str):
-                branch.ended = item
-                return
-            previous = history[-1]
-            self._check_symmetry(item)
-            self.watch.row(item, self.follower)
-            self._check_zeros(history, item)
-            if item.stretch <= 0:
-                self._end_at_zero_stretch(branch, previous, item)
-                return
-            if self.follower.convexity is not None and self.follower.convexity.lowest(item.x) <= 0:
-                branch.ended = f"the stored energy is not convex any more at {self.scene.load} = {item.load:.6g}"
-                return
-            reason = self._between(branch, previous, item)
-            if reason:
-                branch.ended = reason
-                return
-            history.append(item)
-            branch.points.append(item)
-            self.report.progress(branch, item)
-            if self._closes(branch, previous, item):
-                branch.ended = "closed loop"
-                return
-
-    def _between(self, branch: Branch, a: Point, b: Point) -> str:
-        """Insert folds, branch points and user points between two points; a reason if the branch ends there."""
-        with self.follower.system.clock.purpose("location"):
-            return self._between_points(branch, a, b)
-
-    def _between_points(self, branch: Branch, a: Point, b: Point) -> str:
-        specials = [] if a is branch.points[0] and branch.parent else self._special_between(a, b)
-        pieces = [a, *(s.point for s in specials), b]
-        users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
-        for special in specials + users:
-            self.watch.special(special)
-        for special in sorted(specials + users, key=lambda s: s.point.arclength):
-            if special.kind == BRANCH_POINT:
-                reason = self._meeting(branch, special)
-                branch.insert(special)
-                self.report.special(branch, special)
-                if reason:
-                    return reason
-            else:
-                branch.insert(special)
-                self.report.special(branch, special)
-        return ""
-
-    def _special_between(self, a: Point, b: Point, halvings: int = 3) -> list[Special]:
-        """Folds and branch points between two points, on halves of the piece where a whole one is not resolved."""
-        try:
-            return find_special(self.follower, a, b)
-        except ConvergenceError as trouble:
-            middle = midpoint(self.follower, a, b) if halvings else None
-            if middle is None:
-                self.report.warn(f"A special point between loads {a.load:.8g} and {b.load:.8g} is missing: {trouble}")
-                return []
-        return self._special_between(a, middle, halvings - 1) + self._special_between(middle, b, halvings - 1)
-
-    def _users(self, branch: Branch, p: Point, q: Point, a: Point, b: Point) -> list[Special]:
-        """User points between two neighbours among which the load is monotone."""
-        found = []
-        for load in self.plan.at:
-            if (
-                (p.load - load) * (q.load - load) < 0
-                or (load == p.load and p is branch.points[0])
-                or (load == q.load and q is b)
-            ):
-                s = p.arclength + (load - p.load) / (q.load - p.load) * (q.arclength - p.arclength)
-                for _ in range(3):
-                    x, direction = hermite(a, b, s)
-                    slope = self.follower.system.scalar(direction)
-                    if slope:
-                        s = min(max(s + (load - self.follower.system.scalar(x)) / slope, p.arclength), q.arclength)
-                point = self._user(hermite(a, b, s)[0], load, s, increasing=q.load > p.load)
-                found.append(Special(USER, point, p.negative, q.negative, 1e-12 * max(1.0, abs(load))))
-                found[-1].negative_before = found[-1].negative_after = point.negative
-        return found
-
-    def _first_users(self, branch: Branch) -> None:
-        """User points between the special point that a branch leaves and its first point, if they are on the branch."""
-        if len(branch.points) != 2 or branch.parent is None:
-            return
-        a, b = map(self._here, branch.points)
-        for special in self._users(branch, a, b, a, b):
-            self.watch.special(special)
-            p, system = special.point, self.follower.system
-            guess = hermite(a, b, p.arclength)[0]
-            if distance(system, guess, p.x) < 0.5 * distance(system, a.x, p.x):  # not fallen back to the trunk
-                branch.insert(special)
-                self.report.special(branch, special)
-
-    def _user(self, guess: PETSc.Vec, load: float, s: float, increasing: bool) -> Point:
-        self.follower.system.set_phase(guess)
-        x, outcome = self.follower.at_load(guess, load, reach=1.0)
-        if not outcome.converged:
-            raise ConvergenceError(
-                f"No equilibrium at {self.scene.load} = {load:g} between two points of the branch: use another load."
-            )
-        return self.follower.point(x, s, self.follower.load_tangent(x, increasing), outcome)
-
-    def _meeting(self, branch: Branch, special: Special) -> str:
-        """Recognise a branch point that is known already; a reason if the branch ends there."""
-        for other in self.branches:
-            for i, known in enumerate(other.special):
-                if other is branch and special.point.arclength - known.point.arclength < 0.5:
-                    continue  # a neighbour on this branch: a nearly double eigenvalue
-                if known.kind == BRANCH_POINT and self._alike(known.point, special.point, 1e-6):
-                    special.meets = (other.name, i)
-                    special.switched = known.switched = True
-                    if branch.parent == special.meets:
-                        return "closed loop"
-                    if special.zero_of == "mu" and known.zero_of == "slope":
-                        return ""  # the branch on which the known one ended: it goes on
-                    return f"meets {other.name} at {self.scene.load} = {special.point.load:.8g}"
-        if special.zero_of == "slope":
-            return f"meets another branch at {self.scene.load} = {special.point.load:.8g}"
-        return ""
-
-    def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> None:
-        """Add the last admissible point, where the smallest stretch vanishes, and say so."""
-        shape = self.follower.shape
-        branch.ended = "stretch reaches zero"
-
-        def stretch(s: float) -> float:
-            return shape.stretch(solve_at(self.follower, lambda t: hermite(a, b, t), s))
-
-        h = b.arclength - a.arclength
-        s = brentq(stretch, a.arclength + 1e-9 * h, b.arclength, xtol=1e-11)
-        x = solve_at(self.follower, lambda t: hermite(a, b, t), s)
-        row = self.follower.row(hermite(a, b, s)[1])
-        last = self.follower.point(x, s, self.follower.tangent(row))
-        if self._between(branch, a, last):
-            return
-        special = Special(END, last, last.negative, last.negative, 1e-10, zero_of="stretch")
-        if self.plan.error_bars:
-            try:
-                with self.follower.system.clock.purpose("error bars"):
-                    special = zero_stretch(self.follower, last)
-            except ConvergenceError as trouble:
-                special.note = f"no error estimate: {trouble}"
-            else:
-                self.watch.judge(special)
-        branch.points.append(special.point)
-        branch.special.append(special)
-
-    def _singular_end(self, branch: Branch, last: Point) -> None:
-        """Report a branch point on the very end of the range, located on a piece of the branch that goes past it."""
-        parameter, load = self.scene.parameters[self.scene.load], last.load
-        beyond = load + BEYOND * (load - sum(self.plan.span) / 2)
-        previous = self._here(branch.points[-2])
-        if not parameter.admissible[0] < beyond < parameter.admissible[1] or previous.x is last.x:
-            return
-        try:
-            with self.follower.system.clock.purpose("location"):
-                guess = hermite(previous, last, last.arclength)[0]
-                point = self._user(guess, beyond, 2 * last.arclength - previous.arclength, beyond > load)
-                point.arclength = last.arclength + distance(self.follower.system, last.x, point.x)
-                found = [s for s in find_special(self.follower, previous, point) if s.kind == BRANCH_POINT]
-        except ConvergenceError as trouble:
-            self.report.warn(
-                f"The last state, at {self.scene.load} = {load:g}, is singular, and was not resolved: {trouble}"
-            )
-            return
-        for special in found:
-            if abs(special.point.load - load) < 1e-6 * abs(self.high - self.low):
-                branch.points[-1] = special.point
-                branch.special.append(special)
-                branch.renumber()
-                self.report.special(branch, special)
-                return
-
-    def _closes(self, branch: Branch, a: Point, b: Point) -> bool:
-        """Whether the branch passes its own beginning again between two points."""
-        if len(branch.points) < 12:
-            return False
-        first = branch.points[1]
-        if max(abs(a.slope), abs(b.slope)) < VERTICAL * (self.high - self.low):  # equal loads: compare the states
-            return distance(self.follower.system, b.x, self._here(branch.points[0]).x) < b.arclength - a.arclength
-        if (a.load - first.load) * (b.load - first.load) > 0 or not _near(first, a, 4) or a.slope * first.slope <= 0:
-            return False
-        s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
-        point = self._user(hermite(a, b, s)[0], first.load, s, increasing=b.load > a.load)
-        return self._alike(point, first, 1e-7)
-
-    def _alike(self, a: Point, b: Point, tolerance: float) -> bool:
-        """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
-        across = 0.0 if a.mesh == b.mesh or self.plan.accuracy is None else 30 * self.plan.accuracy
-        return _equivalent(a, b, max(tolerance, across), across**0.5)
-
-    def _check_symmetry(self, point: Point) -> None:
-        if point.drift > 1e-6 * self.follower.inertia.scale:
-            self.watch.drifting(point)
-            raise ConvergenceError(
-                f"The mesh does not resolve a symmetry of the scene any more: the drift is {point.drift:.2g} at "
-                f"{self.scene.load} = {point.load:.6g} where it should vanish; use more elements, or ask for an "
-                "accuracy."
-            )
-
-    def _check_zeros(self, history: list[Point], point: Point) -> None:
-        """Say once where eigenvalues stay zero without a symmetry: the state is one of a family at the same load."""
-        extra = point.zero - self.follower.system.active_drifts()
-        if abs(point.slope) < VERTICAL * (self.high - self.low):
-            extra -= 1  # the branch itself is such a family
-        recent = history[-4:]
-        stay = extra > 0 and len(recent) == 4 and all(p.zero == point.zero for p in recent)
-        self.follower.damp(extra if stay else 0)
-        if stay and not self.warned:
-            self.warned = True
-            self.report.say(
-                f"  {extra} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
-                "move freely at one and the same load"
-            )
-
-    def _finish(self, branch: Branch) -> None:
-        branch.renumber()
-        last = branch.points[-1]
-        if branch.ended == "end of range" and last.zero > self.follower.system.active_drifts():
-            self._singular_end(branch, last)
-            last = branch.points[-1]
-        if not any(s.point is last for s in branch.special):
-            branch.special.append(end_of(last))
-            branch.renumber()
-        if self.plan.error_bars or self.plan.accuracy:
-            self._error_bars(branch)
-        self.report.finished(branch)
-        self.watch.summary(branch, self.report)
-        self.finished()
-
-    def _error_bars(self, branch: Branch) -> None:
-        with self.follower.system.clock.purpose("error bars"):
-            for special in branch.special:
-                if isnan(special.error_estimate):
-                    self.meshes.richer(special.point.mesh).estimate(special)
-                self.watch.label(special)
-
-
-def _equivalent(a: Point, b: Point, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:
-    """Whether two points agree in all that a symmetry leaves alone: load, energy and stretch."""
-    strain = max(tolerance, of_strain)
-    pairs = ((a.load, b.load, tolerance), (a.energy, b.energy, tolerance), (a.stretch, b.stretch, strain))
-    return all(abs(p - q) <= allowed * max(1.0, abs(p), abs(q)) for p, q, allowed in pairs)
-
-
-def _near(a: Point, b: Point, steps: float = 2.0) -> bool:
-    """Whether two points could be neighbours on one branch, seen through load and energy."""
-    reach = 0.05 * steps
-    return abs(a.load - b.load) <= reach * max(1.0, abs(a.load)) and abs(a.energy - b.energy) <= reach * max(
-        1.0, abs(a.energy)
-    )
 
 
 def explore(

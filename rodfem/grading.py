@@ -3,8 +3,8 @@ r"""Graded meshes: how smooth a state is along the rod, and the cheapest element
 On each element the Legendre coefficients of the strains (curvature and stretch, weighted as in the stored energy) decay
 like ``A rho^-j``, for singularities of the state at a distance ``h (rho - 1/rho) / 4`` across the rod (Trefethen,
 Approximation Theory and Approximation Practice, chapter 8).  With elements of degree k the strains are missed by
-``A rho^-k``, and loads and positions, being stationary, by the *square* of that, integrated along the rod; the factor in
-front is measured by a computation one degree richer.  On an element of another size the distance stays, and ``rho``
+``A rho^-k``, and loads and positions, being stationary, by the *square* of that, integrated along the rod; the factor
+in front is measured by a computation one degree richer.  On an element of another size the distance stays, and ``rho``
 follows: how large an element may be at each place is had in closed form.
 """
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -64,7 +65,7 @@ class Smoothness:
     def fulfilled_by(self, mesh: Discretization, vertices: np.ndarray, indicator: float) -> bool:
         """Whether elements with these vertices are nowhere larger than the indicator allows."""
         sizes = self.sizes(mesh.degree, indicator)
-        for a, b in zip(vertices, vertices[1:], strict=False):
+        for a, b in pairwise(vertices):
             over = (self.vertices[:-1] < b) & (self.vertices[1:] > a)
             if b - a > 1.05 * sizes[over].min():
                 return False
@@ -108,7 +109,7 @@ class Gauge:
 
 
 def weights_of(scene: Scene) -> list[tuple[str, np.ndarray]]:
-    """Weights of curvature (as the derivative of q or an angle) and of free strains v: root of stiffness over bending."""
+    """Weights of curvature (derivative of q or an angle) and of free strains v: root of stiffness over bending."""
     stiffness = np.diag(scene.stiffness())
     free = len(scene.free_strains)
     bending = stiffness[free:].min()
@@ -136,6 +137,29 @@ def _decay(vertices: np.ndarray, coefficients: np.ndarray) -> Smoothness:
     return Smoothness(vertices, degree, amplitude, decay)
 
 
+def pieces_of(scene: Scene) -> np.ndarray:
+    """Arclengths at which elements must meet: ends, joints, and where the ordinate is taken.
+
+    The centreline is as accurate as a load at vertices only, and far less inside of elements.
+    """
+    a, b = scene.interval
+    inner = [s for s in (*scene.joints, scene.ordinate.s) if min(s - a, b - s) > 1e-9 * scene.length]
+    out = [a]
+    for s in sorted(inner):
+        if s - out[-1] > 1e-9 * scene.length:
+            out.append(s)
+    return np.array([*out, b])
+
+
+def first_mesh(scene: Scene, formulation: str, elements: int, degree: int) -> Discretization:
+    """About so many elements of nearly equal size."""
+    pieces = pieces_of(scene)
+    counts = np.maximum(np.ceil(np.diff(pieces) / scene.length * elements - 1e-6).astype(int), 1)
+    inner = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
+    vertices = tuple(map(float, np.concatenate([pieces[:1], *inner])))
+    return Discretization(formulation, len(vertices) - 1, degree, vertices)
+
+
 def cost(fields: Fields, elements: int, degree: int) -> float:
     """Cost of a point of a branch with that many elements of a degree, in units of an unknown of degree zero."""
     unknowns = elements * degree * sum(b.size for b in fields.blocks)
@@ -158,11 +182,10 @@ def cheapest(solver: Equilibria, found: Smoothness, indicator: float) -> Discret
 
 
 def _place(fields: Fields, found: Smoothness, sizes: np.ndarray) -> np.ndarray:
-    """Vertices of a mesh with elements of these sizes, one at each joint, and an element for each rank."""
-    scene = fields.scene
+    """Vertices of a mesh with elements of these sizes, an element for each rank at least."""
     number = np.append(0.0, np.cumsum(np.diff(found.vertices) / sizes))
     number *= max(1.0, (max(2, fields.comm.size) + 0.1) / number[-1])
-    pieces = np.array([scene.interval[0], *scene.joints, scene.interval[1]])
+    pieces = pieces_of(fields.scene)
     at = np.interp(pieces, found.vertices, number)
     out = [pieces[:1]]
     for left, right, a, b in zip(pieces, pieces[1:], at, at[1:], strict=False):

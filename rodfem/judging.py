@@ -10,9 +10,9 @@ from pathlib import Path
 from rodfem.branch import USER, Branch
 from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.explore import Plan
 from rodfem.mode_finder import ModeFinder
 from rodfem.modes import save_modes
+from rodfem.plan import Plan
 from rodfem.plot_modes import draw_modes
 from rodfem.report import Report
 from rodfem.stability.judge import Judge

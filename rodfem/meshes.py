@@ -1,45 +1,37 @@
 """The discretisations of one run: one, or with an accuracy asked for as many as its branches need.
 
-Every point knows the number of its mesh.  While a branch is traced a :class:`Watch` estimates the error of its points by
-a computation one degree richer, and in between by the decay of Legendre coefficients (:mod:`rodfem.grading`), which
-costs next to nothing.  Where an error is too large it raises :class:`TooCoarse`; the explorer then has a mesh made for
-that very state, carries the last points over, and goes on there.
+Every point knows the number of its mesh.  Here meshes are made, and points carried from one to another.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from math import isfinite, isnan, log10
+from dataclasses import replace
+from math import isfinite, log10
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.accuracy import Richer
-from rodfem.branch import BRANCH_POINT, END, FOLD, Branch, Point, Special
+from rodfem.branch import BRANCH_POINT, FOLD, Point, Special
 from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.grading import Gauge, cheapest, cost, weights_of
+from rodfem.fields import Discretization
+from rodfem.grading import Gauge, cheapest, cost, first_mesh, weights_of
 from rodfem.newton import correct
-from rodfem.report import Report
 from rodfem.scene import Scene
+from rodfem.symmetries import is_uniform_ring
 from rodfem.system import System
 
-FINEST, COARSEST = 1e-11, 1e-1
+FINEST, COARSEST = 1e-10, 1e-1
 """Accuracies that can be asked for; round-off is near the first."""
+OF_A_RING = 1e-8
+"""Accuracy with which a uniform ring is computed at least."""
 MARGIN = 100.0
 """A new mesh is made for an accuracy better than the one asked for by this factor: it is to last for a while."""
 FURTHER = 10.0
 """By this factor more at each further try at one place."""
-TRIES, MOST = 4, 16
-"""Meshes tried at one place, and in a run."""
-SURE = 10.0
-"""An error estimated by the decay of coefficients counts where it is this much better than the accuracy."""
-GROWN, SELDOM = 1.5, 10
-"""An error is computed again where the indicator has grown by this factor, and at the latest after so many points."""
-NEAR = 0.1
-"""Points of a branch nearer to each other than this, in arclength, are at one place."""
 
 
 def check_accuracy(accuracy: float) -> None:
@@ -50,9 +42,15 @@ def check_accuracy(accuracy: float) -> None:
         )
 
 
-def first_mesh(scene: Scene, accuracy: float, comm: MPI.Comm) -> tuple[int, int]:
-    """Elements and degree to start with: few, of a degree that grows with the digits asked for."""
-    return max(4, len(scene.joints) + 1, comm.size), min(max(round(4 - log10(accuracy) / 2), 4), 9)
+def internal_accuracy(scene: Scene, accuracy: float) -> float:
+    """Accuracy to work with: a mesh breaks the symmetry of a uniform ring along itself, which must not be seen."""
+    return min(accuracy, OF_A_RING) if is_uniform_ring(scene) else accuracy
+
+
+def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) -> Discretization:
+    """Discretisation to start with: few elements, of a degree that grows with the digits asked for."""
+    degree = round(4 - log10(internal_accuracy(scene, accuracy)) / 2)
+    return first_mesh(scene, formulation, max(4, comm.size), min(max(degree, 4), 9))
 
 
 class TooCoarse(Exception):
@@ -75,7 +73,7 @@ class Meshes:
     def __init__(self, follower: Follower, accuracy: float | None) -> None:
         """Begin with one mesh; None as accuracy: no other is made."""
         self.followers = [follower]
-        self.accuracy = accuracy
+        self.accuracy = None if accuracy is None else internal_accuracy(follower.system.scene, accuracy)
         self._richer: dict[int, Richer] = {}
         self._gauges: dict[int, Gauge] = {}
         if accuracy is not None:
@@ -192,131 +190,3 @@ class Meshes:
                 "--degree instead of an accuracy."
             )
         return pairs
-
-
-@dataclass
-class Checked:
-    """A point whose error was computed: its indicator, its error, and how many points came since."""
-
-    indicator: float
-    error: float
-    since: int = 0
-
-
-class Watch:
-    """Watches over the accuracy of the points of one branch."""
-
-    def __init__(self, meshes: Meshes, bounds: tuple[float, float]) -> None:
-        """Begin a branch; its points at the ``bounds`` of the load are judged at that very load."""
-        self.meshes, self.bounds = meshes, bounds
-        self.checked: Checked | None = None
-        self.place, self.error, self.tries = -np.inf, np.inf, 0
-        self.excused = -np.inf
-
-    @property
-    def accuracy(self) -> float:
-        """The accuracy asked for, infinite without one."""
-        return self.meshes.accuracy or np.inf
-
-    def row(self, point: Point, follower: Follower) -> None:
-        """Estimate the error of a point, by computation where need be; raises :class:`TooCoarse`."""
-        if self.meshes.accuracy is None:
-            return
-        indicator = self.meshes.gauge(follower.mesh)(point.x).indicator
-        last = self.checked
-        if last is not None and last.since < SELDOM and not self._at_bound(point):
-            point.estimate = last.error * max(1.0, indicator / last.indicator)
-            if indicator < GROWN * last.indicator or point.estimate * SURE < self.accuracy:
-                last.since += 1
-                return
-        with follower.system.clock.purpose("error bars"):
-            point.estimate = self._computed(point)
-        self.checked = Checked(max(indicator, 1e-30), point.estimate)
-        if point.estimate * GROWN > self.accuracy and point.arclength > self.excused:
-            raise TooCoarse(point, point.estimate)
-
-    def special(self, special: Special) -> None:
-        """Estimate the errors of a special point; raises :class:`TooCoarse` where another mesh may help."""
-        if self.meshes.accuracy is None:
-            return
-        with self.meshes.followers[special.point.mesh].system.clock.purpose("error bars"):
-            self.meshes.richer(special.point.mesh).estimate(special)
-        self.judge(special)
-
-    def judge(self, special: Special) -> None:
-        """Raise :class:`TooCoarse` for a special point with too large an error, where another mesh may help."""
-        error = self.meshes.error_of(special)
-        located = special.located_to / max(1.0, abs(special.point.load))
-        if error > self.accuracy > located and special.point.arclength > self.excused:
-            raise TooCoarse(special.point, error, special.null_vectors, 2.0 if special.zero_of == "stretch" else 1.0)
-
-    def drifting(self, point: Point) -> None:
-        """Raise :class:`TooCoarse` for a point at which the mesh breaks a symmetry, where another mesh may help."""
-        if self.meshes.accuracy is not None and point.arclength > self.excused:
-            raise TooCoarse(point, float("inf"), why="the mesh breaks a symmetry")
-
-    def label(self, special: Special) -> None:
-        """Say at a special point whether the accuracy was not reached, and why."""
-        if self.meshes.accuracy is None:
-            return
-        special.point.estimate = error = self.meshes.error_of(special)
-        if error > self.accuracy and not special.note:
-            located = special.located_to / max(1.0, abs(special.point.load)) > self.accuracy
-            why = f"located to {special.located_to:.0e} only" if located else "finer meshes did not lower the error"
-            special.note = f"accuracy {self.accuracy:g} not reached: {why}"
-
-    def summary(self, branch: Branch, report: Report) -> None:
-        """Say on which meshes a branch was traced, and the largest error of its points."""
-        if self.meshes.accuracy is None:
-            return
-        used = [self.meshes.followers[number].system for number in sorted({p.mesh for p in branch.points})]
-        worst = max(p.estimate for p in branch.points if not isnan(p.estimate))
-        report.accuracy(used, worst, self.meshes.accuracy)
-
-    def another(self, trouble: TooCoarse) -> Follower | None:
-        """Follower on a mesh for the state that was too coarse; None where further meshes do not help there."""
-        if abs(trouble.point.arclength - self.place) < NEAR:
-            self.tries += 1
-            helps = not isfinite(trouble.error) or trouble.error < 0.5 * self.error
-        else:
-            self.tries, helps = 0, True
-        self.place, self.error = trouble.point.arclength, trouble.error
-        self.checked = None
-        if not helps or self.tries >= TRIES or len(self.meshes.followers) >= MOST:
-            self.excused = trouble.point.arclength + NEAR
-            return None
-        return self.meshes.raised(trouble, self.tries)
-
-    def _at_bound(self, point: Point) -> bool:
-        return min(abs(point.load - bound) for bound in self.bounds) < 1e-9 * abs(self.bounds[1] - self.bounds[0])
-
-    def _computed(self, point: Point) -> float:
-        """Error of a point across its branch, or in the ordinate where its load is given; raises where the index errs."""
-        richer = self.meshes.richer(point.mesh)
-        try:
-            x = richer.again(point, fixed_load=self._at_bound(point))
-        except ConvergenceError:
-            return float("inf")
-        index, drifts = richer.follower.inertia.count(x), richer.system.active_drifts()
-        apart = index.negative > point.negative + max(point.zero - drifts, 0) or point.negative > index.negative + max(
-            index.zero - drifts, 0
-        )
-        if apart and point.arclength > self.excused:
-            follower = self.meshes.followers[point.mesh]
-            follower.system.set_phase(point.x)
-            follower.inertia.count(point.x)
-            modes = follower.inertia.nearest(abs(index.negative - point.negative), accuracy=1e-2)[1]
-            raise TooCoarse(
-                point,
-                float("inf"),
-                [m.copy() for m in modes],
-                why=f"index {point.negative}, {index.negative} one degree richer",
-            )
-        load, ordinate = richer.system.scalar(x), richer.follower.shape.ordinate(x)
-        pairs = (load, point.load), (ordinate, point.ordinate)
-        return max(1e-14, *(abs(a - b) / max(1.0, abs(b)) for a, b in pairs))
-
-
-def end_of(point: Point) -> Special:
-    """Last point of a branch as a special one."""
-    return Special(END, point, point.negative, point.negative, 1e-12 * max(1.0, abs(point.load)))

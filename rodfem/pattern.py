@@ -15,29 +15,42 @@ def bordered_pattern(fields: Fields) -> sp.csr_matrix:
     Returns a matrix of ones, (local_unknowns, unknowns), that has the diagonal too.
     """
     comm, n = fields.comm, fields.unknowns
-    cells = fields.owned_cells
+    own = len(fields.free_owned)
+    rows = _own_rows(fields)
+    scalars = np.array(list(fields.scalars.values()), dtype=np.int32)  # beyond all fields: the last columns of each row
+    size = len(scalars)
+    indptr = rows.indptr.astype(np.int64) + size * np.arange(own + 1)
+    indices = np.empty(indptr[-1], dtype=np.int32)
+    scalar = (indptr[1:, None] - size + np.arange(size)).ravel()
+    field = np.ones(len(indices), dtype=bool)
+    field[scalar] = False
+    indices[scalar], indices[field] = np.tile(scalars, own), rows.indices
+    if comm.rank == comm.size - 1:
+        indptr = np.append(indptr, indptr[-1] + n * np.arange(1, size + 1))
+        indices = np.append(indices, np.tile(np.arange(n, dtype=np.int32), size))
+    shape = (fields.local_unknowns, n)
+    return sp.csr_matrix((np.ones(len(indices)), indices, indptr), shape=shape)
+
+
+def _own_rows(fields: Fields) -> sp.csr_matrix:
+    """Couplings of this rank's field unknowns inside all cells of which they are, (free_owned, unknowns), sorted."""
+    comm, n = fields.comm, fields.unknowns
+    first, own, cells = fields.offset, len(fields.free_owned), fields.owned_cells
     numbers = np.hstack([fields.number[d[:cells]].reshape(cells, -1) for d in fields.dofs.values()])
-    cell = np.repeat(np.arange(cells), numbers.shape[1])
-    keep = numbers.ravel() >= 0
-    incidence = sp.csr_matrix((np.ones(keep.sum()), (cell[keep], numbers.ravel()[keep])), shape=(cells, n))
-    coupling = (incidence.T @ incidence).tocoo()
-    mine = fields.offset + np.arange(len(fields.free_owned))
-    scalars = np.array(list(fields.scalars.values()))
-    field, scalar = (x.ravel() for x in np.meshgrid(mine, scalars, indexing="ij"))
-    a, b = (x.ravel() for x in np.meshgrid(scalars, scalars, indexing="ij"))
-    rows = np.concatenate([coupling.row, mine, field, scalar, a])
-    columns = np.concatenate([coupling.col, mine, scalar, field, b])
-    starts = np.array([*comm.allgather(fields.offset), n])
-    starts[-1] = n
-    owner = np.clip(np.searchsorted(starts, rows, side="right") - 1, 0, comm.size - 1)
-    owner[rows >= fields.field_unknowns] = comm.size - 1
-    sent = comm.alltoall([np.stack([rows[owner == rank], columns[owner == rank]]) for rank in range(comm.size)])
-    row, column = np.hstack(sent)
-    first = fields.offset
-    pattern = sp.csr_matrix((np.ones(len(row)), (row - first, column)), shape=(fields.local_unknowns, n))
-    pattern.sum_duplicates()
-    pattern.sort_indices()
-    return pattern
+    keep = numbers >= 0
+    indptr = np.append(0, np.cumsum(keep.sum(axis=1)))
+    incidence = sp.csr_matrix((np.ones(indptr[-1], dtype=np.int8), numbers[keep], indptr), shape=(cells, n))
+    coupling = incidence.T.tocsr() @ incidence
+    rows = coupling[first : first + own]
+    if comm.size > 1:
+        starts = np.array(comm.allgather(first))
+        outside = sp.vstack([coupling[:first], sp.csr_matrix((own, n), dtype=np.int8), coupling[first + own :]]).tocoo()
+        owner = np.searchsorted(starts, outside.row, side="right") - 1
+        sent = comm.alltoall([(outside.row[owner == rank], outside.col[owner == rank]) for rank in range(comm.size)])
+        row, column = (np.concatenate(parts) for parts in zip(*sent, strict=True))
+        rows = rows + sp.csr_matrix((np.ones(len(row), dtype=np.int8), (row - first, column)), shape=rows.shape)
+    rows.sort_indices()
+    return rows
 
 
 def new_matrix(fields: Fields, pattern: sp.csr_matrix, rows: PETSc.LGMap, columns: PETSc.LGMap) -> PETSc.Mat:

@@ -149,6 +149,8 @@ def _tex(text: str, always: bool = False) -> str:
 def _footer(diagram: Mapping[str, Any]) -> str:
     """Return the line that names the discretisation and the accuracy of the special points."""
     phrase = "{formulation} formulation, {elements} elements of degree {degree}, {unknowns} unknowns"
+    if diagram.get("accuracy"):
+        phrase = f"{{formulation}} formulation, {len(diagram['meshes'])} meshes of up to {{unknowns}} unknowns"
     parts = [phrase.format(**diagram["discretization"])] if diagram.get("discretization") else []
     special = [point for branch in diagram["branches"] for point in branch.get("special", [])]
     errors = [point.get("error_estimate") for point in special if point["kind"] in SINGULAR]

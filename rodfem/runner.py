@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from mpi4py import MPI
@@ -15,9 +14,10 @@ from rodfem.clock import Clock
 from rodfem.continuation import Equilibria, Follower
 from rodfem.diagram import as_data, save_json, save_states
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
 from rodfem.fields import Discretization
-from rodfem.meshes import first_mesh
+from rodfem.meshes import start_mesh
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.sweep import Sweep
@@ -56,9 +56,8 @@ def run(
     """Explore a scene and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
     By default 8 elements of degree 6 (few elements to start with where the plan has an accuracy), the scene's own span,
-    and the folder ``results/<name>``.  Files are brought up to date after every branch, so that an interrupted run loses
-    no finished one.  Raises
-    :class:`~rodfem.errors.SceneError` for bad input, before any computation, and
+    and the folder ``results/<name>``.  Files are brought up to date after every branch, so that an interrupted run
+    loses no finished one.  Raises :class:`~rodfem.errors.SceneError` for bad input, before any computation, and
     :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
     """
     plan = plan or Plan(scene.span)
@@ -68,8 +67,7 @@ def run(
     plan.check(scene)
     discretization = discretization or Discretization()
     if plan.accuracy is not None and discretization.vertices is None:
-        elements, degree = first_mesh(scene, plan.accuracy, comm)
-        discretization = replace(discretization, elements=elements, degree=degree)
+        discretization = start_mesh(scene, discretization.formulation, plan.accuracy, comm)
     writable(output, comm)
     report, clock = Report(comm, quiet), Clock()
     with compat.announce_compilation(report.compiling):

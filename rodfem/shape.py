@@ -21,12 +21,6 @@ from rodfem.fields import LOAD
 from rodfem.system import System
 
 
-def spin(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-    """Infinitesimal rotation ``2 vec(dq conj(q)) / |q|^2`` in the space frame: (..., 4) -> (..., 3)."""
-    a, v, da, dv = q[..., :1], q[..., 1:], dq[..., :1], dq[..., 1:]
-    return np.asarray(2 * (a * dv - da * v + np.cross(v, dv)) / np.sum(q * q, axis=-1, keepdims=True))
-
-
 def directors(q: np.ndarray) -> np.ndarray:
     """Rotation matrices of quaternions (..., 4), scalar first, of any length: (..., 3, 3)."""
     flat = np.asarray(q).reshape(-1, 4)
@@ -90,6 +84,7 @@ class Shape:
         self._v_at_gauss = compat.lagrange_basis(k - 1, self.gauss.points)
         self._v_dense = compat.lagrange_basis(k - 1, np.linspace(0, 1, 4 * k + 1))
         self._v_to_powers = np.linalg.inv(np.vander(2 * compat.nodes(k - 1) - 1, k, increasing=True))
+        self._held_strains = np.array([0.0 if i in system.scene.free_strains else x for i, x in enumerate(UNDEFORMED)])
         self._probe_weights = self._position_weights(system.scene.ordinate.s)
         self._cells = cells
         self.reduced = f.discretization.formulation == "reduced"
@@ -226,6 +221,7 @@ class Shape:
         return np.einsum("pn,pni->pi", basis, table[cell.ravel()]).reshape(*x.shape, block.size)
 
     def gather(self, values: np.ndarray) -> np.ndarray:
+        """Rows of all ranks, one for each element, in the order of the ranks."""
         return values if self.system.comm.size == 1 else np.concatenate(self.system.comm.allgather(values))
 
     @staticmethod
@@ -236,13 +232,15 @@ class Shape:
     def _slopes(self) -> np.ndarray:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""
         f = self.system.fields
-        turned = np.einsum("gn,cni->cgi", self._q_at_gauss, f.u.x.array[f.dofs[f.turning.name][self._cells]])
-        q = f.turning.quaternion(turned)
-        v = np.broadcast_to(np.array(UNDEFORMED), (*q.shape[:2], 3)).copy()
+        u = f.u.x.array
+        turned = self._q_at_gauss @ u[f.dofs[f.turning.name][self._cells]]
+        R = directors(f.turning.quaternion(turned))
         free = list(self.system.scene.free_strains)
+        slopes = R @ self._held_strains
         if free:
-            v[:, :, free] = np.einsum("gn,cni->cgi", self._v_at_gauss, f.u.x.array[f.dofs["v"][self._cells]])
-        return np.einsum("cgij,cgj->cgi", directors(q), v)
+            v = self._v_at_gauss @ u[f.dofs["v"][self._cells]]
+            slopes += (R[..., free] @ v[..., None])[..., 0]
+        return np.asarray(slopes)
 
     def _position_weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
         """Weights of the slopes at Gauss points in the integral up to ``s``, and of nodal values in the value there."""
@@ -261,13 +259,13 @@ class Shape:
         u = f.u.x.array
         parts = np.zeros((3, 4))
         size = f.turning.size
-        parts[0, :size] = np.einsum("cn,cni->i", value, u[f.dofs[f.turning.name][self._cells]])
+        parts[0, :size] = value.ravel() @ u[f.dofs[f.turning.name][self._cells]].reshape(-1, size)
         if self.reduced:
             slopes = self._slopes()
-            parts[1, :3] = np.einsum("cg,cgi->i", integral, slopes)
-            parts[2, :3] = np.einsum("g,cgi,c->i", self.gauss.weights, slopes, self.size)
+            parts[1, :3] = integral.ravel() @ slopes.reshape(-1, 3)
+            parts[2, :3] = np.outer(self.size, self.gauss.weights).ravel() @ slopes.reshape(-1, 3)
         else:
-            parts[1, :3] = np.einsum("cn,cni->i", value, u[f.dofs["r"][self._cells]])
+            parts[1, :3] = value.ravel() @ u[f.dofs["r"][self._cells]].reshape(-1, 3)
         if system.comm.size > 1:
             parts = system.comm.allreduce(parts)
         load = float(f.u.x.array[f.copies[0, -1]])
@@ -280,7 +278,8 @@ class Shape:
     def _anchor(self, load: float, chord: np.ndarray) -> np.ndarray:
         """Position of the left end: where it is held, or else a chord back from where the right end is held."""
         f = self.system.fields
-        scalar = {x.name: float(f.u.x.array[f.copies[0, i]]) for i, x in enumerate(f.unknown_scalars)}
+        values = f.u.x.array[f.copies[0]]
+        scalar = {x.name: float(value) for x, value in zip(f.unknown_scalars, values, strict=False)}
         c = self.system.scene.constants(load)
         left, right = (
             [scalar.get(f"{letter}{i + 1}") if p is None else float(p) for i, p in enumerate(end.held(c))]

@@ -22,8 +22,8 @@ from rodfem.accuracy import Transfer
 from rodfem.branch import DIVERGENCE, END, FLUTTER, USER, Branch, Point, Special
 from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError
-from rodfem.explore import Plan
 from rodfem.locate import real_root, zero_uncertainty
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.stability.vibration import Frequencies, Vibration
 from rodfem.system import System

@@ -22,7 +22,7 @@ from forms.symmetry import AXES, Matrix, cross, left, right
 from rodfem import compat
 from rodfem.ends import Ring
 from rodfem.equations import Equations
-from rodfem.fields import Fields
+from rodfem.fields import Block, Fields
 from rodfem.scene import Scene
 
 EXACT = 1e-9
@@ -76,12 +76,10 @@ class Shift:
     def change(self, fields: Fields) -> np.ndarray:
         """Derivative of the state that ``fields.u`` holds: local values, consistent on all ranks; zero for scalars."""
         u, kept = fields.u, fields.u.x.array.copy()
-        size = (fields.vertices[:, 1] - fields.vertices[:, 0])[:, None, None]
         out, count = np.zeros(len(kept)), np.zeros(len(kept))
         for block in fields.blocks:
             dofs = fields.dofs[block.name]
-            values = np.einsum("pn,cni->cpi", differentiation(compat.nodes(block.degree)), kept[dofs]) / size
-            np.add.at(out, dofs.ravel(), values.ravel())
+            np.add.at(out, dofs.ravel(), self._slopes(fields, block).ravel())
             np.add.at(count, dofs.ravel(), 1.0)
         u.x.array[:] = out / np.maximum(count, 1.0)
         u.x.scatter_forward()
@@ -89,6 +87,22 @@ class Shift:
         u.x.array[:] = kept
         change[fields.number < 0] = 0.0
         return change
+
+    def mismatch(self, fields: Fields) -> float:
+        """Greatest jump between elements of the rotation's derivative: how far the mesh is from the symmetry."""
+        block = next(b for b in fields.blocks if b.name == fields.turning.name)
+        dofs, slopes = fields.dofs[block.name].ravel(), self._slopes(fields, block).ravel()
+        low, high = np.full(len(fields.number), np.inf), np.full(len(fields.number), -np.inf)
+        np.minimum.at(low, dofs, slopes)
+        np.maximum.at(high, dofs, slopes)
+        return float(fields.comm.allreduce((high - low)[dofs].max(), op=MPI.MAX))
+
+    @staticmethod
+    def _slopes(fields: Fields, block: Block) -> np.ndarray:
+        """Derivative in arclength of a field at the nodes of each cell, (cells, nodes, components)."""
+        size = (fields.vertices[:, 1] - fields.vertices[:, 0])[:, None, None]
+        values = fields.u.x.array[fields.dofs[block.name]].real
+        return np.asarray(np.einsum("pn,cni->cpi", differentiation(compat.nodes(block.degree)), values) / size)
 
 
 def differentiation(nodes: np.ndarray) -> np.ndarray:

@@ -34,6 +34,10 @@ SYMMETRIC_STATE = 1e-6
 """A generator smaller than this (in the metric) is zero: the state has the symmetry itself."""
 
 
+MESH = 10.0
+"""Times the mismatch of a mesh with the motion of a ring along itself, below which a generator is the mesh's error."""
+
+
 class System:
     """Residual, Jacobian and metric of a scene at a discretisation, and their borders.
 
@@ -74,6 +78,7 @@ class System:
         self._all = PETSc.LGMap().create(self._columns[True], comm=comm)
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
         self._equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
+        self._equation_numbers = number[self._equation_targets].astype(PETSc.IntType)
         self._pattern = bordered_pattern(self.fields)
         self.matrix = self.state_matrix(load=True)
         self.x_local = PETSc.Vec().createSeq(int((number >= 0).sum()), comm=PETSc.COMM_SELF)
@@ -109,7 +114,7 @@ class System:
 
     def scalar(self, x: PETSc.Vec, name: str = LOAD) -> float:
         """Value of a scalar unknown, the same on all ranks."""
-        value = float(np.real(x.getValue(self.scalars[name]))) if self.has_scalars else 0.0
+        value = float(x.getValue(self.scalars[name]).real) if self.has_scalars else 0.0
         return self.comm.bcast(value, root=self.comm.size - 1) if self.comm.size > 1 else value
 
     def set_load(self, x: PETSc.Vec, value: float) -> None:
@@ -127,7 +132,7 @@ class System:
     def norm(self, d: PETSc.Vec) -> float:
         """Size of a change of state in the metric."""
         self.metric.mult(d, self.workspace)
-        return float(max(np.real(self.workspace.dot(d)), 0.0)) ** 0.5
+        return float(max(self.workspace.dot(d).real, 0.0)) ** 0.5
 
     def bring(self, x: PETSc.Vec) -> None:
         """Put ``x`` into the dolfinx function on which the forms are assembled."""
@@ -152,8 +157,8 @@ class System:
             self._residual_local[:] = 0.0
             fem.assemble_vector(self._residual_local, self.equations.residual)
             out.set(0.0)
-            targets = self._equation_targets
-            out.setValues(self.fields.number[targets], self._residual_local[targets], addv=PETSc.InsertMode.ADD_VALUES)
+            values = self._residual_local[self._equation_targets]
+            out.setValues(self._equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)
             out.assemble()
             for i, (phase, index) in enumerate(zip(self.phases, self.drifts, strict=True)):
                 drift = self.scalar(x, f"drift{i}")
@@ -245,14 +250,27 @@ class System:
             return
         generators = [self.generator(reference, i) for i in range(count)]
         images = [self.metric * g for g in generators]
-        gram = np.array([[np.real(g.dot(m)) for m in images] for g in generators])
-        squares, combinations = np.linalg.eigh(gram)
-        self.kept = combinations[:, squares < SYMMETRIC_STATE**2].T
-        for i, (square, weights) in enumerate(zip(squares, combinations.T, strict=True)):
-            if square >= SYMMETRIC_STATE**2:
-                phase = combine(images, weights / square**0.5)
-                self.phases[i], self._phase_offset[i] = phase, np.real(phase.dot(reference))
-                self.broken[self.drifts[i]] = weights / square**0.5
+        exact = [i for i, s in enumerate(self.symmetries) if not isinstance(s, Shift)]
+        gram = np.array([[np.real(generators[i].dot(images[j])) for j in exact] for i in exact])
+        squares, turn = np.linalg.eigh(gram.reshape(len(exact), len(exact)))
+        combinations, sizes = list((np.eye(count)[:, exact] @ turn).T), list(np.sqrt(np.maximum(squares, 0.0)))
+        least = [SYMMETRIC_STATE] * len(exact)
+        last = self.symmetries[-1]
+        if isinstance(last, Shift):  # what of the motion along itself the exact ones do not do as well
+            rest = np.eye(count)[-1]
+            for weights, size in zip(combinations, sizes, strict=True):
+                if size >= SYMMETRIC_STATE:
+                    rest = rest - weights / size**2 * np.real(combine(images, weights).dot(generators[-1]))
+            combinations.append(rest / np.linalg.norm(rest))
+            sizes.append(self.norm(combine(generators, combinations[-1])))
+            self.bring(reference)
+            least.append(max(MESH * last.mismatch(self.fields), SYMMETRIC_STATE))
+        broken = np.array(sizes) >= least
+        self.kept = np.array(combinations)[~broken]
+        for i in np.flatnonzero(broken):
+            phase = combine(images, combinations[i] / sizes[i])
+            self.phases[i], self._phase_offset[i] = phase, np.real(phase.dot(reference))
+            self.broken[self.drifts[i]] = combinations[i] / sizes[i]
 
     def equivalent_directions(self, x: PETSc.Vec, direction: PETSc.Vec) -> list[PETSc.Vec]:
         """Directions into which the symmetries that the state ``x`` has itself carry a direction, to first order.

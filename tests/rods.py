@@ -12,8 +12,9 @@ from types import ModuleType
 
 from rodfem.branch import Branch, Point, Special
 from rodfem.continuation import Follower
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
 from rodfem.fields import Discretization
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.system import System

@@ -1,8 +1,8 @@
 """A taut rod between clamps turned out of its line: boundary layers of width ``sqrt(EI/T)``, in closed form.
 
 The rod of length 1 and bending stiffness 1 is pulled by a dead force ``T = 10^lam`` along e3; both ends are clamped at
-the angle ``ANGLE`` to e3.  Near an end the angle obeys ``tan(theta/4) = tan(ANGLE/4) exp(-s sqrt(T))``, and shortens the
-rod by ``2 (1 - cos(ANGLE/2)) / sqrt(T)``; the other end is felt as ``exp(-sqrt(T))`` only.
+the angle ``ANGLE`` to e3.  Near an end the angle obeys ``tan(theta/4) = tan(ANGLE/4) exp(-s sqrt(T))`` (the separatrix
+of a pendulum), and shortens the rod by ``2 (1 - cos(ANGLE/2)) / sqrt(T)``; the other end is felt as ``exp(-sqrt(T))``.
 """
 
 from math import cos, pi, sin

@@ -14,7 +14,8 @@ from rods import DEFAULT, explored, follower, specials, user_points
 from rodfem.continuation import Steps
 from rodfem.diagram import load_state, save_states
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
+from rodfem.plan import Plan
 from rodfem.report import Report
 
 HALF = DEFAULT[3]
@@ -110,7 +111,7 @@ def test_newton_converges_quadratically() -> None:
 def test_restart_on_another_discretisation(formulation: str, folder: Path) -> None:
     """A saved state starts Newton's method on other elements of another degree, and it lands on the exact state."""
     branch = explored(formulation, 8, 6, at=AT if formulation == "reduced" else (0.5,), depth=1)[1]
-    save_states(branch, follower(formulation, 8, 6), folder / "states.h5", first=True)
+    save_states(branch, [follower(formulation, 8, 6)], folder / "states.h5", first=True)
     row = branch.points.index(user_points(branch, 0.5)[0])
     other = follower(formulation, 10, 8)
     other.system.comm.barrier()
@@ -137,7 +138,7 @@ def test_polynomials_survive_a_finer_mesh_and_back(formulation: str) -> None:
 def test_restart_from_what_is_not_there(folder: Path) -> None:
     branch = explored(at=AT)[0]
     path = folder / "states.h5"
-    save_states(branch, follower(), path, first=True)
+    save_states(branch, [follower()], path, first=True)
     follower().system.comm.barrier()
     for wrong in ((folder / "nothing.h5", "straight", 0), (path, "crooked", 0), (path, "straight", 999)):
         with pytest.raises(SceneError, match=r"no row .* of a branch"):

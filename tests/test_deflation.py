@@ -15,8 +15,9 @@ from scenes import Found, explored, scene
 from rodfem.branch import Point
 from rodfem.continuation import Follower, distance
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
 from rodfem.fields import Discretization
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.search.deflation import NEW, SAME, Deflation, further, starts, states_at
 from rodfem.search.guesses import turned_state

@@ -19,8 +19,8 @@ from scenes import scene
 
 from rodfem.branch import Branch
 from rodfem.continuation import Equilibria
-from rodfem.explore import Plan
 from rodfem.fields import Discretization
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.stability.vibration import Vibration
 from rodfem.sweep import Sweep

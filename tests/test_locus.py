@@ -24,9 +24,10 @@ from rodfem.branch import Branch, Special
 from rodfem.continuation import Equilibria, Follower, Steps
 from rodfem.ends import clamped, free
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.loci.locus import Locus, locus
+from rodfem.plan import Plan
 from rodfem.plot_locus import draw_locus
 from rodfem.report import Report
 from rodfem.scene import Ordinate, Parameter, Scene

@@ -8,8 +8,9 @@ from mpi4py import MPI
 from rods import DEFAULT, explored, follower, scene
 
 from rodfem.continuation import Follower
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
 from rodfem.fields import Discretization
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.system import System
 

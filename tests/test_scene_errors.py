@@ -28,8 +28,9 @@ from rodfem.ends import (
     pinned,
 )
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer, Plan
+from rodfem.explore import Explorer
 from rodfem.fields import Discretization, Fields
+from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Inertia, Ordinate, Parameter, Scene
 from rodfem.system import System

@@ -65,26 +65,14 @@ subroutine stpnt(ndim, u, par, t)
 end subroutine
 
 subroutine bcnd(ndim, par, icp, nbc, u0, u1, fb, ijac, dbc)
-   use rod, only: dp
+   use rod, only: dp, held
    implicit none
    integer, intent(in) :: ndim, icp(*), nbc, ijac
    real(dp), intent(in) :: par(*), u0(ndim), u1(ndim)
    real(dp), intent(out) :: fb(nbc)
    real(dp), intent(inout) :: dbc(nbc, *)
-   integer, parameter :: left(7) = [1, 2, 3, 4, 8, 9, 10], right(6) = [1, 2, 3, 4, 8, 9]
-   integer :: i
-   fb(1:7) = u0(left)
-   fb(8:13) = u1(right)
+   call held([1, 2, 3, 4, 8, 9, 10], [1, 2, 3, 4, 8, 9], 4, u0, u1, fb, ijac, dbc)
    fb([1, 8]) = fb([1, 8]) - 1
-   if (ijac == 0) return
-   dbc(:, 1:2*ndim) = 0
-   do i = 1, 7
-      dbc(i, left(i)) = 1
-   end do
-   do i = 1, 6
-      dbc(7 + i, ndim + right(i)) = 1
-   end do
-   if (ijac == 2) dbc(:, 2*ndim + 1:2*ndim + 4) = 0
 end subroutine
 
 subroutine pvls(ndim, u, par)
@@ -95,10 +83,4 @@ subroutine pvls(ndim, u, par)
    real(dp), intent(inout) :: par(*)
    real(dp), external :: getp
    par(5) = 1 - getp('BV1', 10, u)
-end subroutine
-
-subroutine icnd
-end subroutine
-
-subroutine fopt
 end subroutine

@@ -70,9 +70,3 @@ end subroutine
 
 subroutine pvls
 end subroutine
-
-subroutine icnd
-end subroutine
-
-subroutine fopt
-end subroutine

@@ -50,7 +50,7 @@ subroutine stpnt(ndim, u, par, t)
 end subroutine
 
 subroutine bcnd(ndim, par, icp, nbc, u0, u1, fb, ijac, dbc)
-   use rod, only: dp, directors
+   use rod, only: dp, directors, held
    implicit none
    integer, intent(in) :: ndim, icp(*), nbc, ijac
    real(dp), intent(in) :: par(*), u0(ndim), u1(ndim)
@@ -60,22 +60,14 @@ subroutine bcnd(ndim, par, icp, nbc, u0, u1, fb, ijac, dbc)
    integer :: i
    q = u1(1:4)
    call directors(q, R)
-   fb(1:4) = u0(1:4) - [1._dp, 0._dp, 0._dp, 0._dp]
-   fb(5:7) = u1(5:7)
+   call held([1, 2, 3, 4], [5, 6, 7], 4, u0, u1, fb, ijac, dbc)
+   fb(1) = fb(1) - 1
    fb(8:10) = par(2:4) + par(1)*R(:, 3)
    if (ijac == 0) return
-   dbc(:, 1:2*ndim) = 0
-   do i = 1, 4
-      dbc(i, i) = 1
-   end do
-   do i = 5, 7
-      dbc(i, ndim + i) = 1
-   end do
    dbc(8, ndim + 1:ndim + 4) = 2*par(1)*[q(3), q(4), q(1), q(2)]
    dbc(9, ndim + 1:ndim + 4) = 2*par(1)*[-q(2), -q(1), q(4), q(3)]
    dbc(10, ndim + 1:ndim + 4) = 2*par(1)*[q(1), -q(2), -q(3), q(4)]
    if (ijac == 1) return
-   dbc(:, 2*ndim + 1:2*ndim + 4) = 0
    dbc(8:10, 2*ndim + 1) = R(:, 3)
    do i = 1, 3
       dbc(7 + i, 2*ndim + 1 + i) = 1
@@ -83,10 +75,4 @@ subroutine bcnd(ndim, par, icp, nbc, u0, u1, fb, ijac, dbc)
 end subroutine
 
 subroutine pvls
-end subroutine
-
-subroutine icnd
-end subroutine
-
-subroutine fopt
 end subroutine

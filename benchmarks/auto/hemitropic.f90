@@ -59,7 +59,7 @@ subroutine stpnt(ndim, u, par, t)
 end subroutine
 
 subroutine bcnd(ndim, par, icp, nbc, u0, u1, fb, ijac, dbc)
-   use rod, only: dp
+   use rod, only: dp, held
    use hemitropic_law, only: half_length
    implicit none
    integer, intent(in) :: ndim, icp(*), nbc, ijac
@@ -67,29 +67,12 @@ subroutine bcnd(ndim, par, icp, nbc, u0, u1, fb, ijac, dbc)
    real(dp), intent(out) :: fb(nbc)
    real(dp), intent(inout) :: dbc(nbc, *)
    integer, parameter :: clamped(7) = [1, 2, 3, 4, 8, 9, 10]
-   integer :: i
-   fb(1:7) = u0(clamped)
-   fb(8:14) = u1(clamped)
+   call held(clamped, clamped, 5, u0, u1, fb, ijac, dbc)
    fb([1, 8]) = fb([1, 8]) - 1
    fb(7) = fb(7) + half_length*(1 - par(1))
    fb(14) = fb(14) - half_length*(1 - par(1))
-   if (ijac == 0) return
-   dbc(:, 1:2*ndim) = 0
-   do i = 1, 7
-      dbc(i, clamped(i)) = 1
-      dbc(7 + i, ndim + clamped(i)) = 1
-   end do
-   if (ijac == 1) return
-   dbc(:, 2*ndim + 1:2*ndim + 5) = 0
-   dbc(7, 2*ndim + 1) = -half_length
-   dbc(14, 2*ndim + 1) = half_length
+   if (ijac == 2) dbc([7, 14], 2*ndim + 1) = [-half_length, half_length]
 end subroutine
 
 subroutine pvls
-end subroutine
-
-subroutine icnd
-end subroutine
-
-subroutine fopt
 end subroutine

@@ -40,30 +40,17 @@ subroutine stpnt(ndim, u, par, t)
 end subroutine
 
 subroutine bcnd(ndim, par, icp, nbc, u0, u1, fb, ijac, dbc)
-   use rod, only: dp
+   use rod, only: dp, held
    use hemitropic_law, only: half_length
    implicit none
    integer, intent(in) :: ndim, icp(*), nbc, ijac
    real(dp), intent(in) :: par(*), u0(ndim), u1(ndim)
    real(dp), intent(out) :: fb(nbc)
    real(dp), intent(inout) :: dbc(nbc, *)
-   integer, parameter :: middle(5) = [3, 4, 5, 9, 10], clamped(7) = [1, 2, 3, 4, 8, 9, 10]
-   integer :: i
-   fb(1:5) = u0(middle)
-   fb(6:12) = u1(clamped)
+   call held([3, 4, 5, 9, 10], [1, 2, 3, 4, 8, 9, 10], 3, u0, u1, fb, ijac, dbc)
    fb(6) = fb(6) - 1
    fb(12) = fb(12) - half_length*(1 - par(1))
-   if (ijac == 0) return
-   dbc(:, 1:2*ndim) = 0
-   do i = 1, 5
-      dbc(i, middle(i)) = 1
-   end do
-   do i = 1, 7
-      dbc(5 + i, ndim + clamped(i)) = 1
-   end do
-   if (ijac == 1) return
-   dbc(:, 2*ndim + 1:2*ndim + 3) = 0
-   dbc(12, 2*ndim + 1) = half_length
+   if (ijac == 2) dbc(12, 2*ndim + 1) = half_length
 end subroutine
 
 subroutine pvls(ndim, u, par)
@@ -74,10 +61,4 @@ subroutine pvls(ndim, u, par)
    real(dp), intent(inout) :: par(*)
    real(dp), external :: getp
    par(4) = abs(getp('BV0', 8, u))
-end subroutine
-
-subroutine icnd
-end subroutine
-
-subroutine fopt
 end subroutine

@@ -10,7 +10,7 @@
 module rod
    implicit none
    private
-   public :: dp, directors, transposed_times, rod_rhs
+   public :: dp, directors, transposed_times, rod_rhs, held
 
    integer, parameter :: dp = kind(1d0)
 
@@ -100,6 +100,27 @@ contains
       df(8, 1:4) = df(8, 1:4) + 2*v*[q(3), q(4), q(1), q(2)]
       df(9, 1:4) = df(9, 1:4) + 2*v*[-q(2), -q(1), q(4), q(3)]
       df(10, 1:4) = df(10, 1:4) + 2*v*[q(1), -q(2), -q(3), q(4)]
+   end subroutine
+
+   pure subroutine held(left, right, npar, u0, u1, fb, ijac, dbc)
+      ! Boundary conditions u0(left) = 0, u1(right) = 0, to which a scene adds what is not zero; with ijac = 1 their
+      ! derivatives in u0, u1, with ijac = 2 also the (zero) ones in npar parameters.
+      integer, intent(in) :: left(:), right(:), npar, ijac
+      real(dp), intent(in) :: u0(:), u1(:)
+      real(dp), intent(out) :: fb(:)
+      real(dp), intent(inout) :: dbc(size(fb), *)
+      integer :: i, n
+      n = size(u0)
+      fb(:size(left) + size(right)) = [u0(left), u1(right)]
+      if (ijac == 0) return
+      dbc(:, 1:2*n) = 0
+      do i = 1, size(left)
+         dbc(i, left(i)) = 1
+      end do
+      do i = 1, size(right)
+         dbc(size(left) + i, n + right(i)) = 1
+      end do
+      if (ijac == 2) dbc(:, 2*n + 1:2*n + npar) = 0
    end subroutine
 
 end module rod

@@ -53,26 +53,14 @@ subroutine stpnt(ndim, u, par, t)
 end subroutine
 
 subroutine bcnd(ndim, par, icp, nbc, u0, u1, fb, ijac, dbc)
-   use rod, only: dp
+   use rod, only: dp, held
    implicit none
    integer, intent(in) :: ndim, icp(*), nbc, ijac
    real(dp), intent(in) :: par(*), u0(ndim), u1(ndim)
    real(dp), intent(out) :: fb(nbc)
    real(dp), intent(inout) :: dbc(nbc, *)
-   integer, parameter :: left(5) = [1, 2, 3, 4, 8], right(3) = [5, 6, 7]
-   integer :: i
-   fb(1:5) = u0(left)
-   fb(6:8) = u1(right)
+   call held([1, 2, 3, 4, 8], [5, 6, 7], 1, u0, u1, fb, ijac, dbc)
    fb(1) = fb(1) - 1
-   if (ijac == 0) return
-   dbc(:, 1:2*ndim) = 0
-   do i = 1, 5
-      dbc(i, left(i)) = 1
-   end do
-   do i = 1, 3
-      dbc(5 + i, ndim + right(i)) = 1
-   end do
-   if (ijac == 2) dbc(:, 2*ndim + 1) = 0
 end subroutine
 
 subroutine pvls(ndim, u, par)
@@ -83,10 +71,4 @@ subroutine pvls(ndim, u, par)
    real(dp), intent(inout) :: par(*)
    real(dp), external :: getp
    par(2) = abs(getp('BV1', 8, u))
-end subroutine
-
-subroutine icnd
-end subroutine
-
-subroutine fopt
 end subroutine

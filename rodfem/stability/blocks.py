@@ -14,6 +14,9 @@ multipliers (each column the gradient of one constraint), ``M`` (m, m) the kinet
   (pointwise formulation only).  In each cell the gradients of its constraints in its own strains are a block ``C_v`` of
   full column rank; ``dv = -(C_v^t)^+ C_u^t (theta, dr)`` and an orthonormal ``N`` with ``C_v N = 0`` leave ``C_u N``.
 
+A ring is closed by ``q(l) = +-q(0)``.  The norms being fulfilled, three of these four equations are independent: in
+tangent and compatible coordinates those across ``q(0)``, one in the plane.
+
 Sizes for ``N`` elements of degree ``k``, ``f`` free strains, one end clamped (``e = 1``) or both (``e = 2``), ``h``
 held components of the centreline's ends, ``g`` scalar contact forces (reduced formulation):
 
@@ -33,12 +36,13 @@ continuous stretch would have one value more, ``4n - 2``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
+from rodfem.ends import Ring
 from rodfem.errors import SceneError
 from rodfem.stability.matrices import block_matrix, first_of, local_rows, petsc_matrix
 from rodfem.stability.pencil import assemble_pencil
@@ -149,6 +153,8 @@ class Blocks:
         where["theta"] = np.flatnonzero(spins[kept]) + first
         del where["q"]
         pencil = Pencil(K.ptap(T), T.transposeMatMult(C), M.ptap(T), T, where, self.place, symmetric)
+        if isinstance(self.system.scene.ends, Ring):
+            pencil = self._closed(pencil)
         if self.coordinates == "tangent" or "v" not in where:
             return pencil
         return self._compatible(pencil)
@@ -202,6 +208,30 @@ class Blocks:
             shape=(len(self.rows),) * 2,
         )
         return petsc_matrix(self.system.comm, full[:, np.delete(np.arange(len(self.rows)), quads[:, 0])])
+
+    def _closed(self, pencil: Pencil) -> Pencil:
+        """Keep of the equations that close a ring's rotation the combinations across the quaternion at its start."""
+        f, comm = self.system.fields, self.system.comm
+        start = np.isclose(f.coordinates(self.system.fields.discretization.degree), self.system.scene.interval[0])
+        here = f.u.x.array[f.dofs["q"][start]].real
+        q = next(part[0] for part in comm.allgather(here) if len(part))
+        closing = [x for x in f.unknown_scalars if x.group == "t"]
+        scalars = np.array([f.scalars[x.name] for x in closing] if self.system.has_scalars else [], dtype=int)
+        columns = np.searchsorted(self.columns, scalars)
+        across = np.linalg.svd(q[[x.component for x in closing]][None])[2][1:].T if len(columns) else np.zeros((0, 0))
+        kept = np.delete(np.arange(len(self.columns)), columns[-1:])
+        chosen = sp.identity(len(self.columns), format="lil")[:, kept]
+        if len(columns):
+            chosen[np.ix_(columns, np.searchsorted(kept, columns[:-1]))] = across
+        first, begin = pencil.C.getOwnershipRangeColumn()[0], first_of(comm, len(kept))
+        where = dict(pencil.where)
+        for name in ("n", "scalars", *(n for n in where if n.startswith("p") and n[1:].isdigit())):
+            if name in where:
+                own = where[name] - first
+                where[name] = np.searchsorted(kept, own[np.isin(own, kept)]) + begin
+        every = np.concatenate(comm.allgather(columns[-1:] + first))
+        place = np.delete(self.place, every)
+        return replace(pencil, C=pencil.C.matMult(petsc_matrix(comm, chosen)), where=where, place=place)
 
     def _compatible(self, pencil: Pencil) -> Pencil:
         """Let the strains of ``pencil`` (tangent coordinates) follow from the motion."""

@@ -12,6 +12,9 @@ from rodfem.stability.vibration import Vibration
 SAME = 1e-6
 """A left and a right eigenvalue that differ by less than this, relative, are the same."""
 
+ROUND_OFF = 1e-10
+"""An imaginary part smaller than this, relative, is that of a real eigenvalue."""
+
 
 @dataclass(frozen=True)
 class BothSides:
@@ -49,8 +52,9 @@ def both_sides(vibration: Vibration, number: int) -> BothSides:
     X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * weighed(vibration, X), axis=0)).real)
     X = X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * weighed(vibration, X), axis=0))))
     Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ weighed(vibration, X)).T)
+    values = right.values[chosen]
     return BothSides(
-        right.values[chosen],
+        np.where(abs(values.imag) < ROUND_OFF * abs(values), values.real, values),
         right.errors[chosen],
         tuple(right.kinds[i] for i in chosen),
         X,

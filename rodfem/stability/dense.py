@@ -1,8 +1,8 @@
-r"""All finite eigenvalues of a small singular pencil ``S x = mu M x``, by dense orthogonal reductions.
+r"""Eigenvalues of small pencils by dense matrices.
 
-``M`` is singular (multipliers and all else without inertia), and the infinite eigenvalues come in Jordan blocks, which
-round-off turns into large finite ones.  They are removed before any eigenvalue is computed: with bases of the range and
-the null space of ``M`` ::
+Of a singular pencil ``S x = mu M x`` all finite ones, by orthogonal reductions.  ``M`` is singular (multipliers and all
+else without inertia), and the infinite eigenvalues come in Jordan blocks, which round-off turns into large finite ones.
+They are removed before any eigenvalue is computed: with bases of the range and the null space of ``M`` ::
 
     S = ( S11  S10 )      M = ( M11  0 )
         ( S01  S00 ),         (  0   0 ),
@@ -17,6 +17,10 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
+
+from rodfem.errors import ConvergenceError
+from rodfem.stability.blocks import Pencil
+from rodfem.stability.matrices import gathered
 
 RANK = 1e-11
 """Singular values below this, relative to the norm of the pencil's matrices, are zero."""
@@ -56,3 +60,33 @@ def finite_eigenpairs(S: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndar
     values, vectors = scipy.linalg.eig(np.linalg.solve(M, S)) if len(M) else (np.zeros(0), np.zeros((0, 0)))
     order = np.argsort(abs(values))
     return np.asarray(values[order], dtype=complex), back @ vectors[:, order]
+
+
+def symmetric_eigenpairs(pencil: Pencil, below: float, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Left-most eigenvalues and vectors (m, k) of a small symmetric pencil, given a number below all of them.
+
+    ``M z = nu (K - below M) z`` on the kernel of the constraints, ``mu = below + 1/nu``: the matrix on the right is
+    positive definite there, and the infinite eigenvalues are ``nu = 0``.
+    """
+    K, C, M = (gathered(A).toarray() for A in (pencil.K, pencil.C, pencil.M))
+    Z = scipy.linalg.null_space(C.T) if C.shape[1] else np.eye(len(K))
+    mass, shifted = Z.T @ M @ Z, Z.T @ (K - below * M) @ Z
+    nu, z = scipy.linalg.eigh((mass + mass.T) / 2, (shifted + shifted.T) / 2)
+    finite = int((nu > 1e-13 * nu[-1]).sum())
+    if number > finite:
+        raise ConvergenceError(f"The pencil has {finite} finite eigenvalues, not {number}: ask for fewer.")
+    best = np.argsort(nu)[::-1][:number]
+    return below + 1 / nu[best], Z @ z[:, best]
+
+
+def eigenvalues_near(pencil: Pencil, target: float) -> np.ndarray:
+    """All finite eigenvalues of a small pencil without symmetry, the more precise the nearer to ``target``.
+
+    LAPACK's QZ algorithm finds ``nu`` of ``M z = nu (K - target M) z`` on the kernel of the constraints, and ``mu =
+    target + 1/nu``; the infinite eigenvalues are ``nu = 0``.
+    """
+    K, C, M = (gathered(A).toarray() for A in (pencil.K, pencil.C, pencil.M))
+    Z = scipy.linalg.null_space(C.T) if C.shape[1] else np.eye(len(K))
+    above, under = scipy.linalg.eig(Z.T @ M @ Z, Z.T @ (K - target * M) @ Z, right=False, homogeneous_eigvals=True)
+    finite = abs(above) > 1e-13 * abs(above / under).max() * abs(under)
+    return np.asarray(target + under[finite] / above[finite])

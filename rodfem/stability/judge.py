@@ -20,14 +20,13 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse as sp
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.stability.band import Decision, decide
 from rodfem.stability.blocks import Blocks, Pencil
-from rodfem.stability.dense import finite_eigenpairs
+from rodfem.stability.dense import eigenvalues_near, symmetric_eigenpairs
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.matrices import first_of, gathered, local_rows
 from rodfem.stability.pencil import in_interval, symmetry_modes, weighed_modes
@@ -313,11 +312,8 @@ class Judge:
             found = Reduction(pencil).near(number, target)
             self._made += 1
             return found.values, [], found.errors
-        K, C, M = (gathered(A).toarray() for A in (pencil.K, pencil.C, pencil.M))
-        p = C.shape[1]
-        S, mass = np.block([[K, C], [C.T, np.zeros((p, p))]]), np.pad(M, (0, p))
-        values, _ = finite_eigenpairs(S, mass)
-        values = values[:number]
+        values = eigenvalues_near(pencil, 1e-3 * self.system.stiffness_scale)
+        values = values[np.argsort(abs(values), kind="stable")[:number]]
         order = np.lexsort((values.imag, np.round(values.real, 9)))
         return values[order], [], np.full(len(values), np.finfo(float).eps)
 
@@ -369,23 +365,6 @@ def two_distinct(values: np.ndarray) -> tuple[float, float]:
     first = float(values[0])
     others = values[values > first + DISTINCT * abs(values).max()]
     return first, float(others[0]) if len(others) else first + 0.5 * abs(values).max()
-
-
-def symmetric_eigenpairs(pencil: Pencil, below: float, number: int) -> tuple[np.ndarray, np.ndarray]:
-    """Left-most eigenvalues and vectors (m, k) of a small symmetric pencil, given a number below all of them.
-
-    ``M z = nu (K - below M) z`` on the kernel of the constraints, ``mu = below + 1/nu``: the matrix on the right is
-    positive definite there, and the infinite eigenvalues are ``nu = 0``.
-    """
-    K, C, M = (gathered(A).toarray() for A in (pencil.K, pencil.C, pencil.M))
-    Z = scipy.linalg.null_space(C.T) if C.shape[1] else np.eye(len(K))
-    mass, shifted = Z.T @ M @ Z, Z.T @ (K - below * M) @ Z
-    nu, z = scipy.linalg.eigh((mass + mass.T) / 2, (shifted + shifted.T) / 2)
-    finite = int((nu > 1e-13 * nu[-1]).sum())
-    if number > finite:
-        raise ConvergenceError(f"The pencil has {finite} finite eigenvalues, not {number}: ask for fewer.")
-    best = np.argsort(nu)[::-1][:number]
-    return below + 1 / nu[best], Z @ z[:, best]
 
 
 def judge(source: Any, x: PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:

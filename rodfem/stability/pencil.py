@@ -11,6 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
+from rodfem.errors import SceneError
 from rodfem.system import DENSE_ROWS, Factorizer, System, combine, prefer_options
 
 MASSLESS = 1e-12
@@ -18,7 +19,12 @@ MASSLESS = 1e-12
 
 
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> None:
-    """Assemble tangent matrix and kinetic metric at the state ``x``, without the symmetries' phase conditions."""
+    """Assemble tangent matrix and kinetic metric at the state ``x``, without the symmetries' phase conditions.
+
+    Raises :class:`SceneError` for a rod without any inertia.
+    """
+    if system.equations.massless:
+        raise SceneError("A rod without inertia has no eigenvalues mu = omega^2: give it a mass or a rotary inertia.")
     system.bring(x)
     for target, form in ((matrix, system.equations.jacobian), (mass, system.equations.kinetic)):
         target.zeroEntries()

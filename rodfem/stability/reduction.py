@@ -93,9 +93,9 @@ class Reduction:
         return found
 
     def _certified(self, found: Reduced, number: int, target: float) -> Reduced:
-        """Keep the ``number`` nearest to ``target``, and count whether any is missing among them."""
+        """Keep the ``number`` nearest to ``target``, of equally near ones the left; count whether any is missing."""
         distance = abs(found.values - target)
-        nearest = np.argsort(distance)[:number]
+        nearest = np.lexsort((found.values, np.round(distance / distance.max(), 9)))[:number]
         radius = distance[nearest[-1]] * (1 + 1e-6)
         count = self.projection.below(target + radius) - self.projection.below(target - radius)
         keep = np.sort(nearest)

@@ -31,6 +31,8 @@ HIT = 1e-8
 EXTRA = (2, 6, 14)
 """How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
 
+CONVERGED = 1e-7
+"""A pair with a residual greater than this, relative to the stiffness, is none: the Krylov space broke down."""
 NOISE = 1e-6
 """Size of what is added to the modes of the state before, which may span an invariant space without the lowest one."""
 
@@ -93,6 +95,11 @@ class Spectrum:
                 modes = self._solve(number, extra)
                 if modes.certified:
                     break
+        if len(modes.values) < number:
+            raise ConvergenceError(
+                f"SLEPc found {len(modes.values)} of the {number} eigenvalues asked for: ask for fewer, or use a "
+                "richer discretisation."
+            )
         spread = modes.values[-1] - modes.values[0] + 1e-3 * abs(modes.values).max()
         self.shift = modes.values[0] - 0.1 * spread
         return modes
@@ -138,19 +145,23 @@ class Spectrum:
         asked for.
         """
         self._factor(self.shift)
-        values, vectors = self._krylov_schur(number, number + extra)
-        if values[0] - self.shift < HIT * (values[number - 1] - self.shift):
-            self.shift -= max(values[number - 1] - self.shift, self.inertia.scale)
+        values, vectors, errors = self._krylov_schur(number, number + extra)
+        reach = max(values[-1] - self.shift, self.inertia.scale) if len(values) else np.inf
+        if len(values) and values[0] - self.shift < HIT * reach:
+            self.shift -= reach
             return self._solve(number, extra)
+        if len(values) < number:
+            return Modes(values, vectors, errors, False)
         self._last = sum(vector.array_r for vector in vectors)
         cut = values[number - 1] + 1e-6 * max(abs(values[number - 1]), self.inertia.scale)
         known = int((values < cut).sum())
-        values, vectors = values[:number], vectors[:number]
-        errors = self.backward_errors(values, vectors)
-        return Modes(values, vectors, errors, self.below(cut) == known)
+        return Modes(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
 
-    def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec]]:
-        """Solve by SLEPc, for ``number`` eigenvalues or all there are."""
+    def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec], np.ndarray]:
+        """Solve by SLEPc, for ``number`` eigenvalues or all there are: with their vectors and backward errors.
+
+        Where it asks for more than there are finite ones, the Krylov space breaks down, and what comes is no eigenpair.
+        """
         start = self.inertia.seed(1)
         if len(self._last):  # a space that is invariant already would miss all else
             start.scale(NOISE / self.system.norm(start))
@@ -160,7 +171,7 @@ class Spectrum:
         found = solver.getConverged()
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
         vectors = [self.system.new_vector() for _ in range(found)]
-        for i, vector in zip(np.argsort(values), vectors, strict=True):
+        for i, vector in enumerate(vectors):
             solver.getEigenvector(i, vector)
         solver.destroy()
         if found < least:
@@ -168,7 +179,10 @@ class Spectrum:
                 f"SLEPc found {found} of the {least} eigenvalues asked for: "
                 f"ask for at most {found} at this discretisation."
             )
-        return np.sort(values), vectors
+        errors = self.backward_errors(values, vectors)
+        stiffness, mass = (A.norm(PETSc.NormType.INFINITY) for A in (self.matrix, self.mass))
+        true = [i for i in np.argsort(values) if errors[i] * (1 + abs(values[i]) * mass / stiffness) < CONVERGED]
+        return values[true], [vectors[i] for i in true], errors[true]
 
     def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:
         """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""

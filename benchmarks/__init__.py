@@ -1,0 +1,1 @@
+"""What rodfem costs: run from the root of the project, as in ``python -m benchmarks.speed``."""

@@ -1,0 +1,1 @@
+"""The rods of the demos, traced with AUTO-07p."""

@@ -1,0 +1,1 @@
+"""Speed against error: writes ``docs/speed.md`` and its figures; run by ``make bench``."""

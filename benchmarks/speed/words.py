@@ -1,0 +1,55 @@
+"""What the page says in words; numbers come from elsewhere."""
+
+INTRODUCTION = """
+Errors are relative to references that neither rodfem nor what it is compared with has computed. Times are medians of
+{runs} with warm caches, after one that is not counted, in processor time (user and system) except where wall time is
+said. `10 P6 reduced` is ten elements of degree 6 in the reduced formulation.
+"""
+REFERENCES = """
+All but the hemitropic rod's bent states (multiple shooting, `tests/shooting.py`) were computed anew in this run, and
+differ from the table by at most {deviation:.0e}: errors below that mean nothing.
+"""
+EQUILIBRIA = """
+Time per accepted point of following a branch, index included, special points not, against the error of the ordinate
+at one load. A star is the discretisation of Kumar & Healey (2010).
+"""
+SPECIAL = """
+Time of a whole branch, index included and special points located, against the error of their loads.
+"""
+PAPER = """
+150 linear elements with the midpoint rule, and the fastest discretisation that is at least as accurate on all targets
+of the branch (and whose finer ones of the same degree are, too). The ratio is how many times faster that is.
+"""
+GOALS = """
+Time per accepted point over AUTO's, full rod against full rod, on one core: of following alone (rodfem with its index,
+AUTO has none), and with special points and all else included. The goals are a ratio of 1 at an error of 1e-6 and of 0.5
+at 1e-8. The reason is where rodfem's time goes.
+"""
+AUTO = """
+For each error the fastest discretisation of either: AUTO's NTST x NCOL found by a sweep (`benchmarks/auto`), rodfem's
+from the last table of this page. The error is the largest of the branch's targets. `ms/point` and `ms/branch` include
+special points and the loads asked for, `following` does not; rodfem's always include the index of every point. Each
+program takes the steps that its own control chooses. Ratios are rodfem's over AUTO's. The follower load's peer is
+`flutter.f90`, whose equations were linearised by hand; rodfem computes six frequencies or more at each of its points.
+"""
+SCIPY = """
+`scipy.integrate.solve_bvp` on the same equations as AUTO, from load to load through those of rodfem's points; the time
+is the median over them. The ratio is scipy's time over that of rodfem at an error that is no greater.
+"""
+EIGENVALUES = """
+Left-most eigenvalues of straight rods with closed forms or by Ritz's method (`benchmarks/references.py`). A judgement
+is assembly, index, eigenvalues and the certificate that none is missing (under the follower load: assembly and
+eigenvalues). AUTO and solve_bvp have nothing of the kind.
+"""
+GROWTH = """
+The cord at lam = 40 with elements of degree 2. Medians of three; memory is what the rod adds to the process.
+An equilibrium is computed at a load a thousandth off; exponents are fitted from {far} unknowns on.
+"""
+RANKS = """
+The buckled cord, wall time. Strong: the same number of elements on more ranks; weak: as many for each rank, for which
+a speed-up of 1 is perfect.
+"""
+MANY = """
+`demos/map.py` with fewer rods, wall time. Taken up again, when all is finished, it only starts, reads and draws.
+"""
+MINUTE = "`python demos/hemitropic.py --no-figures`, wall time. Cold is with an empty cache of compiled forms."

@@ -1,0 +1,64 @@
+"""The benchmarks' own arithmetic, and the boundary value problems for other programs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from benchmarks.auto.output import AutoError
+from benchmarks.auto.problems import PROBLEMS
+from benchmarks.auto.program import check, require_auto
+from benchmarks.speed.scipy_bvp import RODS, solve
+from benchmarks.speed.store import Store
+from benchmarks.speed.tables import fastest
+from benchmarks.targets import TARGETS
+
+pytestmark = pytest.mark.alone
+
+
+@pytest.mark.parametrize(("scene", "branch"), RODS)
+def test_scipy_solves_the_same_rods(scene: str, branch: str) -> None:
+    rod, (target,) = RODS[scene, branch], [t for t in TARGETS[scene][branch] if t.at is not None]
+    found = solve(rod, rod.at, *rod.guess(), 1e-4)
+    if target.at != rod.at:
+        found = solve(rod, target.at, found.x, found.y, rod.guess()[2], 1e-4)
+    assert found.success
+    assert rod.ordinate(found.sol(rod.place)[7:]) == pytest.approx(target.reference, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_derivatives_given_to_auto(name: str) -> None:
+    try:
+        require_auto()
+    except AutoError as missing:
+        pytest.skip(str(missing))
+    assert max(check(PROBLEMS[name])) < 1e-8
+
+
+def test_an_error_that_is_small_by_chance_does_not_count() -> None:
+    errors = {4: 1e-9, 8: 1e-5, 12: 1e-7, 16: 1e-9}
+    rows = [
+        {"formulation": "reduced", "degree": 2, "elements": n, "values": {"a": 1.0}, "errors": {"a": e}, "seconds": n}
+        for n, e in errors.items()
+    ]
+    chosen = fastest(rows, 1e-6, lambda r: float(r["seconds"]))
+    assert chosen is not None and chosen["elements"] == 12
+    assert fastest(rows, 1e-10, lambda r: float(r["seconds"])) is None
+
+
+def test_nothing_measured_is_lost(tmp_path: Path) -> None:
+    store = Store(tmp_path / "measured.json", resume=False)
+    store.measure("one", lambda: [{"failed": "no"}, {"seconds": 1.0}])
+    with pytest.raises(KeyboardInterrupt):
+        store.measure("two", interrupted)
+    again = Store(tmp_path / "measured.json", resume=True)
+    assert again.measure("one", interrupted)[1] == {"seconds": 1.0}
+    assert again.failures() == {"no": ["one"]}
+    again.measure("two", lambda: [])
+    assert list(json.loads((tmp_path / "measured.json").read_text())) == ["one", "two"]
+
+
+def interrupted() -> None:
+    raise KeyboardInterrupt

@@ -1,0 +1,88 @@
+"""One symmetric factorisation a point against two shifts, LU factors, and what the theory says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import rods
+import scenes
+
+from rodfem.branch import BRANCH_POINT, FOLD, Branch
+from rodfem.continuation import Follower
+from rodfem.corrector import NEAR
+from rodfem.newton import TOLERANCE, correct
+
+BENT = {"hemitropic": ("branch 1", 0.5), "cord": ("branch 2", 30.0), "ruler": ("branch 1", 8.0)}
+
+
+def demo(name: str, formulation: str) -> tuple[Follower, list[Branch]]:
+    """Follower and branches of a demo."""
+    if name == "hemitropic":
+        return rods.follower(formulation, 8, 6), rods.explored(formulation, 8, 6)
+    found = scenes.explored(name, formulation)
+    return found.follower, found.branches
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+@pytest.mark.parametrize("name", ["hemitropic", "cord", "ruler"])
+def test_index_is_that_of_two_shifts_at_every_point(name: str, formulation: str) -> None:
+    follower, branches = demo(name, formulation)
+    for branch in branches:
+        for point in branch.points:
+            follower.system.set_phase(point.x)
+            index = follower.inertia.count(point.x)
+            if point is not branch.points[0] and not any(s.point is point for s in branch.special):
+                assert (index.negative, index.zero) == (point.negative, point.zero), (branch.name, point.load)
+
+
+@pytest.mark.parametrize("name", BENT)
+def test_state_and_tangent_are_those_of_lu_factors(name: str) -> None:
+    follower, branches = demo(name, "reduced")
+    system, wanted = follower.system, BENT[name]
+    branch = next(b for b in branches if b.name == wanted[0])
+    point = min(branch.points[2:-2], key=lambda p: abs(p.load - wanted[1]))
+    row = follower.row(point.tangent)
+    guess = point.x.copy()
+    guess.axpy(0.01, point.tangent)
+    guess.axpy(1e-3, system.metric * follower.inertia.seed(0))
+    system.set_phase(guess)
+    ours, theirs = guess.copy(), guess.copy()
+    outcome = follower.corrector.correct(ours, row)
+    assert outcome is not None and outcome.converged and correct(system, theirs, row).converged
+    ours.axpy(-1.0, theirs)
+    assert system.norm(ours) < TOLERANCE
+    tangent = follower.tangent(row, at=theirs)
+    assert follower.corrector.regular
+    system.residual(theirs, system.new_vector())
+    image = system.jacobian(row) * tangent  # J t = (0, row . t)
+    system.set_load(image, 0.0)
+    assert image.norm() < 1e-9 * system.matrix.norm()
+
+
+@pytest.mark.parametrize("name", ["hemitropic", "cord"])
+def test_near_singular_states_are_left_to_others(name: str) -> None:
+    follower, branches = demo(name, "reduced")
+    special = [s for b in branches for s in b.special if s.kind in (FOLD, BRANCH_POINT)]
+    assert len(special) > 2
+    for s in special:
+        follower.system.set_phase(s.point.x)
+        follower.corrector.restart()
+        assert not follower.corrector.factor(s.point.x)
+        assert follower.corrector.nearest < NEAR * follower.inertia.scale
+
+
+def test_nearest_eigenvalue_of_the_straight_cord_is_estimated() -> None:
+    """Straight cord in tension: S is singular at 49.348 only, and its eigenvalues are smooth in between."""
+    follower, branches = demo("cord", "reduced")
+    straight = branches[0].points
+    seen = []
+    follower.corrector.restart()
+    for point in straight[1:20]:
+        follower.system.set_phase(point.x)
+        if not any(s.point is point for s in branches[0].special) and follower.corrector.factor(point.x):
+            follower.inertia.count(point.x)
+            exact = abs(follower.inertia.nearest(1, accuracy=1e-6)[0][0])
+            assert follower.corrector.nearest > (1 - 1e-6) * exact  # an upper bound
+            seen.append(follower.corrector.nearest / exact)
+    assert len(seen) > 5
+    assert np.median(seen) < 1.5
