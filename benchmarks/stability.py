@@ -22,6 +22,7 @@ from petsc4py import PETSc
 
 from benchmarks.common import ROOT, exponent, load, machine, measured, milliseconds, table, versions
 from rodfem.continuation import Equilibria
+from rodfem.corrector import Corrector
 from rodfem.fields import Discretization
 from rodfem.stability.band import decide, quotient_error
 from rodfem.stability.blocks import Blocks
@@ -38,7 +39,18 @@ import states
 
 LOAD, NUMBER = 20.0, 4
 ELEMENTS = (100, 1000, 10_000, 100_000)
-METHODS = ("factorisation", "count", "shift-invert", "slicing", "reduction", "cayley", "scipy", "dense", "dense QZ")
+METHODS = (
+    "factorisation",
+    "index",
+    "count",
+    "shift-invert",
+    "slicing",
+    "reduction",
+    "cayley",
+    "scipy",
+    "dense",
+    "dense QZ",
+)
 MOST = {"dense": 300, "dense QZ": 100, "scipy": 10_000, "slicing": 10_000}
 POINTWISE = MOST | {"reduction": 10_000, "cayley": 10_000}
 ENOUGH = 3.0
@@ -63,6 +75,20 @@ def task(method: str, system: System, x: PETSc.Vec) -> Callable[[], Any]:
         inertia = to_judge.inertia
         inertia.assemble(x)
         return lambda: inertia.below(inertia.shift + 1e-3)
+    if method == "index":
+        corrector = Corrector(to_judge.inertia)
+        corrector.factor(x)
+        return lambda: corrector.factor(x)
+    if method == "assembly":
+        return lambda: to_judge.inertia.assemble(x)
+    if method == "solves":
+        to_judge.inertia.assemble(x)
+        to_judge.inertia.below(0.0)
+        right = PETSc.Mat().createDense(((len(x.array_r), None), (None, 2)), comm=PETSc.COMM_WORLD)
+        right.setUp()
+        right.assemble()
+        solved = right.duplicate()
+        return lambda: to_judge.inertia.factors.solve_all(right, solved)
     if method in ("scipy", "dense QZ"):
         spectrum = to_judge.spectrum
         spectrum.assemble(x)
@@ -86,7 +112,17 @@ def measure(method: str, formulation: str, elements: int, degree: int) -> dict[s
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     run = task(method, system, x)
     values = run()
+    if method == "index":  # beside what Newton's method needs anyway: the assembly, and solves for step and tangent
+        others = [task(name, system, x) for name in ("assembly", "solves")]
+        return {"seconds": seconds(run) - sum(map(seconds, others)), "memory": 0.0, "first": None}
     memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    found = np.atleast_1d(values)
+    first = float(found[0]) if method not in ("count", "factorisation", "dense QZ") else None
+    return {"seconds": seconds(run), "memory": memory, "first": first, "unknowns": system.fields.unknowns}
+
+
+def seconds(run: Callable[[], Any]) -> float:
+    """Median time of what is called at least three times."""
     times: list[float] = []
     while len(times) < 3 or (len(times) < 15 and sum(times) < 0.5):
         started = perf_counter()
@@ -94,9 +130,7 @@ def measure(method: str, formulation: str, elements: int, degree: int) -> dict[s
         times.append(perf_counter() - started)
         if sum(times) > ENOUGH:
             break
-    found = np.atleast_1d(values)
-    first = float(found[0]) if method not in ("count", "factorisation", "dense QZ") else None
-    return {"seconds": float(np.median(times)), "memory": memory, "first": first, "unknowns": system.fields.unknowns}
+    return float(np.median(times))
 
 
 def in_a_process(*arguments: object) -> dict[str, Any] | None:
@@ -112,6 +146,7 @@ def times(formulation: str, progress: Callable[[str], None]) -> tuple[str, str, 
     """Tables of time and memory for linear elements, and the left-most eigenvalues that were found."""
     head = ["method", *(f"n = {n:g}" for n in ELEMENTS), "exponent"]
     rows, memory, first = [], [], []
+    seconds_of: dict[str, list[float]] = {}
     for method in METHODS:
         found: list[dict[str, Any] | None] = []
         for n in ELEMENTS:
@@ -122,6 +157,7 @@ def times(formulation: str, progress: Callable[[str], None]) -> tuple[str, str, 
             progress(f"{formulation} {method} {n}: {found[-1]}")
         if found[2] and found[2]["first"] is not None:
             first.append(f"{method} {found[2]['first']:.9f}")
+        seconds_of[method] = [f["seconds"] if f else np.nan for f in found]
         good = [(n, f) for n, f in zip(ELEMENTS, found, strict=True) if f]
         slope = exponent([n for n, _ in good], [f["seconds"] for _, f in good], 1000)
         rows.append(
@@ -131,7 +167,11 @@ def times(formulation: str, progress: Callable[[str], None]) -> tuple[str, str, 
                 "" if np.isnan(slope) else f"{slope:.2f}",
             ]
         )
-        memory.append([method, *(f"{f['memory']:.0f}" if f else "" for f in found)])
+        if method == "index":
+            shares = np.array(seconds_of["index"]) / seconds_of["factorisation"]
+            rows.append(["index over factorisation", *("" if np.isnan(r) else f"{r:.2f}" for r in shares), ""])
+        else:
+            memory.append([method, *(f"{f['memory']:.0f}" if f else "" for f in found)])
     return table(head, rows), table(head[:-1], memory), ", ".join(first)
 
 
@@ -139,10 +179,10 @@ def rich(progress: Callable[[str], None]) -> str:
     """Table of few elements of high degree."""
     rows = []
     for elements, degree in ((8, 6), (32, 6), (128, 6)):
-        found = [in_a_process(m, "reduced", elements, degree) for m in METHODS[:6]]
+        found = [in_a_process(m, "reduced", elements, degree) for m in METHODS[:7]]
         progress(f"{elements} {degree}: {found}")
         rows.append([f"{elements} of degree {degree}", *(milliseconds(f["seconds"]) if f else "" for f in found)])
-    return table(["elements", *METHODS[:6]], rows)
+    return table(["elements", *METHODS[:7]], rows)
 
 
 def bands() -> str:
@@ -204,9 +244,11 @@ Written by `make bench` (`python -m benchmarks.stability`) in {(perf_counter() -
 The state is the straight telephone cord at lam = {LOAD:g}; {NUMBER} left-most eigenvalues are asked for. A time is the
 median of repeated judgements after a first one, which makes the symbolic factorisation (as along a branch), and
 contains the assembly. `factorisation` is one numeric LDL^t of the saddle matrix with its inertia, without assembly;
-`count` the index, from two of them; `scipy` is `eigs` with shift-invert (SuperLU) on the same matrices and shift,
-`dense QZ` LAPACK's on the singular pencil, which has infinite eigenvalues besides. All but these two prove by counts
-that no eigenvalue is missing. No number: not tried, or stopped after 50 s.
+`index` is what the index costs along a branch: the one factorisation that serves Newton's method and the tangent as
+well, and two columns more in its solves, to know how far from zero the nearest eigenvalue is.
+`count` is the index of a state by itself, from two factorisations; `scipy` is `eigs` with shift-invert (SuperLU) on the
+same matrices and shift, `dense QZ` LAPACK's on the singular pencil, which has infinite eigenvalues besides. All but
+these two prove by counts that no eigenvalue is missing. No number: not tried, or stopped after 50 s.
 
 ## Milliseconds, linear elements
 
