@@ -3,7 +3,8 @@
 #
 #     tools/test.sh PYTHON MPIRUN SECONDS [options for pytest]        (as `make test` does)
 #
-# Two ranks do without the tests marked `alone` that are not `short`; with marks=short in the environment they run the short ones only.
+# Two ranks do without the tests marked `alone` that are not `short`; with marks=short in the environment they run the
+# short ones only.
 set -eu
 cd "$(dirname "$0")/.."
 marks=${marks-not alone or short}
