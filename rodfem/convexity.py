@@ -11,6 +11,9 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
+from ufl.algorithms.analysis import extract_coefficients, extract_type
+from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from forms.kinematics import curvature, strain
 from rodfem import compat
@@ -37,12 +40,19 @@ class Convexity:
         hessian = ufl.diff(ufl.diff(W, x), x)
         self.size = len(free) + 3
         entries = [hessian[i, j] for i in range(self.size) for j in range(self.size)]
+        expression = apply_derivatives(apply_algebra_lowering(ufl.as_vector(entries)))
+        places = [*extract_coefficients(expression), *extract_type(expression, ufl.SpatialCoordinate)]
+        self.evaluate = None
+        if not places:  # the same everywhere: checked with the scene
+            return
         inside = (np.polynomial.legendre.leggauss(f.discretization.degree + 1)[0] + 1) / 2
         points = np.array([0.0, *inside, 1.0])
         self.evaluate = compat.expression(ufl.as_vector(entries), points.reshape(-1, 1), f.mesh, f.owned_cells)
 
     def lowest(self, x: PETSc.Vec) -> float:
-        """Least eigenvalue over the whole rod at the state ``x``, relative to the largest one."""
+        """Least eigenvalue over the whole rod at the state ``x``, relative to the largest one; 1 if it is constant."""
+        if self.evaluate is None:
+            return 1.0
         self.system.bring(x)
         matrices = self.evaluate().reshape(-1, self.size, self.size)
         values = np.linalg.eigvalsh((matrices + matrices.transpose(0, 2, 1)) / 2)
