@@ -117,6 +117,7 @@ def test_every_row_of_a_taut_rod(accuracy: float) -> None:
     assert len({p.mesh for p in branch.points}) > 2
 
 
+@pytest.mark.alone
 def test_graded_mesh_beats_uniform_ones() -> None:
     """The same error at the end of the taut rod's branch takes twelve times the unknowns on equal elements."""
     found = pulled(1e-6)
