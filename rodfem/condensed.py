@@ -44,6 +44,8 @@ from rodfem.piece import Piece
 
 GROWTH = 100.0
 """Times its springs' own compliance, how compliant a braced piece may be: what exceeds one is lost in digits."""
+NOTHING = 1e-8
+"""A diagonal less than this, relative to the sum of its column, is round-off."""
 SPRINGS = (1.0, 3.0, -2.0, 0.3, 10.0, -0.5)
 """Multiples of the springs, tried one after the other."""
 
@@ -89,7 +91,7 @@ class Condensed:
         piece, m = self.piece, len(diagonal)
         sizes, stiffness = piece.border()
         usual = np.where(sizes > 0, -(sizes**2) / stiffness, 1.0)
-        usual = np.where(diagonal != 0, diagonal, usual)
+        usual = np.where(abs(diagonal) > NOTHING * sizes, diagonal, usual)
         self._columns = np.zeros((piece.size + m, m), dtype=PETSc.ScalarType)
         if not piece.size:
             return usual, np.diag(1.0 / usual)
