@@ -28,7 +28,8 @@ negative eigenvalues away; elimination of the pieces leaves D, up to the sign of
 The springs are arbitrary, and exact: what they add to the pieces is taken away in D.  At a cut they are the diagonal of
 the whole matrix, which nearly clamps the piece there; for scalars, without a diagonal, the negative of a compliance.
 A piece so braced is singular by accident only, and that shows: ``|T|^1/2 X |T|^1/2`` is large, or a pivot zero.  Then
-it is braced by other springs.
+it is braced by other springs.  One that is singular with any has a null vector that does not move the shared unknowns,
+and the matrix has the same.
 """
 
 from __future__ import annotations
@@ -46,6 +47,8 @@ GROWTH = 100.0
 """Times its springs' own compliance, how compliant a braced piece may be: what exceeds one is lost in digits."""
 NOTHING = 1e-8
 """A diagonal less than this, relative to the sum of its column, is round-off."""
+ZERO = 1e-14
+"""An eigenvalue or singular value of D less than this, relative to its largest, is zero."""
 SPRINGS = (1.0, 3.0, -2.0, 0.3, 10.0, -0.5)
 """Multiples of the springs, tried one after the other."""
 
@@ -83,11 +86,13 @@ class Condensed:
         parts = piece.comm.allgather((trouble, negative, springs, compliance))
         if any(part[0] for part in parts):
             raise ConvergenceError(next(part[0] for part in parts if part[0]))
-        self._negative = sum(part[1] - len(part[2]) for part in parts)
-        self._join(corner, [part[2] for part in parts], [part[3] for part in parts])
+        self._negative, self._zero = sum(part[1] - len(part[2]) for part in parts), 1
+        self.regular = all(np.isfinite(part[3]).all() for part in parts)
+        if self.regular:
+            self._join(corner, [part[2] for part in parts], [part[3] for part in parts])
 
     def _factor_piece(self, diagonal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Factor this rank's piece; springs (m,) and compliance ``X`` (m, m)."""
+        """Factor this rank's piece; springs (m,) and compliance ``X`` (m, m), nan where it is singular with any."""
         piece, m = self.piece, len(diagonal)
         sizes, stiffness = piece.border()
         usual = np.where(sizes > 0, -(sizes**2) / stiffness, 1.0)
@@ -112,7 +117,7 @@ class Condensed:
             scale = np.sqrt(abs(springs))
             if abs(compliance * np.outer(scale, scale)).max(initial=0.0) < GROWTH:
                 return springs, compliance
-        raise ConvergenceError("A part of the rod on one rank is singular whatever holds it: use fewer ranks.")
+        return usual, np.full((m, m), np.nan)
 
     def _join(self, corner: np.ndarray, springs: list[np.ndarray], compliances: list[np.ndarray]) -> None:
         """Factor ``D``, scaled by the springs."""
@@ -130,10 +135,11 @@ class Condensed:
         start = sum(len(part) for part in self.touched[: self.piece.comm.rank])
         self._forces, self._number = np.arange(start, start + len(self.piece.touched)), forces
         factor, self._back = scipy.linalg.get_lapack_funcs(("getrf", "getrs"), (joint,))
-        self._lu, self._pivots, status = factor(joint)
-        self.regular = bool(status == 0 and np.isfinite(self._lu).all())
-        if self.symmetric and self.regular:
-            self._negative += int((np.linalg.eigvalsh(joint) < 0).sum())
+        self._lu, self._pivots, _ = factor(joint)
+        values = np.linalg.eigvalsh(joint) if self.symmetric else np.linalg.svd(joint, compute_uv=False)
+        self._negative += int((values < 0).sum())
+        self._zero = int((abs(values) < ZERO * abs(values).max()).sum())
+        self.regular = self._zero == 0
 
     def _solve_units(self, rows: np.ndarray) -> np.ndarray:
         """Columns of the inverse of the piece; MUMPS skips what the zeros of their right-hand sides spare it."""
@@ -187,4 +193,4 @@ class Condensed:
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
-        return self._negative, 0 if self.regular else 1
+        return self._negative, self._zero
