@@ -45,8 +45,8 @@ from rodfem.piece import Piece
 
 GROWTH = 100.0
 """Times its springs' own compliance, how compliant a braced piece may be: what exceeds one is lost in digits."""
-NOTHING = 1e-8
-"""A diagonal less than this, relative to the sum of its column, is round-off."""
+NOTHING = 1e-12
+"""Less than this, a diagonal relative to the sum of its column, or that relative to other diagonals, is round-off."""
 ZERO = 1e-14
 """An eigenvalue or singular value of D less than this, relative to its largest, is zero."""
 SPRINGS = (1.0, 3.0, -2.0, 0.3, 10.0, -0.5)
@@ -87,7 +87,7 @@ class Condensed:
         if any(part[0] for part in parts):
             raise ConvergenceError(next(part[0] for part in parts if part[0]))
         self._negative, self._zero = sum(part[1] - len(part[2]) for part in parts), 1
-        self.regular = all(np.isfinite(part[3]).all() for part in parts)
+        self.regular = all(np.isfinite(part).all() for part in (corner, *(part[3] for part in parts)))
         if self.regular:
             self._join(corner, [part[2] for part in parts], [part[3] for part in parts])
 
@@ -95,7 +95,7 @@ class Condensed:
         """Factor this rank's piece; springs (m,) and compliance ``X`` (m, m), nan where it is singular with any."""
         piece, m = self.piece, len(diagonal)
         sizes, stiffness = piece.border()
-        usual = np.where(sizes > 0, -(sizes**2) / stiffness, 1.0)
+        usual = np.where(sizes > NOTHING * stiffness, -(sizes**2) / stiffness, 1.0)
         usual = np.where(abs(diagonal) > NOTHING * sizes, diagonal, usual)
         self._columns = np.zeros((piece.size + m, m), dtype=PETSc.ScalarType)
         if not piece.size:
@@ -120,17 +120,14 @@ class Condensed:
         return usual, np.full((m, m), np.nan)
 
     def _join(self, corner: np.ndarray, springs: list[np.ndarray], compliances: list[np.ndarray]) -> None:
-        """Factor ``D``, scaled by the springs."""
+        """Factor ``D``, scaled."""
         forces = sum(len(part) for part in springs)
         held = np.concatenate(self.touched)
         joint = scipy.linalg.block_diag(*[-part for part in compliances], corner)
         every = np.concatenate(springs)
         joint[np.arange(forces), forces + held] = joint[forces + held, np.arange(forces)] = 1.0
         np.subtract.at(joint, (forces + held, forces + held), every)
-        stiffest = np.zeros(len(corner))
-        np.maximum.at(stiffest, held, abs(every))
-        stiffest[stiffest == 0] = 1.0
-        self._scale = np.append(np.sqrt(abs(every)), 1.0 / np.sqrt(stiffest))
+        self._scale = equilibrate(joint)
         joint *= np.outer(self._scale, self._scale)
         start = sum(len(part) for part in self.touched[: self.piece.comm.rank])
         self._forces, self._number = np.arange(start, start + len(self.piece.touched)), forces
@@ -194,3 +191,15 @@ class Condensed:
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
         return self._negative, self._zero
+
+
+def equilibrate(matrix: np.ndarray, most: int = 30) -> np.ndarray:
+    """Scale of rows and columns, the same for both, with which the largest entries of all are near one (Ruiz 2001)."""
+    sizes = np.maximum(abs(matrix), abs(matrix.T))
+    scale = np.ones(len(matrix))
+    for _ in range(most):
+        largest = (sizes * np.outer(scale, scale)).max(axis=0, initial=0.0)
+        if np.all((largest == 0) | (abs(largest - 1) < 0.5)):
+            break
+        scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
+    return scale
