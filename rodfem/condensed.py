@@ -25,8 +25,9 @@ negative eigenvalues away; elimination of the pieces leaves D, up to the sign of
 
     negative(A) = sum_r [negative(P_r) - m_r] + negative(D).
 
-The springs are arbitrary, and exact: what they add to the pieces is taken away in D.  At a cut they are the diagonal of
-the whole matrix, which nearly clamps the piece there; for scalars, without a diagonal, the negative of a compliance.
+The springs are arbitrary, and exact: what they add to the pieces is taken away in D.  They are the diagonal of the
+whole matrix, which at a cut nearly clamps the piece; for multipliers, scalars, and a centreline without weight, where
+there is none, minus the sum of magnitudes of the column: what is singular with small springs loses digits.
 A piece so braced is singular by accident only, and that shows: ``|T|^1/2 X |T|^1/2`` is large, or a pivot zero.  Then
 it is braced by other springs.  One that is singular with any has a null vector that does not move the shared unknowns,
 and the matrix has the same.
@@ -45,8 +46,10 @@ from rodfem.piece import Piece
 
 GROWTH = 100.0
 """Times its springs' own compliance, how compliant a braced piece may be: what exceeds one is lost in digits."""
+SOFT = 1e-3
+"""A diagonal less than this, relative to the sum of its column, is no spring: it may be a shift of zero."""
 NOTHING = 1e-12
-"""Less than this, a diagonal relative to the sum of its column, or that relative to other diagonals, is round-off."""
+"""A column whose sum is less than this, relative to the diagonals of others, is round-off."""
 ZERO = 1e-14
 """An eigenvalue or singular value of D less than this, relative to its largest, is zero."""
 SPRINGS = (1.0, 3.0, -2.0, 0.3, 10.0, -0.5)
@@ -64,13 +67,13 @@ class Condensed:
         self.factors, self.scalars = factors, scalars
         self.symmetric = factors.kind == "cholesky"
         self.regular = False
-        self._matrix = 0
+        self._matrix: PETSc.Mat | None = None
         self._blocks: dict[int, tuple[PETSc.Mat, PETSc.Mat]] = {}
 
     def __call__(self, matrix: PETSc.Mat) -> None:
         """Factor ``matrix``; raises :class:`ConvergenceError` on all ranks where MUMPS gives up on one."""
-        if matrix.handle != self._matrix:
-            self._matrix = matrix.handle
+        if self._matrix is None or matrix.handle != self._matrix.handle:
+            self._matrix = matrix
             self.piece = Piece(matrix, self.scalars, symmetric=self.symmetric)
             self.touched = self.piece.comm.allgather(self.piece.touched)
             self._blocks = {}
@@ -95,8 +98,8 @@ class Condensed:
         """Factor this rank's piece; springs (m,) and compliance ``X`` (m, m), nan where it is singular with any."""
         piece, m = self.piece, len(diagonal)
         sizes, stiffness = piece.border()
-        usual = np.where(sizes > NOTHING * stiffness, -(sizes**2) / stiffness, 1.0)
-        usual = np.where(abs(diagonal) > NOTHING * sizes, diagonal, usual)
+        usual = np.where(sizes > NOTHING * stiffness, -sizes, 1.0)
+        usual = np.where(abs(diagonal) > SOFT * sizes, diagonal, usual)
         self._columns = np.zeros((piece.size + m, m), dtype=PETSc.ScalarType)
         if not piece.size:
             return usual, np.diag(1.0 / usual)

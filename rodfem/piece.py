@@ -112,11 +112,11 @@ class Piece:
     def update(self, matrix: PETSc.Mat) -> np.ndarray:
         """Take the values of ``matrix``, all but the springs; returns its block of shared unknowns, on all ranks."""
         values = matrix.getValuesCSR()[2]
-        received = values[:0]
         if not self.symmetric:
             received = np.empty(sum(self._counts[1]), dtype=values.dtype)
             self.comm.Alltoallv([values[self._sent], self._counts[0]], [received, self._counts[1]])
-        np.take(np.concatenate([values, received, np.zeros(len(self.touched))]), self._source, out=self.values)
+            values = np.append(values, received)
+        np.take(values, self._source, out=self.values, mode="clip")  # springs, beyond the end, are set later
         corner = np.zeros((len(self.shared), len(self.shared)), dtype=values.dtype)
         entries, row, column = self._corner
         corner[row, column] = values[entries]

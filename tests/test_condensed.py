@@ -59,6 +59,20 @@ def test_inertia_and_solutions(name: str, state: str, formulation: str, load: fl
         np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
 
 
+@FORMULATIONS
+def test_inertia_beside_a_branch_point(formulation: str) -> None:
+    """The straight rod loses stability at 0.1143042145: two eigenvalues are zero but for the discretisation's error."""
+    system, x = at("hemitropic", "plain", formulation, 0.1143042145)
+    inertia, factors = Inertia(system), symmetric(system)
+    for sigma in (-1e-5, 1e-5):
+        inertia.assemble(x)
+        inertia.matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        factors(inertia.matrix)
+        negative = (np.linalg.eigvalsh(gathered(inertia.matrix).toarray()) < 0).sum()
+        assert factors.inertia() == (negative, 0)
+        assert negative - inertia.constraints == (2 if sigma > 0 else 0)
+
+
 def test_many_right_hand_sides() -> None:
     system, x = at("hemitropic", "buckled", "pointwise", 0.2)
     inertia, factors = Inertia(system), symmetric(system)
