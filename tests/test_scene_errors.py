@@ -246,13 +246,13 @@ def test_functions_that_a_number_satisfies_but_no_expression() -> None:
     """``math.cosh`` takes the numbers of the first checks; the forms are more than numbers."""
     scene = Scene(**(GOOD | {"energy": lambda v, k, c: GOOD["energy"](v, k, c) + cosh(k[0])}))
     with pytest.raises(SceneError, match=r"stored energy fails with .*write it with UFL"):
-        System(scene, Discretization("reduced", 2, 2))
+        System(scene, Discretization("reduced", 4, 2))
 
 
 def test_a_rod_squeezed_to_nothing() -> None:
     """The energy is written in v3, not in v3 - 1: without a load the rod has no length."""
     scene = Scene(**(GOOD | {"energy": lambda v, k, c: ufl.dot(v, v) + ufl.dot(k, k)}))
-    solver = Follower(System(scene, Discretization("reduced", 2, 2)))
+    solver = Follower(System(scene, Discretization("reduced", 4, 2)))
     with pytest.raises(SceneError, match=r"squeezed to a stretch.*v\[2\] - 1"):
         Explorer(solver, Plan(scene.span, error_bars=False), Report(quiet=True), lambda: None).run()
 
