@@ -135,7 +135,7 @@ def seconds(run: Callable[[], Any]) -> float:
 
 def in_a_process(*arguments: object) -> dict[str, Any] | None:
     """Measure in a new process; None where it fails or takes too long."""
-    (found,) = list(measured("benchmarks.stability", "--measure", *arguments, limit=50.0)) or [{"failed": "nothing"}]
+    (found,) = list(measured("benchmarks.stability", "--measure", *arguments, limit=150.0)) or [{"failed": "nothing"}]
     if "failed" in found:
         print(arguments, found["failed"], file=sys.stderr)
         return None

@@ -16,7 +16,7 @@ def bordered_pattern(fields: Fields) -> sp.csr_matrix:
     """
     comm, n = fields.comm, fields.unknowns
     own = len(fields.free_owned)
-    rows = _own_rows(fields)
+    rows = _own_rows(fields, list(fields.dofs))
     scalars = np.array(list(fields.scalars.values()), dtype=np.int32)  # beyond all fields: the last columns of each row
     size = len(scalars)
     indptr = rows.indptr.astype(np.int64) + size * np.arange(own + 1)
@@ -32,11 +32,29 @@ def bordered_pattern(fields: Fields) -> sp.csr_matrix:
     return sp.csr_matrix((np.ones(len(indices)), indices, indptr), shape=shape)
 
 
-def _own_rows(fields: Fields) -> sp.csr_matrix:
-    """Couplings of this rank's field unknowns inside all cells of which they are, (free_owned, unknowns), sorted."""
+def metric_pattern(fields: Fields) -> sp.csr_matrix:
+    """Nonzero pattern of a metric: rotations couple to rotations, the centreline to itself; and the diagonal.
+
+    A fifth of :func:`bordered_pattern`, of which it is a part.
+    """
+    names = [name for name in (fields.turning.name, "r") if name in fields.dofs]
+    rows = sum(_own_rows(fields, [name]) for name in names)
+    size = (fields.local_unknowns, fields.unknowns)
+    diagonal = sp.eye(*size, k=fields.offset, format="csr")
+    pattern = sp.csr_matrix((rows.data, rows.indices, np.pad(rows.indptr, (0, size[0] - rows.shape[0]), "edge")), size)
+    pattern = (pattern + diagonal).tocsr()
+    pattern.sort_indices()
+    return pattern
+
+
+def _own_rows(fields: Fields, names: list[str]) -> sp.csr_matrix:
+    """Couplings of this rank's unknowns of some fields inside all cells of which they are.
+
+    Returns (free_owned, unknowns), sorted.
+    """
     comm, n = fields.comm, fields.unknowns
     first, own, cells = fields.offset, len(fields.free_owned), fields.owned_cells
-    numbers = np.hstack([fields.number[d[:cells]].reshape(cells, -1) for d in fields.dofs.values()])
+    numbers = np.hstack([fields.number[fields.dofs[name][:cells]].reshape(cells, -1) for name in names])
     keep = numbers >= 0
     indptr = np.append(0, np.cumsum(keep.sum(axis=1)))
     incidence = sp.csr_matrix((np.ones(indptr[-1], dtype=np.int8), numbers[keep], indptr), shape=(cells, n))

@@ -24,7 +24,7 @@ from rodfem.clock import Clock
 from rodfem.equations import Equations
 from rodfem.errors import ConvergenceError
 from rodfem.fields import LOAD, Discretization, Fields
-from rodfem.pattern import bordered_pattern, new_matrix
+from rodfem.pattern import bordered_pattern, metric_pattern, new_matrix
 from rodfem.scene import Scene
 from rodfem.symmetries import Shift, Symmetry, find_symmetries, is_uniform_ring
 
@@ -79,7 +79,7 @@ class System:
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
         self._equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self._equation_numbers = number[self._equation_targets].astype(PETSc.IntType)
-        self._pattern = bordered_pattern(self.fields)
+        self._pattern, self._metric_pattern = bordered_pattern(self.fields), metric_pattern(self.fields)
         self.matrix = self.state_matrix(load=True)
         self.x_local = PETSc.Vec().createSeq(int((number >= 0).sum()), comm=PETSc.COMM_SELF)
         self._numbered = np.flatnonzero(number >= 0)
@@ -209,7 +209,7 @@ class System:
         """Assemble and factor the Jacobian at the state last brought, with ``damping`` times the metric added."""
         matrix, damping = self.jacobian(row), damping or self.damping
         if damping:
-            matrix.axpy(damping, self.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            matrix.axpy(damping, self.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             matrix.stateIncrease()
         with self.clock("solve"):
             self.lu(matrix)
@@ -225,6 +225,10 @@ class System:
     def state_matrix(self, *, load: bool = False) -> PETSc.Mat:
         """Allocate a matrix for the second variation at fixed load (row of the load empty, column unless ``load``)."""
         return new_matrix(self.fields, self._pattern, self._no_load, self._all if load else self._no_load)
+
+    def metric_matrix(self) -> PETSc.Mat:
+        """Allocate a matrix for a metric (of rotations and centreline), whose pattern is part of the other's."""
+        return new_matrix(self.fields, self._metric_pattern, self._no_load, self._no_load)
 
     # --- symmetry ----------------------------------------------------------------------------------------------
 
@@ -293,7 +297,7 @@ class System:
     # --- set-up ------------------------------------------------------------------------------------------------
 
     def _assemble_metric(self) -> PETSc.Mat:
-        metric = new_matrix(self.fields, self._pattern, self._no_load, self._no_load)
+        metric = self.metric_matrix()
         self.assemble_into(metric, self.equations.metric)
         if self.has_scalars:
             a, b = self.scene.span

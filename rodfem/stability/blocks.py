@@ -103,7 +103,7 @@ class Blocks:
         if coordinates == "compatible" and system.fields.discretization.formulation != "pointwise":
             raise SceneError("Compatible coordinates need the centreline: use --formulation pointwise.")
         self.system, self.coordinates = system, coordinates
-        self.matrix, self.mass = system.state_matrix(), system.state_matrix()
+        self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
         fields = system.fields
         primal = {b.name: self._owned(b.name) for b in fields.blocks if not b.multiplier}
         dual = {b.name: self._owned(b.name) for b in fields.blocks if b.multiplier}

@@ -98,7 +98,7 @@ class Inertia:
         """Number of eigenvalues below ``sigma`` at the state last assembled; symmetry modes not counted."""
         with self.system.clock("stability"):
             if sigma != self.shift:
-                self.matrix.axpy(self.shift - sigma, self.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+                self.matrix.axpy(self.shift - sigma, self.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             self.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
             self.shift = sigma
             negative, zero, _ = self.factors(self.matrix).getInertia()

@@ -66,7 +66,7 @@ class Spectrum:
         """Allocate the matrices of the pencil once."""
         self.inertia, self.system = inertia, inertia.system
         self.matrix = self.system.state_matrix()
-        self.mass = self.system.state_matrix()
+        self.mass = self.system.metric_matrix()
         self._shifted = self.system.state_matrix()
         self._factors = inertia_factorizer(self.system.comm)
         self.shift = -inertia.scale
@@ -132,7 +132,7 @@ class Spectrum:
         if sigma == self._factored_at:
             return
         self.matrix.copy(self._shifted, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        self._shifted.axpy(-sigma, self.mass, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self._shifted.axpy(-sigma, self.mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         self._shifted.stateIncrease()
         self._factors(self._shifted)
         self._factored_at = sigma

@@ -76,7 +76,7 @@ class Vibration:
     def __init__(self, system: System) -> None:
         """Allocate the matrices of the pencil once."""
         self.system = system
-        self.matrix, self.mass = system.state_matrix(), system.state_matrix()
+        self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
         self.turned = np.zeros((0, 0, 4))
 
     def assemble(self, x: PETSc.Vec) -> None:
@@ -172,7 +172,7 @@ class Vibration:
         """Solve with a complex shift by the real matrix of twice the size."""
         a, b = target.real, target.imag
         shifted, upper = self.matrix.copy(), self.mass.copy()
-        shifted.axpy(-a, self.mass, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        shifted.axpy(-a, self.mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         upper.scale(b)
         lower = upper.copy()
         lower.scale(-1.0)
