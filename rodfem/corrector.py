@@ -130,7 +130,7 @@ class Corrector:
 
     def _chord(self, right: PETSc.Vec) -> None:
         with self.system.clock("solve"):
-            self.inertia.factors.ksp.solve(right, self._step)
+            self.inertia.factors.solve(right, self._step)
 
     def correct(
         self, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3, tolerance: float = 0.0
