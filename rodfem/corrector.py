@@ -85,6 +85,7 @@ class Corrector:
         try:
             self._below = inertia.below(0.0)
         except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong
+            self.nearest = 0.0
             return False
         x.copy(self._factored)
         for _ in range(1 if self._started else 3):
