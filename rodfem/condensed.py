@@ -51,7 +51,7 @@ SOFT = 1e-3
 NOTHING = 1e-12
 """A column whose sum is less than this, relative to the diagonals of others, is round-off."""
 ZERO = 1e-14
-"""An eigenvalue or singular value of D less than this, relative to its largest, is zero."""
+"""An eigenvalue of a symmetric D less than this, relative to its largest, is zero: its sign is round-off."""
 SPRINGS = (1.0, 3.0, -2.0, 0.3, 10.0, -0.5)
 """Multiples of the springs, tried one after the other."""
 
@@ -135,11 +135,13 @@ class Condensed:
         start = sum(len(part) for part in self.touched[: self.piece.comm.rank])
         self._forces, self._number = np.arange(start, start + len(self.piece.touched)), forces
         factor, self._back = scipy.linalg.get_lapack_funcs(("getrf", "getrs"), (joint,))
-        self._lu, self._pivots, _ = factor(joint)
-        values = np.linalg.eigvalsh(joint) if self.symmetric else np.linalg.svd(joint, compute_uv=False)
-        self._negative += int((values < 0).sum())
-        self._zero = int((abs(values) < ZERO * abs(values).max()).sum())
-        self.regular = self._zero == 0
+        self._lu, self._pivots, zero_pivot = factor(joint)
+        self.regular = zero_pivot == 0
+        if self.symmetric:
+            values = np.linalg.eigvalsh(joint)
+            self._negative += int((values < 0).sum())
+            self._zero = int((abs(values) < ZERO * abs(values).max()).sum())
+            self.regular = self._zero == 0
 
     def _solve_units(self, rows: np.ndarray) -> np.ndarray:
         """Columns of the inverse of the piece; MUMPS skips what the zeros of their right-hand sides spare it."""
