@@ -80,7 +80,11 @@ class Explorer(Tracer):
                 "choose constants that make it so."
             )
         follower.system.set_phase(x)
-        point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
+        try:
+            point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
+        except ConvergenceError:  # with constraints that repeat each other Newton's method may converge all the same
+            self._check_rank(x)
+            raise
         if point.stretch < COLLAPSED:
             raise SceneError(
                 f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
