@@ -50,8 +50,6 @@ SOFT = 1e-3
 """A diagonal less than this, relative to the sum of its column, is no spring: it may be a shift of zero."""
 NOTHING = 1e-12
 """A column whose sum is less than this, relative to the diagonals of others, is round-off."""
-ZERO = 1e-14
-"""An eigenvalue of a symmetric D less than this, relative to its largest, is zero: its sign is round-off."""
 SPRINGS = (1.0, 3.0, -2.0, 0.3, 10.0, -0.5)
 """Multiples of the springs, tried one after the other."""
 
@@ -140,7 +138,7 @@ class Condensed:
         if self.symmetric:
             values = np.linalg.eigvalsh(joint)
             self._negative += int((values < 0).sum())
-            self._zero = int((abs(values) < ZERO * abs(values).max()).sum())
+            self._zero = int((values == 0).sum())
             self.regular = self._zero == 0
 
     def _solve_units(self, rows: np.ndarray) -> np.ndarray:

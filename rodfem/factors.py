@@ -1,4 +1,4 @@
-"""Factors of a matrix whose pattern stays: by MUMPS on one rank, piece by piece on several."""
+"""Factors of a matrix whose pattern stays: by MUMPS, or for long rods on several ranks piece by piece."""
 
 from __future__ import annotations
 
@@ -9,8 +9,21 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 
+LONG = 20_000
+"""Unknowns from which a rod is cut at the ranks.
+
+MUMPS in parallel is as reliable as on one rank, but it gains nothing on a chain: the elimination tree that QAMD makes
+of one is as deep as the chain is long, and at 1e5 elements MUMPS's parallel analysis overflows its stack on it.
+"""
 DENSE_ROWS = {"mat_mumps_icntl_7": 6}
-"""MUMPS's ordering for matrices with dense rows.  PETSc takes it from its options only."""
+"""MUMPS's ordering for matrices with dense rows (QAMD).  PETSc takes it from its options only."""
+BALANCED = {"mat_mumps_icntl_7": 4}
+"""One that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
+
+
+def ordering(matrix: PETSc.Mat) -> dict[str, int]:
+    """MUMPS's ordering for a matrix on all its ranks."""
+    return DENSE_ROWS if matrix.comm.size == 1 or matrix.size[0] < LONG else BALANCED
 
 
 def prefer_options(prefix: str, values: dict[str, int]) -> None:
@@ -43,32 +56,39 @@ class Factors(Protocol):
 
 
 def factors_of(
-    kind: str, comm: MPI.Comm, scalars: int, controls: dict[int, int], thresholds: dict[int, float] | None = None
+    kind: str,
+    comm: MPI.Comm,
+    unknowns: int,
+    scalars: int,
+    controls: dict[int, int],
+    thresholds: dict[int, float] | None = None,
 ) -> Factors:
-    """Factors for matrices on a communicator, the last ``scalars`` rows and columns of which may be dense.
+    """Factors for matrices of ``unknowns`` rows on a communicator, the last ``scalars`` of which may be dense.
 
     ``controls`` are MUMPS's ICNTL, ``thresholds`` its CNTL.
     """
-    if comm.size == 1:
-        return Mumps(kind, controls, thresholds)
+    if comm.size == 1 or unknowns < LONG:
+        return Mumps(kind, comm, controls, thresholds)
     from rodfem.condensed import Condensed  # it is made of the former
 
-    return Condensed(scalars, Mumps(kind, controls, thresholds))
+    return Condensed(scalars, Mumps(kind, MPI.COMM_SELF, controls, thresholds))
 
 
 class Mumps:
-    """Factors by MUMPS, on one rank.
+    """Factors by MUMPS.
 
     Unknowns are ordered by an approximate minimum degree that knows dense rows (QAMD): what MUMPS chooses by itself
     takes ten times as long to order the matrix of 3e4 elements with an integral constraint.  PETSc's options change
     that and all else, ``-rodfem_lu_mat_mumps_icntl_7 2`` or ``-rodfem_cholesky_...`` for example.
     """
 
-    def __init__(self, kind: str, controls: dict[int, int], thresholds: dict[int, float] | None = None) -> None:
+    def __init__(
+        self, kind: str, comm: MPI.Comm, controls: dict[int, int], thresholds: dict[int, float] | None = None
+    ) -> None:
         """Keep MUMPS's integer ``controls`` (ICNTL) and real ``thresholds`` (CNTL) for when there is a matrix."""
         self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
         self.room = 50
-        self.ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        self.ksp = PETSc.KSP().create(comm)
         self.factor: PETSc.Mat | None = None
         self.regular = False
         self._matrix = 0

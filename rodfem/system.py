@@ -91,10 +91,8 @@ class System:
         self.phases: list[PETSc.Vec | None] = [None] * len(self.drifts)
         self.broken: dict[int, np.ndarray] = {}
         self._phase_offset = [0.0] * len(self.drifts)
-        scalars = self.fields.unknowns - self.fields.field_unknowns
-        self.lu = factors_of(
-            "lu", comm, scalars, {8: 0}
-        )  # no scaling: a third of the time; Newton's method mends what it costs
+        # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
+        self.lu = factors_of("lu", comm, self.fields.unknowns, self.fields.dense_rows, {8: 0})
 
     def _symmetries(self) -> list[Symmetry | Shift]:
         """Symmetries of the scene; found with few elements, which have the same ones, where there are many."""

@@ -9,8 +9,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.condensed import Condensed
+from rodfem.continuation import Follower
 from rodfem.factors import Mumps
+from rodfem.fields import Discretization
 from rodfem.stability.inertia import Inertia
+from rodfem.stability.judge import Judge
 from rodfem.stability.matrices import gathered
 from rodfem.system import System
 
@@ -33,8 +36,7 @@ def at(name: str, state: str, formulation: str, load: float) -> tuple[System, PE
 
 def symmetric(system: System) -> Condensed:
     """LDL^t factors."""
-    scalars = system.fields.unknowns - system.fields.field_unknowns
-    return Condensed(scalars, Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
+    return Condensed(system.fields.dense_rows, Mumps("cholesky", MPI.COMM_SELF, {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
 
 
 def whole(vector: PETSc.Vec) -> np.ndarray:
@@ -98,7 +100,7 @@ def test_matrix_without_symmetry(formulation: str, name: str, load: float) -> No
     if name == "follower":
         formulation = "pointwise"
     system, x = at(name, "plain", formulation, load)
-    factors = Condensed(system.fields.unknowns - system.fields.field_unknowns, Mumps("lu", {8: 0}))
+    factors = Condensed(system.fields.dense_rows, Mumps("lu", MPI.COMM_SELF, {8: 0}))
     row = system.metric * x
     system.set_load(row, 1.0)
     system.residual(x, system.new_vector())
@@ -130,7 +132,7 @@ def frequencies(n: int) -> np.ndarray:
 def test_pieces_may_be_singular_where_the_whole_is_not() -> None:
     """At eigenvalues of all parts of the chain the whole is counted right, and solved with."""
     n = 24
-    factors = Condensed(1, Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
+    factors = Condensed(1, Mumps("cholesky", MPI.COMM_SELF, {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
     exact = frequencies(n)
     for sigma in np.unique(np.round([s for m in range(1, n) for s in frequencies(m)], 12)):
         if abs(exact - sigma).min() < 1e-6:
@@ -142,3 +144,24 @@ def test_pieces_may_be_singular_where_the_whole_is_not() -> None:
         right.set(1.0)
         factors.solve(right, out)
         assert (matrix * out - right).norm() < 1e-9 * out.norm()
+
+
+@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="nothing is cut on one rank")
+@pytest.mark.parametrize(("formulation", "elements"), [("reduced", 5000), ("pointwise", 2000)])
+def test_long_rods_are_cut(formulation: str, elements: int) -> None:
+    """Their index, their eigenvalue nearest zero, and the left-most ones are those of MUMPS on one rank."""
+    found = []
+    for comm, kind in ((MPI.COMM_SELF, Mumps), (MPI.COMM_WORLD, Condensed)):
+        system = System(states.scene("cord"), Discretization(formulation, elements, 1), comm)
+        solver = Follower(system)
+        assert isinstance(solver.inertia.factors, kind)
+        assert isinstance(system.lu, kind)
+        system.set_phase(None)
+        x, outcome = solver.at_load(solver.start(20.0), 20.0)
+        assert outcome.converged
+        verdict = Judge(solver)(x, number=3)
+        assert verdict.certified
+        solver.inertia.count(x)
+        nearest, _ = solver.inertia.nearest(1, accuracy=1e-9)
+        found.append([verdict.negative, verdict.zero, *nearest, *verdict.values])
+    np.testing.assert_allclose(*found, rtol=1e-7)

@@ -35,7 +35,7 @@ class Bordered:
         size = (rows + self.extra, self.n + borders)
         self.matrix = PETSc.Mat().createAIJ((size, size), comm=self.comm)
         self.matrix.setPreallocationCSR((self.start, self.columns, self.values))
-        self.factors = inertia_factors(self.comm, self.n + borders - self.system.fields.field_unknowns)
+        self.factors = inertia_factors(self.comm, self.n + borders, self.system.fields.dense_rows + borders)
         self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))
 
     def factor(self, psi: list[PETSc.Vec]) -> int:

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import SceneError
-from rodfem.factors import DENSE_ROWS, Factors, prefer_options
+from rodfem.factors import Factors, ordering, prefer_options
 from rodfem.system import System, combine
 
 MASSLESS = 1e-12
@@ -100,7 +100,7 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
     ksp.getPC().setFactorSolverType("mumps")
-    prefer_options("rodfem_st_", DENSE_ROWS)
+    prefer_options("rodfem_st_", ordering(matrix))
     solver.setFromOptions()
     return solver
 
@@ -160,5 +160,5 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> 
     ksp.setType("preonly")
     ksp.getPC().setType("cholesky")
     ksp.getPC().setFactorSolverType("mumps")
-    prefer_options(ksp.getOptionsPrefix(), DENSE_ROWS | {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1})
+    prefer_options(ksp.getOptionsPrefix(), ordering(matrix) | {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1})
     return solver

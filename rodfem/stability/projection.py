@@ -61,7 +61,7 @@ class Projection:
 
     def below(self, sigma: float) -> int:
         """Number of eigenvalues of a symmetric pencil below ``sigma``, by the inertia of the saddle matrix."""
-        factors = inertia_factors(MPI.COMM_SELF, 0)
+        factors = inertia_factors(MPI.COMM_SELF, 0, 0)
         factors(petsc_matrix(MPI.COMM_SELF, self.saddle(sigma)))
         return factors.inertia()[0] - self.C.shape[1]
 

@@ -68,9 +68,7 @@ class Spectrum:
         self.matrix = self.system.state_matrix()
         self.mass = self.system.state_matrix()
         self._shifted = self.system.state_matrix()
-        self._factors = inertia_factors(
-            self.system.comm, self.system.fields.unknowns - self.system.fields.field_unknowns
-        )
+        self._factors = inertia_factors(self.system.comm, self.system.fields.unknowns, self.system.fields.dense_rows)
         self.shift = -inertia.scale
         self.factorisations = 0
         self._factored_at = np.nan
