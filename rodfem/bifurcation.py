@@ -23,6 +23,8 @@ COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
 ROUND_OFF = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
+SHIFT = 1e-6
+"""Shift of a singular Jacobian, in units of the lowest bending eigenvalue."""
 
 
 def special_at(follower: Follower, located: Located, arclength: float, still: Sequence[PETSc.Vec] = ()) -> Special:
@@ -173,13 +175,17 @@ def _sum(x: PETSc.Vec, d: PETSc.Vec) -> PETSc.Vec:
 
 
 def _load_response(follower: Follower, special: Special) -> PETSc.Vec:
-    """Change of state with the load off the null vectors: the other branch where a side branch ends."""
+    """Change of state with the load off the null vectors: the other branch where a side branch ends.
+
+    The Jacobian is singular there, and the load is orthogonal to its null vectors up to an error that its inverse would
+    blow up: it is shifted, which changes the answer by about as much as the shift, :data:`SHIFT`, relative to it.
+    """
     system = follower.system
     out = system.new_vector()
     x = special.point.x
     system.set_phase(x)
     system.residual(x, out)
-    system.factor(follower.axis)
+    system.factor(follower.axis, SHIFT * system.stiffness_scale)
     system.solve(follower.axis, out)
     for v in special.null_vectors:
         out.axpy(-(system.metric * v).dot(out), v)

@@ -85,6 +85,7 @@ class Corrector:
         try:
             self._below = inertia.below(0.0)
         except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong
+            self.nearest = 0.0
             return False
         x.copy(self._factored)
         for _ in range(1 if self._started else 3):
@@ -130,7 +131,7 @@ class Corrector:
 
     def _chord(self, right: PETSc.Vec) -> None:
         with self.system.clock("solve"):
-            self.inertia.factors.ksp.solve(right, self._step)
+            self.inertia.factors.solve(right, self._step)
 
     def correct(
         self, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3, tolerance: float = 0.0

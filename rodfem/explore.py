@@ -64,11 +64,32 @@ class Explorer(Tracer):
                         self._switch(branch, i, special)
 
     def _primary(self) -> Branch:
+        """First branch: its first state.  Where none is found constraints that repeat each other are named."""
+        start = self.plan.span[0]
+        try:
+            point = self._first()
+        except ConvergenceError:
+            self._check_rank(self.follower.start(start))
+            raise
+        if point.stretch < COLLAPSED:
+            raise SceneError(
+                f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
+                f"{start:g}: write the energy of stretch in v[2] - 1 (zero in the undeformed rod), or push less."
+            )
+        if isinstance(self.scene.ends, Ring):
+            number, Tw, Wr = link(self.follower.shape.sample(point.x))
+            self.report.say(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
+        if point.negative:
+            self.report.say(
+                f"  the first state is unstable already (index {point.negative}): stability was lost outside the range"
+            )
+        return Branch(self.scene.states, None, 0, [point])
+
+    def _first(self) -> Point:
         start, stop = self.plan.span
         follower = self.follower
         x, outcome = follower.first(start)
         if not outcome.converged:
-            self._check_rank(follower.start(start))
             raise ConvergenceError(
                 f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: start at another "
                 "load, give the scene a start nearer to one, or see whether constraints repeat each other or what an "
@@ -80,20 +101,7 @@ class Explorer(Tracer):
                 "choose constants that make it so."
             )
         follower.system.set_phase(x)
-        point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
-        if point.stretch < COLLAPSED:
-            raise SceneError(
-                f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
-                f"{start:g}: write the energy of stretch in v[2] - 1 (zero in the undeformed rod), or push less."
-            )
-        if isinstance(self.scene.ends, Ring):
-            number, Tw, Wr = link(follower.shape.sample(x))
-            self.report.say(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
-        if point.negative:
-            self.report.say(
-                f"  the first state is unstable already (index {point.negative}): stability was lost outside the range"
-            )
-        return Branch(self.scene.states, None, 0, [point])
+        return follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
 
     def _check_rank(self, x: PETSc.Vec) -> None:
         """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others."""

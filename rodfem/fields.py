@@ -303,6 +303,11 @@ class Fields:
         self.unknowns += len(names)
         self.local_unknowns += len(names) if self.comm.rank == self.comm.size - 1 else 0
 
+    @property
+    def dense_rows(self) -> int:
+        """Number of scalars: the last rows of a system couple to all others."""
+        return self.unknowns - self.field_unknowns
+
     def add_drifts(self, count: int) -> None:
         """Add a drift scalar for each symmetry; before any matrix is made."""
         self._append([f"drift{i}" for i in range(count)])

@@ -22,7 +22,7 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.clock import Clock
 from rodfem.equations import Equations
-from rodfem.errors import ConvergenceError
+from rodfem.factors import factors_of
 from rodfem.fields import LOAD, Discretization, Fields
 from rodfem.pattern import bordered_pattern, metric_pattern, new_matrix
 from rodfem.scene import Scene
@@ -91,7 +91,8 @@ class System:
         self.phases: list[PETSc.Vec | None] = [None] * len(self.drifts)
         self.broken: dict[int, np.ndarray] = {}
         self._phase_offset = [0.0] * len(self.drifts)
-        self.lu = Factorizer("lu", comm, {8: 0})  # no scaling: a third of the time; Newton's method mends what it costs
+        # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
+        self.lu = factors_of("lu", comm, self.fields.unknowns, self.fields.dense_rows, {8: 0})
 
     def _symmetries(self) -> list[Symmetry | Shift]:
         """Symmetries of the scene; found with few elements, which have the same ones, where there are many."""
@@ -217,10 +218,9 @@ class System:
     def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> bool:
         """Solve with the last factors; False where the matrix was found singular."""
         with self.clock("solve"):
-            if self.lu.factor is None or self.lu.factor.getMumpsInfog(1) < 0:
-                return False
-            self.lu.ksp.solve(right, out)
-            return bool(self.lu.ksp.getConvergedReason() > 0)
+            if self.lu.regular:
+                self.lu.solve(right, out)
+            return self.lu.regular
 
     def state_matrix(self, *, load: bool = False) -> PETSc.Mat:
         """Allocate a matrix for the second variation at fixed load (row of the load empty, column unless ``load``)."""
@@ -323,80 +323,3 @@ def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:
     out.set(0.0)
     out.maxpy(list(weights), vectors)
     return out
-
-
-DENSE_ROWS = {"mat_mumps_icntl_7": 6}
-"""MUMPS's ordering for matrices with dense rows.  PETSc takes it from its options only."""
-
-
-def prefer_options(prefix: str, values: dict[str, int]) -> None:
-    """Set PETSc options that nobody has set."""
-    options = PETSc.Options(prefix)
-    for name, value in values.items():
-        if not options.hasName(name):
-            options.setValue(name, value)
-
-
-class Factorizer:
-    """MUMPS factors of a matrix whose pattern stays: ``lu``, or ``cholesky`` (LDL^t, which also counts the inertia).
-
-    Unknowns are ordered by an approximate minimum degree that knows dense rows (QAMD): what MUMPS chooses by itself
-    takes ten times as long to order the matrix of 3e4 elements with an integral constraint.  PETSc's options change
-    that and all else, ``-rodfem_lu_mat_mumps_icntl_7 2`` or ``-rodfem_cholesky_...`` for example.
-    """
-
-    def __init__(
-        self, kind: str, comm: MPI.Comm, controls: dict[int, int], thresholds: dict[int, float] | None = None
-    ) -> None:
-        """Keep MUMPS's integer ``controls`` (ICNTL) and real ``thresholds`` (CNTL) for when there is a matrix."""
-        self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
-        self.room = 50
-        self.ksp = PETSc.KSP().create(comm)
-        self.factor: PETSc.Mat | None = None
-        self._matrix = 0
-
-    def __call__(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """Factor ``matrix``; raises :class:`ConvergenceError` where MUMPS gives up.
-
-        Delayed pivots may need more room than was estimated.  PETSc does not raise by itself, and what a failed
-        factorisation counts or solves is arbitrary: the factors are then made again with more room.
-        """
-        while True:
-            if self.factor is None or matrix.handle != self._matrix:
-                self._prepare(matrix)
-            else:
-                self.ksp.setOperators(matrix)
-            self.ksp.setUp()
-            status = self.ksp.getPC().getFactorMatrix().getMumpsInfog(1)
-            if status not in (-8, -9, -19) or self.room > 10000:
-                break
-            self.room *= 4
-            self.factor = None
-        if status < 0:
-            self._matrix = 0  # PETSc would not factor again what has failed: set it up anew next time
-        if status < 0 and status != -10:  # -10 is a singular matrix, which the solve reports
-            raise ConvergenceError(f"MUMPS could not factor the bordered matrix: its status INFOG(1) is {status}.")
-        return self.factor
-
-    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Solve for all columns of a dense matrix at once, with the last factors."""
-        self.ksp.getPC().getFactorMatrix().matSolve(right, out)
-
-    def _prepare(self, matrix: PETSc.Mat) -> None:
-        self.ksp.reset()
-        self.ksp.setType("preonly")
-        self.ksp.setOptionsPrefix(f"rodfem_{self.kind}_")
-        pc = self.ksp.getPC()
-        pc.setType(self.kind)
-        pc.setFactorSolverType("mumps")
-        self.ksp.setFromOptions()
-        self.ksp.setOperators(matrix)
-        pc.setFactorSetUpSolverType()
-        self.factor, self._matrix = pc.getFactorMatrix(), matrix.handle
-        prefer_options(f"rodfem_{self.kind}_", DENSE_ROWS)
-        self.factor.setOptionsPrefix(f"rodfem_{self.kind}_")  # made before PETSc's own set-up, it has none
-        self.factor.setMumpsIcntl(14, self.room)
-        for control, value in self.controls.items():
-            self.factor.setMumpsIcntl(control, value)
-        for control, threshold in self.thresholds.items():
-            self.factor.setMumpsCntl(control, threshold)

@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError
-from rodfem.stability.inertia import inertia_factorizer
+from rodfem.stability.inertia import inertia_factors
 
 
 class Bordered:
@@ -35,7 +35,7 @@ class Bordered:
         size = (rows + self.extra, self.n + borders)
         self.matrix = PETSc.Mat().createAIJ((size, size), comm=self.comm)
         self.matrix.setPreallocationCSR((self.start, self.columns, self.values))
-        self.factors = inertia_factorizer(self.comm)
+        self.factors = inertia_factors(self.comm, self.n + borders, self.system.fields.dense_rows + borders)
         self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))
 
     def factor(self, psi: list[PETSc.Vec]) -> int:
@@ -51,7 +51,8 @@ class Bordered:
         self.matrix.setValuesCSR(self.start, self.columns, self.values)
         self.matrix.assemble()
         with self.system.clock("stability"):
-            negative, zero, _ = self.factors(self.matrix).getInertia()
+            self.factors(self.matrix)
+            negative, zero = self.factors.inertia()
         rest = negative - self.inertia.constraints - self.system.active_drifts() - self.k
         if zero or rest < 0:
             raise ConvergenceError("another eigenvalue vanishes")
@@ -67,10 +68,10 @@ class Bordered:
                 right.array[:rows] = f.array_r
             if self.last:
                 right.array[rows:] = g
-            self.factors.ksp.solve(right, out)
+            self.factors.solve(right, out)
             self.matrix.mult(out, self.residual)
             self.residual.aypx(-1.0, right)
-            self.factors.ksp.solve(self.residual, right)
+            self.factors.solve(self.residual, right)
             out.axpy(1.0, right)
             x = self.system.new_vector()
             x.array[:] = out.array_r[:rows]

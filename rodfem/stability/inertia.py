@@ -19,7 +19,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.system import Factorizer, System, combine
+from rodfem.factors import Factors, factors_of
+from rodfem.system import System, combine
 
 EPS = float(np.finfo(float).eps)
 
@@ -32,17 +33,17 @@ class Index:
     zero: int
 
 
-def inertia_factorizer(comm: MPI.Comm) -> Factorizer:
-    """LDL^t factors that report the inertia.
+def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
+    """LDL^t factors that report the inertia, of matrices of ``unknowns`` rows, the last ``scalars`` perhaps dense.
 
-    ICNTL(24) = 1 is what makes MUMPS report it, ICNTL(13) = 1 what makes it do so in parallel; CNTL(3) is so
-    small that no pivot is taken for zero: the matrices are shifted off their eigenvalues.  ICNTL(8) = 0: with MUMPS's
-    own scaling of saddle matrices solutions were seen to lose ten digits, and factorisations take up to ten times as
-    long.  CNTL(1) = 1e-3 is ten times below MUMPS's own threshold of pivots: the stiffness is 1/h and the constraints
-    are h, and at 1e5 elements pivots were delayed by the hundred thousand, to the few rows of the scalars, which cost
-    several times the factorisation itself.
+    ICNTL(24) = 1 is what makes MUMPS report it, ICNTL(13) = 1 what makes it do so in parallel; CNTL(3) is so small that
+    no pivot is taken for zero: the matrices are shifted off their eigenvalues.  ICNTL(8) = 0: with MUMPS's own scaling
+    of saddle matrices solutions were seen to lose ten digits, and factorisations take up to ten times as long.
+    CNTL(1) = 1e-3 is ten times below MUMPS's own threshold of pivots: the stiffness is 1/h and the constraints are h,
+    and at 1e5 elements pivots were delayed by the hundred thousand, to the few rows of the scalars, which cost several
+    times the factorisation itself.
     """
-    return Factorizer("cholesky", comm, {24: 1, 13: 1, 8: 0}, {3: -1e-300, 1: 1e-3})
+    return factors_of("cholesky", comm, unknowns, scalars, {24: 1, 13: 1, 8: 0}, {3: -1e-300, 1: 1e-3})
 
 
 class Inertia:
@@ -66,7 +67,7 @@ class Inertia:
         if system.has_scalars:  # the load is no part of a perturbation
             self.metric.setValue(system.load_index, system.load_index, 0.0)
         self.metric.assemble()
-        self.factors = inertia_factorizer(system.comm)
+        self.factors = inertia_factors(system.comm, system.fields.unknowns, system.fields.dense_rows)
         self.constraints = system.fields.constraints()
         self.scale = system.stiffness_scale
         self.tolerance = 1e-7 * self.scale
@@ -101,7 +102,8 @@ class Inertia:
                 self.matrix.axpy(self.shift - sigma, self.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             self.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
             self.shift = sigma
-            negative, zero, _ = self.factors(self.matrix).getInertia()
+            self.factors(self.matrix)
+            negative, zero = self.factors.inertia()
         below = negative - self.constraints - self.system.active_drifts()
         if zero or below < 0:
             raise ConvergenceError(
@@ -136,7 +138,7 @@ class Inertia:
             for _ in range(most):
                 solved = [v.duplicate() for v in self._vectors]
                 for v, out in zip(self._vectors, solved, strict=True):
-                    self.factors.ksp.solve(metric * v, out)
+                    self.factors.solve(metric * v, out)
                 orthonormalize(solved, metric)
                 images = [self.matrix * y for y in solved]
                 theta, z = np.linalg.eigh(np.array([[y.dot(w) for w in images] for y in solved]))
@@ -152,7 +154,7 @@ class Inertia:
         """Return ``1 / (mode . M S^-1 M mode)`` for a vector of metric norm 1: that of an eigenvector."""
         with self.system.clock("stability"):
             image = self.metric * mode
-            self.factors.ksp.solve(image, self.system.workspace)
+            self.factors.solve(image, self.system.workspace)
             return 1.0 / image.dot(self.system.workspace) + self.shift
 
     def seed(self, i: int) -> PETSc.Vec:

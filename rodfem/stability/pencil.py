@@ -2,7 +2,7 @@
 
 SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
 and overrule what is set here.  Those of the factorisation inside are ``-rodfem_st_...`` for a pencil without symmetry,
-else ``-rodfem_cholesky_...`` (see :class:`~rodfem.system.Factorizer`).
+else ``-rodfem_cholesky_...`` (see :class:`~rodfem.factors.Mumps`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import SceneError
-from rodfem.system import DENSE_ROWS, Factorizer, System, combine, prefer_options
+from rodfem.factors import Factors, ordering, prefer_options
+from rodfem.system import System, combine
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
@@ -99,7 +100,7 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
     ksp.getPC().setFactorSolverType("mumps")
-    prefer_options("rodfem_st_", DENSE_ROWS)
+    prefer_options("rodfem_st_", ordering(matrix))
     solver.setFromOptions()
     return solver
 
@@ -107,17 +108,17 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
 class Inverse:
     """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
 
-    def __init__(self, factors: Factorizer) -> None:
+    def __init__(self, factors: Factors) -> None:
         """Keep the factors."""
         self.factors = factors
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
         """Solve for ``z``."""
-        self.factors.ksp.solve(b, z)
+        self.factors.solve(b, z)
 
 
 def with_factors(
-    matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: float, factors: Factorizer, start: PETSc.Vec
+    matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: float, factors: Factors, start: PETSc.Vec
 ) -> SLEPc.EPS:
     """Set up the same for a symmetric pencil, with the factors of ``matrix - target mass`` and a first vector."""
     solver = SLEPc.EPS().create(matrix.comm)
@@ -159,5 +160,5 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> 
     ksp.setType("preonly")
     ksp.getPC().setType("cholesky")
     ksp.getPC().setFactorSolverType("mumps")
-    prefer_options(ksp.getOptionsPrefix(), DENSE_ROWS | {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1})
+    prefer_options(ksp.getOptionsPrefix(), ordering(matrix) | {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1})
     return solver

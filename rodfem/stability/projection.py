@@ -27,11 +27,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.factors import DENSE_ROWS, prefer_options
 from rodfem.stability.blocks import Pencil
-from rodfem.stability.inertia import inertia_factorizer
+from rodfem.stability.inertia import inertia_factors
 from rodfem.stability.kernel import kernel
 from rodfem.stability.matrices import gathered, petsc_matrix
-from rodfem.system import DENSE_ROWS, prefer_options
 
 INVERSES = ("saddle", "elimination")
 SINGULAR = 1e-6
@@ -61,8 +61,9 @@ class Projection:
 
     def below(self, sigma: float) -> int:
         """Number of eigenvalues of a symmetric pencil below ``sigma``, by the inertia of the saddle matrix."""
-        factors = inertia_factorizer(MPI.COMM_SELF)
-        return int(factors(petsc_matrix(MPI.COMM_SELF, self.saddle(sigma))).getInertia()[0]) - self.C.shape[1]
+        factors = inertia_factors(MPI.COMM_SELF, 0, 0)
+        factors(petsc_matrix(MPI.COMM_SELF, self.saddle(sigma)))
+        return factors.inertia()[0] - self.C.shape[1]
 
 
 class ShiftedInverse:

@@ -21,7 +21,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.stability.inertia import Inertia, inertia_factorizer
+from rodfem.stability.inertia import Inertia, inertia_factors
 from rodfem.stability.pencil import assemble_pencil, exclude_modes, symmetry_modes, with_factors
 
 HIT = 1e-8
@@ -68,7 +68,7 @@ class Spectrum:
         self.matrix = self.system.state_matrix()
         self.mass = self.system.metric_matrix()
         self._shifted = self.system.state_matrix()
-        self._factors = inertia_factorizer(self.system.comm)
+        self._factors = inertia_factors(self.system.comm, self.system.fields.unknowns, self.system.fields.dense_rows)
         self.shift = -inertia.scale
         self.factorisations = 0
         self._factored_at = np.nan
@@ -119,7 +119,7 @@ class Spectrum:
     def below(self, sigma: float) -> int:
         """Number of eigenvalues of the pencil last assembled below ``sigma``, symmetry modes not included."""
         self._factor(sigma)
-        negative, zero, _ = self._factors.ksp.getPC().getFactorMatrix().getInertia()
+        negative, zero = self._factors.inertia()
         below = negative - self.inertia.constraints - self.system.active_drifts()
         if zero or below < 0:
             raise ConvergenceError(

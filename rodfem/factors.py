@@ -1,0 +1,149 @@
+"""Factors of a matrix whose pattern stays: by MUMPS, or for long rods on several ranks piece by piece."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.errors import ConvergenceError
+
+LONG = 20_000
+"""Unknowns from which a rod is cut at the ranks.
+
+MUMPS in parallel is as reliable as on one rank, but it gains nothing on a chain: the elimination tree that QAMD makes
+of one is as deep as the chain is long, and at 1e5 elements MUMPS's parallel analysis overflows its stack on it.
+"""
+DENSE_ROWS = {"mat_mumps_icntl_7": 6}
+"""MUMPS's ordering for matrices with dense rows (QAMD).  PETSc takes it from its options only."""
+BALANCED = {"mat_mumps_icntl_7": 4}
+"""One that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
+
+
+def ordering(matrix: PETSc.Mat) -> dict[str, int]:
+    """MUMPS's ordering for a matrix on all its ranks."""
+    return DENSE_ROWS if matrix.comm.size == 1 or matrix.size[0] < LONG else BALANCED
+
+
+def prefer_options(prefix: str, values: dict[str, int]) -> None:
+    """Set PETSc options that nobody has set."""
+    options = PETSc.Options(prefix)
+    for name, value in values.items():
+        if not options.hasName(name):
+            options.setValue(name, value)
+
+
+class Factors(Protocol):
+    """Factors ``lu``, or ``cholesky`` (LDL^t, which also counts the inertia), of matrices given one after the other.
+
+    ``regular`` tells whether the last one could be solved with: none is exactly singular.
+    """
+
+    regular: bool
+
+    def __call__(self, matrix: PETSc.Mat) -> None:
+        """Factor ``matrix``; raises :class:`ConvergenceError` on all ranks where MUMPS gives up on one."""
+
+    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Solve with the last factors."""
+
+    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
+        """Solve for all columns of a dense matrix at once: it is the call that costs, not the column."""
+
+    def inertia(self) -> tuple[int, int]:
+        """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
+
+
+def factors_of(
+    kind: str,
+    comm: MPI.Comm,
+    unknowns: int,
+    scalars: int,
+    controls: dict[int, int],
+    thresholds: dict[int, float] | None = None,
+) -> Factors:
+    """Factors for matrices of ``unknowns`` rows on a communicator, the last ``scalars`` of which may be dense.
+
+    ``controls`` are MUMPS's ICNTL, ``thresholds`` its CNTL.
+    """
+    if comm.size == 1 or unknowns < LONG:
+        return Mumps(kind, comm, controls, thresholds)
+    from rodfem.condensed import Condensed  # it is made of the former
+
+    return Condensed(scalars, Mumps(kind, MPI.COMM_SELF, controls, thresholds))
+
+
+class Mumps:
+    """Factors by MUMPS.
+
+    Unknowns are ordered by an approximate minimum degree that knows dense rows (QAMD): what MUMPS chooses by itself
+    takes ten times as long to order the matrix of 3e4 elements with an integral constraint.  PETSc's options change
+    that and all else, ``-rodfem_lu_mat_mumps_icntl_7 2`` or ``-rodfem_cholesky_...`` for example.
+    """
+
+    def __init__(
+        self, kind: str, comm: MPI.Comm, controls: dict[int, int], thresholds: dict[int, float] | None = None
+    ) -> None:
+        """Keep MUMPS's integer ``controls`` (ICNTL) and real ``thresholds`` (CNTL) for when there is a matrix."""
+        self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
+        self.room = 50
+        self.ksp = PETSc.KSP().create(comm)
+        self.factor: PETSc.Mat | None = None
+        self.regular = False
+        self._matrix = 0
+
+    def __call__(self, matrix: PETSc.Mat) -> None:
+        """Factor ``matrix``; raises :class:`ConvergenceError` where MUMPS gives up.
+
+        Delayed pivots may need more room than was estimated.  PETSc does not raise by itself, and what a failed
+        factorisation counts or solves is arbitrary: the factors are then made again with more room.
+        """
+        while True:
+            if self.factor is None or matrix.handle != self._matrix:
+                self._prepare(matrix)
+            else:
+                self.ksp.setOperators(matrix)
+            self.ksp.setUp()
+            status = self.ksp.getPC().getFactorMatrix().getMumpsInfog(1)
+            if status not in (-8, -9, -19) or self.room > 10000:
+                break
+            self.room *= 4
+            self.factor = None
+        self.regular = status >= 0
+        if status < 0:
+            self._matrix = 0  # PETSc would not factor again what has failed: set it up anew next time
+        if status < 0 and status != -10:  # -10 is a singular matrix
+            raise ConvergenceError(f"MUMPS could not factor the bordered matrix: its status INFOG(1) is {status}.")
+
+    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Solve with the last factors."""
+        self.ksp.solve(right, out)
+
+    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
+        """Solve for all columns of a dense matrix at once: it is the call that costs, not the column."""
+        self.ksp.getPC().getFactorMatrix().matSolve(right, out)
+
+    def inertia(self) -> tuple[int, int]:
+        """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
+        negative, zero, _ = self.ksp.getPC().getFactorMatrix().getInertia()
+        return int(negative), int(zero)
+
+    def _prepare(self, matrix: PETSc.Mat) -> None:
+        self.ksp.reset()
+        self.ksp.setType("preonly")
+        self.ksp.setOptionsPrefix(f"rodfem_{self.kind}_")
+        pc = self.ksp.getPC()
+        pc.setType(self.kind)
+        pc.setFactorSolverType("mumps")
+        self.ksp.setFromOptions()
+        self.ksp.setOperators(matrix)
+        pc.setFactorSetUpSolverType()
+        self.factor, self._matrix = pc.getFactorMatrix(), matrix.handle
+        prefer_options(f"rodfem_{self.kind}_", DENSE_ROWS)
+        self.factor.setOptionsPrefix(f"rodfem_{self.kind}_")  # made before PETSc's own set-up, it has none
+        self.factor.setMumpsIcntl(14, self.room)
+        for control, value in self.controls.items():
+            self.factor.setMumpsIcntl(control, value)
+        for control, threshold in self.thresholds.items():
+            self.factor.setMumpsCntl(control, threshold)

@@ -1,0 +1,167 @@
+"""Factors on several ranks (on one: only the scalars are shared) against dense linear algebra on the same matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import states
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.condensed import Condensed
+from rodfem.continuation import Follower
+from rodfem.factors import Mumps
+from rodfem.fields import Discretization
+from rodfem.stability.inertia import Inertia
+from rodfem.stability.judge import Judge
+from rodfem.stability.matrices import gathered
+from rodfem.system import System
+
+pytestmark = pytest.mark.short
+
+FORMULATIONS = pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+STATES = pytest.mark.parametrize(
+    ("name", "state", "load"),
+    [("cord", "plain", 30.0), ("cord", "buckled", 40.0), ("hemitropic", "plain", 0.25), ("hemitropic", "buckled", 0.2)],
+)
+SIGMAS = (-30.0, -3.0, -0.1, 0.0, 0.1, 2.0, 40.0)
+
+
+def at(name: str, state: str, formulation: str, load: float) -> tuple[System, PETSc.Vec]:
+    """System and state, its phase conditions set."""
+    system, x = getattr(states, state)(name, formulation, 7, 3, load)
+    system.set_phase(x)
+    return system, x
+
+
+def symmetric(system: System) -> Condensed:
+    """LDL^t factors."""
+    return Condensed(system.fields.dense_rows, Mumps("cholesky", MPI.COMM_SELF, {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
+
+
+def whole(vector: PETSc.Vec) -> np.ndarray:
+    """All of a vector on every rank."""
+    return np.concatenate(vector.comm.tompi4py().allgather(vector.array_r))
+
+
+@FORMULATIONS
+@STATES
+def test_inertia_and_solutions(name: str, state: str, formulation: str, load: float) -> None:
+    system, x = at(name, state, formulation, load)
+    inertia, factors = Inertia(system), symmetric(system)
+    right, out = inertia.seed(1), system.new_vector()
+    for sigma in SIGMAS:
+        inertia.assemble(x)
+        inertia.matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        dense = gathered(inertia.matrix).toarray()
+        factors(inertia.matrix)
+        assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
+        factors.solve(right, out)
+        expected = np.linalg.solve(dense, whole(right))
+        np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
+
+
+@FORMULATIONS
+def test_inertia_beside_a_branch_point(formulation: str) -> None:
+    """The straight rod loses stability at 0.1143042145: eigenvalues are near zero there."""
+    system, x = at("hemitropic", "plain", formulation, 0.1143042145)
+    inertia, factors = Inertia(system), symmetric(system)
+    for sigma in (-1e-5, 1e-5):
+        inertia.assemble(x)
+        inertia.matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        factors(inertia.matrix)
+        negative = (np.linalg.eigvalsh(gathered(inertia.matrix).toarray()) < 0).sum()
+        assert factors.inertia() == (negative, 0)
+
+
+def test_many_right_hand_sides() -> None:
+    system, x = at("hemitropic", "buckled", "pointwise", 0.2)
+    inertia, factors = Inertia(system), symmetric(system)
+    inertia.assemble(x)
+    inertia.matrix.axpy(1.0, inertia.metric, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+    factors(inertia.matrix)
+    rows = (system.fields.local_unknowns, system.fields.unknowns)
+    right = PETSc.Mat().createDense((rows, (None, 3)), comm=system.comm)
+    right.setUp()
+    right.assemble()
+    out = right.duplicate()
+    for i in range(3):
+        right.getDenseArray()[:, i] = inertia.seed(i).array_r
+    factors.solve_all(right, out)
+    for i in range(3):
+        one = system.new_vector()
+        factors.solve(inertia.seed(i), one)
+        np.testing.assert_allclose(out.getDenseArray()[:, i], one.array_r, rtol=1e-8, atol=1e-12)
+
+
+@FORMULATIONS
+@pytest.mark.parametrize(("name", "load"), [("follower", 10.0), ("hemitropic", 0.3)])
+def test_matrix_without_symmetry(formulation: str, name: str, load: float) -> None:
+    if name == "follower":
+        formulation = "pointwise"
+    system, x = at(name, "plain", formulation, load)
+    factors = Condensed(system.fields.dense_rows, Mumps("lu", MPI.COMM_SELF, {8: 0}))
+    row = system.metric * x
+    system.set_load(row, 1.0)
+    system.residual(x, system.new_vector())
+    matrix = system.jacobian(row)
+    right, out = system.load_axis(), system.new_vector()
+    factors(matrix)
+    assert factors.regular
+    factors.solve(right, out)
+    expected = np.linalg.solve(gathered(matrix).toarray(), whole(right))
+    np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
+
+
+def chain(n: int, sigma: float) -> PETSc.Mat:
+    """Chain of ``n`` masses between walls, shifted by ``sigma``, as a distributed matrix."""
+    matrix = PETSc.Mat().createAIJ((n, n), nnz=3, comm=MPI.COMM_WORLD)
+    matrix.setUp()
+    for i in range(*matrix.getOwnershipRange()):
+        for j in range(max(i - 1, 0), min(i + 2, n)):
+            matrix.setValue(i, j, 2.0 - sigma if i == j else -1.0)
+    matrix.assemble()
+    return matrix
+
+
+def frequencies(n: int) -> np.ndarray:
+    """Eigenvalues of the chain."""
+    return 2 - 2 * np.cos(np.pi * np.arange(1, n + 1) / (n + 1))
+
+
+def test_pieces_may_be_singular_where_the_whole_is_not() -> None:
+    """At eigenvalues of all parts of the chain the whole is counted right, and solved with."""
+    n = 24
+    factors = Condensed(1, Mumps("cholesky", MPI.COMM_SELF, {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
+    exact = frequencies(n)
+    for sigma in np.unique(np.round([s for m in range(1, n) for s in frequencies(m)], 12)):
+        if abs(exact - sigma).min() < 1e-6:
+            continue
+        matrix = chain(n, float(sigma))
+        factors(matrix)
+        assert factors.inertia() == ((exact < sigma).sum(), 0)
+        right, out = matrix.createVecs()
+        right.set(1.0)
+        factors.solve(right, out)
+        assert (matrix * out - right).norm() < 1e-9 * out.norm()
+
+
+@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="nothing is cut on one rank")
+@pytest.mark.parametrize(("formulation", "elements"), [("reduced", 5000), ("pointwise", 2000)])
+def test_long_rods_are_cut(formulation: str, elements: int) -> None:
+    """Their index, their eigenvalue nearest zero, and the left-most ones are those of MUMPS on one rank."""
+    found = []
+    for comm, kind in ((MPI.COMM_SELF, Mumps), (MPI.COMM_WORLD, Condensed)):
+        system = System(states.scene("cord"), Discretization(formulation, elements, 1), comm)
+        solver = Follower(system)
+        assert isinstance(solver.inertia.factors, kind)
+        assert isinstance(system.lu, kind)
+        system.set_phase(None)
+        x, outcome = solver.at_load(solver.start(20.0), 20.0)
+        assert outcome.converged
+        verdict = Judge(solver)(x, number=3)
+        assert verdict.certified
+        solver.inertia.count(x)
+        nearest, _ = solver.inertia.nearest(1, accuracy=1e-9)
+        found.append([verdict.negative, verdict.zero, *nearest, *verdict.values])
+    np.testing.assert_allclose(*found, rtol=1e-7)
