@@ -43,6 +43,7 @@ METHODS = (
     "factorisation",
     "index",
     "count",
+    "eigenvalues",
     "shift-invert",
     "slicing",
     "reduction",
@@ -89,6 +90,10 @@ def task(method: str, system: System, x: PETSc.Vec) -> Callable[[], Any]:
         right.assemble()
         solved = right.duplicate()
         return lambda: to_judge.inertia.factors.solve_all(right, solved)
+    if method == "eigenvalues":
+        to_judge.system.set_phase(x)
+        leftmost = to_judge.spectrum.leftmost
+        return lambda: leftmost(x, NUMBER).values
     if method in ("scipy", "dense QZ"):
         spectrum = to_judge.spectrum
         spectrum.assemble(x)

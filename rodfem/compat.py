@@ -36,6 +36,8 @@ REAL: Any = np.float64
 """Numbers of states and forms, whatever those of PETSc."""
 COMPLEX = bool(np.issubdtype(PETSc.ScalarType, np.complexfloating))
 """Whether this PETSc was built for complex numbers: forms and states are real all the same."""
+SUITESPARSE = bool(PETSc.Sys.hasExternalPackage("suitesparse"))
+"""Whether this PETSc has SuiteSparse, and with it KLU."""
 
 
 def require_real_petsc() -> None:

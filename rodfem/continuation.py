@@ -98,6 +98,7 @@ class Equilibria:
         x = guess.copy()
         self.system.set_load(x, load)
         outcome = correct(self.system, x, self.axis, reach=reach)
+        self.system.set_load(x, load)  # steps at fixed load may have moved it by round-off
         return x, outcome
 
     def first(self, load: float) -> tuple[PETSc.Vec, Outcome]:

@@ -24,6 +24,7 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError
 from rodfem.newton import ROUND_OFF, TOLERANCE, Outcome
 from rodfem.stability.inertia import Index, Inertia
+from rodfem.system import dense_columns
 
 BLOCK = 2
 """Number of vectors that are iterated along a branch."""
@@ -52,11 +53,7 @@ class Corrector:
         """Allocate right-hand sides, solutions and the block of vectors."""
         self.inertia, self.system = inertia, inertia.system
         system = self.system
-        rows = (system.fields.local_unknowns, system.fields.unknowns)
-        self._right = PETSc.Mat().createDense((rows, (None, BLOCK + 2)), comm=system.comm)
-        self._right.setUp()
-        self._right.assemble()
-        self._solved = self._right.duplicate()
+        self._right, self._solved = dense_columns(system, BLOCK + 2), dense_columns(system, BLOCK + 2)
         self._equations, self._step, self._image = (system.new_vector() for _ in range(3))
         self._factored = system.new_vector()
         self._fresh = [inertia.seed(i) for i in range(BLOCK)]

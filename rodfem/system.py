@@ -317,6 +317,16 @@ def _set_clamps(fields: Fields) -> None:
             u[here] = fields.turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)
 
 
+def dense_columns(system: System, count: int) -> PETSc.Mat:
+    """Zero matrix of as many columns, each a vector of the system: right-hand sides or solutions."""
+    columns = PETSc.Mat().createDense(
+        ((system.fields.local_unknowns, system.fields.unknowns), (None, count)), comm=system.comm
+    )
+    columns.setUp()
+    columns.assemble()
+    return columns
+
+
 def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:
     """Linear combination of vectors."""
     out = vectors[0].duplicate()

@@ -41,6 +41,7 @@ def cord() -> tuple[System, PETSc.Vec]:
 
 def test_factors(options: PETSc.Options) -> None:
     options["rodfem_lu_mat_mumps_icntl_7"] = options["rodfem_cholesky_mat_mumps_icntl_7"] = ORDERING
+    options["rodfem_lu_pc_factor_mat_solver_type"] = "mumps"
     system, x = cord()
     system.residual(x, system.new_vector())
     system.factor(system.load_axis())
@@ -72,6 +73,7 @@ def test_pencil_without_symmetry(options: PETSc.Options) -> None:
     vibration = Vibration(system)
     vibration.assemble(x)
     expected = vibration.near(2, 0.0).values[:2]
+    options["rodfem_st_pc_factor_mat_solver_type"] = "mumps"
     options["rodfem_st_mat_mumps_icntl_7"], options["rodfem_st_type"] = ORDERING, "cayley"
     solver = shift_invert(vibration.matrix, vibration.mass, 2, 1.0, symmetric=False)
     solver.solve()
@@ -85,6 +87,7 @@ def test_reduced_pencil(options: PETSc.Options) -> None:
     system, x = cord()
     reduction = Reduction(Blocks(system).assemble(x))
     expected = reduction.near(3, -30.0).values
+    options[f"{PREFIX}pc_factor_mat_solver_type"] = "mumps"
     options[f"{PREFIX}mat_mumps_icntl_7"], options["rodfem_reduced_eps_tol"] = ORDERING, 1e-11
     np.testing.assert_allclose(reduction.near(3, -30.0).values, expected, rtol=1e-9)
     options[f"{PREFIX}ksp_type"], options[f"{PREFIX}ksp_max_it"] = "richardson", 3

@@ -149,6 +149,7 @@ class Deflation(DeflatedNewton):
         system, follower = self.system, self.follower
         system.set_phase(x)
         outcome = correct(system, x, follower.axis, reach=0.1)
+        system.set_load(x, self.load)  # steps at fixed load may have moved it by round-off
         if not outcome.converged:
             return None, FAILED
         if self.nearest_known(x) < SAME:

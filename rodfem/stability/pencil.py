@@ -2,7 +2,7 @@
 
 SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
 and overrule what is set here.  Those of the factorisation inside are ``-rodfem_st_...`` for a pencil without symmetry,
-else ``-rodfem_cholesky_...`` (see :class:`~rodfem.factors.Mumps`).
+else ``-rodfem_lu_...`` on one rank and ``-rodfem_cholesky_...`` on several (see :mod:`rodfem.factors`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import SceneError
-from rodfem.factors import Factors, ordering, prefer_options
+from rodfem.factors import PIVOTS, Factors, lu_package, ordering, prefer_options
 from rodfem.system import System, combine
 
 MASSLESS = 1e-12
@@ -85,7 +85,7 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
 
 
 def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex, *, symmetric: bool) -> SLEPc.EPS:
-    """Set up Krylov-Schur with shift-invert (MUMPS) for the ``number`` eigenvalues nearest to ``target``."""
+    """Set up Krylov-Schur with shift-invert (LU) for the ``number`` eigenvalues nearest to ``target``."""
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_")
     solver.setOperators(matrix, mass)
@@ -96,11 +96,14 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     solver.setDimensions(number, 2 * number + 20)
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)
+    transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     ksp = transform.getKSP()
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
-    ksp.getPC().setFactorSolverType("mumps")
+    package = lu_package(matrix.comm.tompi4py(), "rodfem_st_")
+    ksp.getPC().setFactorSolverType(package)
     prefer_options("rodfem_st_", ordering(matrix))
+    prefer_options("", PIVOTS)
     solver.setFromOptions()
     return solver
 
@@ -120,7 +123,10 @@ class Inverse:
 def with_factors(
     matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: float, factors: Factors, start: PETSc.Vec
 ) -> SLEPc.EPS:
-    """Set up the same for a symmetric pencil, with the factors of ``matrix - target mass`` and a first vector."""
+    """Set up the same for a symmetric pencil, with the factors of ``matrix - target mass`` and a first vector.
+
+    Its vectors are right up to what has no mass.
+    """
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_")
     solver.setOperators(matrix, mass)
@@ -130,6 +136,7 @@ def with_factors(
     solver.setTolerances(tol=1e-9, max_it=300)  # of vectors: the error of eigenvalues is the square
     solver.setDimensions(number, 2 * number + 6)
     solver.setInitialSpace([start])
+    solver.setPurify(False)  # who has the factors does it for all vectors at once
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)
     transform.setMatMode(SLEPc.ST.MatMode.SHELL)
@@ -155,6 +162,7 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> 
     solver.setTolerances(tol=1e-10)
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)
+    transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     solver.setFromOptions()
     ksp = solver.getKrylovSchurKSP()  # that of the solver for one slice
     ksp.setType("preonly")

@@ -27,7 +27,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.factors import DENSE_ROWS, prefer_options
+from rodfem.factors import factors_of
 from rodfem.stability.blocks import Pencil
 from rodfem.stability.inertia import inertia_factors
 from rodfem.stability.kernel import kernel
@@ -38,7 +38,6 @@ SINGULAR = 1e-6
 """A solve that leaves more than this of its right-hand side behind was made with a singular matrix."""
 
 PREFIX = "rodfem_reduced_inverse_"
-CONTROLS = DENSE_ROWS | {"mat_mumps_icntl_14": 200}
 """MUMPS's ordering for dense rows, and room for pivots."""
 
 
@@ -128,25 +127,17 @@ class ShiftedInverse:
 
 
 def factored(matrix: sp.spmatrix) -> Callable[[np.ndarray], np.ndarray]:
-    """Solver with the LU factors of a matrix (MUMPS); raises :class:`ConvergenceError` where there are none."""
+    """Solver with the LU factors of a matrix; raises :class:`ConvergenceError` where there are none."""
     petsc = petsc_matrix(MPI.COMM_SELF, matrix)
-    ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-    ksp.setOptionsPrefix(PREFIX)
-    prefer_options(PREFIX, CONTROLS)
-    ksp.setType("preonly")
-    ksp.getPC().setType("lu")
-    ksp.getPC().setFactorSolverType("mumps")
-    ksp.setFromOptions()
-    ksp.setOperators(petsc)
-    ksp.setUp()
-    status = ksp.getPC().getFactorMatrix().getMumpsInfog(1)
-    if status < 0:
-        raise ConvergenceError(f"MUMPS could not factor the shifted matrix (INFOG(1) = {status}): change the shift.")
+    factors = factors_of("lu", MPI.COMM_SELF, 0, 0, {}, prefix=PREFIX)
+    factors(petsc)
+    if not factors.regular:
+        raise ConvergenceError("The shifted matrix is singular: change the shift.")
     right, out = petsc.createVecs()
 
     def solve(b: np.ndarray) -> np.ndarray:
         right.array[:] = b
-        ksp.solve(right, out)
+        factors.solve(right, out)
         return out.array_r.copy()
 
     return solve

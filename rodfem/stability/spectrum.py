@@ -21,8 +21,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
+from rodfem.factors import factors_of, lu_package
 from rodfem.stability.inertia import Inertia, inertia_factors
 from rodfem.stability.pencil import assemble_pencil, exclude_modes, symmetry_modes, with_factors
+from rodfem.system import dense_columns
 
 HIT = 1e-8
 """A shift nearer to an eigenvalue than this, relative to the farthest one found, spoils the others by round-off."""
@@ -33,6 +35,8 @@ EXTRA = (2, 6, 14)
 
 CONVERGED = 1e-7
 """A pair with a residual greater than this, relative to the stiffness, is none: the Krylov space broke down."""
+LU = "rodfem_lu_"
+"""Prefix of the options of LU factors."""
 NOISE = 1e-6
 """Size of what is added to the modes of the state before, which may span an invariant space without the lowest one."""
 
@@ -69,6 +73,9 @@ class Spectrum:
         self.mass = self.system.metric_matrix()
         self._shifted = self.system.state_matrix()
         self._factors = inertia_factors(self.system.comm, self.system.fields.unknowns, self.system.fields.dense_rows)
+        self._solver = self._factors
+        if lu_package(self.system.comm, LU) == "klu":  # it solves faster than what counts the inertia
+            self._solver = factors_of("lu", self.system.comm, 0, 0, {})
         self.shift = -inertia.scale
         self.factorisations = 0
         self._factored_at = np.nan
@@ -166,7 +173,9 @@ class Spectrum:
         if len(self._last):  # a space that is invariant already would miss all else
             start.scale(NOISE / self.system.norm(start))
             start.array[:] += self._last
-        solver = with_factors(self.matrix, self.mass, number, self.shift, self._factors, start)
+        if self._solver is not self._factors:
+            self._solver(self._shifted)
+        solver = with_factors(self.matrix, self.mass, number, self.shift, self._solver, start)
         solver.solve()
         found = solver.getConverged()
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
@@ -174,6 +183,7 @@ class Spectrum:
         for i, vector in enumerate(vectors):
             solver.getEigenvector(i, vector)
         solver.destroy()
+        self._purify(values, vectors)
         if found < least:
             raise ConvergenceError(
                 f"SLEPc found {found} of the {least} eigenvalues asked for: "
@@ -183,6 +193,18 @@ class Spectrum:
         stiffness, mass = (A.norm(PETSc.NormType.INFINITY) for A in (self.matrix, self.mass))
         true = [i for i in np.argsort(values) if errors[i] * (1 + abs(values[i]) * mass / stiffness) < CONVERGED]
         return values[true], [vectors[i] for i in true], errors[true]
+
+    def _purify(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> None:
+        """Replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``: without what has no mass, and is arbitrary in them.
+
+        All at once: it is the call that costs, not the column.
+        """
+        right, solved = dense_columns(self.system, len(vectors)), dense_columns(self.system, len(vectors))
+        for i, vector in enumerate(vectors):
+            right.getDenseArray()[:, i] = (self.mass * vector).array_r
+        self._solver.solve_all(right, solved)
+        for i, (value, vector) in enumerate(zip(values, vectors, strict=True)):
+            vector.array[:] = (value - self.shift) * solved.getDenseArray()[:, i]
 
     def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:
         """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""
