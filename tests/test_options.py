@@ -58,7 +58,7 @@ def test_symmetric_pencil(options: PETSc.Options) -> None:
     judge = Judge(system)
     expected = judge(x, "shift-invert", 3).values
     spectrum = judge.spectrum
-    solver = with_factors(spectrum.matrix, spectrum.mass, 3, -9.0, spectrum._factors, spectrum.inertia.seed(1))
+    solver = with_factors(spectrum.matrix, spectrum.mass, 3, -9.0, spectrum._solving.factors, spectrum.inertia.seed(1))
     assert (solver.getDimensions()[1], solver.getTolerances()[0]) == (17, 1e-7)
     options["rodfem_slicing_eps_tol"], options["rodfem_slicing_st_mat_mumps_icntl_7"] = 1e-8, ORDERING
     solver = in_interval(spectrum.matrix, spectrum.mass, -20.0, 30.0)

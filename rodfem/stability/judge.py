@@ -16,6 +16,7 @@ Every verdict on a conservative state has its index by the count, decided within
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 from typing import Any
 
@@ -110,12 +111,16 @@ class Judge:
         self.conservative = self.system.scene.conservative
         given = getattr(source, "inertia", None)
         self.inertia: Inertia | None = (given or Inertia(self.system)) if self.conservative else None
-        self.spectrum = Spectrum(self.inertia) if self.inertia else None
         self.vibration = None if self.conservative else Vibration(self.system)
         self._blocks: Blocks | None = None
         self._map: sp.csr_matrix | None = None
         self._estimates: tuple[float, float] | None = None
         self._made, self._note = 0, ""
+
+    @cached_property
+    def spectrum(self) -> Spectrum | None:
+        """Left-most eigenvalues of conservative states; its matrices are made when they are asked for."""
+        return Spectrum(self.inertia) if self.inertia else None
 
     def choose(self, method: str, number: int) -> tuple[str, str]:
         """Name of the method to use and the reason; raises :class:`SceneError` for one unknown or not applicable."""
@@ -151,7 +156,7 @@ class Judge:
         started = perf_counter()
         self.system.set_phase(x)
         self._made, self._note = 0, ""
-        if self.inertia is None or self.spectrum is None:
+        if self.inertia is None:
             values, vectors, errors = self._non_symmetric(x, method, max(number, 1))
             scale = self.system.stiffness_scale / self.system.scene.length
             bad = int(((values.real < -1e-7 * scale) | (abs(values.imag) > 1e-7 * scale)).sum())
@@ -160,12 +165,13 @@ class Judge:
                 *(bad, 0, values, vectors, errors, 0.0, nothing, nothing, False),
                 *(perf_counter() - started, self._made, method, reason),
             )
-        before = self.spectrum.factorisations
         found = self._index(x)
         values, vectors, errors, certified = np.zeros(0), [], np.zeros(0), True
         if method != "count" and number:
+            assert self.spectrum is not None
+            before = self.spectrum.factorisations
             values, vectors, errors, certified = self._symmetric(x, method, number, interval)
-        self._made += self.spectrum.factorisations - before
+            self._made += self.spectrum.factorisations - before
         return Verdict(
             *(found.index.negative, found.index.zero, values, vectors, errors),
             *(found.band, found.inside, found.uncertainty, certified),

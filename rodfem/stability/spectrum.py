@@ -7,10 +7,10 @@ with ``M`` the kinetic metric: stable where all ``mu = omega^2`` are positive (K
 M`` is zero on all that has no inertia.  No Dirichlet row exists that could bring one in.  A symmetry mode, whose
 eigenvalue is known to be zero, is kept out by the constraint ``g.Mx = 0``, and is not among those returned.
 
-The shift is put below the spectrum, which the inertia of the very factors of shift-invert proves; the nearest
-eigenvalues to it are then the left-most ones, and a second count, just above the last of them, proves that none is
-missing.  Along a branch the shift, the symbolic factorisation and a first vector, the sum of the modes, are those
-of the point before: two numeric factorisations a point, as many as a count of the index takes.
+The shift is put below the spectrum: the nearest eigenvalues to it are then the left-most ones.  A count just above the
+last of them proves that none is missing, wherever the shift was.  Along a branch the shift, the symbolic factorisations
+and a first vector, the sum of the modes, are those of the point before: two numeric factorisations a point, one to
+solve with and one to count.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.factors import factors_of, lu_package
+from rodfem.factors import Factors, factors_of, lu_package
 from rodfem.stability.inertia import Inertia, inertia_factors
 from rodfem.stability.pencil import assemble_pencil, exclude_modes, symmetry_modes, with_factors
 from rodfem.system import dense_columns
@@ -55,13 +55,26 @@ class Modes:
         return int((self.values < -tolerance).sum())
 
 
+NOTHING = Modes(np.zeros(0), [], np.zeros(0), False)
+
+
+@dataclass
+class _Shifted:
+    """Factors of ``S - sigma M``, that matrix, and ``sigma`` (nan: none of this state)."""
+
+    factors: Factors
+    matrix: PETSc.Mat
+    at: float = np.nan
+
+
 class Spectrum:
     """Computes left-most eigenvalues at states of the system of an :class:`~rodfem.stability.inertia.Inertia`.
 
     Attributes
     ----------
     shift
-        Where the next computation starts: it is moved to the left until no eigenvalue is below it.
+        Where the next computation starts; the first one, and one whose count finds any missing, moves it to the left
+        until no eigenvalue is below it.
     factorisations
         Number of numeric factorisations made so far.
     """
@@ -71,14 +84,13 @@ class Spectrum:
         self.inertia, self.system = inertia, inertia.system
         self.matrix = self.system.state_matrix()
         self.mass = self.system.metric_matrix()
-        self._shifted = self.system.state_matrix()
-        self._factors = inertia_factors(self.system.comm, self.system.fields.unknowns, self.system.fields.dense_rows)
-        self._solver = self._factors
-        if lu_package(self.system.comm, LU) == "klu":  # it solves faster than what counts the inertia
-            self._solver = factors_of("lu", self.system.comm, 0, 0, {})
+        system = self.system
+        counting = inertia_factors(system.comm, system.fields.unknowns, system.fields.dense_rows)
+        self._counting = self._solving = _Shifted(counting, system.state_matrix())
+        if lu_package(system.comm, LU) == "klu":  # it solves faster than what counts the inertia
+            self._solving = _Shifted(factors_of("lu", system.comm, 0, 0, {}), system.state_matrix())
         self.shift = -inertia.scale
         self.factorisations = 0
-        self._factored_at = np.nan
         self._last = np.zeros(0)
 
     def assemble(self, x: PETSc.Vec) -> None:
@@ -88,7 +100,7 @@ class Spectrum:
             modes = symmetry_modes(system, x)
             assemble_pencil(system, x, self.matrix, self.mass)
             exclude_modes(system, modes, self.matrix, self.mass)
-        self._factored_at = np.nan
+        self._counting.at = self._solving.at = np.nan
 
     def leftmost(self, x: PETSc.Vec, number: int) -> Modes:
         """Return the ``number`` left-most eigenvalues of the state ``x``, at which the phase conditions must be set.
@@ -97,11 +109,13 @@ class Spectrum:
         """
         self.assemble(x)
         with self.system.clock("stability"):
-            self.go_below()
-            for extra in EXTRA:
-                modes = self._solve(number, extra)
-                if modes.certified:
-                    break
+            modes = self._solve(number, EXTRA[0]) if len(self._last) else NOTHING
+            if not modes.certified:
+                self.go_below()
+                for extra in EXTRA:
+                    modes = self._solve(number, extra)
+                    if modes.certified:
+                        break
         if len(modes.values) < number:
             raise ConvergenceError(
                 f"SLEPc found {len(modes.values)} of the {number} eigenvalues asked for: ask for fewer, or use a "
@@ -125,8 +139,8 @@ class Spectrum:
 
     def below(self, sigma: float) -> int:
         """Number of eigenvalues of the pencil last assembled below ``sigma``, symmetry modes not included."""
-        self._factor(sigma)
-        negative, zero = self._factors.inertia()
+        self._factor(sigma, self._counting)
+        negative, zero = self._counting.factors.inertia()
         below = negative - self.inertia.constraints - self.system.active_drifts()
         if zero or below < 0:
             raise ConvergenceError(
@@ -135,14 +149,15 @@ class Spectrum:
             )
         return int(below)
 
-    def _factor(self, sigma: float) -> None:
-        if sigma == self._factored_at:
+    def _factor(self, sigma: float, shifted: _Shifted) -> None:
+        """Factor ``S - sigma M``, unless that is what was factored last."""
+        if sigma == shifted.at:
             return
-        self.matrix.copy(self._shifted, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        self._shifted.axpy(-sigma, self.mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        self._shifted.stateIncrease()
-        self._factors(self._shifted)
-        self._factored_at = sigma
+        self.matrix.copy(shifted.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        shifted.matrix.axpy(-sigma, self.mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        shifted.matrix.stateIncrease()
+        shifted.factors(shifted.matrix)
+        shifted.at = sigma
         self.factorisations += 1
 
     def _solve(self, number: int, extra: int) -> Modes:
@@ -151,7 +166,10 @@ class Spectrum:
         A Krylov method finds the second of two equal eigenvalues late, by round-off: it is there when more are
         asked for.
         """
-        self._factor(self.shift)
+        self._factor(self.shift, self._solving)
+        if not self._solving.factors.regular:
+            self.shift -= self.inertia.scale
+            return self._solve(number, extra)
         values, vectors, errors = self._krylov_schur(number, number + extra)
         reach = max(values[-1] - self.shift, self.inertia.scale) if len(values) else np.inf
         if len(values) and values[0] - self.shift < HIT * reach:
@@ -173,9 +191,7 @@ class Spectrum:
         if len(self._last):  # a space that is invariant already would miss all else
             start.scale(NOISE / self.system.norm(start))
             start.array[:] += self._last
-        if self._solver is not self._factors:
-            self._solver(self._shifted)
-        solver = with_factors(self.matrix, self.mass, number, self.shift, self._solver, start)
+        solver = with_factors(self.matrix, self.mass, number, self.shift, self._solving.factors, start)
         solver.solve()
         found = solver.getConverged()
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
@@ -202,7 +218,7 @@ class Spectrum:
         right, solved = dense_columns(self.system, len(vectors)), dense_columns(self.system, len(vectors))
         for i, vector in enumerate(vectors):
             right.getDenseArray()[:, i] = (self.mass * vector).array_r
-        self._solver.solve_all(right, solved)
+        self._solving.factors.solve_all(right, solved)
         for i, (value, vector) in enumerate(zip(values, vectors, strict=True)):
             vector.array[:] = (value - self.shift) * solved.getDenseArray()[:, i]
 
