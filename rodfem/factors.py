@@ -26,7 +26,7 @@ of one is as deep as the chain is long, and at 1e5 elements MUMPS's parallel ana
 DENSE_ROWS = {"mat_mumps_icntl_7": 6}
 """MUMPS's ordering for matrices with dense rows (QAMD).  PETSc takes it from its options only."""
 PIVOTS = {"mat_klu_pivot_tol": 0.1}
-"""KLU's threshold of pivots, an option of PETSc without prefix; with its own, 1e-3, eigenvalues lose a digit or two."""
+"""KLU's threshold of pivots; with its own, 1e-3, eigenvalues lose a digit or two.  PETSc 3.18 wants it unprefixed."""
 BALANCED = {"mat_mumps_icntl_7": 4}
 """One that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
 
@@ -107,6 +107,7 @@ class Klu:
         self.ksp.getPC().setType("lu")
         self.ksp.getPC().setFactorSolverType("klu")
         prefer_options("", PIVOTS)
+        prefer_options(prefix, PIVOTS)
         self.ksp.setFromOptions()
         self.regular = False
 

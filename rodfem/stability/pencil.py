@@ -103,7 +103,8 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     package = lu_package(matrix.comm.tompi4py(), "rodfem_st_")
     ksp.getPC().setFactorSolverType(package)
     prefer_options("rodfem_st_", ordering(matrix))
-    prefer_options("", PIVOTS)
+    for prefix in ("", "rodfem_st_"):
+        prefer_options(prefix, PIVOTS)
     solver.setFromOptions()
     return solver
 
