@@ -9,6 +9,7 @@ import inspect
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -36,8 +37,6 @@ REAL: Any = np.float64
 """Numbers of states and forms, whatever those of PETSc."""
 COMPLEX = bool(np.issubdtype(PETSc.ScalarType, np.complexfloating))
 """Whether this PETSc was built for complex numbers: forms and states are real all the same."""
-SUITESPARSE = bool(PETSc.Sys.hasExternalPackage("suitesparse"))
-"""Whether this PETSc has SuiteSparse, and with it KLU."""
 
 
 def require_real_petsc() -> None:
@@ -47,6 +46,22 @@ def require_real_petsc() -> None:
             "This PETSc was built for complex numbers, where MUMPS counts no inertia: under a load with a potential "
             "rodfem needs the real one; unset PETSC_DIR and SLEPC_DIR, or point both at the real build."
         )
+
+
+@cache
+def factors_by(package: str) -> bool:
+    """Whether this PETSc's package of that name makes LU factors: what PETSc says that it has differs by release."""
+    matrix = PETSc.Mat().createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=PETSc.COMM_SELF)
+    solver = PETSc.KSP().create(PETSc.COMM_SELF)
+    solver.setType("preonly")
+    solver.getPC().setType("lu")
+    solver.getPC().setFactorSolverType(package)
+    solver.setOperators(matrix)
+    try:
+        solver.setUp()
+    except PETSc.Error:
+        return False
+    return True
 
 
 def interval_mesh(comm: Any, elements: int, a: float, b: float) -> Any:

@@ -91,7 +91,7 @@ def factors_of(
 
 def lu_package(comm: MPI.Comm, prefix: str) -> str:
     """PETSc's name of the package for LU factors of matrices on a communicator; the option overrules what is best."""
-    best = "klu" if comm.size == 1 and compat.SUITESPARSE else "mumps"
+    best = "klu" if comm.size == 1 and compat.factors_by("klu") else "mumps"
     return str(PETSc.Options(prefix).getString("pc_factor_mat_solver_type", best))
 
 
