@@ -22,7 +22,7 @@ from math import isfinite
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.newton import ROUND_OFF, TOLERANCE, Outcome
+from rodfem.newton import Outcome, iterate
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.system import dense_columns
 
@@ -54,7 +54,7 @@ class Corrector:
         self.inertia, self.system = inertia, inertia.system
         system = self.system
         self._right, self._solved = dense_columns(system, BLOCK + 2), dense_columns(system, BLOCK + 2)
-        self._equations, self._step, self._image = (system.new_vector() for _ in range(3))
+        self._step, self._image = system.new_vector(), system.new_vector()
         self._factored = system.new_vector()
         self._fresh = [inertia.seed(i) for i in range(BLOCK)]
         self._fresh_images = [inertia.metric * v for v in self._fresh]
@@ -135,37 +135,25 @@ class Corrector:
     ) -> Outcome | None:
         """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
 
-        As :func:`rodfem.newton.correct`, but done too when what the observed rate of convergence leaves is below
-        ``tolerance``; ``error`` is that.  None, with ``x`` as it was, where ``S`` is too near singular.
+        As :func:`rodfem.newton.iterate`.  None, with ``x`` as it was, where ``S`` is too near singular.
         """
-        system, equations, origin = self.system, self._equations, x.copy()
-        previous, size, refactor = float("inf"), float("inf"), True
-        iteration = 0
-        for iteration in range(1, most + 1):
-            system.residual(x, equations)
-            if not isfinite(equations.norm()):
-                break
-            fresh = refactor
-            if fresh and not self.factor(x, equations):
-                origin.copy(x)
-                return None
+        origin, singular = x.copy(), False
+
+        def solve(equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
+            nonlocal singular
             if not fresh:
                 self._chord(equations)
-            step = self._step
-            step.axpy(-row.dot(step) / row.dot(self.tangent), self.tangent)
-            x.axpy(-1.0, step)
-            distance = system.norm(step)
-            size = max(distance, step.norm() / (1.0 + x.norm()))
-            if not isfinite(size) or distance > reach:
-                break
-            left = size if fresh else min(2.0 * size / previous, 1.0) * size
-            if size < TOLERANCE or left < tolerance or (fresh and ROUND_OFF > size > 0.5 * previous):
-                origin.aypx(-1.0, x)
-                return Outcome(True, iteration, left, system.norm(origin))
-            refactor = size > 0.02 or size > 0.1 * previous
-            previous = size
-        origin.aypx(-1.0, x)
-        return Outcome(False, iteration, size, float("inf"))
+            elif not self.factor(x, equations):
+                singular = True
+                return None
+            self._step.axpy(-row.dot(self._step) / row.dot(self.tangent), self.tangent)
+            return self._step
+
+        outcome = iterate(self.system, x, solve, most, reach, tolerance)
+        if singular:
+            origin.copy(x)
+            return None
+        return outcome
 
     def tangent_along(self, row: PETSc.Vec) -> PETSc.Vec:
         """Unit tangent at the state last factored, on the side to which ``row`` points."""

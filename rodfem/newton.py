@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
 
@@ -17,7 +18,11 @@ ROUND_OFF = 1e-6
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a Newton iteration ended: ``error`` is the size of its last correction, ``moved`` that of all of them."""
+    """How a Newton iteration ended.
+
+    ``error`` is what the observed rate of convergence leaves after the last correction (that one's size, if the factors
+    were new), ``moved`` the size of all corrections together.
+    """
 
     converged: bool
     iterations: int
@@ -32,13 +37,36 @@ def correct(
     most: int = 12,
     reach: float = 1e3,
 ) -> Outcome:
-    """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
+    """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place, with LU factors.
 
-    A Jacobian is factored first, and again only while corrections do not shrink tenfold from one to the next:
-    near a solution the old factors cost one solve where new ones cost five.  Fails, leaving ``x`` where it got
-    to, after ``most`` iterations, at a singular matrix, or when ``x`` has moved further than ``reach`` in the metric.
+    As :func:`iterate`; fails at a singular matrix, too.
     """
-    equations, step, origin = system.new_vector(), system.new_vector(), x.copy()
+    step = system.new_vector()
+
+    def solve(equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
+        if fresh:
+            system.factor(row)
+        return step if system.solve(equations, step) else None
+
+    return iterate(system, x, solve, most, reach)
+
+
+def iterate(
+    system: System,
+    x: PETSc.Vec,
+    solve: Callable[[PETSc.Vec, bool], PETSc.Vec | None],
+    most: int,
+    reach: float,
+    tolerance: float = 0.0,
+) -> Outcome:
+    """Newton's method with chord steps, in place; ``solve(equations, fresh)`` returns what is to be subtracted from x.
+
+    A Jacobian is factored first (``fresh``), and again only while corrections do not shrink tenfold from one to the
+    next: near a solution the old factors cost one solve where new ones cost five.  Done when a correction, or what the
+    observed rate of convergence leaves after it, is small enough.  Fails, leaving ``x`` where it got to, after ``most``
+    iterations, where there is nothing to subtract (None), or when ``x`` moves further than ``reach`` in the metric.
+    """
+    equations, origin = system.new_vector(), x.copy()
     previous, size, refactor = float("inf"), float("inf"), True
     iteration = 0
     for iteration in range(1, most + 1):
@@ -46,18 +74,18 @@ def correct(
         if not isfinite(equations.norm()):  # outside of where the stored energy is defined
             break
         fresh = refactor
-        if fresh:
-            system.factor(row)
-        if not system.solve(equations, step):
+        step = solve(equations, fresh)
+        if step is None:
             break
         x.axpy(-1.0, step)
         distance = system.norm(step)
         size = max(distance, step.norm() / (1.0 + x.norm()))
         if not isfinite(size) or distance > reach:
             break
-        if size < TOLERANCE or (fresh and ROUND_OFF > size > 0.5 * previous):
+        left = size if fresh else min(2.0 * size / previous, 1.0) * size
+        if size < TOLERANCE or left < tolerance or (fresh and ROUND_OFF > size > 0.5 * previous):
             origin.aypx(-1.0, x)
-            return Outcome(True, iteration, size, system.norm(origin))
+            return Outcome(True, iteration, left, system.norm(origin))
         refactor = size > 0.02 or size > 0.1 * previous
         previous = size
     origin.aypx(-1.0, x)

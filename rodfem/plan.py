@@ -42,11 +42,6 @@ class Plan:
         check_load(scene)
         if self.accuracy is not None:
             check_accuracy(self.accuracy)
-            if not scene.conservative:
-                raise SceneError(
-                    f"An accuracy is kept along branches of equilibria, and {scene.name} is swept for its frequencies: "
-                    "give elements and degree instead, and see the error printed beside each flutter load."
-                )
         low, high = sorted(self.span)
         for load in self.at:
             if not low <= load <= high:

@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from rodfem.branch import BRANCH_POINT, DIVERGENCE, END, FLUTTER, FOLD, USER, Branch, Point, Special
 from rodfem.clock import Clock
+from rodfem.fields import Discretization
 from rodfem.modes import Modes
 from rodfem.stability.judge import Verdict
 from rodfem.system import System
@@ -98,7 +99,7 @@ class Report:
             f"{scene.title or scene.name}: {scene.rod} rod, {d.formulation} formulation, "
             f"{d.elements} elements of degree {d.degree}, {f.unknowns} unknowns"
         )
-        if accuracy is not None:
+        if accuracy is not None and scene.conservative:
             self.say(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
         if not scene.conservative:
@@ -106,6 +107,14 @@ class Report:
             self.say(f"  not conservative ({loads}): stability is a matter of frequencies, not of an index")
         for line in f.left_out():
             self.say(f"  left out: {line}")
+
+    def frequency_mesh(self, mesh: Discretization, number: int, change: float, asked: float) -> None:
+        """Say which mesh was chosen for frequencies, and by how much they still change."""
+        word = "" if change <= asked else f", above the {asked:g} asked for: round-off"
+        self.say(
+            f"{mesh.elements} elements of degree {mesh.degree} for an accuracy of {asked:g}: with half as many more "
+            f"the {number} frequencies change by {rounded_up(change):.0e}{word}"
+        )
 
     def mesh(self, system: System, load: float, why: str) -> None:
         """Say that a branch goes on with another mesh, and why."""

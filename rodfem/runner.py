@@ -16,11 +16,12 @@ from rodfem.diagram import as_data, save_json, save_states
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.explore import Explorer
 from rodfem.fields import Discretization
+from rodfem.frequency_mesh import frequency_mesh
 from rodfem.meshes import start_mesh
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Scene
-from rodfem.sweep import Sweep
+from rodfem.sweep import FREQUENCIES, Sweep
 from rodfem.system import System
 
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
@@ -66,12 +67,12 @@ def run(
         compat.require_real_petsc()
     plan.check(scene)
     discretization = discretization or Discretization()
-    if plan.accuracy is not None and discretization.vertices is None:
-        discretization = start_mesh(scene, discretization.formulation, plan.accuracy, comm)
     writable(output, comm)
     report, clock = Report(comm, quiet), Clock()
     with compat.announce_compilation(report.compiling):
         with clock("setup"):
+            if plan.accuracy is not None and discretization.vertices is None:
+                discretization = _chosen(scene, discretization.formulation, plan, report, comm)
             system = System(scene, discretization, comm, clock)
             follower = Follower(system, plan.spectrum) if scene.conservative else Equilibria(system)
         report.system(system, plan.accuracy)
@@ -101,6 +102,17 @@ def run(
         _draw(output, report)
     comm.barrier()
     return branches
+
+
+def _chosen(scene: Scene, formulation: str, plan: Plan, report: Report, comm: MPI.Comm) -> Discretization:
+    """Discretisation for the accuracy of the plan: to start with, or of a whole sweep."""
+    assert plan.accuracy is not None
+    if scene.conservative:
+        return start_mesh(scene, formulation, plan.accuracy, comm)
+    number = plan.spectrum or FREQUENCIES
+    mesh, change = frequency_mesh(scene, formulation, plan.accuracy, plan.span, number, comm)
+    report.frequency_mesh(mesh, number, change, plan.accuracy)
+    return mesh
 
 
 def _save(explorer: Explorer | Sweep, clock: Clock, output: Path) -> None:

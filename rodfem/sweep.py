@@ -30,6 +30,8 @@ from rodfem.system import System
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
+FREQUENCIES = 6
+"""Number of frequencies recorded at each load where nobody asks for another."""
 SEEN = 0.5
 """A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
 SAME = 1e-9
@@ -45,7 +47,7 @@ class Sweep:
         """Allocate the pencil; the plan must have passed its check."""
         self.solver, self.plan, self.report, self.finished = solver, plan, report, finished
         self.vibration = Vibration(solver.system)
-        self.number = plan.spectrum or 6
+        self.number = plan.spectrum or FREQUENCIES
         self.pairs: list[complex] = []
         self.branches: list[Branch] = []
 
@@ -122,7 +124,7 @@ class Sweep:
         A complex shift looks for a pair that may be farther from the origin than all that the real shift found.
         """
         self.vibration.assemble(x)
-        near = self.vibration.near(max(self.number, 6) + 6, -1e-3)
+        near = self.vibration.near(max(self.number, FREQUENCIES) + 6, -1e-3)
         reach = SEEN * abs(near.values).max()
         found = list(zip(near.values, near.errors, near.kinds, strict=True))
         for pair in (p for p in self.pairs if abs(p) > reach):
@@ -227,6 +229,9 @@ class Sweep:
                     s.omega2_error = max(abs(mu - s.omega2), 1e-12 * abs(mu))
                 elif s.kind == DIVERGENCE:
                     s.error_estimate = max(abs(_zero(richer, vibration, x, s.point.load) - s.point.load), floor)
+                asked = self.plan.accuracy
+                if asked is not None and s.error_estimate > asked * max(1.0, abs(s.point.load)):
+                    s.note = s.note or f"accuracy {asked:g} not reached"
 
     @staticmethod
     def _richer_flutter(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import classics
 import closed_form
+import exact
 import h5py
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from rodfem.branch import BRANCH_POINT, FOLD, USER, Branch
+from rodfem.branch import BRANCH_POINT, FLUTTER, FOLD, USER, Branch
 from rodfem.continuation import Follower
 from rodfem.diagram import load_state
 from rodfem.errors import SceneError
@@ -165,10 +166,22 @@ def test_bad_accuracy(accuracy: float) -> None:
         Plan(scene.span, accuracy=accuracy).check(scene)
 
 
-def test_accuracy_of_a_sweep() -> None:
+@pytest.mark.parametrize(("accuracy", "number"), [(1e-3, 6), pytest.param(1e-6, 12, marks=pytest.mark.alone)])
+def test_accuracy_of_a_sweep(accuracy: float, number: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """All frequencies, and the flutter load, against the frequency equation of Beck's column (good to 1e-7)."""
     scene = scenes.scene("follower")
-    with pytest.raises(SceneError, match="give elements and degree instead"):
-        Plan(scene.span, accuracy=1e-6).check(scene)
+    folder = MPI.COMM_WORLD.bcast(tmp_path)
+    plan = Plan((15.0, 25.0), accuracy=accuracy, spectrum=number)
+    (branch,) = run(scene, plan=plan, output=folder, figures=False)
+    out = capfd.readouterr().out
+    assert MPI.COMM_WORLD.rank or f"for an accuracy of {accuracy:g}: with half as many more" in out
+    (flutter,) = [s for s in branch.special if s.kind == FLUTTER]
+    assert abs(flutter.point.load / exact.double(20.0, 120.0)[0] - 1) < accuracy
+    assert not flutter.note
+    for point in branch.points[::25]:
+        for mu in (complex(*parts) for parts in point.omega2):
+            planes = exact.column(mu, point.load), exact.column(mu, point.load, EI=10.0)
+            assert np.nanmin(np.abs(np.array(planes) - mu)) < accuracy * abs(mu)
 
 
 @pytest.mark.parametrize("words", [("--elements", "8"), ("--degree=6",), ("--elem", "8")])

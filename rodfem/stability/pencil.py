@@ -135,7 +135,7 @@ def with_factors(
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTarget(target)
     solver.setTolerances(tol=1e-9, max_it=300)  # of vectors: the error of eigenvalues is the square
-    solver.setDimensions(number, 2 * number + 6)
+    solver.setDimensions(number, 2 * number + 4)
     solver.setInitialSpace([start])
     solver.setPurify(False)  # who has the factors does it for all vectors at once
     transform = solver.getST()
