@@ -2,6 +2,7 @@
 
     python -m benchmarks.speed.growth buckled reduced 1000 10000
     mpirun -n 2 python -m benchmarks.speed.growth straight pointwise 100000
+    mpirun -n 2 python -m benchmarks.speed.growth --each straight pointwise 50000    (each rank a rod of its own)
 
 prints a line of JSON for each number of elements: seconds of processor and of wall time (medians of three, after one
 that is not counted) of an equilibrium at a load a little off and of a count, and memory over all ranks.
@@ -61,14 +62,14 @@ def timed(name: str, work: Callable[[], Any]) -> dict[str, float]:
         started, wall = process_time(), perf_counter()
         work()
         times.append(COMM.allreduce(process_time() - started, op=MPI.MAX))
-        walls.append(perf_counter() - wall)
+        walls.append(COMM.allreduce(perf_counter() - wall, op=MPI.MAX))
     return {name: median(times), f"{name} wall": median(walls)}
 
 
-def measure(state: str, formulation: str, elements: int) -> dict[str, Any]:
+def measure(state: str, formulation: str, elements: int, comm: MPI.Comm) -> dict[str, Any]:
     """Times in seconds and memory in MB."""
     before, started, wall = memory(), process_time(), perf_counter()
-    solver = Follower(System(scene("cord"), Discretization(formulation, elements, DEGREE)))
+    solver = Follower(System(scene("cord"), Discretization(formulation, elements, DEGREE), comm))
     setup = {"setup": process_time() - started, "setup wall": perf_counter() - wall}
     x = first(solver, state)
     corrections: list[int] = []
@@ -99,9 +100,10 @@ def measure(state: str, formulation: str, elements: int) -> dict[str, Any]:
 
 def main() -> None:
     """Print what is measured."""
-    state, formulation, *elements = sys.argv[1:]
+    each = "--each" in sys.argv
+    state, formulation, *elements = (word for word in sys.argv[1:] if word != "--each")
     for n in elements:
-        found = measure(state, formulation, int(n))
+        found = measure(state, formulation, int(n), MPI.COMM_SELF if each else COMM)
         if COMM.rank == 0:
             print(json.dumps(found), flush=True)
 

@@ -123,6 +123,9 @@ def everything(store: Store, size: Size) -> None:
             for elements, kind in ((n, "strong"), (n * ranks // cores, "weak")):
                 key = f"scaling/{kind}/{n}/{ranks}"
                 store.measure(key, partial(_run, "growth", ("buckled", "reduced", elements), ranks))
+        for ranks in range(1, cores + 1):
+            arguments = ("--each", "buckled", "reduced", n // cores)
+            store.measure(f"scaling/each/{n}/{ranks}", partial(_run, "growth", arguments, ranks))
     store.measure("first", partial(_if_it_runs, partial(first_minute, size.runs)))
     for ranks in range(1, cores + 1):
         store.measure(f"map/{ranks}", partial(_if_it_runs, partial(map_of_rods, size.couplings, ranks)))

@@ -47,7 +47,9 @@ An equilibrium is computed at a load a thousandth off; exponents are fitted from
 """
 RANKS = """
 The buckled cord, wall time. Strong: the same number of elements on more ranks; weak: as many for each rank, for which
-a speed-up of 1 is perfect.
+a speed-up of 1 is perfect. Each: as many processes, which have a rod each and nothing to do with one another: what
+their speed-up falls short of 1 by, they take from each other (memory, caches, and whoever else uses the machine), and
+no program for several ranks has it back.
 """
 MANY = """
 `demos/map.py` with fewer rods, wall time. Taken up again, when all is finished, it only starts, reads and draws.
