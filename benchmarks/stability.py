@@ -214,7 +214,7 @@ def goals(found: Sequence[Times], ratios: Sequence[float]) -> str:
     shares = np.stack([t.shares for t in found])
     few, many = np.nanmax(shares[:, 0]), np.nanmax(shares[:, 1:])
     own = {f"{m} {e:.2f}": e for t in found for m, e in t.exponents.items() if "scipy" not in m and "dense" not in m}
-    worst = max((k for k in own if not np.isnan(own[k])), key=own.__getitem__)
+    worst = max((k for k in own if not np.isnan(own[k])), key=own.__getitem__, default="none")
     rows = [
         ["an index along a branch over one factorisation, from n = 1000 on", "at most 1.2", f"{many:.2f}"],
         ["the same for n = 100, where calls cost more than arithmetic", "at most 1.2", f"{few:.2f}"],
