@@ -16,6 +16,7 @@ from states import buckled, plain, scene
 
 from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.factors import factors_of
 from rodfem.fields import Discretization
 from rodfem.scene import Inertia
 from rodfem.stability.band import decide
@@ -23,6 +24,7 @@ from rodfem.stability.blocks import Blocks
 from rodfem.stability.inertia import Inertia as Count
 from rodfem.stability.judge import METHODS, Judge, judge
 from rodfem.stability.matrices import gathered, petsc_matrix
+from rodfem.stability.pencil import assemble_pencil, symmetry_modes, weighed_modes, with_factors
 from rodfem.stability.projection import INVERSES
 from rodfem.stability.rank import rank_of, smallest_singular
 from rodfem.stability.reduction import Reduction
@@ -165,6 +167,29 @@ def test_interval() -> None:
     assert found.certified
     with pytest.raises(SceneError, match="is empty"):
         to_judge(x, "slicing", interval=(high, low))
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_deflation_alone(formulation: str) -> None:
+    """Without the constraint that keeps it out, the symmetry mode is found as mu = 0, unless it is deflated."""
+    to_judge, x = at("hemitropic", formulation, 0.2, True)
+    expected, system = to_judge(x, "shift-invert", 4).values, to_judge.system
+    matrix, mass = system.state_matrix(), system.metric_matrix()
+    assemble_pencil(system, x, matrix, mass)
+    ((mode, _),) = weighed_modes(system, symmetry_modes(system, x), mass).values()
+    shift = float(expected[0]) - 1.0
+    shifted = matrix.copy()
+    shifted.axpy(-shift, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    factors = factors_of("lu", system.comm, 0, 0, {})
+    factors(shifted)
+    assert to_judge.inertia is not None
+    for deflated, zeros in (((), 1), ([mode], 0)):
+        solver = with_factors(matrix, mass, 6, shift, factors, to_judge.inertia.seed(1), deflated)
+        solver.solve()
+        values = np.sort([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
+        vanish = abs(values) < 1e-9 * abs(expected).max()
+        assert vanish.sum() == zeros
+        np.testing.assert_allclose(values[~vanish][:4], expected, rtol=1e-9)
 
 
 # --- nasty -----------------------------------------------------------------------------------------------------

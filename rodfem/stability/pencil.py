@@ -7,6 +7,8 @@ else ``-rodfem_lu_...`` on one rank and ``-rodfem_cholesky_...`` on several (see
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from petsc4py import PETSc
 from slepc4py import SLEPc
@@ -69,12 +71,17 @@ def weighed_modes(
     return out
 
 
-def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat, mass: PETSc.Mat) -> None:
+def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat, mass: PETSc.Mat) -> list[PETSc.Vec]:
     """Add to an assembled pencil the constraints ``g.Mx = 0`` for symmetry modes ``g``, one for each drift scalar.
 
-    ``g`` being an eigenvector (of ``mu = 0``), what they leave of the spectrum is all the rest of it, unchanged.
+    ``g`` being an eigenvector (of ``mu = 0``), what they leave of the spectrum is all the rest of it, unchanged; and
+    the inertia counts it.  Returns the modes that have mass, orthonormal in it: a Krylov space is kept off them by
+    deflation, too, or round-off brings them in where ``mu`` is large beside the rest.
     """
-    for index, (_, image) in weighed_modes(system, modes, mass).items():
+    deflated = []
+    for index, (mode, image) in weighed_modes(system, modes, mass).items():
+        if abs(mode.dot(mass * mode) - 1.0) < 0.5:
+            deflated.append(mode)
         begin, end = image.getOwnershipRange()
         own = np.arange(begin, end, dtype=PETSc.IntType)
         if system.has_scalars:
@@ -82,6 +89,7 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
         matrix.setValues([index], own, image.array_r, addv=True)
         matrix.setValues(own, [index], image.array_r, addv=True)
     matrix.assemble()
+    return deflated
 
 
 def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex, *, symmetric: bool) -> SLEPc.EPS:
@@ -122,11 +130,17 @@ class Inverse:
 
 
 def with_factors(
-    matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: float, factors: Factors, start: PETSc.Vec
+    matrix: PETSc.Mat,
+    mass: PETSc.Mat,
+    number: int,
+    target: float,
+    factors: Factors,
+    start: PETSc.Vec,
+    deflated: Sequence[PETSc.Vec] = (),
 ) -> SLEPc.EPS:
     """Set up the same for a symmetric pencil, with the factors of ``matrix - target mass`` and a first vector.
 
-    Its vectors are right up to what has no mass.
+    Its vectors are right up to what has no mass.  Eigenvectors that are ``deflated`` are not found.
     """
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_")
@@ -137,6 +151,8 @@ def with_factors(
     solver.setTolerances(tol=1e-9, max_it=300)  # of vectors: the error of eigenvalues is the square
     solver.setDimensions(number, 2 * number + 4)
     solver.setInitialSpace([start])
+    if deflated:
+        solver.setDeflationSpace(list(deflated))
     solver.setPurify(False)  # who has the factors does it for all vectors at once
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)

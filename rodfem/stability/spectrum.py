@@ -5,7 +5,8 @@
 with ``M`` the kinetic metric: stable where all ``mu = omega^2`` are positive (Kumar & Healey 2010, (21) and
 (45)).  ``M`` is singular, so that only shift-invert is free of spurious eigenvalues: its image ``(S - sigma M)^-1
 M`` is zero on all that has no inertia.  No Dirichlet row exists that could bring one in.  A symmetry mode, whose
-eigenvalue is known to be zero, is kept out by the constraint ``g.Mx = 0``, and is not among those returned.
+eigenvalue is known to be zero, is kept out by the constraint ``g.Mx = 0`` and by deflation (``EPSSetDeflationSpace``),
+and is not among those returned.
 
 The shift is put below the spectrum: the nearest eigenvalues to it are then the left-most ones.  A count just above the
 last of them proves that none is missing, wherever the shift was.  Along a branch the shift, the symbolic factorisations
@@ -92,6 +93,7 @@ class Spectrum:
         self.shift = -inertia.scale
         self.factorisations = 0
         self._last = np.zeros(0)
+        self._deflated: list[PETSc.Vec] = []
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Assemble the pencil of the state ``x``, at which the phase conditions must be set."""
@@ -99,7 +101,7 @@ class Spectrum:
         with system.clock("assembly"):
             modes = symmetry_modes(system, x)
             assemble_pencil(system, x, self.matrix, self.mass)
-            exclude_modes(system, modes, self.matrix, self.mass)
+            self._deflated = exclude_modes(system, modes, self.matrix, self.mass)
         self._counting.at = self._solving.at = np.nan
 
     def leftmost(self, x: PETSc.Vec, number: int) -> Modes:
@@ -191,7 +193,7 @@ class Spectrum:
         if len(self._last):  # a space that is invariant already would miss all else
             start.scale(NOISE / self.system.norm(start))
             start.array[:] += self._last
-        solver = with_factors(self.matrix, self.mass, number, self.shift, self._solving.factors, start)
+        solver = with_factors(self.matrix, self.mass, number, self.shift, self._solving.factors, start, self._deflated)
         solver.solve()
         found = solver.getConverged()
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
