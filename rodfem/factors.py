@@ -25,8 +25,10 @@ of one is as deep as the chain is long, and at 1e5 elements MUMPS's parallel ana
 """
 DENSE_ROWS = {"mat_mumps_icntl_7": 6}
 """MUMPS's ordering for matrices with dense rows (QAMD).  PETSc takes it from its options only."""
-PIVOTS = {"mat_klu_pivot_tol": 0.1}
-"""KLU's threshold of pivots; with its own, 1e-3, eigenvalues lose a digit or two.  PETSc 3.18 wants it unprefixed."""
+PIVOTS = {"mat_klu_pivot_tol": 1.0}
+"""KLU's threshold of pivots: the largest of a column.  With KLU's own, 1e-3, eigenvalues lose a digit or two, and with
+0.1 the way of a limp cable down was lost.  PETSc 3.18 and 3.22 want the option without a prefix.
+"""
 BALANCED = {"mat_mumps_icntl_7": 4}
 """One that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
 

@@ -43,6 +43,10 @@ SMALL = 12
 """A system with fewer unknowns than this for each eigenvalue is solved by dense matrices."""
 LARGEST = 3000
 """Unknowns that dense matrices may have."""
+WIDER = (0.0, 1e-9, 1e-7, 1e-5)
+"""By how much of itself an interval is widened where what SLEPc finds in it does not match the counts at its ends."""
+PETSC_ERR_PLIB = 77
+"""PETSc's error code for that."""
 DISTINCT = 1e-3
 """Eigenvalues closer than this, relative to the greatest, are one for the parameters of Cayley's transform."""
 
@@ -267,9 +271,20 @@ class Judge:
         low, high = interval or self._enclose(number)
         if not low < high:
             raise SceneError(f"An interval from {low:g} to {high:g} is empty: give its lower end first.")
-        wanted = spectrum.below(high) - spectrum.below(low)
-        solver = in_interval(spectrum.matrix, spectrum.mass, low, high)
-        solver.solve()
+        for wider in WIDER:  # an end on an eigenvalue is moved off it
+            low, high = low - wider * (high - low), high + wider * (high - low)
+            wanted = spectrum.below(high) - spectrum.below(low)
+            solver = in_interval(spectrum.matrix, spectrum.mass, low, high)
+            try:
+                solver.solve()
+            except PETSc.Error as trouble:
+                if trouble.ierr != PETSC_ERR_PLIB:
+                    raise
+                solver.destroy()
+            else:
+                break
+        else:
+            raise ConvergenceError(f"An end of the interval from {low:.6g} to {high:.6g} is an eigenvalue: move it.")
         values = np.array([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
         complete = len(values) == wanted
         order = np.argsort(values)[: None if interval else number]
