@@ -22,7 +22,7 @@ from math import isfinite
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.factors import factors_of, lu_package
+from rodfem.factors import solving
 from rodfem.newton import Outcome, iterate
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.system import dense_columns
@@ -30,8 +30,7 @@ from rodfem.system import dense_columns
 MANY = 5000
 """Unknowns from which LU factors (KLU) solve, and the symmetric ones only count, once a point.
 
-KLU factors in half the time of MUMPS then, and solves in a tenth; with fewer unknowns two factorisations cost more than
-the calls that they save.
+With few unknowns a second factorisation costs more than the faster solves save.
 """
 BLOCK = 2
 """Number of vectors that are iterated along a branch."""
@@ -64,8 +63,8 @@ class Corrector:
         self._step, self._image = system.new_vector(), system.new_vector()
         self._factored = system.new_vector()
         self._solving = inertia.factors
-        if system.fields.unknowns >= MANY and lu_package(system.comm, "rodfem_lu_") == "klu":
-            self._solving = factors_of("lu", system.comm, 0, 0, {})
+        if system.fields.unknowns >= MANY:
+            self._solving = solving(system.comm, inertia.factors)
         self._fresh = [inertia.seed(i) for i in range(BLOCK)]
         self._fresh_images = [inertia.metric * v for v in self._fresh]
         self._below: int | None = None

@@ -1,8 +1,8 @@
 """Factors of a matrix whose pattern stays: LDL^t by MUMPS, LU by KLU; for long rods on several ranks piece by piece.
 
 Only LDL^t factors count the inertia, which MUMPS alone does.  Where solutions are all that is wanted, on one rank, KLU
-is better for a chain: it has no dense fronts to manage, each of which would be one element.  For 1e4 linear elements of
-the reduced formulation it factors in half the time of MUMPS's LDL^t, and solves in a tenth.
+is better for a chain: it has no dense fronts to manage, each of which would be one element.  For 1e4 linear elements it
+solves in a tenth (reduced formulation) to a quarter (pointwise) of MUMPS's time.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ of one is as deep as the chain is long, and at 1e5 elements MUMPS's parallel ana
 DENSE_ROWS = {"mat_mumps_icntl_7": 6}
 """MUMPS's ordering for matrices with dense rows (QAMD).  PETSc takes it from its options only."""
 PIVOTS = {"mat_klu_pivot_tol": 1.0}
-"""KLU's threshold of pivots: the largest of a column.  With KLU's own, 1e-3, eigenvalues lose a digit or two, and with
-0.1 the way of a limp cable down was lost.  PETSc 3.18 and 3.22 want the option without a prefix.
+"""KLU's threshold of pivots: the largest of a column.  With KLU's own, 1e-3, eigenvalues lose a digit or two; with 0.1
+a limp cable does not always find its way down.  PETSc 3.18 and 3.22 want the option without a prefix.
 """
 BALANCED = {"mat_mumps_icntl_7": 4}
 """One that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
@@ -82,7 +82,7 @@ def factors_of(
     ``rodfem_cholesky_``, or with another ``prefix``.
     """
     prefix = prefix or f"rodfem_{kind}_"
-    if kind == "lu" and lu_package(comm, prefix) == "klu":
+    if kind == "lu" and lu_package(comm, prefix) != "mumps":
         return Klu(prefix)
     if comm.size == 1 or unknowns < LONG:
         return Mumps(kind, comm, controls, thresholds, prefix)
@@ -97,8 +97,13 @@ def lu_package(comm: MPI.Comm, prefix: str) -> str:
     return str(PETSc.Options(prefix).getString("pc_factor_mat_solver_type", best))
 
 
+def solving(comm: MPI.Comm, counting: Factors) -> Factors:
+    """What solves with a symmetric matrix best, where ``counting`` are its LDL^t factors: those, or LU factors."""
+    return counting if lu_package(comm, "rodfem_lu_") == "mumps" else factors_of("lu", comm, 0, 0, {})
+
+
 class Klu:
-    """LU factors by SuiteSparse's KLU, on one rank.  PETSc's options with the prefix change what is set here."""
+    """LU factors by SuiteSparse's KLU, on one rank; PETSc's options with the prefix may choose another package."""
 
     def __init__(self, prefix: str) -> None:
         """Make the solver."""

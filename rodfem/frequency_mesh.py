@@ -46,7 +46,7 @@ def frequency_mesh(
     for _ in range(MOST):
         finer = replace(mesh, elements=ceil(REFINED * mesh.elements))
         richer = _frequencies(scene, finer, loads, number, comm)
-        change = max(_change(v, w) for v, w in zip(values, richer, strict=True))
+        change = max(_change(v[:number], w) for v, w in zip(values, richer, strict=True))
         if change >= least:
             break
         best, least = mesh, change
@@ -75,5 +75,5 @@ def _frequencies(
 
 
 def _change(values: np.ndarray, richer: np.ndarray) -> float:
-    """Largest relative distance of the first values, all but two, from the nearest of the richer ones."""
-    return max(float(abs(richer - v).min() / max(1.0, abs(v))) for v in values[:-2])
+    """Largest relative distance of values from the nearest of the richer ones."""
+    return max(float(abs(richer - v).min() / max(1.0, abs(v))) for v in values)

@@ -35,7 +35,7 @@ def bordered_pattern(fields: Fields) -> sp.csr_matrix:
 def metric_pattern(fields: Fields) -> sp.csr_matrix:
     """Nonzero pattern of a metric: rotations couple to rotations, the centreline to itself; and the diagonal.
 
-    A fifth of :func:`bordered_pattern`, of which it is a part.
+    A part of :func:`bordered_pattern`.
     """
     names = [name for name in (fields.turning.name, "r") if name in fields.dofs]
     rows = sum(_own_rows(fields, [name]) for name in names)

@@ -151,11 +151,11 @@ def test_pieces_may_be_singular_where_the_whole_is_not() -> None:
 def test_long_rods_are_cut(formulation: str, elements: int) -> None:
     """Their index, their eigenvalue nearest zero, and the left-most ones are those of MUMPS on one rank."""
     found = []
-    for comm, kind in ((MPI.COMM_SELF, Mumps), (MPI.COMM_WORLD, Condensed)):
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         system = System(states.scene("cord"), Discretization(formulation, elements, 1), comm)
         solver = Follower(system)
-        assert isinstance(solver.inertia.factors, kind)
-        assert isinstance(system.lu, kind)
+        for factors in (solver.inertia.factors, system.lu):
+            assert isinstance(factors, Condensed) == (comm.size > 1)
         system.set_phase(None)
         x, outcome = solver.at_load(solver.start(20.0), 20.0)
         assert outcome.converged

@@ -22,7 +22,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.factors import Factors, factors_of, lu_package
+from rodfem.factors import Factors, solving
 from rodfem.stability.inertia import Inertia, inertia_factors
 from rodfem.stability.pencil import assemble_pencil, exclude_modes, symmetry_modes, with_factors
 from rodfem.system import dense_columns
@@ -36,8 +36,6 @@ EXTRA = (2, 6, 14)
 
 CONVERGED = 1e-7
 """A pair with a residual greater than this, relative to the stiffness, is none: the Krylov space broke down."""
-LU = "rodfem_lu_"
-"""Prefix of the options of LU factors."""
 NOISE = 1e-6
 """Size of what is added to the modes of the state before, which may span an invariant space without the lowest one."""
 
@@ -88,8 +86,9 @@ class Spectrum:
         system = self.system
         counting = inertia_factors(system.comm, system.fields.unknowns, system.fields.dense_rows)
         self._counting = self._solving = _Shifted(counting, system.state_matrix())
-        if lu_package(system.comm, LU) == "klu":  # it solves faster than what counts the inertia
-            self._solving = _Shifted(factors_of("lu", system.comm, 0, 0, {}), system.state_matrix())
+        solver = solving(system.comm, counting)
+        if solver is not counting:
+            self._solving = _Shifted(solver, system.state_matrix())
         self.shift = -inertia.scale
         self.factorisations = 0
         self._last = np.zeros(0)

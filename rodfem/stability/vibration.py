@@ -25,6 +25,7 @@ from slepc4py import SLEPc
 
 from rodfem import compat
 from rodfem.errors import ConvergenceError
+from rodfem.factors import PETSC_ERR_LIB
 from rodfem.stability import character
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.pencil import assemble_pencil, shift_invert
@@ -36,8 +37,6 @@ FAR = 1e5
 The pencil has infinite eigenvalues with Jordan blocks of size two, one for each pair of constraint and multiplier,
 which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than the nearest: those are not kept.
 """
-PETSC_ERR_LIB = 76
-"""PETSc's error code for a failure in a library below: here LAPACK, as it sorts a Schur form with Jordan blocks."""
 DENSE = 3
 """A pencil smaller than this many Krylov spaces is solved by dense reductions: it may have few finite eigenvalues."""
 EPS = float(np.finfo(float).eps)
