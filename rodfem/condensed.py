@@ -41,7 +41,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.factors import Mumps
+from rodfem.factors import Klu, Mumps
 from rodfem.piece import Piece
 
 GROWTH = 100.0
@@ -50,17 +50,21 @@ SOFT = 1e-3
 """A diagonal less than this, relative to the sum of its column, is no spring: it may be a shift of zero."""
 NOTHING = 1e-12
 """A column whose sum is less than this, relative to the diagonals of others, is round-off."""
-SPRINGS = (1.0, 3.0, -2.0, 0.3, 10.0, -0.5)
-"""Multiples of the springs, tried one after the other."""
+SPRINGS = (3.0, 1.0, -2.0, 0.3, 10.0, -0.5)
+"""Multiples of the springs, tried one after the other.
+
+More than the diagonal first: of a positive matrix what the piece takes from a spring is at most that, and is just that
+where an unknown couples to this piece alone.
+"""
 
 
 class Condensed:
-    """Factors on several ranks: each its own piece by MUMPS, and all together what the pieces share.
+    """Factors on several ranks: each its own piece by KLU or MUMPS, and all together what the pieces share.
 
     :class:`~rodfem.factors.Factors` of matrices whose pattern is symmetric and stays.
     """
 
-    def __init__(self, scalars: int, factors: Mumps) -> None:
+    def __init__(self, scalars: int, factors: Mumps | Klu) -> None:
         """Keep the factors for this rank's piece; the last ``scalars`` unknowns are shared."""
         self.factors, self.scalars = factors, scalars
         self.symmetric = factors.kind == "cholesky"
@@ -69,7 +73,7 @@ class Condensed:
         self._blocks: dict[int, tuple[PETSc.Mat, PETSc.Mat]] = {}
 
     def __call__(self, matrix: PETSc.Mat) -> None:
-        """Factor ``matrix``; raises :class:`ConvergenceError` on all ranks where MUMPS gives up on one."""
+        """Factor ``matrix``; raises :class:`ConvergenceError` on all ranks where one gives up."""
         if self._matrix is None or matrix.handle != self._matrix.handle:
             self._matrix = matrix
             self.piece = Piece(matrix, self.scalars, symmetric=self.symmetric)
@@ -109,7 +113,9 @@ class Condensed:
             if not self.factors.regular or (self.symmetric and self.factors.inertia()[1]):
                 continue
             if len(coupled):
-                self._columns[:, coupled] = self._solve_units(piece.size + coupled)
+                block = self._block(len(coupled))
+                self.factors.columns(piece.size + coupled, *block)
+                self._columns[:, coupled] = block[1].getDenseArray()
             for i in np.flatnonzero(sizes == 0):
                 self._columns[piece.size + i, i] = 1.0 / springs[i]
             compliance = self._columns[piece.size :]
@@ -140,16 +146,6 @@ class Condensed:
             self._negative += int((values < 0).sum())
             self._zero = int((values == 0).sum())
             self.regular = self._zero == 0
-
-    def _solve_units(self, rows: np.ndarray) -> np.ndarray:
-        """Columns of the inverse of the piece; MUMPS skips what the zeros of their right-hand sides spare it."""
-        n, k = self.piece.matrix.size[0], len(rows)
-        starts = np.arange(k + 1, dtype=PETSc.IntType)
-        units = PETSc.Mat().createAIJ(
-            (k, n), csr=(starts, rows.astype(PETSc.IntType), np.ones(k)), comm=PETSc.COMM_SELF
-        )
-        self.factors.solve_all(PETSc.Mat().createTranspose(units), self._block(k)[1])
-        return self._block(k)[1].getDenseArray()
 
     def _solve_piece(self, right: np.ndarray) -> np.ndarray:
         given, out = self._block(right.shape[1])

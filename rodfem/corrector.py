@@ -64,7 +64,7 @@ class Corrector:
         self._factored = system.new_vector()
         self._solving = inertia.factors
         if system.fields.unknowns >= MANY:
-            self._solving = solving(system.comm, inertia.factors)
+            self._solving = solving(inertia.factors, system.comm, system.fields.unknowns, system.fields.dense_rows)
         self._fresh = [inertia.seed(i) for i in range(BLOCK)]
         self._fresh_images = [inertia.metric * v for v in self._fresh]
         self._below: int | None = None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
+import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -82,13 +83,15 @@ def factors_of(
     ``rodfem_cholesky_``, or with another ``prefix``.
     """
     prefix = prefix or f"rodfem_{kind}_"
-    if kind == "lu" and lu_package(comm, prefix) != "mumps":
-        return Klu(prefix)
-    if comm.size == 1 or unknowns < LONG:
-        return Mumps(kind, comm, controls, thresholds, prefix)
+    cut = comm.size > 1 and unknowns >= LONG
+    whole = MPI.COMM_SELF if cut else comm
+    lu = kind == "lu" and lu_package(whole, prefix) != "mumps"
+    factors = Klu(prefix) if lu else Mumps(kind, whole, controls, thresholds, prefix)
+    if not cut:
+        return factors
     from rodfem.condensed import Condensed  # it is made of the former
 
-    return Condensed(scalars, Mumps(kind, MPI.COMM_SELF, controls, thresholds, prefix))
+    return Condensed(scalars, factors)
 
 
 def lu_package(comm: MPI.Comm, prefix: str) -> str:
@@ -97,9 +100,11 @@ def lu_package(comm: MPI.Comm, prefix: str) -> str:
     return str(PETSc.Options(prefix).getString("pc_factor_mat_solver_type", best))
 
 
-def solving(comm: MPI.Comm, counting: Factors) -> Factors:
+def solving(counting: Factors, comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
     """What solves with a symmetric matrix best, where ``counting`` are its LDL^t factors: those, or LU factors."""
-    return counting if lu_package(comm, "rodfem_lu_") == "mumps" else factors_of("lu", comm, 0, 0, {})
+    whole = MPI.COMM_SELF if unknowns >= LONG else comm
+    known = lu_package(whole, "rodfem_lu_") == "mumps"
+    return counting if known else factors_of("lu", comm, unknowns, scalars, {})
 
 
 class Klu:
@@ -138,6 +143,12 @@ class Klu:
     def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
         """Solve for all columns of a dense matrix."""
         self.ksp.getPC().getFactorMatrix().matSolve(right, out)
+
+    def columns(self, rows: np.ndarray, right: PETSc.Mat, out: PETSc.Mat) -> None:
+        """Columns ``rows`` of the inverse; ``right`` is room for their right-hand sides."""
+        right.zeroEntries()
+        right.getDenseArray()[rows, np.arange(len(rows))] = 1.0
+        self.solve_all(right, out)
 
     def inertia(self) -> tuple[int, int]:
         """LU factors count none."""
@@ -199,6 +210,16 @@ class Mumps:
     def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
         """Solve for all columns of a dense matrix at once: it is the call that costs, not the column."""
         self.ksp.getPC().getFactorMatrix().matSolve(right, out)
+
+    def columns(self, rows: np.ndarray, right: PETSc.Mat, out: PETSc.Mat) -> None:
+        """Columns ``rows`` of the inverse; MUMPS skips what the zeros of their right-hand sides spare it."""
+        starts = np.arange(len(rows) + 1, dtype=PETSc.IntType)
+        units = PETSc.Mat().createAIJ(
+            (len(rows), right.size[0]),
+            csr=(starts, rows.astype(PETSc.IntType), np.ones(len(rows))),
+            comm=PETSc.COMM_SELF,
+        )
+        self.solve_all(PETSc.Mat().createTranspose(units), out)
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""

@@ -208,7 +208,7 @@ def test_shift_on_an_eigenvalue() -> None:
 
 
 def test_shift_of_the_reduction_on_an_eigenvalue() -> None:
-    """All three, or a sentence that says to look elsewhere."""
+    """All three, or a sentence that says to look elsewhere; or without the constraints, whose multiplier is zero."""
     system, x = plain("cord", "reduced", *SMALL, 20.0)
     expected = at("cord", "reduced", 20.0, False)[0](x, "dense", 3).values
     for inverse in INVERSES:
@@ -217,7 +217,7 @@ def test_shift_of_the_reduction_on_an_eigenvalue() -> None:
             try:
                 found = reduction.near(3, value)
             except ConvergenceError as trouble:
-                assert "elsewhere" in str(trouble)
+                assert "elsewhere" in str(trouble) or (inverse != "saddle" and "the inverse 'saddle'" in str(trouble))
                 continue
             assert found.certified
             assert abs(found.values - value).min() < 1e-9 * abs(expected).max()

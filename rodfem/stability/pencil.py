@@ -19,6 +19,8 @@ from rodfem.system import System, combine
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
+LEAST = 6
+"""How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
 
 
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> None:
@@ -149,7 +151,7 @@ def with_factors(
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTarget(target)
     solver.setTolerances(tol=1e-9, max_it=300)  # of vectors: the error of eigenvalues is the square
-    solver.setDimensions(number, 2 * number + 4)
+    solver.setDimensions(number, number + max(number, LEAST))
     solver.setInitialSpace([start])
     if deflated:
         solver.setDeflationSpace(list(deflated))
