@@ -41,7 +41,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.factors import Klu, Mumps
+from rodfem.factors import Block, Klu, Mumps, Spread
 from rodfem.piece import Piece
 
 GROWTH = 100.0
@@ -58,7 +58,7 @@ where an unknown couples to this piece alone.
 """
 
 
-class Condensed:
+class Condensed(Spread):
     """Factors on several ranks: each its own piece by KLU or MUMPS, and all together what the pieces share.
 
     :class:`~rodfem.factors.Factors` of matrices whose pattern is symmetric and stays.
@@ -70,7 +70,6 @@ class Condensed:
         self.symmetric = factors.kind == "cholesky"
         self.regular = False
         self._matrix: PETSc.Mat | None = None
-        self._blocks: dict[int, tuple[PETSc.Mat, PETSc.Mat]] = {}
 
     def __call__(self, matrix: PETSc.Mat) -> None:
         """Factor ``matrix``; raises :class:`ConvergenceError` on all ranks where one gives up."""
@@ -78,7 +77,9 @@ class Condensed:
             self._matrix = matrix
             self.piece = Piece(matrix, self.scalars, symmetric=self.symmetric)
             self.touched = self.piece.comm.allgather(self.piece.touched)
-            self._blocks = {}
+            self._block = Block(self.factors, self.piece.matrix.size[0])
+            if isinstance(self.factors, Klu):
+                self.factors.dense = len(self.piece.touched)
         piece = self.piece
         corner = piece.update(matrix)
         trouble = ""
@@ -113,9 +114,7 @@ class Condensed:
             if not self.factors.regular or (self.symmetric and self.factors.inertia()[1]):
                 continue
             if len(coupled):
-                block = self._block(len(coupled))
-                self.factors.columns(piece.size + coupled, *block)
-                self._columns[:, coupled] = block[1].getDenseArray()
+                self._columns[:, coupled] = self._block.columns(piece.size + coupled)
             for i in np.flatnonzero(sizes == 0):
                 self._columns[piece.size + i, i] = 1.0 / springs[i]
             compliance = self._columns[piece.size :]
@@ -147,45 +146,22 @@ class Condensed:
             self._zero = int((values == 0).sum())
             self.regular = self._zero == 0
 
-    def _solve_piece(self, right: np.ndarray) -> np.ndarray:
-        given, out = self._block(right.shape[1])
-        given.getDenseArray()[:] = right
-        self.factors.solve_all(given, out)
-        return np.array(out.getDenseArray())
-
-    def _block(self, columns: int) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """Right-hand sides and solutions for the piece."""
-        if columns not in self._blocks:
-            block = PETSc.Mat().createDense((self.piece.matrix.size[0], columns), comm=PETSc.COMM_SELF)
-            block.setUp()
-            block.assemble()
-            self._blocks[columns] = block, block.duplicate()
-        return self._blocks[columns]
-
-    def _solve(self, right: np.ndarray, out: np.ndarray) -> None:
+    def spread(self, right: np.ndarray) -> np.ndarray:
         """Solve for the columns of the rows of this rank."""
         piece, k = self.piece, right.shape[1]
         local = np.zeros((piece.size + len(piece.touched), k), dtype=PETSc.ScalarType)
         if piece.size:
             local[: piece.size] = right[piece.inner]
-            local = self._solve_piece(local)
+            local = self._block.solve(local)
         shared = np.zeros((len(self._scale), k), dtype=PETSc.ScalarType)
         shared[self._forces] = local[piece.size :]
         shared[self._number + piece.held] = right[piece.own]
         piece.comm.Allreduce(MPI.IN_PLACE, shared)
         solved = self._back(self._lu, self._pivots, self._scale[:, None] * shared)[0] * self._scale[:, None]
+        out = np.empty(right.shape, dtype=PETSc.ScalarType)
         out[piece.inner] = local[: piece.size] + self._columns[: piece.size] @ solved[self._forces]
         out[piece.own] = solved[self._number + piece.held]
-
-    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Solve with the last factors."""
-        column = np.empty((out.getLocalSize(), 1), dtype=PETSc.ScalarType)
-        self._solve(right.array_r[:, None], column)
-        out.array[:] = column[:, 0]
-
-    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Solve for all columns of a dense matrix at once."""
-        self._solve(right.getDenseArray(), out.getDenseArray())
+        return out
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""

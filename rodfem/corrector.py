@@ -22,16 +22,10 @@ from math import isfinite
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.factors import solving
 from rodfem.newton import Outcome, iterate
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.system import dense_columns
 
-MANY = 5000
-"""Unknowns from which LU factors (KLU) solve, and the symmetric ones only count, once a point.
-
-With few unknowns a second factorisation costs more than the faster solves save.
-"""
 BLOCK = 2
 """Number of vectors that are iterated along a branch."""
 FRESH = 1e-3
@@ -62,12 +56,9 @@ class Corrector:
         self._right, self._solved = dense_columns(system, BLOCK + 2), dense_columns(system, BLOCK + 2)
         self._step, self._image = system.new_vector(), system.new_vector()
         self._factored = system.new_vector()
-        self._solving = inertia.factors
-        if system.fields.unknowns >= MANY:
-            self._solving = solving(inertia.factors, system.comm, system.fields.unknowns, system.fields.dense_rows)
         self._fresh = [inertia.seed(i) for i in range(BLOCK)]
         self._fresh_images = [inertia.metric * v for v in self._fresh]
-        self._below: int | None = None
+        self._below = 0
         self.tangent = system.new_vector()
         self.nearest = 0.0
         self.regular = False
@@ -88,15 +79,11 @@ class Corrector:
         if not self.system.scene.conservative:  # S is not symmetric
             return False
         inertia.assemble(x)
-        self._below, self.nearest = None, 0.0
-        if self._solving is inertia.factors:
-            if not self._count():
-                return False
-        else:
-            with self.system.clock("solve"):
-                self._solving(inertia.matrix)
-            if not self._solving.regular:
-                return False
+        try:
+            self._below = inertia.below(0.0)
+        except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong
+            self.nearest = 0.0
+            return False
         x.copy(self._factored)
         for _ in range(1 if self._started else 3):
             for i in range(BLOCK):
@@ -107,14 +94,6 @@ class Corrector:
         if not self.regular:
             self.restart()
         return self.regular
-
-    def _count(self) -> bool:
-        """Count at the state last assembled; False where it is exactly singular: two shifts tell what is wrong."""
-        try:
-            self._below = self.inertia.below(0.0)
-        except ConvergenceError:
-            return False
-        return True
 
     def _solve(self, right: PETSc.Vec | None) -> None:
         """Solve for all right-hand sides at once: it is the call that costs, not the column."""
@@ -127,7 +106,7 @@ class Corrector:
             for i, (v, image) in enumerate(zip(self._block, self._images, strict=True)):
                 columns[:, 2 + i] = image.array_r
                 sizes.append(image.dot(v) ** 0.5)
-            self._solving.solve_all(self._right, self._solved)
+            inertia.factors.solve_all(self._right, self._solved)
             solved = self._solved.getDenseArray()
             self._step.array[:] = solved[:, 0]
             self.tangent.array[:] = -solved[:, 1]
@@ -149,7 +128,7 @@ class Corrector:
 
     def _chord(self, right: PETSc.Vec) -> None:
         with self.system.clock("solve"):
-            self._solving.solve(right, self._step)
+            self.inertia.factors.solve(right, self._step)
 
     def correct(
         self, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3, tolerance: float = 0.0
@@ -190,6 +169,4 @@ class Corrector:
         moved = self.system.norm(self._image)
         if self.nearest < (NEAR + SENSITIVE * moved) * scale + 10 * self.inertia.tolerance:
             return None
-        if self._below is None:
-            self._count()
-        return None if self._below is None else Index(self._below, drifts)
+        return Index(self._below, drifts)

@@ -1,4 +1,4 @@
-"""Factors of a matrix whose pattern stays: LDL^t by MUMPS, LU by KLU; for long rods on several ranks piece by piece.
+"""Factors of a matrix whose pattern stays: LDL^t by MUMPS, LU by KLU; on several ranks whole or piece by piece.
 
 Only LDL^t factors count the inertia, which MUMPS alone does.  Where solutions are all that is wanted, on one rank, KLU
 is better for a chain: it has no dense fronts to manage, each of which would be one element.  For 1e4 linear elements it
@@ -7,6 +7,7 @@ solves in a tenth (reduced formulation) to a quarter (pointwise) of MUMPS's time
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,16 +20,22 @@ from rodfem.errors import ConvergenceError
 PETSC_ERR_LIB = 76
 """PETSc's error code for a failure in a library below."""
 LONG = 20_000
-"""Unknowns from which a rod is cut at the ranks.
+"""Unknowns from which a rod is cut at the ranks; with fewer each rank factors all of it.
 
-MUMPS in parallel is as reliable as on one rank, but it gains nothing on a chain: the elimination tree that QAMD makes
-of one is as deep as the chain is long, and at 1e5 elements MUMPS's parallel analysis overflows its stack on it.
+MUMPS in parallel gains nothing on a chain: the elimination tree that QAMD makes of one is as deep as the chain is long,
+and at 1e5 elements MUMPS's parallel analysis overflows its stack on it.
 """
 DENSE_ROWS = {"mat_mumps_icntl_7": 6}
 """MUMPS's ordering for matrices with dense rows (QAMD).  PETSc takes it from its options only."""
 PIVOTS = {"mat_klu_pivot_tol": 1.0}
-"""KLU's threshold of pivots: the largest of a column.  With KLU's own, 1e-3, eigenvalues lose a digit or two; with 0.1
-a limp cable does not always find its way down.  PETSc 3.18 and 3.22 want the option without a prefix.
+"""KLU's threshold of pivots: the largest of a column.  With KLU's own, 1e-3, eigenvalues lose a digit or two.
+
+PETSc 3.18 and 3.22 want the option without a prefix.
+"""
+SMALL = 2.0**-14
+"""Factor of dense rows and columns, with which none of them is the pivot of a sparse one: it would fill in all others.
+
+With them as they are, 3000 pointwise elements of the hemitropic rod take 40 s to factor instead of 40 ms.
 """
 BALANCED = {"mat_mumps_icntl_7": 4}
 """One that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
@@ -83,15 +90,14 @@ def factors_of(
     ``rodfem_cholesky_``, or with another ``prefix``.
     """
     prefix = prefix or f"rodfem_{kind}_"
-    cut = comm.size > 1 and unknowns >= LONG
-    whole = MPI.COMM_SELF if cut else comm
-    lu = kind == "lu" and lu_package(whole, prefix) != "mumps"
-    factors = Klu(prefix) if lu else Mumps(kind, whole, controls, thresholds, prefix)
-    if not cut:
+    lu = kind == "lu" and lu_package(MPI.COMM_SELF, prefix) != "mumps"
+    factors = Klu(prefix, scalars) if lu else Mumps(kind, controls, thresholds, prefix)
+    if comm.size == 1:
         return factors
-    from rodfem.condensed import Condensed  # it is made of the former
+    from rodfem.condensed import Condensed  # they are made of the former
+    from rodfem.copied import Copied
 
-    return Condensed(scalars, factors)
+    return Copied(factors) if unknowns < LONG else Condensed(scalars, factors)
 
 
 def lu_package(comm: MPI.Comm, prefix: str) -> str:
@@ -102,17 +108,66 @@ def lu_package(comm: MPI.Comm, prefix: str) -> str:
 
 def solving(counting: Factors, comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
     """What solves with a symmetric matrix best, where ``counting`` are its LDL^t factors: those, or LU factors."""
-    whole = MPI.COMM_SELF if unknowns >= LONG else comm
-    known = lu_package(whole, "rodfem_lu_") == "mumps"
+    known = lu_package(MPI.COMM_SELF, "rodfem_lu_") == "mumps"
     return counting if known else factors_of("lu", comm, unknowns, scalars, {})
 
 
-class Klu:
-    """LU factors by SuiteSparse's KLU, on one rank; PETSc's options with the prefix may choose another package."""
+class Block:
+    """Solves with factors on this rank for the columns of arrays, all at once."""
 
-    def __init__(self, prefix: str) -> None:
+    def __init__(self, factors: Klu | Mumps, rows: int) -> None:
+        """Make no room yet."""
+        self.factors, self.rows = factors, rows
+        self._room: dict[int, tuple[PETSc.Mat, PETSc.Mat]] = {}
+
+    def room(self, columns: int) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """Right-hand sides and solutions."""
+        if columns not in self._room:
+            right = PETSc.Mat().createDense((self.rows, columns), comm=PETSc.COMM_SELF)
+            right.setUp()
+            right.assemble()
+            self._room[columns] = right, right.duplicate()
+        return self._room[columns]
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Solutions (n, k) for ``right`` (n, k)."""
+        given, out = self.room(right.shape[1])
+        given.getDenseArray()[:] = right
+        self.factors.solve_all(given, out)
+        return np.array(out.getDenseArray())
+
+    def columns(self, rows: np.ndarray) -> np.ndarray:
+        """Columns ``rows`` of the inverse (n, k)."""
+        given, out = self.room(len(rows))
+        self.factors.columns(rows, given, out)
+        return np.array(out.getDenseArray())
+
+
+class Spread(ABC):
+    """Solves on several ranks, for vectors and for columns of dense matrices."""
+
+    @abstractmethod
+    def spread(self, right: np.ndarray) -> np.ndarray:
+        """Solve for the columns of the rows of this rank."""
+
+    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Solve with the last factors."""
+        out.array[:] = self.spread(right.array_r[:, None])[:, 0]
+
+    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
+        """Solve for all columns of a dense matrix at once."""
+        out.getDenseArray()[:] = self.spread(right.getDenseArray())
+
+
+class Klu:
+    """LU factors by SuiteSparse's KLU, on one rank; PETSc's options with the prefix may choose another package.
+
+    The last ``dense`` rows and columns are eliminated last.
+    """
+
+    def __init__(self, prefix: str, dense: int = 0) -> None:
         """Make the solver."""
-        self.kind = "lu"
+        self.kind, self.dense = "lu", dense
         self.ksp = PETSc.KSP().create(PETSc.COMM_SELF)
         self.ksp.setOptionsPrefix(prefix)
         self.ksp.setType("preonly")
@@ -122,10 +177,18 @@ class Klu:
         prefer_options(prefix, PIVOTS)
         self.ksp.setFromOptions()
         self.regular = False
+        self._given: PETSc.Mat | None = None
 
     def __call__(self, matrix: PETSc.Mat) -> None:
         """Factor ``matrix``; ``regular`` is false where it is exactly singular."""
-        self.ksp.setOperators(matrix)
+        if self._given is None or matrix.handle != self._given.handle:
+            self._given, self._scaled, self._scale = matrix, matrix.duplicate(), matrix.createVecRight()
+            self._scale.set(1.0)
+            self._scale.array[self._last] = SMALL
+            self._right = self._scale.duplicate()
+        matrix.copy(self._scaled, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self._scaled.diagonalScale(self._scale, self._scale)
+        self.ksp.setOperators(self._scaled)
         try:
             self.ksp.setUp()
         except PETSc.Error as trouble:
@@ -136,13 +199,24 @@ class Klu:
         else:
             self.regular = True
 
+    @property
+    def _last(self) -> slice:
+        """The dense rows."""
+        rows = self._scale.getSize()
+        return slice(rows - self.dense, rows)
+
     def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
         """Solve with the last factors."""
-        self.ksp.solve(right, out)
+        self._right.pointwiseMult(right, self._scale)
+        self.ksp.solve(self._right, out)
+        out.array[self._last] *= SMALL
 
     def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
         """Solve for all columns of a dense matrix."""
+        right.getDenseArray()[self._last] *= SMALL
         self.ksp.getPC().getFactorMatrix().matSolve(right, out)
+        right.getDenseArray()[self._last] /= SMALL  # a power of two: exactly what it was
+        out.getDenseArray()[self._last] *= SMALL
 
     def columns(self, rows: np.ndarray, right: PETSc.Mat, out: PETSc.Mat) -> None:
         """Columns ``rows`` of the inverse; ``right`` is room for their right-hand sides."""
@@ -166,7 +240,6 @@ class Mumps:
     def __init__(
         self,
         kind: str,
-        comm: MPI.Comm,
         controls: dict[int, int],
         thresholds: dict[int, float] | None = None,
         prefix: str = "",
@@ -175,7 +248,7 @@ class Mumps:
         self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
         self.prefix = prefix or f"rodfem_{kind}_"
         self.room = 50
-        self.ksp = PETSc.KSP().create(comm)
+        self.ksp = PETSc.KSP().create(PETSc.COMM_SELF)
         self.factor: PETSc.Mat | None = None
         self.regular = False
         self._matrix = 0

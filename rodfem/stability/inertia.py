@@ -36,14 +36,13 @@ class Index:
 def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
     """LDL^t factors that report the inertia, of matrices of ``unknowns`` rows, the last ``scalars`` perhaps dense.
 
-    ICNTL(24) = 1 is what makes MUMPS report it, ICNTL(13) = 1 what makes it do so in parallel; CNTL(3) is so small that
-    no pivot is taken for zero: the matrices are shifted off their eigenvalues.  ICNTL(8) = 0: with MUMPS's own scaling
-    of saddle matrices solutions were seen to lose ten digits, and factorisations take up to ten times as long.
-    CNTL(1) = 1e-3 is ten times below MUMPS's own threshold of pivots: the stiffness is 1/h and the constraints are h,
-    and at 1e5 elements pivots were delayed by the hundred thousand, to the few rows of the scalars, which cost several
-    times the factorisation itself.
+    ICNTL(24) = 1 is what makes MUMPS report it; CNTL(3) is so small that no pivot is taken for zero: the matrices are
+    shifted off their eigenvalues.  ICNTL(8) = 0: with MUMPS's own scaling of saddle matrices solutions were seen to
+    lose ten digits, and factorisations take up to ten times as long.  CNTL(1) = 1e-3 is ten times below MUMPS's own
+    threshold of pivots: the stiffness is 1/h and the constraints are h, and at 1e5 elements pivots were delayed by the
+    hundred thousand, to the few rows of the scalars, which cost several times the factorisation itself.
     """
-    return factors_of("cholesky", comm, unknowns, scalars, {24: 1, 13: 1, 8: 0}, {3: -1e-300, 1: 1e-3})
+    return factors_of("cholesky", comm, unknowns, scalars, {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3})
 
 
 class Inertia:

@@ -19,6 +19,8 @@ from rodfem.system import System, combine
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
+LARGE = 5000
+"""Rows of a pencil from which MUMPS factors it: a dense row may fill in KLU's factors."""
 LEAST = 6
 """How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
 
@@ -110,7 +112,7 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     ksp = transform.getKSP()
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
-    package = lu_package(matrix.comm.tompi4py(), "rodfem_st_")
+    package = lu_package(matrix.comm.tompi4py(), "rodfem_st_") if matrix.size[0] < LARGE else "mumps"
     ksp.getPC().setFactorSolverType(package)
     prefer_options("rodfem_st_", ordering(matrix))
     for prefix in ("", "rodfem_st_"):

@@ -36,9 +36,11 @@ from rodfem.stability.matrices import gathered, petsc_matrix
 INVERSES = ("saddle", "elimination")
 SINGULAR = 1e-6
 """A solve that leaves more than this of its right-hand side behind was made with a singular matrix."""
+RANK = 1e-10
+"""What is less independent of other vectors than this, squared, adds nothing to their span; nor what has no mass."""
 
 PREFIX = "rodfem_reduced_inverse_"
-"""MUMPS's ordering for dense rows, and room for pivots."""
+"""Prefix of the options of its factors."""
 
 
 class Projection:
@@ -80,7 +82,8 @@ class ShiftedInverse:
         self.sigma = sigma
         shifted, p = r.K - sigma * r.M, r.C.shape[1]
         if inverse == "saddle":
-            self.solve = factored(r.saddle(sigma))
+            full = r.C.nnz > 0.5 * r.C.shape[0] * p  # integral constraints
+            self.solve = factored(r.saddle(sigma), p if full else 0)
             return
         singular = ConvergenceError(
             f"K - sigma M is singular at sigma = {sigma:g} without the constraints: use the inverse 'saddle'."
@@ -102,16 +105,24 @@ class ShiftedInverse:
         """``z = (Q2^t (K - sigma M) Q2)^-1 b``."""
         z.array[:] = self(b.array_r)
 
-    def quotients(self, vectors: np.ndarray) -> np.ndarray:
-        """Eigenvalues (k,) of vectors ``x`` (m, k) by the Rayleigh quotient ``sigma + x.Mx / x.M A^-1 Mx``.
+    def ritz(self, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Eigenvalues in ascending order and vectors, orthonormal in M, in the span of vectors (m, k), no more than k.
 
-        As precise as shift-invert near sigma, where ``x.Kx / x.Mx`` would suffer from the size of K, and the same for
-        all transforms (SLEPc gives wrong values for complex pairs under Cayley's).
+        By the Rayleigh-Ritz method with the inverse, ``mu = sigma + x.Mx / x.M A^-1 Mx``: as precise as shift-invert
+        near sigma, where ``x.Kx / x.Mx`` would suffer from the size of K, and the same for all transforms (SLEPc gives
+        wrong values for complex pairs under Cayley's).  What has no mass is left out.
         """
         r = self.projection
         masses = r.M @ vectors
         solved = np.stack([r.kernel.expand(self(r.kernel.project(mass))) for mass in masses.T], axis=1)
-        return self.sigma + (vectors * masses).sum(axis=0) / (solved * masses).sum(axis=0)
+        squares, turn = np.linalg.eigh((vectors.T @ masses + masses.T @ vectors) / 2)
+        kept = squares > RANK * squares.max(initial=0.0)
+        turn = turn[:, kept] / np.sqrt(squares[kept])
+        compliance = turn.T @ (masses.T @ solved) @ turn
+        inverse, inner = np.linalg.eigh((compliance + compliance.T) / 2)
+        values, turn = self.sigma + 1.0 / inverse, turn @ inner
+        order = np.argsort(values)
+        return values[order], vectors @ turn[:, order]
 
     def __call__(self, b: np.ndarray) -> np.ndarray:
         """Solution for the right-hand side ``b`` (m - p,)."""
@@ -126,10 +137,13 @@ class ShiftedInverse:
         return r.kernel.project(x)
 
 
-def factored(matrix: sp.spmatrix) -> Callable[[np.ndarray], np.ndarray]:
-    """Solver with the LU factors of a matrix; raises :class:`ConvergenceError` where there are none."""
+def factored(matrix: sp.spmatrix, dense: int = 0) -> Callable[[np.ndarray], np.ndarray]:
+    """Solver with the LU factors of a matrix, the last rows of which may be ``dense``.
+
+    Raises :class:`ConvergenceError` where there are none.
+    """
     petsc = petsc_matrix(MPI.COMM_SELF, matrix)
-    factors = factors_of("lu", MPI.COMM_SELF, 0, 0, {}, prefix=PREFIX)
+    factors = factors_of("lu", MPI.COMM_SELF, 0, dense, {}, prefix=PREFIX)
     factors(petsc)
     if not factors.regular:
         raise ConvergenceError("The shifted matrix is singular: change the shift.")

@@ -24,8 +24,9 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem import compat
+from rodfem.copied import Copy
 from rodfem.errors import ConvergenceError
-from rodfem.factors import PETSC_ERR_LIB
+from rodfem.factors import LONG, PETSC_ERR_LIB
 from rodfem.stability import character
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.pencil import assemble_pencil, shift_invert
@@ -77,6 +78,8 @@ class Vibration:
         self.system = system
         self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
         self.turned = np.zeros((0, 0, 4))
+        self._copies: list[Copy] = []
+        self._own = slice(None)
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Assemble the pencil at the state ``x``."""
@@ -112,13 +115,37 @@ class Vibration:
         Fewer are returned only where the discretisation has no more finite ones.  A pencil hardly larger than the
         Krylov space for ``number`` of them is solved by dense reductions.
         """
+        return self._near(number, target, *self._whole())
+
+    def left(self, number: int, target: complex) -> Frequencies:
+        """Return the same of the transposed pencil: ``vectors`` are left ones, ``z.S = mu z.M`` without conjugation."""
+        matrix, mass = self._whole()
+        transposed = matrix.copy()
+        transposed.transpose()
+        try:
+            return self._near(number, target, transposed, mass)
+        finally:
+            transposed.destroy()
+
+    def _whole(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """The pencil; of a rod that is not long all of it on each rank, which solves alone."""
+        pencil = self.matrix, self.mass
+        if self.system.comm.size == 1 or self.matrix.getSize()[0] >= LONG:
+            return pencil
+        if not self._copies:
+            self._copies = [Copy(matrix) for matrix in pencil]
+            self._own = self._copies[0].own
+        whole, mass = (copy.update(matrix) for copy, matrix in zip(self._copies, pencil, strict=True))
+        return whole, mass
+
+    def _near(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> Frequencies:
         with self.system.clock("stability"):
-            if self.matrix.getSize()[0] < DENSE * (2 * number + 20):
-                found = self._dense()
+            if matrix.getSize()[0] < DENSE * (2 * number + 20):
+                found = self._dense(matrix, mass)
             elif target.imag == 0 or compat.COMPLEX:
-                found = self._shifted(number, target)
+                found = self._shifted(number, target, matrix, mass)
             else:
-                found = self._doubled(number, target)
+                found = self._doubled(number, target, matrix, mass)
             found = sorted(found, key=lambda p: abs(p.value - target))[: number + 2]
             third = abs(found[min(2, len(found) - 1)].value - target)
             found = [p for p in found if abs(p.value - target) <= FAR * third]
@@ -133,67 +160,54 @@ class Vibration:
             ),
         )
 
-    def left(self, number: int, target: complex) -> Frequencies:
-        """Return the same of the transposed pencil: ``vectors`` are left ones, ``z.S = mu z.M`` without conjugation."""
-        kept = self.matrix
-        self.matrix = kept.copy()
-        self.matrix.transpose()
-        try:
-            return self.near(number, target)
-        finally:
-            self.matrix.destroy()
-            self.matrix = kept
-
-    def _dense(self) -> list[_Pair]:
-        """All finite eigenvalues of a pencil that is small enough for dense matrices, the same on all ranks."""
-        S, M = (np.vstack(self.system.comm.allgather(dense_rows(A).real)) for A in (self.matrix, self.mass))
-        values, vectors = finite_eigenpairs(S, M)
+    def _dense(self, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
+        """All finite eigenvalues of a pencil that is small enough for dense matrices."""
+        values, vectors = finite_eigenpairs(*(dense(A) for A in (matrix, mass)))
         if len(values) == 0:
             raise ConvergenceError("The rod has no inertia: give it a mass, or a rotary inertia.")
-        begin, end = self.matrix.getOwnershipRange()
-        own = vectors[begin:end]
+        own = vectors[self._own]
         return [_Pair(complex(w), [x.real.copy(), x.imag.copy()], EPS) for w, x in zip(values, own.T, strict=True)]
 
-    def _shifted(self, number: int, target: complex) -> list[_Pair]:
+    def _shifted(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
         """Solve with a shift that this PETSc's numbers can express."""
-        sigma = target if compat.COMPLEX else target.real
-        solver = self._solve(self.matrix, self.mass, number, sigma)
-        re, im = self.system.new_vector(), self.system.new_vector()
+        solver = self._solve(matrix, mass, number, target if compat.COMPLEX else target.real)
+        re, im = matrix.createVecRight(), matrix.createVecRight()
         out = []
         for i in range(solver.getConverged()):
             value = solver.getEigenpair(i, re, im)
-            parts = character.halves(re) if compat.COMPLEX else [re.array_r.copy(), im.array_r.copy()]
-            out.append(_Pair(complex(value), parts, solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)))
+            parts = character.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
+            error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
+            out.append(_Pair(complex(value), [part[self._own].copy() for part in parts], error))
         solver.destroy()
         return out
 
-    def _doubled(self, number: int, target: complex) -> list[_Pair]:
+    def _doubled(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
         """Solve with a complex shift by the real matrix of twice the size."""
-        a, b = target.real, target.imag
-        shifted, upper = self.matrix.copy(), self.mass.copy()
-        shifted.axpy(-a, self.mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        a, b, comm = target.real, target.imag, matrix.comm
+        shifted, upper = matrix.copy(), mass.copy()
+        shifted.axpy(-a, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         upper.scale(b)
         lower = upper.copy()
         lower.scale(-1.0)
-        pencil = PETSc.Mat().createNest([[shifted, upper], [lower, shifted]], comm=self.system.comm).convert("aij")
-        mass = PETSc.Mat().createNest([[self.mass, None], [None, self.mass]], comm=self.system.comm).convert("aij")
-        solver = self._solve(pencil, mass, 2 * number, 0.0)
+        pencil = PETSc.Mat().createNest([[shifted, upper], [lower, shifted]], comm=comm).convert("aij")
+        masses = PETSc.Mat().createNest([[mass, None], [None, mass]], comm=comm).convert("aij")
+        solver = self._solve(pencil, masses, 2 * number, 0.0)
         re, im = pencil.createVecRight(), pencil.createVecRight()
         out = []
         for i in range(solver.getConverged()):
             shift = solver.getEigenpair(i, re, im)
             n = re.getLocalSize() // 2  # each rank holds its part of x, then its part of y
             x, y = re.array_r[:n] + 1j * im.array_r[:n], re.array_r[n:] + 1j * im.array_r[n:]
-            first, second = self.system.comm.allreduce(
+            first, second = comm.tompi4py().allreduce(
                 np.array([np.linalg.norm(x + 1j * y) ** 2, np.linalg.norm(x - 1j * y) ** 2])
             )
             if first >= second:
-                vector = x + 1j * y
+                vector = (x + 1j * y)[self._own]
                 error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
                 out.append(_Pair(target + shift, [vector.real.copy(), vector.imag.copy()], error))
         solver.destroy()
-        for matrix in (shifted, upper, lower, pencil, mass):
-            matrix.destroy()
+        for made in (shifted, upper, lower, pencil, masses):
+            made.destroy()
         return out[:number]
 
     @staticmethod
@@ -218,7 +232,6 @@ class Vibration:
         raise ConvergenceError(f"SLEPc found no eigenvalue near {target:.6g}: use a richer discretisation.")
 
 
-def dense_rows(matrix: PETSc.Mat) -> np.ndarray:
-    """Rows of a matrix that are on this rank, as a dense array (local rows, columns)."""
-    dense = matrix.copy().convert("dense")
-    return np.array(dense.getDenseArray())
+def dense(matrix: PETSc.Mat) -> np.ndarray:
+    """A matrix on this rank as a dense array, real."""
+    return np.array(matrix.copy().convert("dense").getDenseArray().real)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from time import process_time
+
 import numpy as np
 import pytest
 import states
@@ -10,7 +12,8 @@ from petsc4py import PETSc
 
 from rodfem.condensed import Condensed
 from rodfem.continuation import Follower
-from rodfem.factors import Mumps
+from rodfem.copied import Copied
+from rodfem.factors import Klu, Mumps, lu_package
 from rodfem.fields import Discretization
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.judge import Judge
@@ -24,6 +27,8 @@ STATES = pytest.mark.parametrize(
     ("name", "state", "load"),
     [("cord", "plain", 30.0), ("cord", "buckled", 40.0), ("hemitropic", "plain", 0.25), ("hemitropic", "buckled", 0.2)],
 )
+SHARED = pytest.mark.parametrize("shared", ["pieces", "copies"])
+LU = "rodfem_lu_"
 SIGMAS = (-30.0, -3.0, -0.1, 0.0, 0.1, 2.0, 40.0)
 
 
@@ -34,9 +39,10 @@ def at(name: str, state: str, formulation: str, load: float) -> tuple[System, PE
     return system, x
 
 
-def symmetric(system: System) -> Condensed:
+def symmetric(system: System, shared: str) -> Condensed | Copied:
     """LDL^t factors."""
-    return Condensed(system.fields.dense_rows, Mumps("cholesky", MPI.COMM_SELF, {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
+    factors = Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3})
+    return Copied(factors) if shared == "copies" else Condensed(system.fields.dense_rows, factors)
 
 
 def whole(vector: PETSc.Vec) -> np.ndarray:
@@ -44,11 +50,12 @@ def whole(vector: PETSc.Vec) -> np.ndarray:
     return np.concatenate(vector.comm.tompi4py().allgather(vector.array_r))
 
 
+@SHARED
 @FORMULATIONS
 @STATES
-def test_inertia_and_solutions(name: str, state: str, formulation: str, load: float) -> None:
+def test_inertia_and_solutions(name: str, state: str, formulation: str, load: float, shared: str) -> None:
     system, x = at(name, state, formulation, load)
-    inertia, factors = Inertia(system), symmetric(system)
+    inertia, factors = Inertia(system), symmetric(system, shared)
     right, out = inertia.seed(1), system.new_vector()
     for sigma in SIGMAS:
         inertia.assemble(x)
@@ -61,11 +68,12 @@ def test_inertia_and_solutions(name: str, state: str, formulation: str, load: fl
         np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
 
 
+@SHARED
 @FORMULATIONS
-def test_inertia_beside_a_branch_point(formulation: str) -> None:
+def test_inertia_beside_a_branch_point(formulation: str, shared: str) -> None:
     """The straight rod loses stability at 0.1143042145: eigenvalues are near zero there."""
     system, x = at("hemitropic", "plain", formulation, 0.1143042145)
-    inertia, factors = Inertia(system), symmetric(system)
+    inertia, factors = Inertia(system), symmetric(system, shared)
     for sigma in (-1e-5, 1e-5):
         inertia.assemble(x)
         inertia.matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
@@ -74,9 +82,10 @@ def test_inertia_beside_a_branch_point(formulation: str) -> None:
         assert factors.inertia() == (negative, 0)
 
 
-def test_many_right_hand_sides() -> None:
+@SHARED
+def test_many_right_hand_sides(shared: str) -> None:
     system, x = at("hemitropic", "buckled", "pointwise", 0.2)
-    inertia, factors = Inertia(system), symmetric(system)
+    inertia, factors = Inertia(system), symmetric(system, shared)
     inertia.assemble(x)
     inertia.matrix.axpy(1.0, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     factors(inertia.matrix)
@@ -94,13 +103,18 @@ def test_many_right_hand_sides() -> None:
         np.testing.assert_allclose(out.getDenseArray()[:, i], one.array_r, rtol=1e-8, atol=1e-12)
 
 
+@SHARED
+@pytest.mark.parametrize("package", ["klu", "mumps"])
 @FORMULATIONS
 @pytest.mark.parametrize(("name", "load"), [("follower", 10.0), ("hemitropic", 0.3)])
-def test_matrix_without_symmetry(formulation: str, name: str, load: float) -> None:
+def test_matrix_without_symmetry(formulation: str, name: str, load: float, package: str, shared: str) -> None:
+    if package == "klu" != lu_package(MPI.COMM_SELF, LU):
+        pytest.skip("PETSc has no KLU")
     if name == "follower":
         formulation = "pointwise"
     system, x = at(name, "plain", formulation, load)
-    factors = Condensed(system.fields.dense_rows, Mumps("lu", MPI.COMM_SELF, {8: 0}))
+    alone = Klu(LU, system.fields.dense_rows) if package == "klu" else Mumps("lu", {8: 0})
+    factors = Copied(alone) if shared == "copies" else Condensed(system.fields.dense_rows, alone)
     row = system.metric * x
     system.set_load(row, 1.0)
     system.residual(x, system.new_vector())
@@ -132,7 +146,7 @@ def frequencies(n: int) -> np.ndarray:
 def test_pieces_may_be_singular_where_the_whole_is_not() -> None:
     """At eigenvalues of all parts of the chain the whole is counted right, and solved with."""
     n = 24
-    factors = Condensed(1, Mumps("cholesky", MPI.COMM_SELF, {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
+    factors = Condensed(1, Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
     exact = frequencies(n)
     for sigma in np.unique(np.round([s for m in range(1, n) for s in frequencies(m)], 12)):
         if abs(exact - sigma).min() < 1e-6:
@@ -165,3 +179,31 @@ def test_long_rods_are_cut(formulation: str, elements: int) -> None:
         nearest, _ = solver.inertia.nearest(1, accuracy=1e-9)
         found.append([verdict.negative, verdict.zero, *nearest, *verdict.values])
     np.testing.assert_allclose(*found, rtol=1e-7)
+
+
+@pytest.mark.alone
+@pytest.mark.skipif(lu_package(MPI.COMM_SELF, LU) != "klu", reason="PETSc has no KLU")
+@pytest.mark.parametrize(("formulation", "elements", "degree"), [("pointwise", 1000, 1), ("reduced", 300, 6)])
+def test_dense_rows_do_not_fill_in(formulation: str, elements: int, degree: int) -> None:
+    """Newton's matrix has an arclength equation, and integral constraints.
+
+    Where one of them is the pivot of a sparse row KLU takes tens to hundreds of times as long as MUMPS.
+    """
+    solver = Follower(System(states.scene("hemitropic"), Discretization(formulation, elements, degree)))
+    solver.system.set_phase(None)
+    x = solver.start(0.3, 0.4)
+    solver.inertia.assemble(x)
+    matrix, times = solver.system.jacobian(solver.axis), []
+    for factors in (Klu(LU, solver.system.fields.dense_rows), Mumps("lu", {8: 0})):
+        factors(matrix)
+        least = np.inf
+        for _ in range(3):
+            matrix.stateIncrease()
+            started = process_time()
+            factors(matrix)
+            least = min(least, process_time() - started)
+        times.append(least)
+        right, out = solver.inertia.seed(1), solver.system.new_vector()
+        factors.solve(right, out)
+        assert (matrix * out - right).norm() < 1e-14 * matrix.norm(PETSc.NormType.INFINITY) * out.norm()
+    assert times[0] < 8 * times[1]
