@@ -181,7 +181,6 @@ def test_long_rods_are_cut(formulation: str, elements: int) -> None:
     np.testing.assert_allclose(*found, rtol=1e-7)
 
 
-@pytest.mark.alone
 @pytest.mark.skipif(lu_package(MPI.COMM_SELF, LU) != "klu", reason="PETSc has no KLU")
 @pytest.mark.parametrize(("formulation", "elements", "degree"), [("pointwise", 1000, 1), ("reduced", 300, 6)])
 def test_dense_rows_do_not_fill_in(formulation: str, elements: int, degree: int) -> None:
@@ -189,7 +188,7 @@ def test_dense_rows_do_not_fill_in(formulation: str, elements: int, degree: int)
 
     Where one of them is the pivot of a sparse row KLU takes tens to hundreds of times as long as MUMPS.
     """
-    solver = Follower(System(states.scene("hemitropic"), Discretization(formulation, elements, degree)))
+    solver = Follower(System(states.scene("hemitropic"), Discretization(formulation, elements, degree), MPI.COMM_SELF))
     solver.system.set_phase(None)
     x = solver.start(0.3, 0.4)
     solver.inertia.assemble(x)
