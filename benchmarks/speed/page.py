@@ -75,6 +75,21 @@ def scaling(store: Store) -> str:
     return table(head, out)
 
 
+def faster(store: Store) -> str:
+    """Whether the longest rod is faster on two ranks than on one."""
+    found = {(r["elements"], r["ranks"]): r for r in store.rows("scaling/strong")}
+    longest = max((n for n, _ in found), default=0)
+    one, two = found.get((longest, 1)), found.get((longest, 2))
+    if one is None or two is None:
+        return ""
+    gains = [one[f"{k} wall"] / two[f"{k} wall"] for k in WORK[1:]]
+    return (
+        f"One rod of {longest} elements faster on 2 ranks than on 1: {'met' if min(gains) > 1 else 'missed'}, "
+        f"{digits(gains[0], 2)} times as fast an equilibrium, {digits(gains[1], 2)} times an index. What falls "
+        "short of 2 is the inverse of each rank's piece at the cut, the copies of its matrix, and messages."
+    )
+
+
 def many(store: Store) -> str:
     """The map on one rank and more."""
     found = store.rows("map")
@@ -140,7 +155,7 @@ def write(store: Store, path: Path, figures: dict[str, str]) -> None:
         lines += ["## Growth", words.GROWTH.format(far=FAR)]
         lines += [_figure(figures, "growth", "Cost against the number of unknowns"), growth(store)]
     if any(True for _ in store.under("scaling")):
-        lines += ["### Ranks", words.RANKS, scaling(store)]
+        lines += ["### Ranks", words.RANKS, scaling(store), faster(store)]
     if store.rows("map"):
         lines += ["## Many rods", words.MANY, many(store)]
     for data in store.rows("first"):
