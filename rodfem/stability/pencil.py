@@ -2,7 +2,7 @@
 
 SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
 and overrule what is set here.  Those of the factorisation inside are ``-rodfem_st_...`` for a pencil without symmetry,
-else ``-rodfem_lu_...`` on one rank and ``-rodfem_cholesky_...`` on several (see :mod:`rodfem.factors`).
+else ``-rodfem_lu_...`` (see :mod:`rodfem.factors`).
 """
 
 from __future__ import annotations
