@@ -1,7 +1,7 @@
 """Factors of a matrix whose pattern stays: LDL^t by MUMPS, LU by KLU; on several ranks whole or piece by piece.
 
-Only LDL^t factors count the inertia, which MUMPS alone does.  Where solutions are all that is wanted KLU is better for a
-chain of linear elements: it has no dense fronts to manage, each of which would be one element.  For 1e4 of them it
+Only LDL^t factors count the inertia, which MUMPS alone does.  Where solutions are all that is wanted KLU is better for
+a chain of linear elements: it has no dense fronts to manage, each of which would be one element.  For 1e4 of them it
 solves in a tenth (reduced formulation) to a quarter (pointwise) of MUMPS's time.
 """
 
