@@ -1,7 +1,8 @@
 """Time and memory of every way to judge one state, against the number of elements: writes ``docs/stability.md``.
 
-Run by ``make bench``.  Each number is the median of repeated judgements of the same state in a process of its own,
-after one that is not counted (it makes symbolic factorisations and fills caches), as it is along a branch.
+Run by ``make bench``.  All that is measured is kept in results/stability/measured.json as it comes: --resume goes on
+where a run was interrupted.  Each number is the median of repeated judgements of the same state in a process of its
+own, after one that is not counted (it makes symbolic factorisations and fills caches), as it is along a branch.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ import scipy
 import scipy.sparse.linalg as spl
 from petsc4py import PETSc
 
-from benchmarks.common import ROOT, exponent, load, machine, measured, milliseconds, table, versions
+from benchmarks.common import ROOT, exponent, machine, measured, milliseconds, table, versions
+from benchmarks.store import Store
 from rodfem.continuation import Equilibria
 from rodfem.corrector import Corrector
 from rodfem.fields import Discretization
@@ -90,7 +92,6 @@ def task(method: str, system: System, x: PETSc.Vec) -> Callable[[], Any]:
         return lambda: inertia.below(inertia.shift + 1e-3)
     if method == "index":
         corrector = Corrector(to_judge.inertia)
-        corrector.factor(x)
         return lambda: corrector.factor(x)
     if method == "assembly":
         return lambda: to_judge.inertia.assemble(x)
@@ -132,13 +133,32 @@ def measure(method: str, formulation: str, elements: int, degree: int, which: st
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     run = task(method, system, x)
     values = run()
-    if method == "index":  # beside what Newton's method needs anyway: the assembly, and solves for step and tangent
-        others = [task(name, system, x) for name in ("assembly", "solves")]
-        return {"seconds": seconds(run) - sum(map(seconds, others)), "memory": 0.0, "first": None}
+    if method == "index":
+        own, share = index(system, x)
+        return {"seconds": own, "share": share, "memory": 0.0, "first": None}
     memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
     found = np.atleast_1d(values)
     first = float(found[0]) if method not in ("count", "factorisation", "dense QZ", "proof") else None
     return {"seconds": seconds(run), "memory": memory, "first": first, "unknowns": system.fields.unknowns}
+
+
+def index(system: System, x: PETSc.Vec) -> tuple[float, float]:
+    """Seconds of an index along a branch, and that over one factorisation.
+
+    It is what remains without what Newton's method needs anyway: the assembly, and solves for step and tangent.  All
+    are measured in turn, so that what disturbs one disturbs the others.
+    """
+    parts = {name: task(name, system, x) for name in ("index", "assembly", "solves", "factorisation")}
+    times: dict[str, list[float]] = {name: [] for name in parts}
+    started = perf_counter()
+    while len(times["index"]) < 5 or (len(times["index"]) < 99 and perf_counter() - started < ENOUGH):
+        for name, run in parts.items():
+            before = perf_counter()
+            run()
+            times[name].append(perf_counter() - before)
+    median = {name: float(np.median(found[1:])) for name, found in times.items()}
+    own = median["index"] - median["assembly"] - median["solves"]
+    return own, own / median["factorisation"]
 
 
 def seconds(run: Callable[[], Any]) -> float:
@@ -153,13 +173,14 @@ def seconds(run: Callable[[], Any]) -> float:
     return float(np.median(times))
 
 
-def in_a_process(*arguments: object) -> dict[str, Any] | None:
-    """Measure in a new process; None where it fails or takes too long."""
-    (found,) = list(measured("benchmarks.stability", "--measure", *arguments, limit=LIMIT)) or [{"failed": "nothing"}]
-    if "failed" in found:
-        print(arguments, found["failed"], file=sys.stderr)
-        return None
-    return found
+def in_a_process(store: Store, *arguments: object) -> dict[str, Any] | None:
+    """Measure in a new process, unless the store has it; None where it fails or takes too long."""
+
+    def work() -> list[dict[str, Any]]:
+        return list(measured("benchmarks.stability", "--measure", *arguments, limit=LIMIT)) or [{"failed": "nothing"}]
+
+    found: dict[str, Any] = store.measure("/".join(map(str, arguments)), work)[0]
+    return None if "failed" in found else found
 
 
 @dataclass
@@ -173,7 +194,7 @@ class Times:
     exponents: dict[str, float]
 
 
-def times(formulation: str, progress: Callable[[str], None]) -> Times:
+def times(formulation: str, store: Store) -> Times:
     """Measure all methods with linear elements."""
     head = ["method", *(f"n = {n:g}" for n in ELEMENTS), "exponent"]
     rows, memory, first = [], [], []
@@ -186,8 +207,7 @@ def times(formulation: str, progress: Callable[[str], None]) -> Times:
             skip = n > (POINTWISE if formulation == "pointwise" else MOST).get(method, n) or (
                 len(found) > 0 and found[-1] is None
             )
-            found.append(None if skip else in_a_process(method, formulation, n, 1))
-            progress(f"{formulation} {method} {n}: {found[-1]}")
+            found.append(None if skip else in_a_process(store, method, formulation, n, 1))
         if found[2] and found[2]["first"] is not None:
             first.append(f"{method} {found[2]['first']:.9f}")
         seconds_of[method] = [f["seconds"] if f else np.nan for f in found]
@@ -202,7 +222,7 @@ def times(formulation: str, progress: Callable[[str], None]) -> Times:
             ]
         )
         if method == "index":
-            shares = np.array(seconds_of["index"]) / seconds_of["factorisation"]
+            shares = np.array([f["share"] if f else np.nan for f in found])
             rows.append(["index over factorisation", *("" if np.isnan(r) else f"{r:.2f}" for r in shares), ""])
         else:
             memory.append([method, *(f"{f['memory']:.0f}" if f else "" for f in found)])
@@ -229,23 +249,23 @@ def goals(found: Sequence[Times], ratios: Sequence[float]) -> str:
     return table(["goal", "", "measured"], rows)
 
 
-def rich(progress: Callable[[str], None]) -> str:
+def rich(store: Store) -> str:
     """Table of few elements of high degree."""
     rows = []
     for elements, degree in ((8, 6), (32, 6), (128, 6)):
-        found = [in_a_process(m, "reduced", elements, degree) for m in METHODS[:8]]
-        progress(f"{elements} {degree}: {found}")
+        found = [in_a_process(store, m, "reduced", elements, degree) for m in METHODS[:8]]
         rows.append([f"{elements} of degree {degree}", *(milliseconds(f["seconds"]) if f else "" for f in found)])
     return table(["elements", *METHODS[:8]], rows)
 
 
-def beside_scipy() -> tuple[str, list[float]]:
+def beside_scipy(store: Store) -> tuple[str, list[float]]:
     """Table of four left-most eigenvalues of straight and buckled states beside scipy's ``eigs``; ratios."""
     rows, ratios = [], []
     for formulation in ("reduced", "pointwise"):
         for which in ("straight", "buckled"):
             found = [
-                in_a_process(method, formulation, ELEMENTS[2], 1, which) for method in ("eigenvalues", "proof", "scipy")
+                in_a_process(store, method, formulation, ELEMENTS[2], 1, which)
+                for method in ("eigenvalues", "proof", "scipy")
             ]
             mine, proof, scipys = (f["seconds"] if f else np.nan for f in found)
             ratios.append(mine / scipys)
@@ -300,26 +320,24 @@ def ranks() -> str:
     return table(["n", "cord", "/h", "hemitropic", "/h", "hemitropic, compatible", "/h"], rows)
 
 
-def write(path: Path) -> None:
+def write(path: Path, store: Store) -> None:
     """Measure everything and write the page."""
-    started = perf_counter()
-
-    def progress(line: str) -> None:
-        print(f"{perf_counter() - started:6.1f} s  {line}", flush=True)
-
-    reduced, pointwise = times("reduced", progress), times("pointwise", progress)
-    few, (scipys, ratios) = rich(progress), beside_scipy()
+    reduced, pointwise = times("reduced", store), times("pointwise", store)
+    few, (scipys, ratios) = rich(store), beside_scipy(store)
     band, rank = bands(), ranks()
+    low, high = store.loads()
     path.write_text(f"""# Every way to answer "is it stable?", and what it costs
 
-Written by `make bench` (`python -m benchmarks.stability`) in {(perf_counter() - started) / 60:.0f} minutes on
-{machine()}; {versions("petsc4py", "slepc4py", "numpy", "scipy")}; one thread, load {load():.1f}.
+Written by `make bench` (`python -m benchmarks.stability`) in {store.took() / 60:.0f} minutes on
+{machine()}; {versions("petsc4py", "slepc4py", "numpy", "scipy")}; one thread;
+load of the machine between {low:.1f} and {high:.1f}.
 
 The state is the straight telephone cord at lam = {LOAD:g}; {NUMBER} left-most eigenvalues are asked for. A time is the
 median of repeated judgements after a first one, which makes the symbolic factorisation (as along a branch), and
 contains the assembly. `factorisation` is one numeric LDL^t of the saddle matrix with its inertia, without assembly;
 `index` is what the index costs along a branch: the one factorisation that serves Newton's method and the tangent as
-well, and two columns more in its solves, to know how far from zero the nearest eigenvalue is.
+well, and two columns more in its solves, to know how far from zero the nearest eigenvalue is; its ratio to a
+factorisation is that of medians taken in turn in one process.
 `count` is the index of a state by itself, from two factorisations; `eigenvalues` are the left-most ones alone, all
 methods below it have the index too. `scipy` is `eigs` with shift-invert (SuperLU) on the same matrices and shift,
 `dense QZ` LAPACK's on the singular pencil, which has infinite eigenvalues besides. All but these two prove by counts
@@ -375,7 +393,7 @@ The smallest singular value of the gradients C of the pointwise constraints, and
 linear elements: it vanishes like h, as in Table 5 of Kumar & Healey (2010).
 
 {rank}""")
-    print(f"{path} after {perf_counter() - started:.0f} s")
+    print(f"{path}, measured in {store.took() / 60:.1f} minutes")
 
 
 def main() -> None:
@@ -383,12 +401,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--measure", nargs="+", metavar="METHOD FORMULATION ELEMENTS DEGREE [STATE]")
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "stability.md")
+    parser.add_argument("--resume", action="store_true", help="keep what an interrupted run has measured")
     given = parser.parse_args()
     if given.measure:
         method, formulation, elements, degree, *which = given.measure
         print(json.dumps(measure(method, formulation, int(elements), int(degree), *which)))
     else:
-        write(given.output)
+        write(given.output, Store(ROOT / "results" / "stability" / "measured.json", given.resume))
 
 
 if __name__ == "__main__":

@@ -11,8 +11,8 @@ from benchmarks.auto.output import AutoError
 from benchmarks.auto.problems import PROBLEMS
 from benchmarks.auto.program import check, require_auto
 from benchmarks.speed.scipy_bvp import RODS, solve
-from benchmarks.speed.store import Store
 from benchmarks.speed.tables import fastest
+from benchmarks.store import Store
 from benchmarks.targets import TARGETS
 
 pytestmark = pytest.mark.alone

@@ -14,7 +14,7 @@ from benchmarks.common import ROOT
 from benchmarks.speed.page import write
 from benchmarks.speed.plots import draw
 from benchmarks.speed.run import QUICK, Size, everything
-from benchmarks.speed.store import Store
+from benchmarks.store import Store
 
 
 def main() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from benchmarks.auto.settings import ACCURACIES
 from benchmarks.common import digits, exponent, machine, milliseconds, table, versions
 from benchmarks.speed import tables, words
-from benchmarks.speed.store import Store
+from benchmarks.store import Store
 
 Row = dict[str, Any]
 WORK = ("setup", "equilibrium", "count")

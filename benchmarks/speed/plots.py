@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from benchmarks.speed.run import PAPER
-from benchmarks.speed.store import Store
+from benchmarks.store import Store
 from benchmarks.targets import TARGETS, Target
 
 Row = dict[str, Any]

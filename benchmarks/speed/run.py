@@ -15,7 +15,7 @@ from benchmarks.auto.settings import ACCURACIES, at_accuracy
 from benchmarks.common import measured
 from benchmarks.references import deviation
 from benchmarks.speed.first import first_minute, map_of_rods
-from benchmarks.speed.store import Store
+from benchmarks.store import Store
 from benchmarks.targets import TARGETS
 
 Grid = Mapping[int, Sequence[int]]

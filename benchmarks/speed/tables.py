@@ -10,7 +10,7 @@ from benchmarks.auto.settings import ACCURACIES
 from benchmarks.common import digits, milliseconds, table
 from benchmarks.speed.plots import peers
 from benchmarks.speed.run import PAPER, PARTS
-from benchmarks.speed.store import Store
+from benchmarks.store import Store
 from benchmarks.targets import TARGETS
 
 Row = dict[str, Any]
