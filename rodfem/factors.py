@@ -108,8 +108,8 @@ def lu_package(comm: MPI.Comm, prefix: str) -> str:
 
 def solving(counting: Factors, comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
     """What solves with a symmetric matrix best, where ``counting`` are its LDL^t factors: those, or LU factors."""
-    known = lu_package(MPI.COMM_SELF, "rodfem_lu_") == "mumps"
-    return counting if known else factors_of("lu", comm, unknowns, scalars, {})
+    same = lu_package(MPI.COMM_SELF, "rodfem_lu_") == "mumps"
+    return counting if same else factors_of("lu", comm, unknowns, scalars, {})
 
 
 class Block:

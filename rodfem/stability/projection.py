@@ -36,8 +36,8 @@ from rodfem.stability.matrices import gathered, petsc_matrix
 INVERSES = ("saddle", "elimination")
 SINGULAR = 1e-6
 """A solve that leaves more than this of its right-hand side behind was made with a singular matrix."""
-RANK = 1e-10
-"""What is less independent of other vectors than this, squared, adds nothing to their span; nor what has no mass."""
+RANK, MASSLESS = 1e-10, 1e-20
+"""Squares of what a unit vector adds to the span of others, and of what is left of it in the mass, that are nothing."""
 
 PREFIX = "rodfem_reduced_inverse_"
 """Prefix of the options of its factors."""
@@ -113,6 +113,9 @@ class ShiftedInverse:
         wrong values for complex pairs under Cayley's).  What has no mass is left out.
         """
         r = self.projection
+        squares = (vectors * (r.M @ vectors)).sum(axis=0)
+        heavy = squares > MASSLESS * abs(r.M).max() * (vectors**2).sum(axis=0)
+        vectors = vectors[:, heavy] / np.sqrt(squares[heavy])
         masses = r.M @ vectors
         solved = np.stack([r.kernel.expand(self(r.kernel.project(mass))) for mass in masses.T], axis=1)
         squares, turn = np.linalg.eigh((vectors.T @ masses + masses.T @ vectors) / 2)

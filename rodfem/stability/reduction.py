@@ -174,7 +174,6 @@ class Reduction:
         if self.symmetric:  # round-off may make a complex pair of a double eigenvalue: its parts span the same plane
             second = np.append(False, (values.imag[1:] > 0) & (values.imag[:-1] < 0))
             vectors = np.where(second, vectors.imag, vectors.real)
-            vectors = vectors / np.linalg.norm(vectors, axis=0)
             values, vectors = shifted.ritz(vectors)
         p = self.projection
         residuals = np.linalg.norm(p.kernel.project(p.K @ vectors - (p.M @ vectors) * values), axis=0)
