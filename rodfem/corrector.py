@@ -13,12 +13,21 @@ solves.  A block of vectors ``v`` is carried along the branch and iterated inver
 the block is rich in its vector: 1e-3 of a vector that has a bit of everything is mixed in every time, and a vector
 whose eigenvalue is within the tolerance, 1e-7 of the usual, grows by 1e7.  Where that is not safely away from zero a
 state is computed by LU factors of ``J``, and counted by two shifts.
+
+The factors belong to the prediction, the index to the equilibrium.  From one to the other ``S`` changes by ``dS``.  Its
+effect on the eigenvalues near zero is measured, not bounded beforehand: a rod that carries a force or a moment, or
+whose energy is far from quadratic, may be a thousand times as sensitive as another.  The second variation at the
+equilibrium is projected on the block ``Y``, by a difference of the equations along its first vector ``y``: ``y.dS y``
+is the first-order change of that eigenvalue, the rest of ``Y^t dS y`` its coupling to the others.  The count at the
+prediction is that of the equilibrium only where the distance of all eigenvalues from zero is many times as large; else
+``S`` is factored, and counted, at the equilibrium itself.
 """
 
 from __future__ import annotations
 
 from math import isfinite
 
+import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
@@ -33,7 +42,11 @@ FRESH = 1e-3
 NEAR = 1e-3
 """An eigenvalue nearer zero than this, in units of the lowest bending eigenvalue, is left to the two shifts."""
 SENSITIVE = 100.0
-"""What an eigenvalue may change by when the state moves by one radian, in the same units."""
+"""Least change of an eigenvalue that is reckoned with when the state moves by one radian, in the same units."""
+DIFFERENCE = 0.05
+"""Step of the differences, relative to how far the equilibrium is from the prediction."""
+SAFE = 10.0
+"""Times the measured change of the carried eigenvalues by which all eigenvalues must be away from zero."""
 
 
 class Corrector:
@@ -55,10 +68,11 @@ class Corrector:
         system = self.system
         self._right, self._solved = dense_columns(system, BLOCK + 2), dense_columns(system, BLOCK + 2)
         self._step, self._image = system.new_vector(), system.new_vector()
-        self._factored = system.new_vector()
+        self._factored, self._beside = system.new_vector(), system.new_vector()
         self._fresh = [inertia.seed(i) for i in range(BLOCK)]
         self._fresh_images = [inertia.metric * v for v in self._fresh]
         self._below = 0
+        self._projected = np.zeros(BLOCK)
         self.tangent = system.new_vector()
         self.nearest = 0.0
         self.regular = False
@@ -91,9 +105,22 @@ class Corrector:
                 self._images[i].axpy(FRESH, self._fresh_images[i])
             self._solve(right)
         self._started = self.regular = self.nearest > NEAR * inertia.scale
-        if not self.regular:
+        if self.regular:
+            self._projected = self._project()
+        else:
             self.restart()
         return self.regular
+
+    def _project(self) -> np.ndarray:
+        """Products of the block with ``S y`` for its first vector ``y``, of the matrix last assembled: (BLOCK,)."""
+        self.inertia.matrix.mult(self._block[0], self._image)
+        return np.array([self._image.dot(v) for v in self._block])
+
+    def _project_at(self, x: PETSc.Vec, step: float) -> np.ndarray:
+        """The same of ``S`` at the equilibrium ``x``, by a difference of the equations over ``step``."""
+        self._beside.waxpy(step, self._block[0], x)
+        self.system.residual(self._beside, self._image)
+        return np.array([self._image.dot(v) for v in self._block]) / step
 
     def _solve(self, right: PETSc.Vec | None) -> None:
         """Solve for all right-hand sides at once: it is the call that costs, not the column."""
@@ -163,10 +190,18 @@ class Corrector:
         return tangent
 
     def index(self, x: PETSc.Vec) -> Index | None:
-        """Index of ``x``, a state near the one last factored; None where an eigenvalue may vanish in between."""
-        scale, drifts = self.inertia.scale, self.system.active_drifts()
+        """Index of ``x``, a state near the one last factored; None where one of its eigenvalues may be zero.
+
+        The count of the factors holds where no eigenvalue can have crossed zero on the way to ``x``; else ``S`` is
+        factored at ``x``.
+        """
+        inertia, drifts = self.inertia, self.system.active_drifts()
         self._image.waxpy(-1.0, self._factored, x)
         moved = self.system.norm(self._image)
-        if self.nearest < (NEAR + SENSITIVE * moved) * scale + 10 * self.inertia.tolerance:
-            return None
-        return Index(self._below, drifts)
+        least = NEAR * inertia.scale + 10 * inertia.tolerance
+        if moved:
+            projected = self._project_at(x, max(DIFFERENCE * moved, 1e-7))
+            change = float(np.linalg.norm(projected - self._projected))
+            if self.nearest < least + SENSITIVE * moved * inertia.scale + SAFE * change and not self.factor(x):
+                return None
+        return Index(self._below, drifts) if self.nearest >= least else None

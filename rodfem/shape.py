@@ -13,7 +13,6 @@ import numpy as np
 from mpi4py import MPI
 from numpy.polynomial import legendre
 from petsc4py import PETSc
-from scipy.spatial.transform import Rotation
 
 from forms.kinematics import UNDEFORMED
 from rodfem import compat
@@ -21,10 +20,26 @@ from rodfem.fields import LOAD
 from rodfem.system import System
 
 
+def _euler_rodrigues() -> np.ndarray:
+    """Coefficients of ``|q|^2 R`` and of ``|q|^2`` in the products ``q_i q_j``: (16, 10)."""
+    out = np.zeros((4, 4, 10))
+    for i in range(4):
+        out[i, i, 9] = 1.0
+        out[i, i, [0, 4, 8]] = [1.0 if i in (0, k + 1) else -1.0 for k in range(3)]
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):  # R_ij = 2 (q_i q_j - q_0 q_k), R_ji = 2 (q_i q_j + q_0 q_k)
+        out[i + 1, j + 1, [3 * i + j, 3 * j + i]] = 2.0
+        out[0, k + 1, [3 * i + j, 3 * j + i]] = -2.0, 2.0
+    return out.reshape(16, 10)
+
+
+EULER_RODRIGUES = _euler_rodrigues()
+
+
 def directors(q: np.ndarray) -> np.ndarray:
     """Rotation matrices of quaternions (..., 4), scalar first, of any length: (..., 3, 3)."""
-    flat = np.asarray(q).reshape(-1, 4)
-    return Rotation.from_quat(flat[:, [1, 2, 3, 0]]).as_matrix().reshape(*np.shape(q)[:-1], 3, 3)
+    q = np.asarray(q)
+    table = (q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16) @ EULER_RODRIGUES
+    return np.asarray((table[..., :9] / table[..., 9:]).reshape(*q.shape[:-1], 3, 3))
 
 
 def minimum(powers: list[float], t: float, spacing: float) -> float:
@@ -243,14 +258,15 @@ class Shape:
         return np.asarray(slopes)
 
     def _position_weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
-        """Weights of the slopes at Gauss points in the integral up to ``s``, and of nodal values in the value there."""
+        """Weights of slopes at Gauss points in their integrals to ``s`` and over the rod, of nodal values at ``s``."""
         local = (s - self.start) / self.size
         integral = self.gauss.integrals(np.clip(local, 0, 1)) * self.size[:, None]
         first = self.system.scene.interval[0]
         inside = (local > 0) & (local <= 1) if s > first else np.isclose(self.start, first)
         value = np.zeros((len(local), len(self.nodes)))
         value[inside] = compat.lagrange_basis(len(self.nodes) - 1, local[inside])
-        return integral, value
+        whole = np.outer(self.size, self.gauss.weights)
+        return np.stack([integral.ravel(), whole.ravel()]), value.ravel()
 
     def _at(self, s: float) -> tuple[np.ndarray, np.ndarray]:
         """Centreline (3,) and unit quaternion (4,) at the ordinate's arclength."""
@@ -259,13 +275,12 @@ class Shape:
         u = f.u.x.array
         parts = np.zeros((3, 4))
         size = f.turning.size
-        parts[0, :size] = value.ravel() @ u[f.dofs[f.turning.name][self._cells]].reshape(-1, size)
+        parts[0, :size] = value @ u[f.dofs[f.turning.name][self._cells]].reshape(-1, size)
         if self.reduced:
             slopes = self._slopes()
-            parts[1, :3] = integral.ravel() @ slopes.reshape(-1, 3)
-            parts[2, :3] = np.outer(self.size, self.gauss.weights).ravel() @ slopes.reshape(-1, 3)
+            parts[1:, :3] = integral @ slopes.reshape(-1, 3)
         else:
-            parts[1, :3] = value.ravel() @ u[f.dofs["r"][self._cells]].reshape(-1, 3)
+            parts[1, :3] = value @ u[f.dofs["r"][self._cells]].reshape(-1, 3)
         if system.comm.size > 1:
             parts = system.comm.allreduce(parts)
         load = float(f.u.x.array[f.copies[0, -1]])
