@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from petsc4py import PETSc
 
@@ -18,11 +19,14 @@ from rodfem.continuation import VERTICAL, Follower, distance, hermite
 from rodfem.errors import ConvergenceError
 from rodfem.locate import Located, across, locate, solve_at
 from rodfem.newton import correct
+from rodfem.stability.band import decide
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
 ROUND_OFF = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
+APART = 1e-7
+"""Arclength above which there is a state to count at between two special points."""
 SHIFT = 1e-6
 """Shift of a singular Jacobian, in units of the lowest bending eigenvalue."""
 
@@ -61,27 +65,58 @@ def coupling_of(follower: Follower, x: PETSc.Vec, null_vector: PETSc.Vec) -> flo
     return float(abs(derivative.dot(null_vector)) / (derivative.norm() * null_vector.norm()))
 
 
-def find_special(follower: Follower, a: Point, b: Point) -> list[Special]:
-    """All folds and branch points between two consecutive points of a branch, in order of arclength.
+def find_special(follower: Follower, a: Point, b: Point, orders: Sequence[int], persistent: int = 0) -> list[Special]:
+    """All folds and branch points between two points of a branch, in order of arclength, with indices that chain.
 
-    Where the load turns back there is a fold, or a branch point at which this branch ends on another one.
-    Crossings of the index that a fold does not explain are branch points, or further folds.
+    Where the load turns back there is a fold, or a branch point at which this branch ends on another one.  The
+    eigenvalues number ``orders`` (0 is the left-most) change sign from ``a`` to ``b``: those that a fold does not
+    explain do so at branch points, or further folds.  ``persistent`` eigenvalues are zero all along, beside those of
+    symmetries, and are not numbered.
     """
     found: list[Special] = []
-    crossing = _crossing(follower, a, b)
+    rest = list(orders)
     low = min(a.negative, b.negative)
     level = VERTICAL * abs(follower.system.scene.span[1] - follower.system.scene.span[0])
     if a.slope * b.slope < 0 and max(abs(a.slope), abs(b.slope)) > level:
         found.append(_special(follower, a, b, low, "slope"))
         if found[0].kind == FOLD:
             own = min(found[0].negative_before, found[0].negative_after)
-            crossing = [order for order in crossing if order != own]
-    still = _still(follower, a, b) if crossing else []
-    while crossing:
-        special = _special(follower, a, b, crossing[0], "mu", still)
+            rest = [order for order in rest if order != own]
+    still = _persistent(follower, a, persistent) if rest else []
+    while rest:
+        special = _special(follower, a, b, rest[0], "mu", still)
         found.append(special)
-        del crossing[: special.multiplicity]
-    return sorted(found, key=lambda s: s.point.arclength)
+        del rest[: special.multiplicity]
+    found.sort(key=lambda s: s.point.arclength)
+    _count_between(follower, a, b, found)
+    return found
+
+
+def renew(follower: Follower, point: Point) -> None:
+    """Compute the index and the tangent of a point, which may be those of a prediction near by, at its own state."""
+    follower.system.set_phase(point.x)
+    index = decide(follower.inertia, point.x).index
+    point.negative, point.zero = index.negative, index.zero
+    if point.tangent is not None:
+        point.tangent = follower.tangent(follower.row(point.tangent), at=point.x)
+        point.slope = follower.system.scalar(point.tangent)
+
+
+def _count_between(follower: Follower, a: Point, b: Point, found: list[Special]) -> None:
+    """Set the indices between neighbouring special points of one piece of a branch by counts half-way.
+
+    Points too near to each other for a state between them have been told apart by their eigenvalues alone: there the
+    index changes by the multiplicity of the first.
+    """
+    for p, q in pairwise(found):
+        if q.point.arclength - p.point.arclength > APART:
+            s = (p.point.arclength + q.point.arclength) / 2
+            x = solve_at(follower, lambda t: hermite(a, b, t), s)
+            between = decide(follower.inertia, x).index.negative
+        else:
+            rising = b.negative > a.negative
+            between = p.negative_before + (p.multiplicity if rising else -p.multiplicity)
+        p.negative_after = q.negative_before = between
 
 
 def midpoint(follower: Follower, a: Point, b: Point) -> Point | None:
@@ -97,27 +132,11 @@ def midpoint(follower: Follower, a: Point, b: Point) -> Point | None:
     return follower.point(x, s, follower.tangent(follower.row(hermite(a, b, s)[1]), at=x))
 
 
-def _crossing(follower: Follower, a: Point, b: Point) -> list[int]:
-    """Numbers of the eigenvalues that have changed sign from ``a`` to ``b``; one that is zero at either has not.
-
-    Those that are zero at both are not counted: they stay zero.
-    """
-    extra_a, extra_b = (_extra(follower, p) for p in (a, b))
-    stay = min(extra_a, extra_b)
-    (low_a, high_a), (low_b, high_b) = ((p.negative, p.negative + e - stay) for p, e in ((a, extra_a), (b, extra_b)))
-    return list(range(high_a, low_b)) or list(range(high_b, low_a))
-
-
-def _extra(follower: Follower, point: Point) -> int:
-    """Number of zero eigenvalues of a point that are not its symmetries'."""
-    return max(point.zero - follower.system.active_drifts(), 0)
-
-
-def _still(follower: Follower, a: Point, b: Point) -> list[PETSc.Vec]:
-    """Vectors of the eigenvalues that are zero at both points, at the first one."""
-    count = min(_extra(follower, a), _extra(follower, b))
+def _persistent(follower: Follower, a: Point, count: int) -> list[PETSc.Vec]:
+    """Vectors of the eigenvalues that are zero all along a branch, at the point ``a``."""
     if not count:
         return []
+    follower.system.set_phase(a.x)
     follower.inertia.count(a.x)
     return [v.copy() for v in follower.inertia.nearest(count, accuracy=1e-8)[1]]
 
@@ -166,12 +185,6 @@ def directions(follower: Follower, special: Special) -> list[PETSc.Vec]:
                 image.scale(1.0 / system.norm(image))
                 known.append(image)
     return out
-
-
-def _sum(x: PETSc.Vec, d: PETSc.Vec) -> PETSc.Vec:
-    total = x.copy()
-    total.axpy(1.0, d)
-    return total
 
 
 def _load_response(follower: Follower, special: Special) -> PETSc.Vec:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from petsc4py import PETSc
 
 FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
+IMPERFECT = "imperfect bifurcation"
+"""A branch point that an imperfection has taken apart, where steps of continuation do not resolve its pieces."""
 FLUTTER, DIVERGENCE = "flutter", "divergence"
 """Under loads without a potential: a pair of frequencies becomes complex; one becomes imaginary."""
 
@@ -74,7 +76,8 @@ class Special:
     ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` that of the
     discretisation: of the load for folds and branch points, of the ordinate at user points and ends. ``coupling``
     is the cosine between the null vector and the derivative of the equations in the load: zero at a branch point,
-    not at a fold.
+    not at a fold.  ``unfolding`` is the size of the unfolding parameters that make it a branch point, relative to the
+    metric as eigenvalues are (:mod:`rodfem.unfolding`): round-off, unless an imperfection has taken it apart.
     """
 
     kind: str
@@ -94,11 +97,29 @@ class Special:
     law: Law | None = None
     omega2: float = float("nan")
     omega2_error: float = float("nan")
+    unfolding: float = float("nan")
 
     @property
     def multiplicity(self) -> int:
         """Number of eigenvalues that cross or touch zero here."""
         return len(self.null_vectors)
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """Two neighbouring rows between which the index changes from ``before`` to ``after`` without a special point."""
+
+    a: Point
+    b: Point
+    before: int
+    after: int
+
+    def __str__(self) -> str:
+        """Say it in a sentence."""
+        return (
+            f"Between loads {self.a.load:.8g} and {self.b.load:.8g} the index changes from {self.before} to "
+            f"{self.after}, and no special point was found that says why: use smaller steps (--step) or more elements."
+        )
 
 
 @dataclass
@@ -111,6 +132,7 @@ class Branch:
     points: list[Point] = field(default_factory=list)
     special: list[Special] = field(default_factory=list)
     ended: str = "not traced"
+    unexplained: list[Unexplained] = field(default_factory=list)
 
     def insert(self, special: Special) -> None:
         """Put a special point among the points by its arclength, and renumber the rows of all special points."""

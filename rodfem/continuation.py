@@ -8,7 +8,7 @@ where it does not.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -320,11 +320,18 @@ def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
     return combine(parts, value), combine(parts, slope)
 
 
-def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[float, float]) -> Iterator[Point | str]:
+def follow(
+    follower: Follower,
+    points: list[Point],
+    steps: Steps,
+    bounds: tuple[float, float],
+    reach: Callable[[Point], float] = lambda point: float("inf"),
+) -> Iterator[Point | str]:
     """Continue a branch from its last point, yielding accepted points; a string at the end says why it ended.
 
     ``bounds`` are the least and the greatest load; the branch ends exactly on them.  The caller appends (and may
-    insert) points in ``points``.  The direction is that of the last point's tangent.
+    insert) points in ``points``.  The direction is that of the last point's tangent.  ``reach`` bounds the step from a
+    point.
     """
     system, step = follower.system, min(steps.first, steps.largest)
     span = abs(system.scene.span[1] - system.scene.span[0])
@@ -332,14 +339,17 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
     follower.corrector.restart()
     while len(points) < steps.most:
         last = points[-1]
+        most = min(reach(last), steps.largest)
+        step = min(step, most)
         x, direction = predict(points, last.arclength + step)
         load, outcome, tangent, index = system.scalar(x), None, None, None
         if low <= load <= high:
             row = follower.row(direction)
-            system.set_phase(x)
-            outcome, tangent, index = follower.correct(x, row, 0.5 * step, last.slope)
-            if outcome.converged:
-                load = system.scalar(x)
+            if last.tangent is None or row.dot(last.tangent) > 0:  # else an extrapolation that turns back
+                system.set_phase(x)
+                outcome, tangent, index = follower.correct(x, row, 0.5 * step, last.slope)
+                if outcome.converged:
+                    load = system.scalar(x)
         if not low <= load <= high:
             point = _to_load(follower, points, load, bounds[0] if load < low else bounds[1], step)
             if point is not None:
@@ -353,7 +363,7 @@ def follow(follower: Follower, points: list[Point], steps: Steps, bounds: tuple[
             step = min(step * min(max(factor, 0.4), 1.6), steps.largest)
             continue
         step /= 2
-        if step < steps.smallest:
+        if step < min(steps.smallest, 0.01 * most):
             why = f"steps below {steps.smallest:g}"
             if last.zero > system.active_drifts():
                 why += f"; {last.zero - system.active_drifts()} eigenvalues vanish there to working accuracy"

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from petsc4py import PETSc
 
 from rodfem.bifurcation import directions, start_branch
 from rodfem.branch import BRANCH_POINT, Branch, Point, Special
-from rodfem.continuation import Follower
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.gaps import Gap, arms
 from rodfem.pitchfork import law_of
-from rodfem.plan import Plan
-from rodfem.report import Report
-from rodfem.search.deflation import further, starts, states_at
+from rodfem.search.deflation import SAME, further, states_at
+from rodfem.search.orbit import Orbits
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.rank import rank_of
 from rodfem.topology import link
@@ -28,6 +27,9 @@ COLLAPSED = 1e-6
 
 class Explorer(Tracer):
     """Explores the equilibria of a scene from its start state: what to trace, and in which order."""
+
+    _crossed = 0
+    """Number of gaps whose other side was looked at."""
 
     def run(self) -> list[Branch]:
         """Trace the start state's branch, then what leaves each branch point, breadth first."""
@@ -51,14 +53,34 @@ class Explorer(Tracer):
             found = further(self.follower, load, known, self.plan.tries, report=self.report)
         before = len(self.branches)
         for i, point in enumerate(found):
-            for branch in starts(point, f"found {i + 1} at {load:g}"):
-                self.trace(branch)
+            if not self._on_branch(point, before):
+                self.trace_whole(point, f"found {i + 1} at {load:g}", 0)
         self._branch_off(before)
+
+    def _on_branch(self, point: Point, first: int = 0) -> bool:
+        """Whether a point is on one of the branches traced, from number ``first`` on."""
+        self.use(point.mesh)
+        here = [replace(b, points=[self.here(p) for p in b.points]) for b in self.branches[first:]]
+        known = Orbits(self.follower.system)
+        for other in states_at(self.follower, here, point.load):
+            known.add(other.x)
+        return any(apart < SAME for apart, _ in known.nearest(point.x))
+
+    def _detached(self, gap: Gap, depth: int) -> None:
+        """Trace the branch on the other side of a gap: what no step from this side reaches."""
+        self.use(gap.point.mesh)
+        for point in arms(self.follower, gap):
+            if self.low < point.load < self.high and not self._on_branch(point):
+                number = 1 + sum(b.name.startswith("detached") for b in self.branches)
+                self.trace_whole(point, f"detached {number}", depth)
 
     def _branch_off(self, first: int) -> None:
         """Trace what leaves the branch points of the branches from number ``first`` on, breadth first."""
         for branch in itertools.islice(self.branches, first, None):  # grows while it is walked
             if branch.depth < self.plan.depth:
+                while self._crossed < len(self.gaps.known):
+                    self._crossed += 1
+                    self._detached(self.gaps.known[self._crossed - 1], branch.depth + 1)
                 for i, special in enumerate(branch.special):
                     if special.kind == BRANCH_POINT and not special.switched:
                         self._switch(branch, i, special)
@@ -182,10 +204,3 @@ class Explorer(Tracer):
                     if any(near(a, p) for p in before):
                         return True
         return False
-
-
-def explore(
-    follower: Follower, plan: Plan, report: Report, finished: Callable[[], None] = lambda: None
-) -> Sequence[Branch]:
-    """Explore a scene; see :class:`Explorer`."""
-    return Explorer(follower, plan, report, finished).run()

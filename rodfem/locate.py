@@ -103,16 +103,18 @@ def eigenvalue(
     raise ConvergenceError(f"Eigenvalue number {order} is not among those nearest zero; use smaller steps (--step).")
 
 
-def sample(follower: Follower, curve: Curve, s: float, mode: PETSc.Vec) -> Sample:
+def sample(follower: Follower, curve: Curve, s: float, mode: PETSc.Vec, persistent: int = 0) -> Sample:
     """Solve at ``s`` and evaluate ``1 / (mode . M S^-1 M mode)`` there.
 
     For a ``mode`` near the null vector this is the eigenvalue that vanishes, up to second order in their
     difference, but unlike the ordered eigenvalues it is smooth where others come by; its zero is where ``S`` is
-    singular.
+    singular.  Eigenvalues within the tolerance of zero, of which ``persistent`` stay zero, count by its sign.
     """
     x = solve_at(follower, curve, s)
-    below = follower.inertia.count(x).negative
-    return Sample(s, x, follower.system.scalar(x), follower.inertia.response(mode), below)
+    index = follower.inertia.count(x)
+    mu = follower.inertia.response(mode)
+    crossing = index.zero - follower.system.active_drifts() - persistent  # small ones take the sign of this one
+    return Sample(s, x, follower.system.scalar(x), mu, index.negative + (crossing if mu < 0 else 0))
 
 
 @dataclass
@@ -180,12 +182,14 @@ def _barycentric(nodes: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
     return value @ inverse, slope @ derivative @ inverse
 
 
-def refine(follower: Follower, curve: Curve, center: float, half: float, mode: PETSc.Vec, zero_of: str) -> Located:
+def refine(
+    follower: Follower, curve: Curve, center: float, half: float, mode: PETSc.Vec, zero_of: str, persistent: int = 0
+) -> Located:
     """Solve at Chebyshev nodes around ``center``, moved until the zero lies among them, shrunk until it is sharp."""
     best: Located | None = None
     for _ in range(10):
         nodes = center + half * np.cos(np.pi * (np.arange(NODES)[::-1] + 0.5) / NODES)
-        samples = [sample(follower, curve, s, mode) for s in nodes]
+        samples = [sample(follower, curve, s, mode, persistent) for s in nodes]
         located = interpolate(samples, zero_of, center)
         if located is not None and abs(located.s - center) <= half:
             if located.uncertainty < SHARP or (best is not None and located.uncertainty > 0.1 * best.uncertainty):
@@ -281,4 +285,4 @@ def locate(
     else:
         piece = a.arclength + 1e-3 * h, b.arclength - 1e-3 * h
         guess, mode = crossing_mode(follower, curve, piece, order, still)
-    return refine(follower, curve, guess, min(WINDOW, 0.45 * h), mode, zero_of)
+    return refine(follower, curve, guess, min(WINDOW, 0.45 * h), mode, zero_of, len(still))

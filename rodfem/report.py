@@ -10,14 +10,14 @@ from typing import TextIO
 import numpy as np
 from mpi4py import MPI
 
-from rodfem.branch import BRANCH_POINT, DIVERGENCE, END, FLUTTER, FOLD, USER, Branch, Point, Special
+from rodfem.branch import BRANCH_POINT, DIVERGENCE, END, FLUTTER, FOLD, IMPERFECT, USER, Branch, Point, Special
 from rodfem.clock import Clock
 from rodfem.fields import Discretization
 from rodfem.modes import Modes
 from rodfem.stability.judge import Verdict
 from rodfem.system import System
 
-LABELS = {FOLD: "LP", BRANCH_POINT: "BP", FLUTTER: "HB", DIVERGENCE: "BP", USER: "UZ", END: "EP"}
+LABELS = {FOLD: "LP", BRANCH_POINT: "BP", FLUTTER: "HB", DIVERGENCE: "BP", IMPERFECT: "IB", USER: "UZ", END: "EP"}
 """AUTO's two-letter labels."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from math import isnan
 
@@ -10,18 +11,27 @@ from petsc4py import PETSc
 from scipy.optimize import brentq
 
 from rodfem.accuracy import zero_stretch
-from rodfem.bifurcation import find_special, midpoint
-from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
+from rodfem.bifurcation import find_special, midpoint, renew
+from rodfem.branch import BRANCH_POINT, END, IMPERFECT, USER, Branch, Point, Special
+from rodfem.chain import Row, chained, explain
 from rodfem.continuation import VERTICAL, Follower, distance, follow, hermite
 from rodfem.errors import ConvergenceError
+from rodfem.gaps import Gap, Gaps
 from rodfem.locate import solve_at
 from rodfem.meshes import Meshes, TooCoarse
 from rodfem.plan import Plan
 from rodfem.report import Report
+from rodfem.stability.band import resolve
 from rodfem.watch import Watch
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
+
+
+HALVINGS = 5
+"""How many times a piece of a branch is halved until its special points explain the indices of its ends."""
+PATIENCE = 4
+"""Rows with an eigenvalue near zero after which it is asked whether it stays zero."""
 
 
 class Tracer:
@@ -38,7 +48,10 @@ class Tracer:
         self.low, self.high = sorted(plan.span)
         self.branches: list[Branch] = []
         self.meshes = Meshes(follower, plan.accuracy)
+        self.gaps = Gaps(self.meshes)
         self.warned = False
+        self._open: list[Point] = []
+        self._level = 0
 
     @property
     def solvers(self) -> Sequence[Follower]:
@@ -67,9 +80,35 @@ class Tracer:
             self.report.warn(str(trouble))
         self._finish(branch)
 
+    def trace_whole(self, point: Point, name: str, depth: int) -> None:
+        """Follow a branch through a point in both directions, as one."""
+        if point.tangent is None:
+            raise ValueError("A point without a tangent is no start of a branch.")
+        back = Branch(name, None, depth, [reversed_point(point, 0.0)])
+        self.use(point.mesh)
+        self.report.branch(back)
+        self.watch = Watch(self.meshes, (self.low, self.high))
+        self.follower.damp(0)
+        try:
+            self._follow(back)
+        except ConvergenceError as trouble:
+            back.ended = f"no convergence: {trouble}"
+            self.report.warn(str(trouble))
+        branch = reversed_branch(back)
+        if back.ended == "closed loop":
+            self.branches.append(back)
+            self._finish(back)
+            return
+        first = branch.points[0]
+        branch.special.append(Special(END, first, first.negative, first.negative, 1e-12 * max(1.0, abs(first.load))))
+        branch.special[-1].note = f"begins here: {back.ended}"
+        branch.renumber()
+        self.trace(branch)
+
     def _follow(self, branch: Branch) -> None:
         """Follow a branch to its end; where its mesh is too coarse, from there on with another."""
         history, begun = list(branch.points), False
+        self._open = [history[-1]]
         while True:
             try:
                 self.watch.row(history[-1], self.follower)
@@ -95,6 +134,7 @@ class Tracer:
             branch.points = [moved.get(id(p), p) for p in branch.points]
             history = [new for _, new in pairs]
             self.follower = follower
+            self._open = [history[-1]]
             self.report.mesh(follower.system, trouble.point.load, str(trouble))
         last = history[-1].arclength
         branch.points = [p for p in branch.points if p.arclength <= last]
@@ -103,9 +143,13 @@ class Tracer:
 
     def _advance(self, branch: Branch, history: list[Point]) -> None:
         """Append points until the branch ends, which :attr:`Branch.ended` then says."""
-        for item in follow(self.follower, history, self.plan.steps, (self.low, self.high)):
+        follower = self.follower
+        for item in follow(
+            follower, history, self.plan.steps, (self.low, self.high), lambda p: self.gaps.reach(follower, p)
+        ):
             if isinstance(item, str):
                 branch.ended = item
+                self._close(branch)
                 return
             previous = history[-1]
             self._check_symmetry(item)
@@ -117,7 +161,12 @@ class Tracer:
             if self.follower.convexity is not None and self.follower.convexity.lowest(item.x) <= 0:
                 branch.ended = f"the stored energy is not convex any more at {self.scene.load} = {item.load:.6g}"
                 return
-            reason = self._between(branch, previous, item)
+            try:
+                reason = self._between(branch, previous, item)
+            except Gap:  # this point is on another branch: back, to smaller steps
+                self._open = [previous]
+                self._advance(branch, history)
+                return
             if reason:
                 branch.ended = reason
                 return
@@ -134,8 +183,8 @@ class Tracer:
             return self._between_points(branch, a, b)
 
     def _between_points(self, branch: Branch, a: Point, b: Point) -> str:
-        specials = [] if a is branch.points[0] and branch.parent else self._special_between(a, b)
-        pieces = [a, *(s.point for s in specials), b]
+        specials = [] if a is branch.points[0] and branch.parent else self._specials(a, b)
+        pieces = [a, *(s.point for s in specials if s.point.arclength > a.arclength), b]
         users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
         for special in specials + users:
             self.watch.special(special)
@@ -151,16 +200,78 @@ class Tracer:
                 self.report.special(branch, special)
         return ""
 
-    def _special_between(self, a: Point, b: Point, halvings: int = 3) -> list[Special]:
-        """Folds and branch points between two points, on halves of the piece where a whole one is not resolved."""
-        try:
-            return find_special(self.follower, a, b)
-        except ConvergenceError as trouble:
-            middle = midpoint(self.follower, a, b) if halvings else None
-            if middle is None:
-                self.report.warn(f"A special point between loads {a.load:.8g} and {b.load:.8g} is missing: {trouble}")
+    def _specials(self, a: Point, b: Point) -> list[Special]:
+        """Special points that the row ``b`` after ``a`` tells of; raises :class:`Gap` for one that is taken apart.
+
+        An eigenvalue within the tolerance of zero has no sign yet: rows with one wait, as ``_open``, until it has.  One
+        that stays zero to working accuracy belongs to a family of equilibria at one load, and is not waited for.
+        """
+        rows = [self.here(p) for p in self._open]
+        self._level = rows[0].zero
+        if b.zero > self._level:
+            self._open.append(b)
+            if len(self._open) <= PATIENCE or self._row(b).decided:
                 return []
-        return self._special_between(a, middle, halvings - 1) + self._special_between(middle, b, halvings - 1)
+        if len(rows) > 1 or a.negative != b.negative or a.slope * b.slope < 0:
+            for point in (*rows, b):
+                renew(self.follower, point)
+        self._open = [b]
+        return self._examined(self._among([*rows, b]))
+
+    def _among(self, points: Sequence[Point]) -> list[Special]:
+        """Special points among rows, all but the first and the last of which have an eigenvalue near zero."""
+        rows = [self._row(p) for p in points]
+        sure = [rows[0], *(row for row in rows[1:-1] if row.decided), rows[-1]]
+        return [special for p, q in pairwise(sure) for special in self._special_between(p, q)]
+
+    def _close(self, branch: Branch) -> None:
+        """Insert special points among rows at the end of a branch that have an eigenvalue near zero."""
+        if len(self._open) > 1:
+            with self.follower.system.clock.purpose("location"):
+                for special in self._examined(self._among([self.here(p) for p in self._open])):
+                    branch.insert(special)
+                    self.report.special(branch, special)
+
+    def _row(self, point: Point) -> Row:
+        """Index of a point, small eigenvalues by their Rayleigh quotients."""
+        if point.zero <= self._level:
+            return Row(point, point.negative, point.negative)
+        self.follower.system.set_phase(point.x)
+        return Row(point, *resolve(self.follower.inertia, point.x))
+
+    def _examined(self, specials: list[Special]) -> list[Special]:
+        """Branch points with the size of their unfolding parameters; raises :class:`Gap` where they are not one."""
+        for special in specials:
+            if special.kind == BRANCH_POINT or special.negative_before == special.negative_after:
+                gap = self.gaps.examine(self.follower, special)
+                if gap is not None and self.gaps.open(gap, self.follower):
+                    raise gap
+                if gap is not None:
+                    special.kind, special.note = IMPERFECT, str(gap)
+        return specials
+
+    def _special_between(self, p: Row, q: Row, halvings: int = HALVINGS) -> list[Special]:
+        """Folds and branch points between two rows, on halves of the piece where a whole one is not resolved.
+
+        It is where they explain the indices of both rows.
+        """
+        found, why = [], ""
+        persistent = max(self._level - self.follower.system.active_drifts(), 0)
+        try:
+            found = find_special(self.follower, p.point, q.point, p.crossing(q), persistent)
+        except ConvergenceError as trouble:
+            why = str(trouble)
+        if not why and chained(p.low, p.high, found, q.low, q.high):
+            return found
+        middle = midpoint(self.follower, p.point, q.point) if halvings else None
+        if middle is None:
+            if why:
+                self.report.warn(
+                    f"A special point between loads {p.point.load:.8g} and {q.point.load:.8g} is missing: {why}"
+                )
+            return found
+        row = self._row(middle)
+        return self._special_between(p, row, halvings - 1) + self._special_between(row, q, halvings - 1)
 
     def _users(self, branch: Branch, p: Point, q: Point, a: Point, b: Point) -> list[Special]:
         """User points between two neighbours among which the load is monotone."""
@@ -262,7 +373,11 @@ class Tracer:
                 guess = hermite(previous, last, last.arclength)[0]
                 point = self.user(guess, beyond, 2 * last.arclength - previous.arclength, beyond > load)
                 point.arclength = last.arclength + distance(self.follower.system, last.x, point.x)
-                found = [s for s in find_special(self.follower, previous, point) if s.kind == BRANCH_POINT]
+                self._level = min(previous.zero, point.zero)
+                orders = self._row(previous).crossing(self._row(point))
+                persistent = max(self._level - self.follower.system.active_drifts(), 0)
+                found = find_special(self.follower, previous, point, orders, persistent)
+                found = [s for s in found if s.kind == BRANCH_POINT]
         except ConvergenceError as trouble:
             self.report.warn(
                 f"The last state, at {self.scene.load} = {load:g}, is singular, and was not resolved: {trouble}"
@@ -305,7 +420,7 @@ class Tracer:
 
     def _check_zeros(self, history: list[Point], point: Point) -> None:
         """Say once where eigenvalues stay zero without a symmetry: the state is one of a family at the same load."""
-        extra = point.zero - self.follower.system.active_drifts()
+        extra = min(point.zero, self._level) - self.follower.system.active_drifts()
         if abs(point.slope) < VERTICAL * (self.high - self.low):
             extra -= 1  # the branch itself is such a family
         recent = history[-4:]
@@ -320,6 +435,7 @@ class Tracer:
 
     def _finish(self, branch: Branch) -> None:
         branch.renumber()
+        explain(branch)
         last = branch.points[-1]
         if branch.ended == "end of range" and last.zero > self.follower.system.active_drifts():
             self._singular_end(branch, last)
@@ -346,6 +462,28 @@ def equivalent(a: Point, b: Point, tolerance: float = 1e-8, of_strain: float = 0
     strain = max(tolerance, of_strain)
     pairs = ((a.load, b.load, tolerance), (a.energy, b.energy, tolerance), (a.stretch, b.stretch, strain))
     return all(abs(p - q) <= allowed * max(1.0, abs(p), abs(q)) for p, q, allowed in pairs)
+
+
+def reversed_point(point: Point, total: float) -> Point:
+    """The same equilibrium on the branch of length ``total`` followed the other way."""
+    tangent = None
+    if point.tangent is not None:
+        tangent = point.tangent.copy()
+        tangent.scale(-1.0)
+    return replace(point, arclength=total - point.arclength, tangent=tangent, slope=-point.slope)
+
+
+def reversed_branch(branch: Branch) -> Branch:
+    """The same branch followed the other way, from its end."""
+    total = branch.points[-1].arclength
+    points = {id(p): reversed_point(p, total) for p in branch.points}
+    special = [
+        replace(s, point=points[id(s.point)], negative_before=s.negative_after, negative_after=s.negative_before)
+        for s in branch.special
+    ]
+    out = Branch(branch.name, branch.parent, branch.depth, list(points.values()), special)
+    out.renumber()
+    return out
 
 
 def near(a: Point, b: Point, steps: float = 2.0) -> bool:

@@ -38,9 +38,9 @@ from petsc4py import PETSc
 
 from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError
-from rodfem.loci.bordered import Bordered
 from rodfem.loci.plane import Node, Plane
 from rodfem.newton import ROUND_OFF, TOLERANCE
+from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import combine
 
 DIFFERENCE = 1e-4
@@ -82,7 +82,7 @@ class Singular:
         self.psi: list[PETSc.Vec] = []
         self._adopt(vectors)
         follower.inertia.assemble(vectors[0])  # for its pattern
-        self.bordered = Bordered(follower, len(vectors))
+        self.bordered = Bordered(follower.inertia, len(vectors))
 
     def _adopt(self, vectors: list[PETSc.Vec]) -> None:
         """Border with these vectors from now on, made orthonormal in the metric."""

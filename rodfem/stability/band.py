@@ -64,6 +64,23 @@ def decide(inertia: Inertia, x: PETSc.Vec) -> Decision:
     return Decision(Index(index.negative + negative, zero + known), inertia.tolerance, theta, doubt)
 
 
+def resolve(inertia: Inertia, x: PETSc.Vec) -> tuple[int, int]:
+    """Least and greatest index of the state ``x``, small eigenvalues judged by their Rayleigh quotients.
+
+    Those within the tolerance of zero are told from zero down to their round-off; what is left open between the two
+    numbers is zero to working accuracy.  Modes of symmetries are left out.
+    """
+    index = inertia.count(x)
+    near = index.zero - inertia.system.active_drifts()
+    if near <= 0:
+        return index.negative, index.negative
+    theta, vectors = inertia.nearest(near + SPARE, accuracy=1e-8)
+    chosen = np.argsort(abs(theta))[:near]
+    doubt = np.array([quotient_error(inertia.matrix, vectors[i]) for i in chosen])
+    theta = np.array([vectors[i].dot(inertia.matrix * vectors[i]) for i in chosen]) + inertia.shift
+    return index.negative + int((theta < -doubt).sum()), index.negative + int((theta <= doubt).sum())
+
+
 def quotient_error(matrix: PETSc.Mat, y: PETSc.Vec) -> float:
     """Ten times the change of ``y.Sy`` by independent relative errors eps of all entries of S."""
     starts, columns, values = matrix.getValuesCSR()

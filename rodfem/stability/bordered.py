@@ -5,18 +5,17 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError
-from rodfem.stability.inertia import inertia_factors
+from rodfem.stability.inertia import Inertia, inertia_factors
 
 
 class Bordered:
     """The symmetric matrix ``S`` of a state with dense borders, its LDL^t factors and its count."""
 
-    def __init__(self, follower: Follower, borders: int) -> None:
-        """Allocate for a number of borders."""
-        self.inertia, self.k = follower.inertia, borders
-        self.system = follower.system
+    def __init__(self, inertia: Inertia, borders: int) -> None:
+        """Allocate for a number of borders, with the pattern of the matrix that ``inertia`` has assembled."""
+        self.inertia, self.k = inertia, borders
+        self.system = inertia.system
         self.comm, self.last = self.system.comm, self.system.has_scalars
         self.extra = borders if self.last else 0
         self.n = self.system.fields.unknowns

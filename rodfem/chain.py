@@ -1,0 +1,75 @@
+"""Indices along a branch: its rows and its special points tell one story.
+
+From row to row the index changes by exactly what the special points in between say, each with its own index before and
+after.  A row allows an interval: eigenvalues that are zero within the tolerance of the count may be of either sign.
+Where the intervals of two neighbours have nothing in common the chain is broken: an eigenvalue has crossed zero unseen,
+or a number is wrong.  A branch keeps the breaks that no smaller step explains in :attr:`Branch.unexplained`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from rodfem.branch import BRANCH_POINT, FOLD, Branch, Point, Special, Unexplained
+
+Interval = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A point of a branch with the least and the greatest index that its smallest eigenvalues leave open."""
+
+    point: Point
+    low: int
+    high: int
+
+    @property
+    def decided(self) -> bool:
+        """Whether its index is known."""
+        return self.low == self.high
+
+    def crossing(self, other: Row) -> list[int]:
+        """Numbers of the eigenvalues that have changed sign between two rows; one that is zero at either has not."""
+        return list(range(self.high, other.low)) or list(range(other.high, self.low))
+
+
+def chained(low: int, high: int, specials: Sequence[Special], last_low: int, last_high: int) -> bool:
+    """Whether special points in order lead from an index between ``low`` and ``high`` to one between the others."""
+    intervals = [(low, high)]
+    for special in specials:
+        intervals += [(special.negative_before,) * 2, (special.negative_after,) * 2]
+    intervals.append((last_low, last_high))
+    return all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(intervals[::2], intervals[1::2], strict=True))
+
+
+def breaks(points: Sequence[Point], specials: Sequence[Special]) -> list[Unexplained]:
+    """Neighbours among rows in order of arclength, some of them special points, whose indices do not agree."""
+    at = {id(s.point): s for s in specials if s.kind in (FOLD, BRANCH_POINT)}
+    persistent = persistent_zeros(points)
+    found = []
+    for a, b in pairwise(points):
+        left, right = _beside(a, at, persistent, after=True), _beside(b, at, persistent, after=False)
+        if left[1] < right[0] or right[1] < left[0]:
+            found.append(Unexplained(a, b, left[0], right[0]))
+    return found
+
+
+def persistent_zeros(points: Sequence[Point]) -> int:
+    """Number of eigenvalues that are zero at every row: of symmetries, or of families of equilibria at one load."""
+    return min((p.zero for p in points), default=0)
+
+
+def _beside(point: Point, at: dict[int, Special], persistent: int, after: bool) -> Interval:
+    """Least and greatest index right before or after a row."""
+    special = at.get(id(point))
+    if special is not None:
+        index = special.negative_after if after else special.negative_before
+        return index, index
+    return point.negative, point.negative + max(point.zero - persistent, 0)
+
+
+def explain(branch: Branch) -> None:
+    """Check the whole branch, which must be in order, and keep what is not explained."""
+    branch.unexplained = breaks(branch.points, branch.special)
