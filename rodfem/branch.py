@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from petsc4py import PETSc
 
 FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
+NOT_TRACED = "not traced"
 IMPERFECT = "imperfect bifurcation"
 """A branch point that an imperfection has taken apart, where steps of continuation do not resolve its pieces."""
 FLUTTER, DIVERGENCE = "flutter", "divergence"
@@ -131,7 +132,7 @@ class Branch:
     depth: int
     points: list[Point] = field(default_factory=list)
     special: list[Special] = field(default_factory=list)
-    ended: str = "not traced"
+    ended: str = NOT_TRACED
     unexplained: list[Unexplained] = field(default_factory=list)
 
     def insert(self, special: Special) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import inf
 
 from rodfem.branch import BRANCH_POINT, FOLD, Branch, Point, Special, Unexplained
 
@@ -73,3 +74,25 @@ def _beside(point: Point, at: dict[int, Special], persistent: int, after: bool) 
 def explain(branch: Branch) -> None:
     """Check the whole branch, which must be in order, and keep what is not explained."""
     branch.unexplained = breaks(branch.points, branch.special)
+
+
+def merge_doubles(branch: Branch) -> None:
+    """Make one of neighbouring branch points that the error of the discretisation does not tell apart.
+
+    A mesh that lacks a symmetry of the rod splits a multiple eigenvalue: its zeros are apart by no more than the error.
+    """
+    for p, q in list(pairwise(branch.special)):
+        apart = abs(p.point.load - q.point.load)
+        if (
+            p.kind == q.kind == BRANCH_POINT
+            and p.zero_of == q.zero_of == "mu"
+            and p.point.mesh == q.point.mesh
+            and apart <= p.error_estimate + q.error_estimate < inf
+        ):
+            q.null_vectors = p.null_vectors + q.null_vectors
+            q.negative_before = p.negative_before
+            q.point.zero += p.multiplicity
+            q.note = f"{q.multiplicity} eigenvalues that this mesh does not tell apart vanish within {apart:.0e}"
+            branch.special.remove(p)
+            branch.points = [point for point in branch.points if point is not p.point]
+            branch.renumber()

@@ -97,6 +97,7 @@ def _mesh_data(fields: Fields) -> dict[str, Any]:
 
 
 def _branch_data(branch: Branch) -> dict[str, Any]:
+    rows = {id(p): i for i, p in enumerate(branch.points)}
     columns: dict[str, list[Any]] = {name: [_plain(getattr(p, name)) for p in branch.points] for name in COLUMNS}
     if any(np.isfinite(p.estimate) for p in branch.points):
         columns["estimate"] = [_plain(p.estimate) for p in branch.points]
@@ -114,6 +115,7 @@ def _branch_data(branch: Branch) -> dict[str, Any]:
         "ended": branch.ended,
         "columns": columns,
         "special": [_special_data(s) for s in branch.special],
+        "unexplained": [{"row": rows[id(u.a)], "before": u.before, "after": u.after} for u in branch.unexplained],
     }
 
 
@@ -135,6 +137,7 @@ def _special_data(s: Special) -> dict[str, Any]:
         "meets": list(s.meets) if s.meets else None,
         "omega2": _plain(s.omega2),
         "law": None if s.law is None else asdict(s.law),
+        "unfolding": _plain(s.unfolding),
         "note": s.note,
     }
 

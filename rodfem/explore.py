@@ -6,9 +6,10 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 from petsc4py import PETSc
 
-from rodfem.bifurcation import directions, start_branch
+from rodfem.bifurcation import COUPLED, coupling_of, directions, start_branch
 from rodfem.branch import BRANCH_POINT, Branch, Point, Special
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError
@@ -17,6 +18,7 @@ from rodfem.pitchfork import law_of
 from rodfem.search.deflation import SAME, further, states_at
 from rodfem.search.orbit import Orbits
 from rodfem.stability.blocks import Blocks
+from rodfem.stability.bordered import Bordered
 from rodfem.stability.rank import rank_of
 from rodfem.topology import link
 from rodfem.tracer import Tracer, equivalent, near
@@ -123,7 +125,36 @@ class Explorer(Tracer):
                 "choose constants that make it so."
             )
         follower.system.set_phase(x)
-        return follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
+        point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
+        family = point.zero - follower.system.active_drifts()
+        if family > 0:
+            self._leave_family(point, family, stop > start)
+        return point
+
+    def _leave_family(self, point: Point, freedoms: int, increasing: bool) -> None:
+        """Give a first point that may move freely at its load the tangent along which the load changes.
+
+        With the null vectors ``phi`` of ``S`` as borders, ``S w = -F_lam`` is solvable where ``phi . F_lam = 0``: the
+        load does no work on the free motion, and the branch goes on with the tangent ``(w, 1)``, across the family.
+        """
+        follower, system = self.follower, self.follower.system
+        follower.inertia.count(point.x)
+        vectors = [v.copy() for v in follower.inertia.nearest(freedoms, accuracy=1e-8)[1]]
+        if max(coupling_of(follower, point.x, v) for v in vectors) > COUPLED:
+            raise SceneError(
+                f"The first state, at {self.scene.load} = {point.load:g}, may move freely at this load, and is not the "
+                f"state that a small {self.scene.load} leads on from: start the range at another load, or give the "
+                "scene a start that is in equilibrium under the load, too."
+            )
+        follower.inertia.assemble(point.x)
+        bordered = Bordered(follower.inertia, freedoms)
+        bordered.factor([follower.inertia.metric * v for v in vectors])
+        right = follower.inertia.border.copy()
+        right.scale(-1.0)
+        tangent, _ = bordered.solve(right, np.zeros(freedoms))
+        system.set_load(tangent, 1.0)
+        tangent.scale((1.0 if increasing else -1.0) / system.norm(tangent))
+        point.tangent, point.slope = tangent, system.scalar(tangent)
 
     def _check_rank(self, x: PETSc.Vec) -> None:
         """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others."""

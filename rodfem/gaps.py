@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from rodfem.branch import Point, Special
 from rodfem.continuation import Follower
+from rodfem.locate import ROUND_OFF
 from rodfem.meshes import Meshes
 from rodfem.newton import correct
 from rodfem.unfolding import Unfolded, unfold
@@ -52,9 +53,10 @@ class Gaps:
         if found is None:
             return None
         special.unfolding = found.size
-        if found.size <= found.noise or self._of_the_mesh(special, found):
+        if found.size <= found.noise:
+            sharpen(follower, special, found)
             return None
-        return Gap(special, found)
+        return None if self._of_the_mesh(special, found) else Gap(special, found)
 
     def _of_the_mesh(self, special: Special, found: Unfolded) -> bool:
         """Whether the mesh takes the branch point apart, not the rod: a mesh need not have a symmetry of the scene."""
@@ -84,6 +86,21 @@ class Gaps:
             apart.axpy(-1.0, point.x)
             least = min(least, follower.system.norm(apart))
         return max(SHARE * least, LEAST)
+
+
+def sharpen(follower: Follower, special: Special, found: Unfolded) -> None:
+    """Give a branch point the state and the load that solve its equations, where they are those that were located."""
+    if abs(found.load - special.point.load) > 10 * special.located_to:
+        return
+    special.point = replace(
+        special.point,
+        x=found.x,
+        load=found.load,
+        ordinate=follower.shape.ordinate(found.x),
+        energy=follower.energy(found.x),
+        stretch=follower.shape.stretch(found.x),
+    )
+    special.located_to = ROUND_OFF * max(1.0, abs(found.load))
 
 
 def arms(follower: Follower, gap: Gap) -> list[Point]:

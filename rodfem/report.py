@@ -184,6 +184,8 @@ class Report:
                     self.say(f"    double eigenvalue omega^2 = {number(s.omega2, s.omega2_error)}")
                 if s.note:
                     self.say(f"    {s.note}")
+            for unexplained in branch.unexplained:
+                self.warn(f"{branch.name}: {unexplained}")
 
     def spectra(self, branches: Sequence[Branch]) -> None:
         """Print the left-most eigenvalues of the special points, if they were asked for."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import isnan
+from math import inf, isnan
 
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
 from rodfem.accuracy import zero_stretch
 from rodfem.bifurcation import find_special, midpoint, renew
-from rodfem.branch import BRANCH_POINT, END, IMPERFECT, USER, Branch, Point, Special
-from rodfem.chain import Row, chained, explain
+from rodfem.branch import BRANCH_POINT, END, IMPERFECT, NOT_TRACED, USER, Branch, Point, Special
+from rodfem.chain import Row, chained, explain, merge_doubles
 from rodfem.continuation import VERTICAL, Follower, distance, follow, hermite
 from rodfem.errors import ConvergenceError
 from rodfem.gaps import Gap, Gaps
@@ -28,10 +28,16 @@ BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
 
 
-HALVINGS = 5
+HALVINGS = 4
 """How many times a piece of a branch is halved until its special points explain the indices of its ends."""
+SHORTER = 2
+"""How many times steps are made eight times shorter where the indices are not explained."""
 PATIENCE = 4
 """Rows with an eigenvalue near zero after which it is asked whether it stays zero."""
+
+
+class Unresolved(Exception):
+    """The special points found in a step do not explain the indices at its ends."""
 
 
 class Tracer:
@@ -51,6 +57,8 @@ class Tracer:
         self.gaps = Gaps(self.meshes)
         self.warned = False
         self._open: list[Point] = []
+        self._before: Point | None = None
+        self._short = (-inf, inf, 0)
         self._level = 0
 
     @property
@@ -69,7 +77,8 @@ class Tracer:
     def trace(self, branch: Branch) -> None:
         """Follow a branch to its end, insert its special points, estimate errors, hand it on as finished."""
         self.branches.append(branch)
-        self.report.branch(branch)
+        if branch.ended == NOT_TRACED:
+            self.report.branch(branch)
         self.use(branch.points[-1].mesh)
         self.watch = Watch(self.meshes, (self.low, self.high))
         self.follower.damp(0)
@@ -95,6 +104,7 @@ class Tracer:
             back.ended = f"no convergence: {trouble}"
             self.report.warn(str(trouble))
         branch = reversed_branch(back)
+        branch.ended = back.ended
         if back.ended == "closed loop":
             self.branches.append(back)
             self._finish(back)
@@ -107,8 +117,9 @@ class Tracer:
 
     def _follow(self, branch: Branch) -> None:
         """Follow a branch to its end; where its mesh is too coarse, from there on with another."""
-        history, begun = list(branch.points), False
-        self._open = [history[-1]]
+        special = {id(s.point) for s in branch.special}
+        history, begun = [p for p in branch.points if id(p) not in special], False
+        self._open, self._before, self._short = [history[-1]], None, (-inf, inf, 0)
         while True:
             try:
                 self.watch.row(history[-1], self.follower)
@@ -134,7 +145,7 @@ class Tracer:
             branch.points = [moved.get(id(p), p) for p in branch.points]
             history = [new for _, new in pairs]
             self.follower = follower
-            self._open = [history[-1]]
+            self._open, self._before = [history[-1]], None
             self.report.mesh(follower.system, trouble.point.load, str(trouble))
         last = history[-1].arclength
         branch.points = [p for p in branch.points if p.arclength <= last]
@@ -143,10 +154,7 @@ class Tracer:
 
     def _advance(self, branch: Branch, history: list[Point]) -> None:
         """Append points until the branch ends, which :attr:`Branch.ended` then says."""
-        follower = self.follower
-        for item in follow(
-            follower, history, self.plan.steps, (self.low, self.high), lambda p: self.gaps.reach(follower, p)
-        ):
+        for item in follow(self.follower, history, self.plan.steps, (self.low, self.high), self._reach):
             if isinstance(item, str):
                 branch.ended = item
                 self._close(branch)
@@ -163,8 +171,8 @@ class Tracer:
                 return
             try:
                 reason = self._between(branch, previous, item)
-            except Gap:  # this point is on another branch: back, to smaller steps
-                self._open = [previous]
+            except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
+                self._open, self._before = [previous], None
                 self._advance(branch, history)
                 return
             if reason:
@@ -193,7 +201,8 @@ class Tracer:
                 reason = self._meeting(branch, special)
                 branch.insert(special)
                 self.report.special(branch, special)
-                if reason:
+                if reason:  # it ends before a row that was taken for one of it
+                    branch.points = [p for p in branch.points if p.arclength <= special.point.arclength]
                     return reason
             else:
                 branch.insert(special)
@@ -207,22 +216,51 @@ class Tracer:
         that stays zero to working accuracy belongs to a family of equilibria at one load, and is not waited for.
         """
         rows = [self.here(p) for p in self._open]
-        self._level = rows[0].zero
+        self._level = min(rows[0].zero, b.zero)
         if b.zero > self._level:
             self._open.append(b)
             if len(self._open) <= PATIENCE or self._row(b).decided:
                 return []
         if len(rows) > 1 or a.negative != b.negative or a.slope * b.slope < 0:
+            was = rows[0].negative, rows[0].slope > 0
             for point in (*rows, b):
                 renew(self.follower, point)
-        self._open = [b]
+            if was != (rows[0].negative, rows[0].slope > 0) and self._before is not None:
+                rows.insert(0, self.here(self._before))  # what changes does so before that row
+        self._before, self._open = rows[-1], [b]
         return self._examined(self._among([*rows, b]))
 
     def _among(self, points: Sequence[Point]) -> list[Special]:
-        """Special points among rows, all but the first and the last of which have an eigenvalue near zero."""
-        rows = [self._row(p) for p in points]
+        """Special points among rows, all but the first and the last of which have an eigenvalue near zero.
+
+        Raises :class:`Unresolved` where they do not explain the indices, and shorter steps have not been tried.
+        """
+        rows, found = [self._row(p) for p in points], []
+        why: list[str] = []
         sure = [rows[0], *(row for row in rows[1:-1] if row.decided), rows[-1]]
-        return [special for p, q in pairwise(sure) for special in self._special_between(p, q)]
+        for p, q in pairwise(sure):
+            specials = self._special_between(p, q, why)
+            found += specials
+            if not chained(p.low, p.high, specials, q.low, q.high):
+                self._shorten(p.point, q.point)
+        for trouble in why:
+            self.report.warn(trouble)
+        return found
+
+    def _shorten(self, a: Point, b: Point) -> None:
+        """Shorten the steps from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are short already."""
+        until, _, tries = self._short
+        tries = tries + 1 if a.arclength < until else 1
+        if tries <= SHORTER:
+            length = b.arclength - a.arclength
+            self._short = b.arclength + length, length / 8, tries
+            raise Unresolved
+
+    def _reach(self, point: Point) -> float:
+        """Largest step from a point: near gaps, and where the indices are not explained, short ones."""
+        until, largest, _ = self._short
+        near = self.gaps.reach(self.follower, point)
+        return min(near, largest) if point.arclength < until else near
 
     def _close(self, branch: Branch) -> None:
         """Insert special points among rows at the end of a branch that have an eigenvalue near zero."""
@@ -250,10 +288,10 @@ class Tracer:
                     special.kind, special.note = IMPERFECT, str(gap)
         return specials
 
-    def _special_between(self, p: Row, q: Row, halvings: int = HALVINGS) -> list[Special]:
+    def _special_between(self, p: Row, q: Row, troubles: list[str], halvings: int = HALVINGS) -> list[Special]:
         """Folds and branch points between two rows, on halves of the piece where a whole one is not resolved.
 
-        It is where they explain the indices of both rows.
+        It is where they explain the indices of both rows.  ``troubles`` gets sentences on pieces that are not.
         """
         found, why = [], ""
         persistent = max(self._level - self.follower.system.active_drifts(), 0)
@@ -266,12 +304,12 @@ class Tracer:
         middle = midpoint(self.follower, p.point, q.point) if halvings else None
         if middle is None:
             if why:
-                self.report.warn(
-                    f"A special point between loads {p.point.load:.8g} and {q.point.load:.8g} is missing: {why}"
-                )
+                loads = f"{p.point.load:.8g} and {q.point.load:.8g}"
+                troubles.append(f"A special point between loads {loads} is missing: {why}")
             return found
         row = self._row(middle)
-        return self._special_between(p, row, halvings - 1) + self._special_between(row, q, halvings - 1)
+        first = self._special_between(p, row, troubles, halvings - 1)
+        return first + self._special_between(row, q, troubles, halvings - 1)
 
     def _users(self, branch: Branch, p: Point, q: Point, a: Point, b: Point) -> list[Special]:
         """User points between two neighbours among which the load is monotone."""
@@ -288,7 +326,7 @@ class Tracer:
                     slope = self.follower.system.scalar(direction)
                     if slope:
                         s = min(max(s + (load - self.follower.system.scalar(x)) / slope, p.arclength), q.arclength)
-                point = self.user(hermite(a, b, s)[0], load, s, increasing=q.load > p.load)
+                point = self._user_between(a, b, load, (p, q), s)
                 found.append(Special(USER, point, p.negative, q.negative, 1e-12 * max(1.0, abs(load))))
                 found[-1].negative_before = found[-1].negative_after = point.negative
         return found
@@ -300,20 +338,43 @@ class Tracer:
         a, b = map(self.here, branch.points)
         for special in self._users(branch, a, b, a, b):
             self.watch.special(special)
-            p, system = special.point, self.follower.system
-            guess = hermite(a, b, p.arclength)[0]
-            if distance(system, guess, p.x) < 0.5 * distance(system, a.x, p.x):  # not fallen back to the trunk
-                branch.insert(special)
-                self.report.special(branch, special)
+            branch.insert(special)
+            self.report.special(branch, special)
+
+    def _user_between(self, a: Point, b: Point, load: float, rows: tuple[Point, Point], s: float) -> Point:
+        """Point at exactly ``load`` between two ``rows`` of the piece from ``a`` to ``b``, expected at arclength ``s``.
+
+        Close to a branch point Newton's method at a fixed load fails, or ends on the other branch.  On planes across
+        the branch it does not, and the load is a function of arclength there, whose zero is found.
+        """
+        system, (p, q), guess = self.follower.system, rows, hermite(a, b, s)[0]
+        system.set_phase(guess)
+        x, outcome = self.follower.at_load(guess, load, reach=1.0)
+        on_branch = outcome.converged and (
+            a.x is not p.x or distance(system, guess, x) < 0.5 * distance(system, a.x, x) or p.load == load
+        )
+        if not on_branch:
+            if (p.load - load) * (q.load - load) >= 0:
+                raise ConvergenceError(self._no_equilibrium(load))
+
+            def beyond(s: float) -> float:
+                return system.scalar(solve_at(self.follower, lambda t: hermite(a, b, t), s)) - load
+
+            margin = 1e-9 * (q.arclength - p.arclength)
+            s = brentq(beyond, p.arclength + margin, q.arclength - margin, xtol=1e-15)
+            x = solve_at(self.follower, lambda t: hermite(a, b, t), s)
+            system.set_load(x, load)
+        return self.follower.point(x, s, self.follower.load_tangent(x, q.load > p.load), outcome)
+
+    def _no_equilibrium(self, load: float) -> str:
+        return f"No equilibrium at {self.scene.load} = {load:g} between two points of the branch: use another load."
 
     def user(self, guess: PETSc.Vec, load: float, s: float, increasing: bool) -> Point:
         """Point at exactly ``load`` from a guess; raises :class:`ConvergenceError`."""
         self.follower.system.set_phase(guess)
         x, outcome = self.follower.at_load(guess, load, reach=1.0)
         if not outcome.converged:
-            raise ConvergenceError(
-                f"No equilibrium at {self.scene.load} = {load:g} between two points of the branch: use another load."
-            )
+            raise ConvergenceError(self._no_equilibrium(load))
         return self.follower.point(x, s, self.follower.load_tangent(x, increasing), outcome)
 
     def _meeting(self, branch: Branch, special: Special) -> str:
@@ -445,6 +506,9 @@ class Tracer:
             branch.renumber()
         if self.plan.error_bars or self.plan.accuracy:
             self._error_bars(branch)
+            merge_doubles(branch)
+        for unexplained in branch.unexplained:
+            self.report.warn(str(unexplained))
         self.report.finished(branch)
         self.watch.summary(branch, self.report)
         self.finished()

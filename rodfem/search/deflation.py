@@ -27,10 +27,12 @@ from rodfem.newton import correct
 from rodfem.report import Report
 from rodfem.search.deflated import FLOW, MOST, DeflatedNewton
 from rodfem.search.guesses import turned_state
-from rodfem.search.mirror import mirrors
+from rodfem.search.mirror import Mirror, mirrors
 from rodfem.symmetries import is_uniform_ring
 from rodfem.system import combine
 
+IMAGE = 1e-12
+"""Relative difference of stored energies above which a state is no mirror image of another."""
 SAME = 1e-5
 """Equilibria nearer to each other than this, in the metric, are one."""
 LEAST, GREATEST = 0.3, 3.0
@@ -52,11 +54,15 @@ class Try:
 
 @dataclass
 class Tally:
-    """What a search did: the load in words, all tries in order, and the mirrors that the scene turned out to have."""
+    """What a search did: the load in words, all tries in order, and the mirrors that the scene turned out to have.
+
+    ``nearly`` counts equilibria that are nearly mirror images of others, which an imperfection makes different ones.
+    """
 
     load: str
     tries: list[Try] = field(default_factory=list)
     mirrors: list[str] = field(default_factory=list)
+    nearly: int = 0
 
     def count(self, outcome: str) -> int:
         """Number of tries that ended so."""
@@ -67,8 +73,9 @@ class Tally:
         counts = Counter(t.outcome for t in self.tries)
         words = ", ".join(f"{counts[outcome]} {outcome}" for outcome in (NEW, KNOWN, INADMISSIBLE, FAILED))
         images = "; ".join(self.mirrors) or "none"
+        nearly = f"  {self.nearly} new: nearly, but not exactly, mirror images of others\n" if self.nearly else ""
         return (
-            f"Further equilibria at {self.load} by deflation, {len(self.tries)} tries: {words}\n"
+            f"Further equilibria at {self.load} by deflation, {len(self.tries)} tries: {words}\n{nearly}"
             f"  states that a symmetry carries into each other count as one (mirror images: {images})\n"
             "  no proof that there are no others: more tries or another seed may find some"
         )
@@ -140,9 +147,29 @@ class Deflation(DeflatedNewton):
         """Add a state and its images to what is known."""
         self.bases.append(x)
         self.energies.append(self.follower.energy(x))
-        for image in [x, *(mirror(self.system, x) for mirror in self.mirrors)]:
-            if self.nearest_known(image) > SAME:
-                self.known.add(image)
+        if self.nearest_known(x) > SAME:
+            self.known.add(x)
+        for mirror in list(self.mirrors):
+            image = mirror(self.system, x)
+            if mirror in self.mirrors and self.nearest_known(image) > SAME:
+                self._deflate_image(image, self.energies[-1], mirror)
+
+    def _deflate_image(self, image: PETSc.Vec, energy: float, mirror: Mirror) -> None:
+        """Add the mirror image of an equilibrium to what is known; without it, if it is none, the mirror goes.
+
+        An imperfection below what the test of the mirrors sees makes the image another equilibrium, with another
+        energy: a pole beside its root would hide it from Newton's method.
+        """
+        point, _ = self._judge(image)
+        scale = max(abs(energy), self.follower.inertia.scale)
+        if point is not None and abs(point.energy - energy) > IMAGE * scale:
+            self.found.append(point)
+            self.tally.nearly += 1
+            self.mirrors.remove(mirror)
+            self.tally.mirrors.remove(str(mirror))
+            self._deflate(point.x)
+        else:
+            self.known.add(image)
 
     def _judge(self, x: PETSc.Vec) -> tuple[Point | None, str]:
         """Polish a candidate by the plain Newton method; the point, if it is a new equilibrium, and the outcome."""
