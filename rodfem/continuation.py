@@ -33,6 +33,8 @@ LEVEL = 0.05
 correction was so small that it cannot have changed its sign."""
 VERTICAL = 1e-8
 """A branch along which the load changes by less than this (of its span a unit of arclength) is one of equal loads."""
+STILL = 1e-6
+"""Damping of Newton's method at a start that may move freely at its load, over the lowest bending eigenvalue."""
 STRAYED = 0.3
 """Distance from the start beyond which an equilibrium is not the one that the start stands for."""
 ON_BOUND = 1e-8
@@ -111,6 +113,11 @@ class Equilibria:
         x, outcome = self.at_load(guess, load)
         if outcome.converged and (outcome.moved < STRAYED or self.is_stable(x)):
             return x, outcome
+        damping, self.system.damping = self.system.damping, STILL * self.system.stiffness_scale
+        still, found = self.at_load(guess, load)  # the start may be one of a family, along which it need not move
+        self.system.damping = damping
+        if found.converged and found.moved < STRAYED:
+            return still, found
         other = self.downhill(load)
         return other if other[1].converged else (x, outcome)
 

@@ -248,7 +248,7 @@ class Tracer:
         return found
 
     def _shorten(self, a: Point, b: Point) -> None:
-        """Shorten the steps from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are short already."""
+        """Shorten steps from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are short already."""
         until, _, tries = self._short
         tries = tries + 1 if a.arclength < until else 1
         if tries <= SHORTER:

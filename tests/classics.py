@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import ufl
+from rows import verify
 
 from forms import loads
 from forms.energy import bending
@@ -80,7 +81,9 @@ def explore(
     """Trace the branches of a conservative scene."""
     solver = Follower(System(scene, Discretization(formulation, elements, 6)))
     plan = Plan(scene.span, at=stops, depth=depth, steps=WIDE, error_bars=False)
-    return Found(solver, Explorer(solver, plan, Report(quiet=True), lambda: None).run())
+    found = Found(solver, Explorer(solver, plan, Report(quiet=True), lambda: None).run())
+    verify(solver, found.branches)
+    return found
 
 
 def sweep(scene: Scene, elements: int = 4) -> Found:

@@ -10,6 +10,8 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 
+from rows import verify
+
 from rodfem.branch import Branch, Point, Special
 from rodfem.continuation import Follower
 from rodfem.explore import Explorer
@@ -76,7 +78,10 @@ def explored(
 ) -> list[Branch]:
     """Branches of the demo."""
     plan = Plan(span, at=at, depth=depth, error_bars=error_bars)
-    return Explorer(follower(formulation, elements, degree, constants), plan, Report(quiet=True), lambda: None).run()
+    solver = follower(formulation, elements, degree, constants)
+    branches = Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+    verify(solver, branches)
+    return branches
 
 
 def specials(branch: Branch, kind: str) -> list[Special]:

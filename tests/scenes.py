@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from rows import verify
 
 from rodfem.branch import Branch, Point
 from rodfem.continuation import Follower
@@ -56,6 +57,7 @@ class Found:
         self.scene, self.follower = scene, Follower(System(scene, discretization))
         plan = Plan(scene.span, at=at, depth=depth)
         self.branches = Explorer(self.follower, plan, Report(quiet=True), lambda: None).run()
+        verify(self.follower, self.branches)
 
     def __getitem__(self, name: str) -> Branch:
         """Branch of that name."""

@@ -1,0 +1,29 @@
+"""Every row of a diagram against counts at its own state, and the chain of indices along every branch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rodfem import judge
+from rodfem.branch import BRANCH_POINT, FOLD, Branch
+from rodfem.continuation import Follower
+
+
+def verify(follower: Follower, branches: Sequence[Branch], explained: bool = True) -> None:
+    """Assert that each recorded index is that of two shifts at the row's own state, and that all changes are explained.
+
+    What the prediction's factors tell and what these tell is independent: other matrices, other factors, other code.
+    """
+    for branch in branches:
+        special = {id(s.point): s for s in branch.special if s.kind in (FOLD, BRANCH_POINT)}
+        for row, point in enumerate(branch.points):
+            if point.mesh != follower.mesh:
+                continue
+            follower.system.set_phase(point.x)
+            verdict = judge(follower, point.x, "count")
+            recorded, counted = (point.negative, point.zero), (verdict.negative, verdict.zero)
+            assert recorded == counted, f"{branch.name}, row {row}, load {point.load}: {recorded}, not {counted}"
+            if id(point) in special:
+                before, after = special[id(point)].negative_before, special[id(point)].negative_after
+                assert point.negative <= min(before, after), f"{branch.name}, row {row}"
+        assert not (explained and branch.unexplained), [str(u) for u in branch.unexplained]
