@@ -19,6 +19,7 @@ from mpi4py import MPI
 from rodfem import compat
 from rodfem.ends import Ring
 from rodfem.errors import SceneError
+from rodfem.kinds import reals, whole
 from rodfem.places import needs_centreline
 from rodfem.scene import Scene
 from rodfem.turning import ByAngle, ByQuaternion, Turning
@@ -54,6 +55,10 @@ class Discretization:
 
     def __post_init__(self) -> None:
         """Check the values; raises :class:`SceneError`."""
+        for name, example in (("elements", 8), ("degree", 6)):
+            object.__setattr__(self, name, whole(name, getattr(self, name), example))
+        if self.vertices is not None:
+            object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
         if self.formulation not in FORMULATIONS:
             raise SceneError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(FORMULATIONS)}.")
         if self.elements < 1:

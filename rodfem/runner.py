@@ -61,7 +61,7 @@ def run(
     loses no finished one.  Raises :class:`~rodfem.errors.SceneError` for bad input, before any computation, and
     :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
     """
-    plan = plan or Plan(scene.span)
+    plan = plan or Plan()
     output = output or Path("results") / scene.name
     if scene.conservative:
         compat.require_real_petsc()
@@ -110,7 +110,7 @@ def _chosen(scene: Scene, formulation: str, plan: Plan, report: Report, comm: MP
     if scene.conservative:
         return start_mesh(scene, formulation, plan.accuracy, comm)
     number = plan.spectrum or FREQUENCIES
-    mesh, change = frequency_mesh(scene, formulation, plan.accuracy, plan.span, number, comm)
+    mesh, change = frequency_mesh(scene, formulation, plan.accuracy, plan.over(scene), number, comm)
     report.frequency_mesh(mesh, number, change, plan.accuracy)
     return mesh
 
@@ -124,7 +124,7 @@ def _save(explorer: Explorer | Sweep, clock: Clock, output: Path) -> None:
 def _save_diagram(explorer: Explorer | Sweep, clock: Clock, output: Path) -> None:
     systems, plan = [solver.system for solver in explorer.solvers], explorer.plan
     if systems[0].comm.rank == 0:
-        save_json(as_data(explorer.branches, systems, clock, plan.span, plan.accuracy), output / "diagram.json")
+        save_json(as_data(explorer.branches, systems, clock, explorer.span, plan.accuracy), output / "diagram.json")
 
 
 def _loci(
@@ -140,7 +140,8 @@ def _loci(
     if plan.locus is None:
         return
     name, low, high = plan.locus
-    load = (min(plan.span), max(plan.span))
+    span = plan.over(solvers[0].system.scene)
+    load = (min(span), max(span))
     saved: list[dict] = []
     for branch in branches:
         for special in branch.special:

@@ -35,7 +35,8 @@ class Tracer:
         """Start with no branch; the plan must have passed its :meth:`Plan.check`."""
         self.follower, self.plan, self.report, self.finished = follower, plan, report, finished
         self.scene = follower.system.scene
-        self.low, self.high = sorted(plan.span)
+        self.span = plan.over(self.scene)
+        self.low, self.high = sorted(self.span)
         self.branches: list[Branch] = []
         self.meshes = Meshes(follower, plan.accuracy)
         self.warned = False
@@ -253,7 +254,7 @@ class Tracer:
     def _singular_end(self, branch: Branch, last: Point) -> None:
         """Report a branch point on the very end of the range, located on a piece of the branch that goes past it."""
         parameter, load = self.scene.parameters[self.scene.load], last.load
-        beyond = load + BEYOND * (load - sum(self.plan.span) / 2)
+        beyond = load + BEYOND * (load - sum(self.span) / 2)
         previous = self.here(branch.points[-2])
         if not parameter.admissible[0] < beyond < parameter.admissible[1] or previous.x is last.x:
             return
