@@ -21,7 +21,8 @@ from forms.kinematics import RODS, UNDEFORMED
 from rodfem.checks import check_kinds, check_scene
 from rodfem.ends import Attachment, Constants, Constraint, End, OfConstants, OfPlace, Ring, Vector
 from rodfem.errors import SceneError
-from rodfem.guard import guards_of
+from rodfem.guard import guarded
+from rodfem.roles import Role, changes
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,12 @@ class Inertia:
     Only frequencies need them, and the stability of states under loads without a potential.
     """
 
-    rho_A: Callable[[Constants], Any] = lambda c: 0.0
-    rho_I: Callable[[Constants], Vector] = lambda c: (1.0, 1.0, 1.0)
+    rho_A: Callable[[Constants], Any] = field(
+        default=lambda c: 0.0, metadata={"role": Role("mass per length", "f(c)", 0)}
+    )
+    rho_I: Callable[[Constants], Vector] = field(
+        default=lambda c: (1.0, 1.0, 1.0), metadata={"role": Role("rotary inertia per length", "f(c)", 3)}
+    )
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,7 @@ class Ordinate:
 
     name: str
     s: float
-    of: Callable[[np.ndarray, np.ndarray], float]
+    of: Callable[[np.ndarray, np.ndarray], float] = field(metadata={"role": Role("ordinate", "of(r, q)")})
     label: str = ""
 
 
@@ -117,28 +122,30 @@ class Scene:
     name: str
     interval: tuple[float, float]
     rod: str
-    energy: Callable[[Any, Any, Constants], Any]
+    energy: Callable[[Any, Any, Constants], Any] = field(metadata={"role": Role("stored energy", "W(v, k, c)")})
     parameters: Mapping[str, Parameter]
     load: str
-    ends: tuple[End, End] | Ring
+    ends: tuple[End, End] | Ring = field(metadata={"places": ("left", "right")})
     ordinate: Ordinate
     span: tuple[float, float]
     title: str = ""
     inertia: Inertia = Inertia()
-    distributed: OfConstants | None = None
-    follower: OfConstants | None = None
-    potential: OfPlace | None = None
+    distributed: OfConstants | None = field(default=None, metadata={"role": Role("distributed force", "f(c)", 3)})
+    follower: OfConstants | None = field(default=None, metadata={"role": Role("distributed follower force", "f(c)", 3)})
+    potential: OfPlace | None = field(
+        default=None, metadata={"role": Role("potential along the rod", "f(x, c)", 0, along=True)}
+    )
     attachments: tuple[Attachment, ...] = ()
     constraints: tuple[Constraint, ...] = ()
     breaks: tuple[float, ...] = ()
     planar: str | None = None
-    start: Callable[[np.ndarray], np.ndarray] | None = None
+    start: Callable[[np.ndarray], np.ndarray] | None = field(default=None, metadata={"role": Role("start", "start(s)")})
     states: str = field(default="straight")
 
     def __post_init__(self) -> None:
         """Check all that can be checked before any computation; raises :class:`SceneError`."""
         check_kinds(self)
-        for field_name, value in guards_of(self).items():
+        for field_name, value in changes(self, guarded).items():
             object.__setattr__(self, field_name, value)
         named = {n: p if isinstance(p, Parameter) else Parameter(float(p)) for n, p in self.parameters.items()}
         object.__setattr__(self, "parameters", named)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from math import cos, cosh, pi
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import ufl
 from mpi4py import MPI
 from rods import run_demo
 
+from rodfem import ends, scene
 from rodfem.continuation import Follower, Steps
 from rodfem.diagram import load_json
 from rodfem.ends import (
@@ -162,6 +164,8 @@ def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
         (held(right=free(ZERO)), "force on the right end is .*: give a function"),  # type: ignore[arg-type]
         ({"energy": lambda v, k: k[0]}, "no function of 3 argument"),
         ({"energy": lambda v, k, c: None}, "energy is None: return"),
+        ({"energy": None}, "energy is None: give a function"),
+        ({"inertia": 1.0}, "inertia is 1.0: give one"),
         ({"energy": lambda v, k, c: np.cosh(k[0])}, "stored energy fails with TypeError.*write it with UFL"),
         ({"constraints": (integral(lambda x, c: x.k[2], 3.0),)}, "value of an integral constraint is 3"),  # type: ignore[arg-type]
         ({"start": lambda s: (cos(s), 0.0, 0.0, 0.0)}, "start fails with TypeError.*array of arclengths"),
@@ -324,6 +328,51 @@ def test_fewer_elements_than_pieces() -> None:
 def test_bad_discretization(make: Callable[[], Discretization]) -> None:
     with pytest.raises(SceneError, match=r"choose|give"):
         make()
+
+
+def raising(*_: object) -> Any:
+    return 1 / 0
+
+
+def takes_functions(owner: type) -> list[str]:
+    """Fields of a dataclass that are annotated as functions."""
+    words = ("Callable", "OfConstants", "OfPlace")
+    return [f.name for f in fields(owner) if any(word in str(f.type) for word in words)]
+
+
+STATED = [x for module in (ends, scene) for x in vars(module).values() if is_dataclass(x) and isinstance(x, type)]
+EVERY = sorted({(owner.__name__, name) for owner in STATED for name in takes_functions(owner)})
+
+
+def with_function(owner: str, name: str) -> Scene:
+    """A scene with a function that raises in one field of one of its parts."""
+    moving = clamped(rotation=lambda c: (1, 0, 0, 0))
+    if owner == "End":
+        of = {name: raising}
+        return Scene(
+            **(GOOD | {"ends": (clamped(), End(**of))} | ({"ends": (End(**of), moving)} if "tion" in name else {}))
+        )  # type: ignore[arg-type]
+    parts: dict[str, Any] = {
+        "Inertia": lambda: {"inertia": Inertia(**{name: raising})},
+        "Ordinate": lambda: {"ordinate": Ordinate("nothing", 0.0, raising)},
+        "Attachment": lambda: {"attachments": (Attachment(0.5, **{name: raising}),)},
+        "Constraint": lambda: {"constraints": (at(0.5, raising),)},
+        "_Difference": lambda: {"constraints": (integral(**({"of": lambda x, c: x.k[2]} | {name: raising})),)},
+        "Scene": lambda: {name: raising},
+    }
+    return Scene(**(GOOD | parts[owner]()))
+
+
+@pytest.mark.parametrize(("owner", "name"), EVERY)
+def test_no_function_of_a_scene_is_forgotten(owner: str, name: str) -> None:
+    """Whatever a dataclass of a scene takes as a function may raise: that is a sentence, and names the function."""
+    with pytest.raises(SceneError, match=r"^The .* fails with ZeroDivisionError, 'division by zero'"):
+        with_function(owner, name).ordinate.of(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+
+
+def test_the_list_of_functions_is_long() -> None:
+    assert {("Inertia", "rho_A"), ("Inertia", "rho_I"), ("_Difference", "equals"), ("End", "rotation")} < set(EVERY)
+    assert len(EVERY) >= 23
 
 
 NAN = float("nan")
