@@ -21,8 +21,8 @@ from rodfem.meshes import start_mesh
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Scene
+from rodfem.solvers import solver
 from rodfem.sweep import FREQUENCIES, Sweep
-from rodfem.system import System
 
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
 """What a picture's caption shows for TeX names."""
@@ -73,8 +73,8 @@ def run(
         with clock("setup"):
             if plan.accuracy is not None and discretization.vertices is None:
                 discretization = _chosen(scene, discretization.formulation, plan, report, comm)
-            system = System(scene, discretization, comm, clock)
-            follower = Follower(system, plan.spectrum) if scene.conservative else Equilibria(system)
+            follower = solver(scene, discretization, comm, spectrum=plan.spectrum, clock=clock)
+            system = follower.system
         report.system(system, plan.accuracy)
         if plan.method or plan.modes:
             from rodfem.judging import check_method
@@ -88,7 +88,7 @@ def run(
         branches = explorer.run()
     _save_diagram(explorer, clock, output)
     report.table(branches, system)
-    report.spectra(branches)
+    report.spectra(branches, scene)
     report.frequencies(branches, scene.load)
     report.timing(clock, sum(len(b.points) for b in branches))
     report.say(f"Results in {output}{os.sep}: diagram.json, states.h5")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import inf, isfinite
 from typing import Any
 
@@ -90,7 +91,8 @@ class Scene:
     rod
         One of the keys of :data:`forms.kinematics.RODS`: which strains are free.
     energy
-        Stored energy ``W(v, k, c)`` per unit length.
+        Stored energy ``W(v, k, c)`` per unit length.  Strains that the kind of rod keeps undeformed count for nothing
+        in it, which the terminal says.
     parameters
         Named constants, each a :class:`Parameter` or a number; ``load`` names the one that is varied.
     ends
@@ -226,6 +228,28 @@ class Scene:
         if self.follower is not None:
             found.append("distributed follower force")
         return found + [f"follower force at s = {x.s:g}" for x in self.attachments if x.follower is not None]
+
+    @property
+    def has_inertia(self) -> bool:
+        """Whether the scene states masses or inertias of its own, beside the unit rotary inertia that counts by."""
+        return self.inertia != Inertia() or any(x.mass or x.rotary_inertia for x in self.attachments)
+
+    @cached_property
+    def ignored_strains(self) -> tuple[int, ...]:
+        """Components of ``v`` that the stored energy depends on, but that the kind of rod keeps undeformed."""
+        rng = np.random.default_rng(1)
+        v, k = 0.05 * rng.uniform(0.5, 1, size=(2, 3))
+        stiff = [i for i in range(3) if i not in self.free_strains]
+        free = np.where(np.isin(np.arange(3), self.free_strains), v, 0.0)
+        found = []
+        for i in stiff:
+            pairs = [
+                [self._energy_at(free + d * v[i] * np.eye(3)[i], k, self.constants(s=s)) for d in (0.0, -1.0, 1.0)]
+                for s in self.samples()
+            ]
+            if any(abs(b - a) > 1e-12 * max(abs(a), abs(b)) for a, *others in pairs for b in others):
+                found.append(i)
+        return tuple(found)
 
     @property
     def free_strains(self) -> tuple[int, ...]:
