@@ -263,10 +263,8 @@ class Report:
             known = f"residual {residual:.0e}" if isfinite(residual) else ""
             self.say(f"    mu = {number + doubt:<28} {known:<15} {motion}".rstrip())
         proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
-        self.say(
-            f"    {found.method} ({found.reason}){proof}; {found.factorisations} factorisation{'s'[: found.factorisations != 1]}, "
-            f"{1e3 * found.seconds:.1f} ms"
-        )
+        took = f"{found.factorisations} factorisation{'s'[: found.factorisations != 1]}, {1e3 * found.seconds:.1f} ms"
+        self.say(f"    {found.method} ({found.reason}){proof}; {took}")
         if found.band:
             inside = ", ".join(f"{m:.3g} +- {u:.0e}" for m, u in zip(found.inside, found.uncertainty, strict=True))
             self.say(
@@ -288,6 +286,5 @@ class Report:
         ]
         self.say(f"\nTime: {', '.join(parts)}; {clock.total():.2f} s in all")
         known = "index" if self.count == INDEX else "frequencies"
-        self.say(
-            f"{points} points with their {known}, {1e3 * work / max(points, 1):.2f} ms each (assembly, solve, stability)"
-        )
+        each = 1e3 * work / max(points, 1)
+        self.say(f"{points} points with their {known}, {each:.2f} ms each (assembly, solve, stability)")

@@ -123,7 +123,7 @@ def test_inertia_of_the_spectrum_is_named(folder: Path, printed: Any) -> None:
     assert first == pytest.approx(2 * second, rel=1e-9)
 
 
-def test_no_index_under_loads_without_potential(folder: Path, printed: Any) -> None:
+def test_what_is_counted_under_loads_without_potential(folder: Path, printed: Any) -> None:
     beck = scenes.scene("follower", span=(0.0, 5.0))
     mesh = Discretization("pointwise", 4, 4)
     out, data = printed(beck, Plan(at=(2.0,), method="shift-invert", error_bars=False), folder, mesh)
