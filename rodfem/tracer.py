@@ -60,7 +60,8 @@ class Tracer:
         self.report.branch(branch)
         self.use(branch.points[-1].mesh)
         self.watch = Watch(self.meshes, (self.low, self.high))
-        self.follower.damp(0)
+        self.follower.system.set_phase(branch.points[-1].x)
+        self.follower.damp(self._extra(branch.points[-1]) if branch.parent else 0)
         try:
             self._follow(branch)
         except ConvergenceError as trouble:
@@ -306,18 +307,23 @@ class Tracer:
 
     def _check_zeros(self, history: list[Point], point: Point) -> None:
         """Say once where eigenvalues stay zero without a symmetry: the state is one of a family at the same load."""
-        extra = point.zero - self.follower.system.active_drifts()
-        if abs(point.slope) < VERTICAL * (self.high - self.low):
-            extra -= 1  # the branch itself is such a family
-        recent = history[-4:]
-        stay = extra > 0 and len(recent) == 4 and all(p.zero == point.zero for p in recent)
+        extra = self._extra(point)
+        recent = [
+            p for p in history[-4:] if p.arclength > 0.0
+        ]  # the start may be a branch point, with zeros of its own
+        stay = extra > 0 and bool(recent) and all(p.zero == point.zero for p in recent)
         self.follower.damp(extra if stay else 0)
-        if stay and not self.warned:
+        if stay and len(recent) == 4 and not self.warned:
             self.warned = True
             self.report.say(
                 f"  {extra} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
                 "move freely at one and the same load"
             )
+
+    def _extra(self, point: Point) -> int:
+        """Zero eigenvalues, beside symmetries' and the branch's own, of the point at which phases were last set."""
+        vertical = abs(point.slope) < VERTICAL * (self.high - self.low)  # the branch itself is a family at one load
+        return point.zero - self.follower.system.active_drifts() - vertical
 
     def _finish(self, branch: Branch) -> None:
         branch.renumber()
