@@ -238,7 +238,8 @@ def _trimmed(row: Any) -> Any:
 def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc.Vec:
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
-    Raises :class:`SceneError` where the file has no such row, or has it in the other formulation.
+    Raises :class:`SceneError` where the file has no such row, has it in the other formulation, or lacks an unknown of
+    the follower's scene.
     """
     import h5py
 
@@ -257,4 +258,12 @@ def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc
         raise SceneError(
             f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it."
         ) from trouble
+    system = follower.system
+    wanted_names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]
+    missing = [name for name in wanted_names if name not in sample]
+    if missing:
+        raise SceneError(
+            f"{path} has no {', '.join(missing)}, unknowns of the scene {system.scene.name!r}: it was written for "
+            "another scene, or by another version of rodfem; run the scene again."
+        )
     return follower.shape.restore(sample)

@@ -63,6 +63,7 @@ def test_scenes_of_the_page_are_traced_without_a_warning(name: str) -> None:
     assert all(re.match("end of range|meets ", b.ended) for b in branches)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     ("name", "load", "accuracy"),
     [

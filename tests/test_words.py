@@ -203,3 +203,11 @@ def test_an_equilibrium_that_there_is_not() -> None:
         rodfem.equilibrium(hemitropic, 1.5)
     with pytest.raises(rodfem.ConvergenceError, match=r"No equilibrium was found at lam = 0.5: go there in steps"):
         rodfem.equilibrium(hemitropic, 0.5, guess=hemitropic.system.new_vector())
+
+
+def test_a_saved_state_of_another_scene(folder: Path) -> None:
+    """An unshearable rod has a stretch, the one whose state was saved none."""
+    run(compressed("unshearable and inextensible"), MESH, Plan(error_bars=False), folder, figures=False, quiet=True)
+    stretched = rodfem.solver(compressed("unshearable"), MESH)
+    with pytest.raises(rodfem.SceneError, match="has no v, unknowns of the scene 'column': it was written for"):
+        rodfem.load_state(folder / "states.h5", "straight", 0, stretched)
