@@ -45,9 +45,9 @@ In what sense UFL's second derivative agrees (``tests/test_paper.py``):
 
 * Pointwise it does exactly, at any ``q`` and in any state, for directions ``dq = 1/2 theta q``, without the unit norm
   term.  The curve's acceleration, polarised, is ``-1/4 theta1 . theta2 q``: a change of length, to which ``R(q/|q|)``
-  and ``k`` are blind.  The unit norm term ``mu/2 (|q|^2 - 1)`` adds ``mu/4 theta1 . theta2`` to the second derivative,
-  and by the same blindness ``mu = 0`` at an exact equilibrium.
-* On a finite element space lengths change at the nodes, and in between directions change with them: ``mu`` at a
+  and ``k`` are blind.  The unit norm term ``eta/2 (|q|^2 - 1)`` adds ``eta/4 theta1 . theta2`` to the second
+  derivative, and by the same blindness ``eta = 0`` at an exact equilibrium.
+* On a finite element space lengths change at the nodes, and in between directions change with them: ``eta`` at a
   discrete equilibrium is an error of the discretisation.  ``T^t K T`` with the unit norm term in ``K`` is exactly the
   second derivative of the discrete energy along ``exp(eps theta_i / 2) q_i`` at all nodes i: that term's second
   derivative pays for the acceleration.

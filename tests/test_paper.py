@@ -176,7 +176,7 @@ def test_the_papers_linearisation_is_named() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_acceleration_of_the_curve_is_a_change_of_length(seed: int) -> None:
-    """Polarised, it is ``-1/4 theta1 . theta2 q``: the unit norm term's share in the Hessian, times minus mu."""
+    """Polarised, it is ``-1/4 theta1 . theta2 q``: the unit norm term's share in the Hessian, times minus eta."""
     rng = np.random.default_rng(seed)
     q = rng.normal(size=4)
     spins = [np.append(0.0, rng.normal(size=3)) for _ in range(2)]
@@ -243,11 +243,11 @@ def test_tangential_hessian_is_the_second_derivative_along_rotations(name: str, 
 
 
 def hessian_of_unit_norm(system: System, blocks: Blocks, x: PETSc.Vec, T: Any) -> Any:
-    """What the unit norm term contributes: ``T^t K T`` with mu less that without."""
+    """What the unit norm term contributes: ``T^t K T`` with eta less that without."""
     pencil = blocks.assemble(x)
     without = x.copy()
     f = system.fields
-    numbers = np.unique(f.number[f.dofs["mu"]])
+    numbers = np.unique(f.number[f.dofs["eta"]])
     mine = numbers[(numbers >= f.offset) & (numbers < f.offset + len(f.free_owned))]
     without.array[mine - f.offset] = 0.0
     return gathered(pencil.K) - gathered(blocks.assemble(without).K)
@@ -288,7 +288,7 @@ def quadratic_forms(name: str, formulation: str, load: float, elements: int, deg
 def perturb(system: System, w: fem.Function, phase: float) -> None:
     """Fill ``w`` with a smooth perturbation; the spin takes the places of q1, q2, q3."""
     f = system.fields
-    for number, block in enumerate(b for b in f.blocks if b.name != "mu"):
+    for number, block in enumerate(b for b in f.blocks if b.name != "eta"):
         nodes = f.coordinates(block.degree) - system.scene.interval[0]
         size = 3 if block.name == "q" else block.size
         values = smooth(nodes, system.scene.length, phase + 0.7 * number, size)

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import rods
@@ -211,3 +212,15 @@ def test_a_saved_state_of_another_scene(folder: Path) -> None:
     stretched = rodfem.solver(compressed("unshearable"), MESH)
     with pytest.raises(rodfem.SceneError, match="has no v, unknowns of the scene 'column': it was written for"):
         rodfem.load_state(folder / "states.h5", "straight", 0, stretched)
+
+
+def test_mu_is_an_eigenvalue_and_nothing_else(folder: Path, printed: Any) -> None:
+    """The multiplier of the unit norm has a symbol of its own, in the terminal and in the file."""
+    plan = Plan((0.0, 0.1), at=(0.05,), method="count", spectrum=1, error_bars=False)
+    out, _ = printed(compressed(), plan, folder)
+    if FIRST:
+        assert "unit-norm multiplier eta (P3)" in out
+        assert set(re.findall(r"\bmu\b.{0,10}", out)) == {"mu = omega^2"}
+        with h5py.File(folder / "states.h5") as file:
+            assert {"q", "eta"} < set(file["branches/straight"])
+            assert "mu" not in file["branches/straight"]
