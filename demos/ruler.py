@@ -10,7 +10,7 @@ a load at which it twists and falls to the side: lateral buckling, with the bend
 into account.  A force along e2 bends it the easy way, and nothing else happens.
 
 The contact force is the dead force everywhere along the ruler: no force is unknown, and the centreline follows from the
-rotation.  What is left are the rotation q, its multiplier mu and the stretch v3.
+rotation.  What is left are the rotation q, its multiplier eta and the stretch v3.
 
 Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section 5.3 and figures 8 and 9.
 """

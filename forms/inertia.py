@@ -1,4 +1,7 @@
-"""Bilinear forms that measure a perturbation ``(dr, dq)`` of a rod: its kinetic metric and a plain one."""
+"""Bilinear forms that measure a perturbation ``(dr, dq)`` of a rod: its kinetic metric and a plain one.
+
+The kinetic metric, :func:`rotary` and :func:`translational`, is the mass of Kumar & Healey (2010), (16).
+"""
 
 from __future__ import annotations
 

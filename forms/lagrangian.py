@@ -2,19 +2,21 @@
 
 The equilibria of a hyperelastic rod are the stationary points of the three-field (Hu-Washizu) functional ::
 
-    L = int_0^l [ W(v, k) + n . (r' - R v) + mu/2 (|q|^2 - 1) ] ds - (potential of the loads)
+    L = int_0^l [ W(v, k) + n . (r' - R v) + eta/2 (|q|^2 - 1) ] ds - (potential of the loads)
 
-with the strains ``v``, the contact force ``n`` and the unit-norm multiplier ``mu`` as fields of their own:
+with the strains ``v``, the contact force ``n`` and the unit-norm multiplier ``eta`` as fields of their own:
 stationarity in ``v`` is the constitutive law ``n_i = dW/dv_i`` (body components), in ``r`` the balance of forces
 ``n' = 0``, in ``q`` the balance of moments, in ``n`` the kinematics ``r' = R v``.  Only the strains that a rod leaves
-free are unknowns; with none of them free this is (19) of Kumar & Healey (2010), with the stretch (18), with all (17).
+free are unknowns: all of a flexible rod, the stretch of an unshearable one, none of one that is inextensible too.  Its
+first variation is the weak form (11)-(12) of Kumar & Healey (2010), which they linearise for each of the three in (17),
+(18) and (19); see :mod:`forms.paper`.
 
 Where no force acts along the rod, ``n`` is constant and ``r`` drops out: with ``chord = r(l) - r(0)`` ::
 
-    L_reduced = int_0^l [ W(v, k) - n . R v + mu/2 (|q|^2 - 1) ] ds + n . chord
+    L_reduced = int_0^l [ W(v, k) - n . R v + eta/2 (|q|^2 - 1) ] ds + n . chord
 
 in which a component of ``n`` is a known dead force or *one scalar* unknown, whose equation is the integral
-constraint ``int (R v)_i ds = chord_i``: their mixed formulation (36)-(40).
+constraint ``int (R v)_i ds = chord_i``: their mixed formulation, with the functionals (37) and (44).
 """
 
 from __future__ import annotations
@@ -40,6 +42,6 @@ def reduced(W: Expr, R: Expr, v: Expr, n: Expr, chord_per_length: Expr) -> Expr:
     return W + ufl.dot(n, chord_per_length - ufl.dot(R, v))
 
 
-def unit_norm(mu: Expr, q: Expr) -> Expr:
-    """Integrand ``mu/2 (|q|^2 - 1)``, to be collocated at the nodes by Gauss-Lobatto-Legendre quadrature."""
-    return 0.5 * mu * (ufl.dot(q, q) - 1)
+def unit_norm(eta: Expr, q: Expr) -> Expr:
+    """Integrand ``eta/2 (|q|^2 - 1)``, to be collocated at the nodes by Gauss-Lobatto-Legendre quadrature."""
+    return 0.5 * eta * (ufl.dot(q, q) - 1)

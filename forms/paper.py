@@ -1,4 +1,4 @@
-r"""The second variation by hand, to be read, and to check automatic derivatives against.
+r"""The second variation and the linearised balance by hand, to be read, and to check automatic derivatives against.
 
 The Lagrangian of :mod:`forms.lagrangian` is a function of rotations.  A perturbation is a *spin* ``theta`` in the space
 frame, together with changes ``dr``, ``dv`` (body components), ``dn``::
@@ -23,24 +23,31 @@ dead loads are linear in ``r`` and enter here only.  The second, with ``dk = R^t
 
 In the first line is the material, then the geometry: moment and force at work on finite rotations.  The last term holds
 the linearised constraints: ``dn`` multiplies ``dr' = theta x R v + R dv``.  :func:`second_variation` is its symmetric
-bilinear form.  It is what Kumar & Healey (2010) linearise by hand for each rod, here for all at once: (16)-(17) with
-``dv`` free, (18) with ``dv = dv3 e3`` (unshearable), (19)-(20) with ``dv = 0`` (unshearable and inextensible), and (40)
-for the mixed formulation: ``dr`` is gone, ``dn`` is constant and its equation is ``int theta x R v + R dv = 0``.
+bilinear form.
 
-:func:`linearized_balance` is the other way to it: the equilibrium equations, in a *fixed* test spin ``tau``, linearised
-with ``dm = theta x m + R (W_kv dv + W_kk dk)``.  It is not symmetric.  The two differ by a multiple of the equations,
+Kumar & Healey (2010) do not take this second variation.  They linearise the weak form ``G`` of the balance laws, their
+(11)-(12), in test fields that stay as they are, among them a *fixed* test spin ``tau``: (17) with ``dv`` free
+(flexible), (18) with ``dv = dv3 e3`` (unshearable), (19) with ``dv = 0`` (unshearable and inextensible); (16) is the
+mass, (20) the terms of the ends.  :func:`linearized_balance` is that form for all rods at once, with
+``dm = theta x m + R (W_kv dv + W_kk dk)``.  For the mixed formulation, whose functionals are (37) and (44), ``dr`` is
+gone, ``dn`` is constant and its equation is ``int theta x R v + R dv = 0``.  The two differ in
+
+* symmetry: :func:`second_variation` is symmetric, :func:`linearized_balance` is not.  Because spins do not commute,
+  they differ by a multiple of the equations ::
 
     linearized_balance(tau, theta) - second_variation(tau, theta) = 1/2 G(tau x theta),
 
-because spins do not commute; at an equilibrium they agree.
+  and agree at an equilibrium, for admissible ``tau x theta``, and only there;
+* the force: the paper perturbs the components of ``n`` in the body frame, here ``dn`` is a vector in the space frame.
+  With ``n = R N`` the latter is ``dn = theta x n + R dN``.
 
 In what sense UFL's second derivative agrees (``tests/test_paper.py``):
 
 * Pointwise it does exactly, at any ``q`` and in any state, for directions ``dq = 1/2 theta q``, without the unit norm
   term.  The curve's acceleration, polarised, is ``-1/4 theta1 . theta2 q``: a change of length, to which ``R(q/|q|)``
-  and ``k`` are blind.  The unit norm term ``mu/2 (|q|^2 - 1)`` adds ``mu/4 theta1 . theta2`` to the second derivative,
-  and by the same blindness ``mu = 0`` at an exact equilibrium.
-* On a finite element space lengths change at the nodes, and in between directions change with them: ``mu`` at a
+  and ``k`` are blind.  The unit norm term ``eta/2 (|q|^2 - 1)`` adds ``eta/4 theta1 . theta2`` to the second
+  derivative, and by the same blindness ``eta = 0`` at an exact equilibrium.
+* On a finite element space lengths change at the nodes, and in between directions change with them: ``eta`` at a
   discrete equilibrium is an error of the discretisation.  ``T^t K T`` with the unit norm term in ``K`` is exactly the
   second derivative of the discrete energy along ``exp(eps theta_i / 2) q_i`` at all nodes i: that term's second
   derivative pays for the acceleration.
@@ -104,7 +111,10 @@ def state(energy: Callable[[Expr, Expr], Expr], R: Expr, v: Expr, k: Expr, n: Ex
 
 
 def first_variation(x: State, r_s: Expr, a: Perturbation) -> Expr:
-    """Integrand of ``G``: weak form of the equilibrium equations, ``r_s`` the derivative of the centreline."""
+    """Integrand of ``G``: weak form of the equilibrium equations, ``r_s`` the derivative of the centreline.
+
+    Kumar & Healey (2010), (11)-(12).
+    """
     return (
         ufl.dot(x.W_v, a.dv)
         + ufl.dot(x.m, a.theta_s)
@@ -114,7 +124,10 @@ def first_variation(x: State, r_s: Expr, a: Perturbation) -> Expr:
 
 
 def second_variation(x: State, a: Perturbation, b: Perturbation) -> Expr:
-    """Integrand of the symmetric bilinear form of ``d^2 L``."""
+    """Integrand of the symmetric bilinear form of ``d^2 L``, with moment and force at work on finite rotations.
+
+    The form whose index decides stability; :func:`linearized_balance`, the paper's, agrees with it at equilibria.
+    """
     dk_a, dk_b = ufl.dot(x.R.T, a.theta_s), ufl.dot(x.R.T, b.theta_s)
     tangent_v = ufl.dot(x.R, x.v)
     material = (
@@ -137,7 +150,10 @@ def constraints(x: State, a: Perturbation, dn: Expr) -> Expr:
 
 
 def linearized_balance(x: State, test: Perturbation, b: Perturbation) -> Expr:
-    """Integrand of the equilibrium equations in fixed test fields, linearised in the direction ``b``."""
+    """Integrand of the weak form ``G`` in fixed test fields, linearised in the direction ``b``: not symmetric.
+
+    Kumar & Healey (2010), (17)-(19), each for one kind of rod, but with ``dn`` as a vector in the space frame.
+    """
     dk = ufl.dot(x.R.T, b.theta_s)
     dm = ufl.cross(b.theta, x.m) + ufl.dot(x.R, ufl.dot(x.W_vk.T, b.dv) + ufl.dot(x.W_kk, dk))
     dt = ufl.cross(b.theta, ufl.dot(x.R, x.v)) + ufl.dot(x.R, b.dv)  # change of R v

@@ -31,6 +31,8 @@ finds and classifies the points where it is lost, follows what branches off, and
 * **Parameters**: any of them can be the load, :meth:`Scene.varying`; :func:`locus` follows a special point in the plane
   of two of them.
 * **Plane**: ``planar="e2"`` keeps the rod in the plane across e2, and records its index in space besides.
+* **One state**: :func:`solver` sets up a scene on a mesh, which the functions below take; :func:`equilibrium` computes
+  a state with it, :func:`load_state` restores a saved one.
 * **Is it stable?**: :func:`judge` answers for one state by any of six methods, and says how far to trust it;
   :class:`ModeFinder` finds how the rod moves in its left-most modes, and what a controller needs to know of them.
 * **Many rods**: :func:`many` shares a list of scenes among the ranks, into files, restartable.
@@ -52,6 +54,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+from rodfem.lazy import submodule
+
 _HOMES = {
     "locus": "loci.locus",
     "Locus": "loci.locus",
@@ -67,6 +71,8 @@ _HOMES = {
     "Plan": "plan",
     "Steps": "continuation",
     "run": "runner",
+    "solver": "solvers",
+    "equilibrium": "solvers",
     "many": "sharing",
     "judge": "stability.judge",
     "ModeFinder": "mode_finder",
@@ -84,10 +90,13 @@ __all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name from its module at first use."""
-    if name not in _HOMES:
+    """Load a public name from its module, or a module of the package, at first use."""
+    if name in _HOMES:
+        return getattr(import_module(f"rodfem.{_HOMES[name]}"), name)
+    module = submodule("rodfem", name)
+    if module is None:
         raise AttributeError(f"module 'rodfem' has no attribute {name!r}; it has {', '.join(__all__)}")
-    return getattr(import_module(f"rodfem.{_HOMES[name]}"), name)
+    return module
 
 
 def __dir__() -> list[str]:

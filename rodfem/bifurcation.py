@@ -208,19 +208,24 @@ def _load_response(follower: Follower, special: Special) -> PETSc.Vec:
 def leave(follower: Follower, special: Special, direction: PETSc.Vec, first: float) -> Point | None:
     """First point of the branch that leaves ``special`` along ``direction``, about ``first`` away, or None.
 
-    The amplitude is halved until the point lies where the direction says, within half of its distance.
+    The amplitude is halved until the point lies where the direction says, within half of its distance.  Where that
+    fails, a family of equilibria may leave at once, at each of which the Jacobian is singular (an elastica whose ends
+    meet turns as a rigid body about any axis): then Newton's method is damped along the family.
     """
-    system, amplitude = follower.system, first
-    origin = special.point.x
-    row = follower.row(direction)
-    while amplitude > 1e-4:
-        x = origin.copy()
-        x.axpy(amplitude, direction)
-        system.set_phase(x)
-        outcome = correct(system, x, row, reach=2.0 * amplitude)
-        if outcome.converged:
-            return follower.point(x, distance(system, origin, x), follower.tangent(row, at=x), outcome)
-        amplitude /= 2
+    system = follower.system
+    row, before = follower.row(direction), system.damping
+    for damping in dict.fromkeys((before, before or follower.inertia.tolerance)):
+        system.damping, amplitude = damping, first
+        while amplitude > 1e-4:
+            x = special.point.x.copy()
+            x.axpy(amplitude, direction)
+            system.set_phase(x)
+            outcome = correct(system, x, row, reach=2.0 * amplitude)
+            if outcome.converged:
+                apart = distance(system, special.point.x, x)
+                return follower.point(x, apart, follower.tangent(row, at=x), outcome)
+            amplitude /= 2
+    system.damping = before
     return None
 
 

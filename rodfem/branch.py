@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from petsc4py import PETSc
@@ -18,9 +19,11 @@ FLUTTER, DIVERGENCE = "flutter", "divergence"
 class Point:
     """One equilibrium: state ``x``, unit ``tangent``, ``arclength`` from the start of the branch, and records.
 
-    ``slope`` is the load's component of the tangent, ``drift`` the largest drift scalar (zero but for round-off),
-    ``error`` the last Newton correction, ``mesh`` the number of the discretisation that ``x`` belongs to, and
-    ``estimate`` the error of the discretisation in load and ordinate, where an accuracy was asked for.
+    ``energy`` is the stored energy ``int W ds`` alone, without the potential of the loads: of two equilibria at one
+    load the one with less of it need not be the one with less total energy.  ``slope`` is the load's component of the
+    tangent, ``drift`` the largest drift scalar (zero but for round-off), ``error`` the last Newton correction, ``mesh``
+    the number of the discretisation that ``x`` belongs to, and ``estimate`` the error of the discretisation in load and
+    ordinate, where an accuracy was asked for.
     """
 
     x: PETSc.Vec
@@ -148,3 +151,8 @@ class Branch:
         self.special.sort(key=lambda s: s.point.arclength)
         for special in self.special:
             special.row = row[id(special.point)]
+
+
+def not_followed(branches: Sequence[Branch]) -> int:
+    """Number of branch points from which no branch was sought, as the depth of the plan was reached."""
+    return sum(s.kind == BRANCH_POINT and not s.switched for b in branches for s in b.special)

@@ -42,27 +42,28 @@ def check_kinds(scene: Scene) -> None:
             raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
         if not isinstance(getattr(parameter, "value", parameter), Real):
             raise SceneError(f"The parameter {name} is {parameter!r}: give a number or a Parameter.")
+    if not (hasattr(scene.inertia, "rho_A") and hasattr(scene.inertia, "rho_I")):
+        raise SceneError(f"The inertia is {scene.inertia!r}: give one, as in Inertia(rho_A=lambda c: 1.0).")
     if not (hasattr(scene.ordinate, "of") and hasattr(scene.ordinate, "s")):
         raise SceneError(f"The ordinate is {scene.ordinate!r}: give an Ordinate(name, s, of).")
-    for what, function, wanted in functions_of(scene):
-        count = wanted.count(",") + 1
+    for what, function, role in functions_of(scene):
         if not callable(function):
-            raise SceneError(f"The {what} is {function!r}: give a function {wanted}.")
+            raise SceneError(f"The {what} is {function!r}: give a function {role.call}.")
         try:
-            inspect.signature(function).bind(*range(count))
+            inspect.signature(function).bind(*range(role.arguments))
         except TypeError:
-            raise SceneError(f"The {what} is no function of {count} argument(s): give {wanted}.") from None
+            raise SceneError(f"The {what} is no function of {role.arguments} argument(s): give {role.call}.") from None
 
 
 def check_shapes(scene: Scene) -> None:
     """Check that forces and moments are vectors, and energies and constraints scalars."""
     c = scene.constants()
-    for what, function, wanted in functions_of(scene):
-        if wanted.endswith("f(c)") and "position" not in what:
-            if "mass" in what or "value" in what:
-                check_scalar(what, function(c))
+    for what, function, role in functions_of(scene):
+        if role.call == "f(c)" and role.size is not None:
+            if role.size:
+                check_vector(what, function(c), role.size)
             else:
-                check_vector(what, function(c), 3)
+                check_scalar(what, function(c))
     for what, function, known in functions_of_places(scene):
         check_scalar(what, function(known, c))
 
@@ -79,8 +80,8 @@ def check_plane(scene: Scene) -> None:
                 f"The ends are held at {float(left):g} and {float(right):g} along {scene.planar}, across which the rod "
                 "is planar: hold both at the same, or leave planar out."
             )
-    for what, function, wanted in functions_of(scene):
-        if wanted != "f(c)" or not ("force" in what or "moment" in what):
+    for what, function, role in functions_of(scene):
+        if role.call != "f(c)" or not ("force" in what or "moment" in what):
             continue
         out = [i for i in range(3) if (i == normal) != ("moment" in what)]
         for s in scene.samples():

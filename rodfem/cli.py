@@ -128,6 +128,14 @@ def parser_for(
         help="largest step along a branch, in radian of rotation (root mean square; default 0.05)",
     )
     group.add_argument(
+        "--depth",
+        type=int,
+        default=2,
+        metavar="D",
+        help="follow what leaves from branch points of branches of a depth less than D; the first branch has depth 0, "
+        "what leaves from it 1, and so on (default 2)",
+    )
+    group.add_argument(
         "--spectrum",
         type=int,
         default=0,
@@ -227,6 +235,7 @@ def main(
         plan = Plan(
             span,
             at,
+            depth=options.depth,
             spectrum=options.spectrum,
             steps=steps,
             tries=options.search,

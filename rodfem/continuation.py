@@ -20,6 +20,7 @@ from rodfem.branch import Point
 from rodfem.convexity import Convexity
 from rodfem.corrector import SENSITIVE, Corrector
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.kinds import real, whole
 from rodfem.newton import TOLERANCE, Outcome, correct, relax
 from rodfem.shape import Shape
 from rodfem.stability.band import decide
@@ -56,11 +57,18 @@ class Steps:
     most: int = 2000
 
     def __post_init__(self) -> None:
-        """Check the largest step; raises :class:`SceneError`."""
+        """Check kinds and the largest step; raises :class:`SceneError`."""
+        for name in ("first", "largest", "smallest", "aim"):
+            real(name, getattr(self, name), getattr(Steps, name))
+        if whole("most", self.most, Steps.most) < 1:
+            raise SceneError(f"A branch of {self.most} points is none: give most=1 or more.")
         if not self.smallest < self.largest <= 1:
             raise SceneError(
                 f"A step of {self.largest:g} is out of bounds: choose more than {self.smallest:g}, at most 1."
             )
+        for name in ("first", "smallest", "aim"):
+            if not getattr(self, name) > 0:
+                raise SceneError(f"Steps with {name} = {getattr(self, name):g} lead nowhere: give more than 0.")
 
 
 class Equilibria:

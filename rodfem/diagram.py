@@ -1,8 +1,9 @@
 """A bifurcation diagram as plain columnar data: made from branches, saved to ``diagram.json`` and ``states.h5``.
 
-``diagram.json`` holds for each branch its columns (one entry a row, a row being an equilibrium) and its special
-points, each of which is a row too.  ``states.h5`` holds the same rows as shapes and fields in natural order along
-the rod, whatever the number of ranks: to draw them, or to start again from one with :func:`load_state`.
+``diagram.json`` holds for each branch its columns (one entry a row, a row being an equilibrium; ``meaning`` has each in
+words) and its special points, each of which is a row too.  ``states.h5`` holds the same rows as shapes and fields in
+natural order along the rod, whatever the number of ranks: to draw them, or to start again from one with
+:func:`load_state`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.branch import Branch, Special
+from rodfem.branch import Branch, Special, not_followed
 from rodfem.clock import Clock
 from rodfem.continuation import Equilibria
 from rodfem.errors import SceneError
@@ -27,6 +28,23 @@ from rodfem.scene import Scene
 from rodfem.system import System
 
 COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error", "mesh")
+
+MEANING = {
+    "load": "value of the parameter",
+    "ordinate": "the scene's ordinate",
+    "energy": "stored energy int W ds of the rod, without the potential of the loads, springs and foundations",
+    "negative": "number of negative eigenvalues of the constrained second variation (the index): 0 is stable",
+    "zero": "number of eigenvalues that vanish, those of symmetries included",
+    "stretch": "least stretch v3 along the rod",
+    "slope": "the load's component of the unit tangent",
+    "drift": "largest drift scalar: the error with which the mesh has the symmetries",
+    "arclength": "length along the branch, in the metric of rotations and load",
+    "error": "size of the last Newton correction",
+    "mesh": "number of the discretisation in meshes",
+}
+"""Columns in words, as they stand in the file."""
+UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
+"""What ``negative`` counts where loads have no potential."""
 
 
 def as_data(
@@ -63,6 +81,9 @@ def as_data(
             "unknowns": system.fields.unknowns,
         },
         "accuracy": accuracy,
+        "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
+        "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE}),
+        "branch_points_not_followed": not_followed(branches),
         "meshes": [_mesh_data(s.fields) for s in systems],
         "branches": [_branch_data(b) for b in branches],
         "timing": {
@@ -135,6 +156,7 @@ def _special_data(s: Special) -> dict[str, Any]:
         "located_to": s.located_to,
         "coupling": s.coupling,
         "meets": list(s.meets) if s.meets else None,
+        "followed": s.switched,
         "omega2": _plain(s.omega2),
         "law": None if s.law is None else asdict(s.law),
         "unfolding": _plain(s.unfolding),
@@ -219,7 +241,8 @@ def _trimmed(row: Any) -> Any:
 def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc.Vec:
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
-    Raises :class:`SceneError` where the file has no such row, or has it in the other formulation.
+    Raises :class:`SceneError` where the file has no such row, has it in the other formulation, or lacks an unknown of
+    the follower's scene.
     """
     import h5py
 
@@ -238,4 +261,12 @@ def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc
         raise SceneError(
             f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it."
         ) from trouble
+    system = follower.system
+    wanted_names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]
+    missing = [name for name in wanted_names if name not in sample]
+    if missing:
+        raise SceneError(
+            f"{path} has no {', '.join(missing)}, unknowns of the scene {system.scene.name!r}: it was written for "
+            "another scene, or by another version of rodfem; run the scene again."
+        )
     return follower.shape.restore(sample)

@@ -13,13 +13,14 @@ They return UFL scalars (see :mod:`forms.loads` for a stock of them).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
 from forms import loads
 from forms.rotation import IDENTITY
 from rodfem.errors import SceneError
+from rodfem.roles import Role
 
 
 class Constants(SimpleNamespace):
@@ -70,14 +71,20 @@ class End:
         Conservative.
     """
 
-    position: OfConstants | None = None
-    rotation: Quaternion | OfConstants | None = None
-    force: OfConstants | None = None
-    follower: OfConstants | None = None
+    position: OfConstants | None = field(default=None, metadata={"role": Role("position of the {} end", "f(c)")})
+    rotation: Quaternion | OfConstants | None = field(
+        default=None, metadata={"role": Role("rotation of the {} end", "f(c)", or_value=True)}
+    )
+    force: OfConstants | None = field(default=None, metadata={"role": Role("force on the {} end", "f(c)", 3)})
+    follower: OfConstants | None = field(
+        default=None, metadata={"role": Role("follower force on the {} end", "f(c)", 3)}
+    )
     hinge: tuple[float, float, float] | None = None
-    moment: OfConstants | None = None
-    follower_moment: OfConstants | None = None
-    energy: OfPlace | None = None
+    moment: OfConstants | None = field(default=None, metadata={"role": Role("moment on the {} end", "f(c)", 3)})
+    follower_moment: OfConstants | None = field(
+        default=None, metadata={"role": Role("follower moment on the {} end", "f(c)", 3)}
+    )
+    energy: OfPlace | None = field(default=None, metadata={"role": Role("energy of the {} end", "f(x, c)", 0)})
 
     def held(self, c: Constants) -> list[Any]:
         """Position of the end: three expressions, None where the end is free."""
@@ -183,11 +190,17 @@ class Attachment:
     """
 
     s: float
-    force: OfConstants | None = None
-    follower: OfConstants | None = None
-    energy: OfPlace | None = None
-    mass: Callable[[Constants], Any] | None = None
-    rotary_inertia: OfConstants | None = None
+    force: OfConstants | None = field(default=None, metadata={"role": Role("force of an attachment", "f(c)", 3)})
+    follower: OfConstants | None = field(
+        default=None, metadata={"role": Role("follower force of an attachment", "f(c)", 3)}
+    )
+    energy: OfPlace | None = field(default=None, metadata={"role": Role("energy of an attachment", "f(x, c)", 0)})
+    mass: Callable[[Constants], Any] | None = field(
+        default=None, metadata={"role": Role("mass of an attachment", "f(c)", 0)}
+    )
+    rotary_inertia: OfConstants | None = field(
+        default=None, metadata={"role": Role("rotary inertia of an attachment", "f(c)", 3)}
+    )
 
 
 @dataclass(frozen=True)
@@ -200,7 +213,7 @@ class Constraint:
     continuous where the equation is one of position or rotation, else not).
     """
 
-    of: OfPlace
+    of: OfPlace = field(metadata={"role": lambda x: Role("constraint", "f(x, c)", 0, along=x.kind != "point")})
     kind: str
     s: float | None = None
     continuous: bool = False
@@ -225,8 +238,8 @@ def everywhere(of: OfPlace, *, strain: bool) -> Constraint:
 class _Difference:
     """Integrand of an integral constraint, whose value is spread over the rod."""
 
-    of: OfPlace
-    equals: Callable[[Constants], Any]
+    of: OfPlace = field(metadata={"role": Role("constraint", "f(x, c)", 0, along=True)})
+    equals: Callable[[Constants], Any] = field(metadata={"role": Role("value of an integral constraint", "f(c)", 0)})
 
     def __call__(self, x: Place, c: Constants) -> Any:
         return self.of(x, c) - self.equals(c) / x.length

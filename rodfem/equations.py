@@ -62,8 +62,8 @@ class Equations:
         along = self._along(f, c, v)
         W = scene.energy(v, along.k, c)
         L = (self._rod(f, c, W, along) + self._along_loads(f, c, along)) * dx
-        if f.mu is not None:
-            L += lagrangian.unit_norm(f.mu, f.q) * dx_nodes
+        if f.eta is not None:
+            L += lagrangian.unit_norm(f.eta, f.q) * dx_nodes
         for i, constraint in enumerate(x for x in scene.constraints if x.kind == "pointwise"):
             L += f.fields[f"p{i}"] * constraint.of(along, c) * (dx_nodes if constraint.continuous else dx)
         L += self._points(f)
@@ -263,7 +263,7 @@ class Equations:
         fields = {block.name: part for block, part in zip(self.fields.blocks, parts, strict=False)}
         values = self._components(parts[-1], len(self.fields.unknown_scalars) + 1)
         scalars = {x.name: value for x, value in zip(self.fields.unknown_scalars, values, strict=False)}
-        named = {name: fields.get(name) for name in ("mu", "v", "r", "n")}
+        named = {name: fields.get(name) for name in ("eta", "v", "r", "n")}
         turning = self.fields.turning
         turned = fields[turning.name]
         q = turning.expression(turned) if at is None else turning.variation(at, turned)

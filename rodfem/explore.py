@@ -89,7 +89,7 @@ class Explorer(Tracer):
 
     def _primary(self) -> Branch:
         """First branch: its first state.  Where none is found constraints that repeat each other are named."""
-        start = self.plan.span[0]
+        start = self.span[0]
         try:
             point = self._first()
         except ConvergenceError:
@@ -110,7 +110,7 @@ class Explorer(Tracer):
         return Branch(self.scene.states, None, 0, [point])
 
     def _first(self) -> Point:
-        start, stop = self.plan.span
+        start, stop = self.span
         follower = self.follower
         x, outcome = follower.first(start)
         if not outcome.converged:

@@ -19,6 +19,7 @@ from mpi4py import MPI
 from rodfem import compat
 from rodfem.ends import Ring
 from rodfem.errors import SceneError
+from rodfem.kinds import reals, whole
 from rodfem.places import needs_centreline
 from rodfem.scene import Scene
 from rodfem.turning import ByAngle, ByQuaternion, Turning
@@ -54,6 +55,10 @@ class Discretization:
 
     def __post_init__(self) -> None:
         """Check the values; raises :class:`SceneError`."""
+        for name, example in (("elements", 8), ("degree", 6)):
+            object.__setattr__(self, name, whole(name, getattr(self, name), example))
+        if self.vertices is not None:
+            object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
         if self.formulation not in FORMULATIONS:
             raise SceneError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(FORMULATIONS)}.")
         if self.elements < 1:
@@ -93,7 +98,7 @@ def turning_of(scene: Scene) -> Turning:
 
 
 def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:
-    """Fields: ``q`` and ``mu``, in a plane ``angle``; ``v`` where strains are free; ``r`` and ``n`` if pointwise.
+    """Fields: ``q`` and ``eta``, in a plane ``angle``; ``v`` where strains are free; ``r`` and ``n`` if pointwise.
 
     Multipliers ``p0``.. belong to constraints that hold all along the rod.
     """
@@ -101,7 +106,7 @@ def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:
     turning = turning_of(scene)
     blocks = [Block(turning.name, turning.size, k, True, False)]
     if turning.name == "q":
-        blocks.append(Block("mu", 1, k, True, True))
+        blocks.append(Block("eta", 1, k, True, True))
     if scene.free_strains:
         blocks.append(Block("v", len(scene.free_strains), k - 1, False, False))
     if discretization.formulation == "pointwise":
@@ -238,7 +243,7 @@ class Fields:
         return np.stack([compat.cell_dofs(component, cells) for component in components], axis=-1)
 
     def _clamped(self) -> np.ndarray:
-        """Local degrees of freedom that an end holds: ``q`` and ``mu`` at clamped directors, ``r`` where held.
+        """Local degrees of freedom that an end holds: ``q`` and ``eta`` at clamped directors, ``r`` where held.
 
         Of a planar rod also all that would leave the plane.
         """
@@ -258,7 +263,7 @@ class Fields:
                         found.append(at_end.ravel())
                 elif end.fixed_rotation is not None:
                     found.append(at_end.ravel())
-                elif ring and block.name == "mu" and s == self.scene.interval[1]:
+                elif ring and block.name == "eta" and s == self.scene.interval[1]:
                     found.append(at_end.ravel())  # the norm of q(l) = +-q(0) is that of q(0)
         return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
 
@@ -343,7 +348,7 @@ class Fields:
         names = {
             "q": "rotation q",
             "angle": "angle of rotation",
-            "mu": "unit-norm multiplier mu",
+            "eta": "unit-norm multiplier eta",
             "v": "strain v",
             "r": "centreline r",
             "n": "contact force n",

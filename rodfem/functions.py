@@ -11,38 +11,22 @@ from forms.kinematics import UNDEFORMED
 from forms.rotation import IDENTITY, rotation
 from rodfem.ends import Constants
 from rodfem.places import NoCentreline, place
+from rodfem.roles import Role, changes
 
 if TYPE_CHECKING:
     from rodfem.scene import Scene
 
 
-def functions_of(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], str]]:
-    """All functions of a scene that are given: what each is in words, the function, how it is called."""
-    along: list[tuple[str, Any, str]] = [
-        ("stored energy", scene.energy, "W(v, k, c)"),
-        ("start", scene.start, "start(s)"),
-        ("ordinate", scene.ordinate.of, "of(r, q)"),
-        ("distributed force", scene.distributed, "f(c)"),
-        ("distributed follower force", scene.follower, "f(c)"),
-        ("potential along the rod", scene.potential, "f(x, c)"),
-        ("mass per length", scene.inertia.rho_A, "f(c)"),
-        ("rotary inertia per length", scene.inertia.rho_I, "f(c)"),
-    ]
-    for side, end in zip(("left", "right"), scene.sides, strict=True):
-        of_constants = {"position of": end.position, "force on": end.force, "follower force on": end.follower}
-        of_constants |= {"moment on": end.moment, "follower moment on": end.follower_moment}
-        along += [(f"{what} the {side} end", f, "f(c)") for what, f in of_constants.items()]
-        along.append((f"energy of the {side} end", end.energy, "f(x, c)"))
-    for x in scene.attachments:
-        of_constants = {"force": x.force, "follower force": x.follower, "mass": x.mass, "inertia": x.rotary_inertia}
-        along += [(f"{what} of an attachment", f, "f(c)") for what, f in of_constants.items()]
-        along.append(("energy of an attachment", x.energy, "f(x, c)"))
-    for constraint in scene.constraints:
-        along.append(("constraint", constraint.of, "f(x, c)"))
-        along.append(("value of an integral constraint", getattr(constraint.of, "equals", None), "f(c)"))
-    for what, function, wanted in along:
-        if function is not None:
-            yield what, function, wanted
+def functions_of(scene: Scene) -> list[tuple[str, Callable[..., Any], Role]]:
+    """All functions of a scene that are given: what each is in words, the function, its role."""
+    found: list[tuple[str, Callable[..., Any], Role]] = []
+
+    def note(what: str, function: Callable[..., Any], role: Role) -> Callable[..., Any]:
+        found.append((what, function, role))
+        return function
+
+    changes(scene, note)
+    return found
 
 
 def functions_of_places(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], Any]]:
@@ -52,11 +36,9 @@ def functions_of_places(scene: Scene) -> Iterator[tuple[str, Callable[..., Any],
     r, strains = ufl.as_vector([0.2, 0.3, 0.4]), (ufl.as_vector([0.01, 0.02, 1.01]), ufl.as_vector([0.1, 0.2, 0.3]))
     point = place(q, R, scene.interval[0], r, length=scene.length)
     rod = place(q, R, scene.interval[0], r, dr=ufl.dot(R, strains[0]), v=strains[0], k=strains[1], length=scene.length)
-    for what, function, wanted in functions_of(scene):
-        if wanted == "f(x, c)" and what != "constraint":
-            yield what, function, rod if "along" in what else point
-    for x in scene.constraints:
-        yield "constraint", getattr(x.of, "of", x.of), point if x.kind == "point" else rod
+    for what, function, role in functions_of(scene):
+        if role.call == "f(x, c)":
+            yield what, function, rod if role.along else point
 
 
 def asked_for(scene: Scene) -> set[str]:
@@ -69,14 +51,11 @@ def asked_for(scene: Scene) -> set[str]:
             return super().__getattribute__(name)
 
     c = Watched(**vars(scene.constants()))
-    for _, function, wanted in functions_of(scene):
-        if wanted == "f(c)":
+    for _, function, role in functions_of(scene):
+        if role.call == "f(c)":
             function(c)
     for _, function, known in functions_of_places(scene):
         function(known, c)
-    for end in scene.sides:
-        if callable(end.rotation):
-            end.rotation(c)
     scene.energy(ufl.as_vector(UNDEFORMED), ufl.as_vector([0.0, 0.0, 0.0]), c)
     return asked
 

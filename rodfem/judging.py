@@ -34,7 +34,8 @@ def judge_users(
     scene = system.scene
     about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}
     about |= {k: v for k, v in asdict(system.fields.discretization).items() if k != "vertices"}
-    report.say(f"\nIs it stable? (left-most eigenvalues mu = omega^2{'' if scene.conservative else ', nearest zero'})")
+    which = "left-most eigenvalues mu = omega^2" if scene.conservative else "eigenvalues mu = omega^2 nearest zero"
+    report.say(f"\nIs it stable? ({which})")
     finders: dict[int, ModeFinder] = {}
     saved: list[tuple[str, int]] = []
     for branch, special in ((b, s) for b in branches for s in b.special if s.kind == USER):

@@ -8,6 +8,7 @@ from rodfem.checks import check_load
 from rodfem.continuation import Steps
 from rodfem.errors import SceneError
 from rodfem.functions import asked_for
+from rodfem.kinds import real, reals, whole
 from rodfem.meshes import check_accuracy
 from rodfem.scene import Scene
 
@@ -16,6 +17,8 @@ from rodfem.scene import Scene
 class Plan:
     """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars.
 
+    Without a ``span`` the range is that of the scene.  Branches are followed from branch points of branches of a depth
+    less than ``depth``; the first branch has depth 0.
     ``spectrum`` left-most eigenvalues of every state are found besides its index; at the loads ``at`` states are judged
     by ``method`` (where one is named), and their ``modes`` left-most modes are found; ``tries`` deflated iterations at
     each of these loads look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
@@ -24,7 +27,7 @@ class Plan:
     (relative to values greater than one).
     """
 
-    span: tuple[float, float]
+    span: tuple[float, float] | None = None
     at: tuple[float, ...] = ()
     depth: int = 2
     steps: Steps = field(default_factory=Steps)
@@ -36,13 +39,37 @@ class Plan:
     modes: int = 0
     accuracy: float | None = None
 
+    def __post_init__(self) -> None:
+        """Check that all is of the right kind; raises :class:`SceneError`."""
+        if self.span is not None:
+            object.__setattr__(self, "span", reals("span", self.span, (0.0, 1.0), 2))
+        object.__setattr__(self, "at", reals("at", self.at, (0.5, 1.0)))
+        for name, example in (("depth", 2), ("spectrum", 4), ("tries", 24), ("modes", 3)):
+            object.__setattr__(self, name, whole(name, getattr(self, name), example))
+        if not isinstance(self.steps, Steps):
+            raise SceneError(f"steps is {self.steps!r}: give Steps, as in steps=Steps(largest=0.02).")
+        if not isinstance(self.method, str):
+            raise SceneError(f"method is {self.method!r}: give the name of one, as in method='auto'.")
+        if self.accuracy is not None:
+            real("accuracy", self.accuracy, 1e-8)
+        if self.locus is not None:
+            parts = tuple(self.locus) if isinstance(self.locus, (tuple, list)) else ()
+            if len(parts) != 3 or not isinstance(parts[0], str):
+                raise SceneError(f"locus is {self.locus!r}: give a name and an interval, as in locus=('A', -3.0, 0.0).")
+            reals("locus[1:]", parts[1:], (-3.0, 0.0))
+
+    def over(self, scene: Scene) -> tuple[float, float]:
+        """Range of the load: that of the plan, or that of the scene."""
+        return scene.span if self.span is None else self.span
+
     def check(self, scene: Scene) -> None:
         """Raise :class:`SceneError` for a range that the scene does not admit, or a load outside the range."""
-        scene.check_span(self.span)
+        span = self.over(scene)
+        scene.check_span(span)
         check_load(scene)
         if self.accuracy is not None:
             check_accuracy(self.accuracy)
-        low, high = sorted(self.span)
+        low, high = sorted(span)
         for load in self.at:
             if not low <= load <= high:
                 raise SceneError(
@@ -67,6 +94,8 @@ class Plan:
                     scene.varying(scene.load, scene.span, **{name: value})
                 except SceneError as trouble:
                     raise SceneError(f"The locus cannot reach {name} = {value:g}. {trouble}") from None
+        if self.depth < 0:
+            raise SceneError(f"{self.depth} is not a depth: give 0 (the first branch alone) or more to --depth.")
         if self.tries < 0:
             raise SceneError(f"{self.tries} is not a number of tries: give 0 or more to --search.")
         if self.tries and not self.at:

@@ -10,15 +10,32 @@ from typing import TextIO
 import numpy as np
 from mpi4py import MPI
 
-from rodfem.branch import BRANCH_POINT, DIVERGENCE, END, FLUTTER, FOLD, IMPERFECT, USER, Branch, Point, Special
+from forms.kinematics import RODS
+from rodfem.branch import (
+    BRANCH_POINT,
+    DIVERGENCE,
+    END,
+    FLUTTER,
+    FOLD,
+    IMPERFECT,
+    USER,
+    Branch,
+    Point,
+    Special,
+    not_followed,
+)
 from rodfem.clock import Clock
 from rodfem.fields import Discretization
 from rodfem.modes import Modes
+from rodfem.scene import Scene
 from rodfem.stability.judge import Verdict
 from rodfem.system import System
 
 LABELS = {FOLD: "LP", BRANCH_POINT: "BP", FLUTTER: "HB", DIVERGENCE: "BP", IMPERFECT: "IB", USER: "UZ", END: "EP"}
 """AUTO's two-letter labels."""
+INDEX, UNSTABLE = "index", "unstable"
+"""Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
+STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
 
 
 def rounded_up(error: float) -> float:
@@ -75,6 +92,7 @@ class Report:
 
     def __init__(self, comm: MPI.Comm = MPI.COMM_WORLD, quiet: bool = False, stream: TextIO | None = None) -> None:
         """Print to ``stream``, by default the terminal."""
+        self.count = INDEX
         self.on = comm.rank == 0 and not quiet
         self.stream = stream or sys.stdout
         self.live = self.on and self.stream.isatty() and comm.size == 1
@@ -102,11 +120,25 @@ class Report:
         if accuracy is not None and scene.conservative:
             self.say(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
+        self.count = INDEX if scene.conservative else UNSTABLE
         if not scene.conservative:
             loads = ", ".join(scene.without_potential())
             self.say(f"  not conservative ({loads}): stability is a matter of frequencies, not of an index")
         for line in f.left_out():
             self.say(f"  left out: {line}")
+        self._ignored(scene)
+
+    def _ignored(self, scene: Scene) -> None:
+        """Say which terms of the stored energy count for nothing in a rod of that kind, and in which they would."""
+        ignored = scene.ignored_strains
+        if not ignored:
+            return
+        wanted = {*scene.free_strains, *ignored}
+        kind = min((rod for rod, free in RODS.items() if wanted <= set(free)), key=lambda rod: len(RODS[rod]))
+        self.warn(
+            f"The stored energy depends on {', '.join(STRAINS[i] for i in ignored)}, but a rod that is {scene.rod} "
+            f"keeps that undeformed, so that it counts for nothing: leave it out, or choose rod={kind!r}."
+        )
 
     def frequency_mesh(self, mesh: Discretization, number: int, change: float, asked: float) -> None:
         """Say which mesh was chosen for frequencies, and by how much they still change."""
@@ -131,14 +163,14 @@ class Report:
         """Head a new branch."""
         origin = f" from {branch.parent[0]}, special point {branch.parent[1] + 1}" if branch.parent else ""
         self.say(f"\n{branch.name}{origin}")
-        self.say("       load           ordinate       energy    index  zero  located to")
+        self.say(f"       load           ordinate       int W ds  {self.count:>6}  zero  located to")
 
     def progress(self, branch: Branch, point: Point) -> None:
         """Keep one line up to date while a branch is traced (on a terminal only)."""
         if self.live:
             self.say(
                 f"  ... {len(branch.points)} points, load {point.load:.5f}, "
-                f"ordinate {point.ordinate:.5f}, index {point.negative}",
+                f"ordinate {point.ordinate:.5f}, {self.count} {point.negative}",
                 end="",
             )
 
@@ -146,14 +178,13 @@ class Report:
         """Print a special point as it is found, as AUTO does."""
         self.say("  " + self._line(special))
 
-    @staticmethod
-    def _line(special: Special) -> str:
+    def _line(self, special: Special) -> str:
         p = special.point
         meets = f"  meets {special.meets[0]}" if special.meets else ""
         return (
             f"{LABELS[special.kind]}   {round(p.load, 10) + 0.0:<14.10f} {round(p.ordinate, 9) + 0.0:<14.9f} "
             f"{p.energy:<10.6f} "
-            f"{_index(special):>6} {p.zero:>5}  {special.located_to:.0e}{meets}"
+            f"{_index(special):>{max(6, len(self.count))}} {p.zero:>5}  {special.located_to:.0e}{meets}"
         )
 
     def law(self, special: Special) -> None:
@@ -172,7 +203,7 @@ class Report:
         self.say(
             f"\nSpecial points (in brackets the estimated error of the discretisation; ordinate: {scene.ordinate.name})"
         )
-        self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} index")
+        self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
         for branch in branches:
             for s in branch.special:
                 exact = s.kind in (USER, END) and s.zero_of != "stretch"
@@ -187,11 +218,22 @@ class Report:
             for unexplained in branch.unexplained:
                 self.warn(f"{branch.name}: {unexplained}")
 
-    def spectra(self, branches: Sequence[Branch]) -> None:
+        missed = not_followed(branches)
+        if missed:
+            deepest = max(
+                b.depth for b in branches if any(s.kind == BRANCH_POINT and not s.switched for s in b.special)
+            )
+            self.say(
+                f"  {missed} branch point{'s were' if missed > 1 else ' was'} not followed, at the depth of switches: "
+                f"--depth {deepest + 1} follows what leaves there"
+            )
+
+    def spectra(self, branches: Sequence[Branch], scene: Scene) -> None:
         """Print the left-most eigenvalues of the special points, if they were asked for."""
         rows = [(b, s) for b in branches for s in b.special if s.point.spectrum]
         if rows:
-            self.say("\nLeft-most eigenvalues mu = omega^2 for unit rotary inertia (symmetry modes left out)")
+            inertia = "the scene's inertia" if scene.has_inertia else "unit rotary inertia"
+            self.say(f"\nLeft-most eigenvalues mu = omega^2 for {inertia} (symmetry modes left out)")
         for branch, s in rows:
             self.say(
                 f"  {branch.name:<12} {s.kind:<13} {s.point.load:<13.8g} "
@@ -219,7 +261,11 @@ class Report:
 
     def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:
         """Print what a judgement says of one state, with its modes where they were found."""
-        unstable = "stable" if found.stable else f"unstable in {found.negative} direction{'s'[: found.negative != 1]}"
+        many = "s"[: found.negative != 1]
+        unstable = f"unstable in {found.negative} direction{many}"
+        if self.count == UNSTABLE:
+            unstable = f"unstable, {found.negative} eigenvalue{many} negative or complex"
+        unstable = "stable" if found.stable else unstable
         zero = f", {found.zero} zero" if found.zero else ""
         self.say(f"  {name}, {load}: {unstable}{zero}")
         motions = ("",) * len(found.values) if modes is None else modes.motion
@@ -231,10 +277,8 @@ class Report:
             known = f"residual {residual:.0e}" if isfinite(residual) else ""
             self.say(f"    mu = {number + doubt:<28} {known:<15} {motion}".rstrip())
         proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
-        self.say(
-            f"    {found.method} ({found.reason}){proof}; {found.factorisations} factorisations, "
-            f"{1e3 * found.seconds:.1f} ms"
-        )
+        took = f"{found.factorisations} factorisation{'s'[: found.factorisations != 1]}, {1e3 * found.seconds:.1f} ms"
+        self.say(f"    {found.method} ({found.reason}){proof}; {took}")
         if found.band:
             inside = ", ".join(f"{m:.3g} +- {u:.0e}" for m, u in zip(found.inside, found.uncertainty, strict=True))
             self.say(
@@ -255,6 +299,6 @@ class Report:
             for name in ("setup", "assembly", "solve", "stability", "location", "error bars", "files")
         ]
         self.say(f"\nTime: {', '.join(parts)}; {clock.total():.2f} s in all")
-        self.say(
-            f"{points} points with their index, {1e3 * work / max(points, 1):.2f} ms each (assembly, solve, stability)"
-        )
+        known = "index" if self.count == INDEX else "frequencies"
+        each = 1e3 * work / max(points, 1)
+        self.say(f"{points} points with their {known}, {each:.2f} ms each (assembly, solve, stability)")

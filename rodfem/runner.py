@@ -21,8 +21,8 @@ from rodfem.meshes import start_mesh
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Scene
+from rodfem.solvers import solver
 from rodfem.sweep import FREQUENCIES, Sweep
-from rodfem.system import System
 
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
 """What a picture's caption shows for TeX names."""
@@ -61,7 +61,7 @@ def run(
     loses no finished one.  Raises :class:`~rodfem.errors.SceneError` for bad input, before any computation, and
     :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
     """
-    plan = plan or Plan(scene.span)
+    plan = plan or Plan()
     output = output or Path("results") / scene.name
     if scene.conservative:
         compat.require_real_petsc()
@@ -73,8 +73,8 @@ def run(
         with clock("setup"):
             if plan.accuracy is not None and discretization.vertices is None:
                 discretization = _chosen(scene, discretization.formulation, plan, report, comm)
-            system = System(scene, discretization, comm, clock)
-            follower = Follower(system, plan.spectrum) if scene.conservative else Equilibria(system)
+            follower = solver(scene, discretization, comm, spectrum=plan.spectrum, clock=clock)
+            system = follower.system
         report.system(system, plan.accuracy)
         if plan.method or plan.modes:
             from rodfem.judging import check_method
@@ -88,7 +88,7 @@ def run(
         branches = explorer.run()
     _save_diagram(explorer, clock, output)
     report.table(branches, system)
-    report.spectra(branches)
+    report.spectra(branches, scene)
     report.frequencies(branches, scene.load)
     report.timing(clock, sum(len(b.points) for b in branches))
     report.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
@@ -110,7 +110,7 @@ def _chosen(scene: Scene, formulation: str, plan: Plan, report: Report, comm: MP
     if scene.conservative:
         return start_mesh(scene, formulation, plan.accuracy, comm)
     number = plan.spectrum or FREQUENCIES
-    mesh, change = frequency_mesh(scene, formulation, plan.accuracy, plan.span, number, comm)
+    mesh, change = frequency_mesh(scene, formulation, plan.accuracy, plan.over(scene), number, comm)
     report.frequency_mesh(mesh, number, change, plan.accuracy)
     return mesh
 
@@ -124,7 +124,7 @@ def _save(explorer: Explorer | Sweep, clock: Clock, output: Path) -> None:
 def _save_diagram(explorer: Explorer | Sweep, clock: Clock, output: Path) -> None:
     systems, plan = [solver.system for solver in explorer.solvers], explorer.plan
     if systems[0].comm.rank == 0:
-        save_json(as_data(explorer.branches, systems, clock, plan.span, plan.accuracy), output / "diagram.json")
+        save_json(as_data(explorer.branches, systems, clock, explorer.span, plan.accuracy), output / "diagram.json")
 
 
 def _loci(
@@ -140,7 +140,8 @@ def _loci(
     if plan.locus is None:
         return
     name, low, high = plan.locus
-    load = (min(plan.span), max(plan.span))
+    span = plan.over(solvers[0].system.scene)
+    load = (min(span), max(span))
     saved: list[dict] = []
     for branch in branches:
         for special in branch.special:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import inf, isfinite
 from typing import Any
 
@@ -21,7 +22,8 @@ from forms.kinematics import RODS, UNDEFORMED
 from rodfem.checks import check_kinds, check_scene
 from rodfem.ends import Attachment, Constants, Constraint, End, OfConstants, OfPlace, Ring, Vector
 from rodfem.errors import SceneError
-from rodfem.guard import guards_of
+from rodfem.guard import guarded
+from rodfem.roles import Role, changes
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,12 @@ class Inertia:
     Only frequencies need them, and the stability of states under loads without a potential.
     """
 
-    rho_A: Callable[[Constants], Any] = lambda c: 0.0
-    rho_I: Callable[[Constants], Vector] = lambda c: (1.0, 1.0, 1.0)
+    rho_A: Callable[[Constants], Any] = field(
+        default=lambda c: 0.0, metadata={"role": Role("mass per length", "f(c)", 0)}
+    )
+    rho_I: Callable[[Constants], Vector] = field(
+        default=lambda c: (1.0, 1.0, 1.0), metadata={"role": Role("rotary inertia per length", "f(c)", 3)}
+    )
 
 
 @dataclass(frozen=True)
@@ -68,7 +74,7 @@ class Ordinate:
 
     name: str
     s: float
-    of: Callable[[np.ndarray, np.ndarray], float]
+    of: Callable[[np.ndarray, np.ndarray], float] = field(metadata={"role": Role("ordinate", "of(r, q)")})
     label: str = ""
 
 
@@ -85,7 +91,8 @@ class Scene:
     rod
         One of the keys of :data:`forms.kinematics.RODS`: which strains are free.
     energy
-        Stored energy ``W(v, k, c)`` per unit length.
+        Stored energy ``W(v, k, c)`` per unit length.  Strains that the kind of rod keeps undeformed count for nothing
+        in it, which the terminal says.
     parameters
         Named constants, each a :class:`Parameter` or a number; ``load`` names the one that is varied.
     ends
@@ -117,28 +124,30 @@ class Scene:
     name: str
     interval: tuple[float, float]
     rod: str
-    energy: Callable[[Any, Any, Constants], Any]
+    energy: Callable[[Any, Any, Constants], Any] = field(metadata={"role": Role("stored energy", "W(v, k, c)")})
     parameters: Mapping[str, Parameter]
     load: str
-    ends: tuple[End, End] | Ring
+    ends: tuple[End, End] | Ring = field(metadata={"places": ("left", "right")})
     ordinate: Ordinate
     span: tuple[float, float]
     title: str = ""
     inertia: Inertia = Inertia()
-    distributed: OfConstants | None = None
-    follower: OfConstants | None = None
-    potential: OfPlace | None = None
+    distributed: OfConstants | None = field(default=None, metadata={"role": Role("distributed force", "f(c)", 3)})
+    follower: OfConstants | None = field(default=None, metadata={"role": Role("distributed follower force", "f(c)", 3)})
+    potential: OfPlace | None = field(
+        default=None, metadata={"role": Role("potential along the rod", "f(x, c)", 0, along=True)}
+    )
     attachments: tuple[Attachment, ...] = ()
     constraints: tuple[Constraint, ...] = ()
     breaks: tuple[float, ...] = ()
     planar: str | None = None
-    start: Callable[[np.ndarray], np.ndarray] | None = None
+    start: Callable[[np.ndarray], np.ndarray] | None = field(default=None, metadata={"role": Role("start", "start(s)")})
     states: str = field(default="straight")
 
     def __post_init__(self) -> None:
         """Check all that can be checked before any computation; raises :class:`SceneError`."""
         check_kinds(self)
-        for field_name, value in guards_of(self).items():
+        for field_name, value in changes(self, guarded).items():
             object.__setattr__(self, field_name, value)
         named = {n: p if isinstance(p, Parameter) else Parameter(float(p)) for n, p in self.parameters.items()}
         object.__setattr__(self, "parameters", named)
@@ -219,6 +228,28 @@ class Scene:
         if self.follower is not None:
             found.append("distributed follower force")
         return found + [f"follower force at s = {x.s:g}" for x in self.attachments if x.follower is not None]
+
+    @property
+    def has_inertia(self) -> bool:
+        """Whether the scene states masses or inertias of its own, beside the unit rotary inertia that counts by."""
+        return self.inertia != Inertia() or any(x.mass or x.rotary_inertia for x in self.attachments)
+
+    @cached_property
+    def ignored_strains(self) -> tuple[int, ...]:
+        """Components of ``v`` that the stored energy depends on, but that the kind of rod keeps undeformed."""
+        rng = np.random.default_rng(1)
+        v, k = 0.05 * rng.uniform(0.5, 1, size=(2, 3))
+        stiff = [i for i in range(3) if i not in self.free_strains]
+        free = np.where(np.isin(np.arange(3), self.free_strains), v, 0.0)
+        found = []
+        for i in stiff:
+            pairs = [
+                [self._energy_at(free + d * v[i] * np.eye(3)[i], k, self.constants(s=s)) for d in (0.0, -1.0, 1.0)]
+                for s in self.samples()
+            ]
+            if any(abs(b - a) > 1e-12 * max(abs(a), abs(b)) for a, *others in pairs for b in others):
+                found.append(i)
+        return tuple(found)
 
     @property
     def free_strains(self) -> tuple[int, ...]:

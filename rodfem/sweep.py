@@ -46,6 +46,7 @@ class Sweep:
     def __init__(self, solver: Equilibria, plan: Plan, report: Report, finished: Callable[[], None]) -> None:
         """Allocate the pencil; the plan must have passed its check."""
         self.solver, self.plan, self.report, self.finished = solver, plan, report, finished
+        self.span = plan.over(solver.system.scene)
         self.vibration = Vibration(solver.system)
         self.number = plan.spectrum or FREQUENCIES
         self.pairs: list[complex] = []
@@ -62,7 +63,7 @@ class Sweep:
         branch = Branch(scene.states, None, 0)
         self.branches.append(branch)
         self.report.branch(branch)
-        a, b = self.plan.span
+        a, b = self.span
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
         x, _ = self.solver.first(a)
         for load in loads if a < b else loads[::-1]:
@@ -104,7 +105,7 @@ class Sweep:
         return Point(
             x=x,
             tangent=None,
-            arclength=abs(load - self.plan.span[0]),
+            arclength=abs(load - self.span[0]),
             load=load,
             ordinate=solver.shape.ordinate(x),
             energy=solver.energy(x),

@@ -51,7 +51,8 @@ class Tracer:
         """Start with no branch; the plan must have passed its :meth:`Plan.check`."""
         self.follower, self.plan, self.report, self.finished = follower, plan, report, finished
         self.scene = follower.system.scene
-        self.low, self.high = sorted(plan.span)
+        self.span = plan.over(self.scene)
+        self.low, self.high = sorted(self.span)
         self.branches: list[Branch] = []
         self.meshes = Meshes(follower, plan.accuracy)
         self.gaps = Gaps(self.meshes)
@@ -81,7 +82,8 @@ class Tracer:
             self.report.branch(branch)
         self.use(branch.points[-1].mesh)
         self.watch = Watch(self.meshes, (self.low, self.high))
-        self.follower.damp(0)
+        self.follower.system.set_phase(branch.points[-1].x)
+        self.follower.damp(self._extra(branch.points[-1]) if branch.parent else 0)
         try:
             self._follow(branch)
         except ConvergenceError as trouble:
@@ -120,6 +122,7 @@ class Tracer:
         special = {id(s.point) for s in branch.special}
         history, begun = [p for p in branch.points if id(p) not in special], False
         self._open, self._before, self._short = [history[-1]], None, (-inf, inf, 0)
+        self._level = history[-1].zero
         while True:
             try:
                 self.watch.row(history[-1], self.follower)
@@ -425,7 +428,7 @@ class Tracer:
     def _singular_end(self, branch: Branch, last: Point) -> None:
         """Report a branch point on the very end of the range, located on a piece of the branch that goes past it."""
         parameter, load = self.scene.parameters[self.scene.load], last.load
-        beyond = load + BEYOND * (load - sum(self.plan.span) / 2)
+        beyond = load + BEYOND * (load - sum(self.span) / 2)
         previous = self.here(branch.points[-2])
         if not parameter.admissible[0] < beyond < parameter.admissible[1] or previous.x is last.x:
             return
@@ -481,18 +484,21 @@ class Tracer:
 
     def _check_zeros(self, history: list[Point], point: Point) -> None:
         """Say once where eigenvalues stay zero without a symmetry: the state is one of a family at the same load."""
-        extra = min(point.zero, self._level) - self.follower.system.active_drifts()
-        if abs(point.slope) < VERTICAL * (self.high - self.low):
-            extra -= 1  # the branch itself is such a family
-        recent = history[-4:]
-        stay = extra > 0 and len(recent) == 4 and all(p.zero == point.zero for p in recent)
+        extra = self._extra(point)
+        recent = [p for p in history[-4:] if p.arclength > 0.0]  # a branch point has zeros of its own
+        stay = extra > 0 and bool(recent) and all(p.zero == point.zero for p in recent)
         self.follower.damp(extra if stay else 0)
-        if stay and not self.warned:
+        if stay and len(recent) == 4 and point.zero <= self._level and not self.warned:
             self.warned = True
             self.report.say(
                 f"  {extra} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
                 "move freely at one and the same load"
             )
+
+    def _extra(self, point: Point) -> int:
+        """Zero eigenvalues, beside symmetries' and the branch's own, of the point at which phases were last set."""
+        vertical = abs(point.slope) < VERTICAL * (self.high - self.low)  # the branch itself is a family at one load
+        return point.zero - self.follower.system.active_drifts() - vertical
 
     def _finish(self, branch: Branch) -> None:
         branch.renumber()

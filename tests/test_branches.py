@@ -6,8 +6,19 @@ import numpy as np
 import pytest
 import shooting
 from rods import DEFAULT, Constants, explored, specials, user_points
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
 
+from forms.energy import bending
 from rodfem.branch import Branch
+from rodfem.continuation import Follower
+from rodfem.ends import pinned
+from rodfem.explore import Explorer
+from rodfem.fields import Discretization
+from rodfem.plan import Plan
+from rodfem.report import Report
+from rodfem.scene import Ordinate, Scene
+from rodfem.system import System
 
 AT = (0.2, 0.325, 0.5, 0.7, 0.9)
 RICH, PLAIN = (16, 8), (8, 6)
@@ -167,3 +178,39 @@ def test_formulations_agree_within_their_estimates() -> None:
     np.testing.assert_allclose(
         [b.points[-1].energy for b in both[0]], [b.points[-1].energy for b in both[1]], rtol=1e-9
     )
+
+
+def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
+    """Where ``2 E(m) = K(m)``, at ``P0 = 4 K^2``, the ends of a pinned column meet: its loop may turn about any axis.
+
+    The force that it carries turns with it: ``P = P0 cos(angle)``.  Two null vectors, and a circle of states at each
+    load below, along which the Jacobian is singular.
+    """
+    m = brentq(lambda m: 2 * ellipe(m) - ellipk(m), 0.5, 0.99)
+    P0 = 4 * ellipk(m) ** 2
+    column = Scene(
+        name="pinned",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending(k, (1.0, 2.0, 1.0)),
+        parameters={"P": 0.0},
+        load="P",
+        ends=(pinned(), pinned(lambda c: (0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P))),
+        ordinate=Ordinate("middle", s=0.5, of=lambda r, q: float(np.hypot(r[0], r[1]))),
+        span=(0.0, 25.0),
+    )
+    solver = Follower(System(column, Discretization("reduced", 8, 6)))
+    found = Explorer(solver, Plan(error_bars=False), Report(quiet=True), lambda: None).run()
+    (loop,) = [s for b in found if b.name == "branch 1" for s in b.special if s.kind == "branch point"]
+    assert loop.point.load == pytest.approx(P0, rel=1e-9)
+    assert loop.multiplicity == 2
+    turned = [b for b in found if b.name.startswith("branch 1.")]
+    assert len(turned) >= 2  # along each null vector; opposite ways may be told from mirror images
+    for branch in turned:
+        assert branch.ended == "end of range"
+        assert branch.points[-1].load == 0.0
+        for p in branch.points[1:]:
+            n = [solver.system.scalar(p.x, name) for name in ("n1", "n2")]
+            assert np.hypot(np.hypot(*n), p.load) == pytest.approx(P0, rel=1e-9)
+            assert p.energy == pytest.approx(loop.point.energy, rel=1e-9)
+            assert (p.negative, p.zero) == (1, 2)

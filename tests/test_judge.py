@@ -393,7 +393,7 @@ def test_dependent_constraints_are_named() -> None:
     sigma, vector = smallest_singular(C)
     assert sigma < 1e-13
     np.testing.assert_allclose(abs(vector[last[:2]]), 2**-0.5, rtol=1e-6)
-    where = pencil.where | {"scalars": last, "mu": np.zeros(0, dtype=int)}
+    where = pencil.where | {"scalars": last, "eta": np.zeros(0, dtype=int)}
     if system.comm.size == 1:
         twin = replace(
             pencil, K=petsc_matrix(comm, gathered(pencil.K)), C=petsc_matrix(comm, sp.csr_matrix(C)), where=where

@@ -42,7 +42,7 @@ def energy(v: Any, k: Any) -> Any:
     return 0.7 * ufl.inner(v, v) ** 2 + ufl.dot(v, k) + coupled + ufl.exp(0.2 * k[0]) + k[2] ** 4
 
 
-SIZES = {"x": 17, "a": 15, "b": 15, "along a": 17, "along b": 17, "which": 6}
+SIZES = {"x": 17, "a": 15, "b": 15, "along a": 17, "along b": 17, "which": 7}
 
 
 class Pointwise:
@@ -77,6 +77,7 @@ class Pointwise:
             paper.second_variation(state, one, other),
             paper.linearized_balance(state, one, other),
             paper.first_variation(state, r_s, bracket),
+            ufl.dot(ufl.diff(paper.first_variation(state, r_s, one), x), self.numbers["along b"]),
         ]
         integrand = sum(self.numbers["which"][i] * f for i, f in enumerate(found))
         (self.form,) = compat.compile_forms([integrand * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})])
@@ -85,7 +86,7 @@ class Pointwise:
         return paper.Perturbation(*(part(self.numbers[name], 3 * i, 3 * i + 3) for i in range(5)))
 
     def values(self, rod: str, seed: int) -> np.ndarray:
-        """All six at a random state of a rod of that kind, in random directions."""
+        """All seven at a random state of a rod of that kind, in random directions."""
         rng = np.random.default_rng(seed)
         stiff = [i for i in range(3) if i not in RODS[rod]]
         for name in ("x", "a", "b"):
@@ -98,8 +99,8 @@ class Pointwise:
             dq, dq_s = hamilton(theta, q) / 2, (hamilton(theta_s, q) + hamilton(theta, q_s)) / 2
             self.numbers[f"along {name}"].value[:] = np.concatenate([dq, dq_s, p[6:]])
         found = []
-        for i in range(6):
-            self.numbers["which"].value[:] = np.arange(6) == i
+        for i in range(7):
+            self.numbers["which"].value[:] = np.arange(7) == i
             found.append(float(np.real(fem.assemble_scalar(self.form))))
         return np.array(found)
 
@@ -117,7 +118,7 @@ def at_a_point(formulation: str) -> Pointwise:
 @pytest.mark.parametrize("rod", RODS)
 def test_pointwise_it_is_exact_in_any_state(rod: str, formulation: str) -> None:
     for seed in range(5):
-        first, first_by_hand, second, second_by_hand, _, _ = at_a_point(formulation).values(rod, seed)
+        first, first_by_hand, second, second_by_hand, *_ = at_a_point(formulation).values(rod, seed)
         assert first_by_hand == pytest.approx(first, rel=1e-11, abs=1e-11)
         assert second_by_hand == pytest.approx(second, rel=1e-11, abs=1e-11)
 
@@ -125,14 +126,57 @@ def test_pointwise_it_is_exact_in_any_state(rod: str, formulation: str) -> None:
 @pytest.mark.parametrize("rod", RODS)
 def test_linearized_balance_differs_by_a_multiple_of_the_equations(rod: str) -> None:
     for seed in range(5):
-        *_, second, balance, equations = at_a_point("pointwise").values(rod, seed)
+        *_, second, balance, equations, _ = at_a_point("pointwise").values(rod, seed)
         assert balance - second == pytest.approx(equations, rel=1e-11, abs=1e-11)
         assert abs(equations) > 1e-3
 
 
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+@pytest.mark.parametrize("rod", RODS)
+def test_linearized_balance_is_the_linearisation_of_the_weak_form(rod: str, formulation: str) -> None:
+    """The paper's (17)-(19): the weak form with a fixed test spin, differentiated in the state by UFL."""
+    for seed in range(5):
+        *_, second, balance, _, linearised = at_a_point(formulation).values(rod, seed)
+        assert balance == pytest.approx(linearised, rel=1e-11, abs=1e-11)
+        assert abs(second - linearised) > 1e-3
+
+
+def test_they_agree_at_an_equilibrium_and_only_there() -> None:
+    """A straight rod under tension and twist; a rotation of the moment, which breaks its balance, tells them apart."""
+    mesh = compat.interval_mesh(MPI.COMM_SELF, 4, 0.0, 1.0)
+    s = ufl.SpatialCoordinate(mesh)[0]
+    slope = fem.Constant(mesh, 0.0)
+    R, zero = rotation(ufl.as_vector([ufl.cos(0.6 * s), 0, 0, ufl.sin(0.6 * s)])), ufl.as_vector([0.0] * 3)
+    n, m = ufl.as_vector([0, 0, 2.5]), ufl.as_vector([slope * s, 0, 1.7])
+    W_kk = ufl.as_matrix([[2.0, 0.1, 0.3], [0.1, 3.0, 0.2], [0.3, 0.2, 1.0]])
+    still = ufl.as_matrix([[0.0] * 3] * 3)
+    state = paper.State(R, ufl.as_vector(UNDEFORMED), n, m, zero, still, still, W_kk)
+
+    def spin(phase: float) -> paper.Perturbation:
+        theta = ufl.as_vector([s * (1 - s) * ufl.sin(phase + (i + 1) * s) for i in range(3)])
+        return paper.Perturbation(theta, theta.dx(0), zero, zero, zero)
+
+    tau, theta = spin(0.3), spin(2.0)
+    dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": 16})
+    found = paper.linearized_balance(state, tau, theta), paper.second_variation(state, tau, theta)
+    forms = compat.compile_forms([f * dx for f in (*found, (found[0] - found[1]) ** 2)])
+    balance, second, apart = (float(np.real(fem.assemble_scalar(f))) for f in forms)
+    assert balance == pytest.approx(second, rel=1e-12)
+    assert apart > 1e-6  # in the integral only, not pointwise
+    slope.value = 3.0
+    balance, second, _ = (float(np.real(fem.assemble_scalar(f))) for f in forms)
+    assert abs(balance - second) > 1e-3
+
+
+def test_the_papers_linearisation_is_named() -> None:
+    for function, paper_has_it in ((paper.linearized_balance, True), (paper.second_variation, False)):
+        assert ("(17)-(19)" in (function.__doc__ or "")) == paper_has_it
+    assert "(11)-(12)" in (paper.first_variation.__doc__ or "")
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_acceleration_of_the_curve_is_a_change_of_length(seed: int) -> None:
-    """Polarised, it is ``-1/4 theta1 . theta2 q``: the unit norm term's share in the Hessian, times minus mu."""
+    """Polarised, it is ``-1/4 theta1 . theta2 q``: the unit norm term's share in the Hessian, times minus eta."""
     rng = np.random.default_rng(seed)
     q = rng.normal(size=4)
     spins = [np.append(0.0, rng.normal(size=3)) for _ in range(2)]
@@ -199,11 +243,11 @@ def test_tangential_hessian_is_the_second_derivative_along_rotations(name: str, 
 
 
 def hessian_of_unit_norm(system: System, blocks: Blocks, x: PETSc.Vec, T: Any) -> Any:
-    """What the unit norm term contributes: ``T^t K T`` with mu less that without."""
+    """What the unit norm term contributes: ``T^t K T`` with eta less that without."""
     pencil = blocks.assemble(x)
     without = x.copy()
     f = system.fields
-    numbers = np.unique(f.number[f.dofs["mu"]])
+    numbers = np.unique(f.number[f.dofs["eta"]])
     mine = numbers[(numbers >= f.offset) & (numbers < f.offset + len(f.free_owned))]
     without.array[mine - f.offset] = 0.0
     return gathered(pencil.K) - gathered(blocks.assemble(without).K)
@@ -244,7 +288,7 @@ def quadratic_forms(name: str, formulation: str, load: float, elements: int, deg
 def perturb(system: System, w: fem.Function, phase: float) -> None:
     """Fill ``w`` with a smooth perturbation; the spin takes the places of q1, q2, q3."""
     f = system.fields
-    for number, block in enumerate(b for b in f.blocks if b.name != "mu"):
+    for number, block in enumerate(b for b in f.blocks if b.name != "eta"):
         nodes = f.coordinates(block.degree) - system.scene.interval[0]
         size = 3 if block.name == "q" else block.size
         values = smooth(nodes, system.scene.length, phase + 0.7 * number, size)

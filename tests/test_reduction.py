@@ -143,7 +143,7 @@ def test_spins_fulfil_the_norm_conditions(formulation: str) -> None:
     C, T = gathered(full.C), gathered(tangent.T)
     K = T.T @ gathered(full.K) @ T - gathered(tangent.K)
     assert abs(K).max() < 1e-12 * abs(gathered(full.K)).max()
-    everywhere = PETSc.COMM_WORLD.tompi4py().allgather(full.where["mu"])
+    everywhere = PETSc.COMM_WORLD.tompi4py().allgather(full.where["eta"])
     assert abs((T.T @ C)[:, np.concatenate(everywhere)]).max() < 1e-15
 
 

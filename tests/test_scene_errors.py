@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from math import cos, cosh, pi
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,9 @@ import ufl
 from mpi4py import MPI
 from rods import run_demo
 
-from rodfem.continuation import Follower
+from rodfem import ends, scene
+from rodfem.continuation import Follower, Steps
+from rodfem.diagram import load_json
 from rodfem.ends import (
     Attachment,
     End,
@@ -32,6 +35,7 @@ from rodfem.explore import Explorer
 from rodfem.fields import Discretization, Fields
 from rodfem.plan import Plan
 from rodfem.report import Report
+from rodfem.runner import run
 from rodfem.scene import Inertia, Ordinate, Parameter, Scene
 from rodfem.system import System
 
@@ -160,6 +164,8 @@ def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
         (held(right=free(ZERO)), "force on the right end is .*: give a function"),  # type: ignore[arg-type]
         ({"energy": lambda v, k: k[0]}, "no function of 3 argument"),
         ({"energy": lambda v, k, c: None}, "energy is None: return"),
+        ({"energy": None}, "energy is None: give a function"),
+        ({"inertia": 1.0}, "inertia is 1.0: give one"),
         ({"energy": lambda v, k, c: np.cosh(k[0])}, "stored energy fails with TypeError.*write it with UFL"),
         ({"constraints": (integral(lambda x, c: x.k[2], 3.0),)}, "value of an integral constraint is 3"),  # type: ignore[arg-type]
         ({"start": lambda s: (cos(s), 0.0, 0.0, 0.0)}, "start fails with TypeError.*array of arclengths"),
@@ -322,6 +328,109 @@ def test_fewer_elements_than_pieces() -> None:
 def test_bad_discretization(make: Callable[[], Discretization]) -> None:
     with pytest.raises(SceneError, match=r"choose|give"):
         make()
+
+
+def raising(*_: object) -> Any:
+    return 1 / 0
+
+
+def takes_functions(owner: type) -> list[str]:
+    """Fields of a dataclass that are annotated as functions."""
+    words = ("Callable", "OfConstants", "OfPlace")
+    return [f.name for f in fields(owner) if any(word in str(f.type) for word in words)]
+
+
+STATED = [x for module in (ends, scene) for x in vars(module).values() if is_dataclass(x) and isinstance(x, type)]
+EVERY = sorted({(owner.__name__, name) for owner in STATED for name in takes_functions(owner)})
+
+
+def with_function(owner: str, name: str) -> Scene:
+    """A scene with a function that raises in one field of one of its parts."""
+    moving = clamped(rotation=lambda c: (1, 0, 0, 0))
+    if owner == "End":
+        of = {name: raising}
+        return Scene(
+            **(GOOD | {"ends": (clamped(), End(**of))} | ({"ends": (End(**of), moving)} if "tion" in name else {}))
+        )  # type: ignore[arg-type]
+    parts: dict[str, Any] = {
+        "Inertia": lambda: {"inertia": Inertia(**{name: raising})},
+        "Ordinate": lambda: {"ordinate": Ordinate("nothing", 0.0, raising)},
+        "Attachment": lambda: {"attachments": (Attachment(0.5, **{name: raising}),)},
+        "Constraint": lambda: {"constraints": (at(0.5, raising),)},
+        "_Difference": lambda: {"constraints": (integral(**({"of": lambda x, c: x.k[2]} | {name: raising})),)},
+        "Scene": lambda: {name: raising},
+    }
+    return Scene(**(GOOD | parts[owner]()))
+
+
+@pytest.mark.parametrize(("owner", "name"), EVERY)
+def test_no_function_of_a_scene_is_forgotten(owner: str, name: str) -> None:
+    """Whatever a dataclass of a scene takes as a function may raise: that is a sentence, and names the function."""
+    with pytest.raises(SceneError, match=r"^The .* fails with ZeroDivisionError, 'division by zero'"):
+        with_function(owner, name).ordinate.of(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+
+
+def test_the_list_of_functions_is_long() -> None:
+    assert {("Inertia", "rho_A"), ("Inertia", "rho_I"), ("_Difference", "equals"), ("End", "rotation")} < set(EVERY)
+    assert len(EVERY) >= 23
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Discretization(elements=8.0), "elements is 8.0: give a whole number, as in elements=8"),  # type: ignore[arg-type]
+        (lambda: Discretization(elements="8"), "elements is '8': give a whole number"),  # type: ignore[arg-type]
+        (lambda: Discretization(elements=True), "elements is True: give a whole number"),
+        (lambda: Discretization(degree=6.0), "degree is 6.0: give a whole number, as in degree=6"),  # type: ignore[arg-type]
+        (lambda: Discretization(degree=NAN), "degree is nan: give a whole number"),  # type: ignore[arg-type]
+        (lambda: Discretization(elements=np.bool_(True)), "elements is .*True.*: give a whole"),  # type: ignore[arg-type]
+        (lambda: Discretization(elements=1, vertices=("0", "1")), r"vertices\[0\] is '0': give a number"),  # type: ignore[arg-type]
+        (lambda: Discretization(elements=1, vertices=1.0), "vertices is 1.0: give a tuple of numbers"),  # type: ignore[arg-type]
+        (lambda: Steps(largest="0.1"), "largest is '0.1': give a number, as in largest=0.05"),  # type: ignore[arg-type]
+        (lambda: Steps(most=10.5), "most is 10.5: give a whole number, as in most=2000"),  # type: ignore[arg-type]
+        (lambda: Steps(first=NAN), "first = nan lead nowhere"),
+        (lambda: Steps(aim=0.0), "aim = 0 lead nowhere"),
+        (lambda: Steps(most=0), "0 points is none"),
+        (lambda: Plan(1.0), "span is 1.0: give 2 numbers"),  # type: ignore[arg-type]
+        (lambda: Plan((0.0, 1.0, 2.0)), "span is .*: give 2 numbers"),  # type: ignore[arg-type]
+        (lambda: Plan(at=0.5), "at is 0.5: give a tuple of numbers"),  # type: ignore[arg-type]
+        (lambda: Plan(at=("0.5",)), r"at\[0\] is '0.5': give a number"),  # type: ignore[arg-type]
+        (lambda: Plan(depth=1.5), "depth is 1.5: give a whole number"),  # type: ignore[arg-type]
+        (lambda: Plan(depth=-1).check(Scene(**GOOD)), "-1 is not a depth"),
+        (lambda: Plan(modes=3.0), "modes is 3.0: give a whole number"),  # type: ignore[arg-type]
+        (lambda: Plan(accuracy="1e-8"), "accuracy is '1e-8': give a number"),  # type: ignore[arg-type]
+        (lambda: Plan(locus=("A",)), "locus is .*: give a name and an interval"),  # type: ignore[arg-type]
+        (lambda: Plan(locus=("A", 0, "b")), r"locus\[1:\]\[1\] is .b.: give a number"),  # type: ignore[arg-type]
+        (lambda: Plan(steps=0.1), r"steps is 0.1: give Steps"),  # type: ignore[arg-type]
+        (lambda: Plan(method=3), "method is 3: give the name"),  # type: ignore[arg-type]
+    ],
+)
+def test_numbers_of_the_wrong_kind(make: Callable[[], object], words: str) -> None:
+    """A float for a whole number is no raw error of pybind from inside the mesh."""
+    with pytest.raises(SceneError, match=words) as raised:
+        make()
+    assert str(raised.value).endswith(".") and "\n" not in str(raised.value)
+
+
+def test_numpys_numbers_are_numbers(folder: Path) -> None:
+    made = Discretization("reduced", np.int64(2), np.int32(3), np.linspace(0.0, 1.0, 3))  # type: ignore[arg-type]
+    assert made == Discretization("reduced", 2, 3, (0.0, 0.5, 1.0))
+    assert {type(x) for x in (made.elements, made.degree)} == {int}
+    assert Plan(np.array([0.0, 1.0]), np.array([0.5])) == Plan((0.0, 1.0), (0.5,))  # type: ignore[arg-type]
+
+
+def test_a_plan_without_a_range_takes_the_scenes(folder: Path) -> None:
+    rod = Scene(**(GOOD | {"span": (0.0, 0.3)}))
+    for plan, rows in ((Plan(error_bars=False), []), (Plan(at=(0.1,), error_bars=False), [0.1])):
+        branches = run(rod, Discretization("reduced", 4, 3), plan, folder, figures=False, quiet=True)
+        assert branches[0].points[-1].load == 0.3
+        assert [s.point.load for s in branches[0].special if s.kind == "user"] == rows
+    assert load_json(folder / "diagram.json")["range"] == [0.0, 0.3]
+    with pytest.raises(SceneError, match="outside the range 0 to"):
+        Plan(at=(1.0,)).check(rod)
 
 
 def test_constraints_that_repeat_each_other() -> None:

@@ -3,7 +3,7 @@ r"""Mirror images and reversals: the discrete symmetries that a discretised scen
 A reflection or half turn of space is ``S = diag(s1, s2, s3)`` with signs ``s_i``; together with the same reflection of
 the directors, and perhaps with a reversal of the rod (``sigma = -1``, otherwise 1), it carries a state to ::
 
-    R -> S R S,   r -> S r,   v -> sigma S v,   k -> sigma det(S) S k,   n -> sigma S n,   mu -> mu,
+    R -> S R S,   r -> S r,   v -> sigma S v,   k -> sigma det(S) S k,   n -> sigma S n,   eta -> eta,
 
 in quaternions ``(q0, vec q) -> (q0, det(S) S vec q)``, fields being read from the other end where the rod is reversed.
 A stretch stays positive only if ``s3 = sigma``, which leaves seven candidates beside the identity.  Whether a scene
@@ -44,7 +44,7 @@ class Mirror:
         full = {
             "q": np.concatenate([[1.0], s.prod() * s]),
             "angle": (s.prod() * s)[[normal or 0]],
-            "mu": np.ones(1),
+            "eta": np.ones(1),
             "r": s,
             "v": -s if self.reversal else s,
             "n": -s if self.reversal else s,

@@ -1,1 +1,5 @@
 """Ways to answer "is it stable?": the inertia of the saddle matrix, and the spectrum of the singular pencil."""
+
+from rodfem.lazy import attributes
+
+__getattr__ = attributes(__name__)

@@ -4,10 +4,10 @@ The eigenproblem of a state is the singular pencil ``(K C; C^t 0) x = mu (M 0; 0
 derivative of the whole Lagrangian in rotation, strain and centreline, ``C`` (m, p) its derivative in those and the
 multipliers (each column the gradient of one constraint), ``M`` (m, m) the kinetic metric.  Three sets of coordinates:
 
-* ``full``: the unknowns as they are, four components of ``q`` at each node and the multiplier ``mu`` of its norm;
+* ``full``: the unknowns as they are, four components of ``q`` at each node and the multiplier ``eta`` of its norm;
 * ``tangent``: a spin ``theta`` in the space frame at each node, ``dq = 1/2 theta q``.  The sparse map ``T`` takes it to
-  the full coordinates and fulfils the collocated norm conditions, ``C_mu^t T = 0``, so that ``mu`` goes with them.
-  The blocks are ``T^t K T``, ``T^t C``, ``T^t M T``.  ``K`` contains ``mu`` times the second derivative of the norm
+  the full coordinates and fulfils the collocated norm conditions, ``C_eta^t T = 0``, so that ``eta`` goes with them.
+  The blocks are ``T^t K T``, ``T^t C``, ``T^t M T``.  ``K`` contains ``eta`` times the second derivative of the norm
   condition: at an equilibrium ``T^t K T`` is then the second derivative of the energy along
   ``exp(eps theta / 2) q`` (see :mod:`forms.paper`), without it, it is not;
 * ``compatible``: tangent coordinates, and the free strains follow from the motion through the kinematics ``r' = R v``
@@ -61,7 +61,7 @@ class Pencil:
         Map from these coordinates to the full ones, (full m, m); None if they are the full ones.
     where
         For each field this rank's global rows in ``K`` and ``C`` (``theta``, ``q``, ``v``, ``r``, ``ends``: positions
-        of ends that move), or columns of ``C`` (``mu``, ``n``, ``p0``.. and ``scalars``: components of a constant
+        of ends that move), or columns of ``C`` (``eta``, ``n``, ``p0``.. and ``scalars``: components of a constant
         contact force, moments at ends, multipliers of integral constraints, in the order of the fields' scalars).
     place
         Arclength (the middle of a cell) by which the constraints of all ranks are in order along the rod, (p,); nan for
@@ -110,8 +110,8 @@ class Blocks:
         for numbers, multiplier in ((primal, False), (dual, True)):
             scalars = [fields.scalars[x.name] for x in fields.unknown_scalars if x.multiplier == multiplier]
             numbers["scalars" if multiplier else "ends"] = np.array(scalars if system.has_scalars else [], dtype=int)
-        if coordinates != "full" and "mu" in dual:
-            del dual["mu"]
+        if coordinates != "full" and "eta" in dual:
+            del dual["eta"]
         self.rows, self.columns = (np.sort(np.concatenate(list(d.values()))) for d in (primal, dual))
         self._numbers = primal | dual
         self._first_row, self._first_column = (first_of(system.comm, len(x)) for x in (self.rows, self.columns))

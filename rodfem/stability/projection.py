@@ -7,7 +7,8 @@ part of the inverse of a sparse matrix:
     ( C^t  0 ) ( y ) = (  0   ),        (Q2^t A Q2)^-1 b = Q2^t x:
 
 the second row puts x in the kernel, Q2^t times the first is Q2^t A Q2 z = b (``inverse="saddle"``).  It holds whenever
-C has full rank and sigma is no eigenvalue, also where A itself is singular.  Elimination of x,
+C has full rank and sigma is no eigenvalue, also where A itself is singular.  Elimination of x (Kumar & Healey 2010,
+(32)),
 
     (Q2^t A Q2)^-1 = Q2^t [A^-1 - A^-1 C (C^t A^-1 C)^-1 C^t A^-1] Q2        (``inverse="elimination"``),
 

@@ -29,7 +29,7 @@ DEPENDENT = 1e-12
 """A singular value below this, relative to the greatest column of ``C``, is zero."""
 SMALL = 300
 """Number of columns up to which the singular values are computed by LAPACK."""
-NAMES = {"mu": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
+NAMES = {"eta": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
 
 
 def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:

@@ -5,8 +5,8 @@ Q2 z``, and the singular pencil ``(K C; C^t 0), (M 0; 0 0)`` of size m + p becom
 
     Q2^t K Q2 z = mu Q2^t M Q2 z,        of size m - p,
 
-whose finite eigenvalues are those of the former, without its 2p infinite ones (Kumar & Healey 2010).  SLEPc sees a
-matrix that it can only multiply by, in O(m) operations for pointwise constraints, O(m p) for integral ones.
+whose finite eigenvalues are those of the former, without its 2p infinite ones (Kumar & Healey 2010, (21)-(32)).  SLEPc
+sees a matrix that it can only multiply by, in O(m) operations for pointwise constraints, O(m p) for integral ones.
 
 Shift-invert and Cayley transforms need the inverse of the shifted matrix: :mod:`rodfem.stability.projection`.
 

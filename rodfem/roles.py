@@ -1,0 +1,85 @@
+"""The functions that a scene is made of, each declared once, at the field that holds it.
+
+The ``metadata`` of a dataclass's field says under ``role`` that it holds a function and what for: a :class:`Role`, or a
+function that returns one for the object that the field belongs to.  Under ``places`` are the words for where the
+objects of a tuple are.  :func:`changes` walks a scene by these declarations alone, so that what checks functions,
+guards them or asks what they depend on cannot forget one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Role:
+    """Purpose of a function of a scene.
+
+    Attributes
+    ----------
+    words
+        Its name in a sentence, with ``{}`` for where it is: ``force on the {} end``.
+    call
+        How it is called: ``f(c)`` of the constants, ``f(x, c)`` of a place, or another.
+    size
+        Number of components that it returns, 0 for a scalar, None where that is checked elsewhere.
+    along
+        Whether its place is the whole rod.
+    or_value
+        Whether a constant value may stand in its place.
+    """
+
+    words: str
+    call: str
+    size: int | None = None
+    along: bool = False
+    or_value: bool = False
+
+    @property
+    def arguments(self) -> int:
+        """Number of its arguments."""
+        return self.call.count(",") + 1
+
+
+Visit = Callable[[str, Any, Role], Any]
+
+
+def changes(owner: Any, visit: Visit, place: str = "") -> dict[str, Any]:
+    """Fields of a dataclass with each function ``f``, and all in what they hold, replaced by ``visit(words, f, role)``.
+
+    A field's own default (None, say), and what is replaced by itself, is left out.
+    """
+    new = {}
+    for f in fields(owner):
+        value = getattr(owner, f.name)
+        found = value if value is f.default else _visited(owner, f.metadata, value, visit, place)
+        if found is not value:
+            new[f.name] = found
+    return new
+
+
+def _visited(owner: Any, declared: Any, value: Any, visit: Visit, place: str) -> Any:
+    role = declared.get("role")
+    if _is_object(value):
+        return _changed(value, visit, place)
+    if role is not None:
+        role = role if isinstance(role, Role) else role(owner)
+        if role.or_value and not callable(value):
+            return value
+        return visit(role.words.format(place), value, role)
+    if isinstance(value, (tuple, list)) and any(map(_is_object, value)):
+        places = declared.get("places") or ("",) * len(value)
+        found = tuple(_changed(x, visit, where) for x, where in zip(value, places, strict=True))
+        return found if any(a is not b for a, b in zip(found, value, strict=True)) else value
+    return value
+
+
+def _changed(owner: Any, visit: Visit, place: str) -> Any:
+    new = changes(owner, visit, place)
+    return replace(owner, **new) if new else owner
+
+
+def _is_object(value: Any) -> bool:
+    return is_dataclass(value) and not isinstance(value, type)
