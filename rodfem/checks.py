@@ -42,7 +42,7 @@ def check_kinds(scene: Scene) -> None:
             raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
         if not isinstance(getattr(parameter, "value", parameter), Real):
             raise SceneError(f"The parameter {name} is {parameter!r}: give a number or a Parameter.")
-    if not (hasattr(scene.ordinate, "of") and hasattr(scene.ordinate, "s")):
+    if not hasattr(scene.ordinate, "places"):
         raise SceneError(f"The ordinate is {scene.ordinate!r}: give an Ordinate(name, s, of).")
     for what, function, wanted in functions_of(scene):
         count = wanted.count(",") + 1
@@ -102,7 +102,12 @@ def check_load(scene: Scene) -> None:
 
 
 def check_ordinate(scene: Scene) -> None:
-    """Raise where the ordinate is no number, at some place where it need not be defined but of the right type."""
+    """Raise where the ordinate at a point is no number, for a state where it need not be defined but of the right type.
+
+    One along the rod is checked as all functions of a place are, by :func:`check_shapes`.
+    """
+    if not scene.ordinate.places:
+        return
     try:
         scene.ordinate.of(np.array([0.2, 0.3, 0.4]), np.array([0.5, 0.1, 0.7, 0.5]))
     except SceneError as trouble:

@@ -21,7 +21,9 @@ def functions_of(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], str]]:
     along: list[tuple[str, Any, str]] = [
         ("stored energy", scene.energy, "W(v, k, c)"),
         ("start", scene.start, "start(s)"),
-        ("ordinate", scene.ordinate.of, "of(r, q)"),
+        ("ordinate", scene.ordinate.of, "of(r, q)")
+        if scene.ordinate.places
+        else ("ordinate along the rod", scene.ordinate.of, "f(x, c)"),
         ("distributed force", scene.distributed, "f(c)"),
         ("distributed follower force", scene.follower, "f(c)"),
         ("potential along the rod", scene.potential, "f(x, c)"),
@@ -60,7 +62,7 @@ def functions_of_places(scene: Scene) -> Iterator[tuple[str, Callable[..., Any],
 
 
 def asked_for(scene: Scene) -> set[str]:
-    """Names of the constants that the functions of a scene ask for."""
+    """Names of the constants that the equations of a scene ask for."""
     asked: set[str] = set()
 
     class Watched(Constants):
@@ -73,7 +75,8 @@ def asked_for(scene: Scene) -> set[str]:
         if wanted == "f(c)":
             function(c)
     for _, function, known in functions_of_places(scene):
-        function(known, c)
+        if function is not scene.ordinate.of:
+            function(known, c)
     for end in scene.sides:
         if callable(end.rotation):
             end.rotation(c)

@@ -51,6 +51,12 @@ def _guarded_fields(owner: Any, of: str, fields: Iterable[str]) -> Any:
     )
 
 
+def _guarded_ordinate(scene: Scene) -> Callable[..., Any]:
+    """Return the function of the ordinate, guarded: of numbers at a point, of UFL expressions along the rod."""
+    of = scene.ordinate.of
+    return guarded("ordinate", of, float) if scene.ordinate.places else guarded("ordinate along the rod", of)
+
+
 def guards_of(scene: Scene) -> dict[str, Any]:
     """Fields of a scene with all its functions guarded."""
     end = ("position", "rotation", "force", "follower", "moment", "follower_moment", "energy")
@@ -58,7 +64,7 @@ def guards_of(scene: Scene) -> dict[str, Any]:
     new: dict[str, Any] = {
         "attachments": tuple(_guarded_fields(x, " of an attachment", attached) for x in scene.attachments),
         "constraints": tuple(replace(x, of=guarded("constraint", x.of)) for x in scene.constraints),
-        "ordinate": replace(scene.ordinate, of=guarded("ordinate", scene.ordinate.of, float)),
+        "ordinate": replace(scene.ordinate, of=_guarded_ordinate(scene)),
     }
     if not isinstance(scene.ends, Ring):
         pair = zip(("left", "right"), scene.ends, strict=True)
