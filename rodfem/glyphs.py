@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rodfem.setting import AXIS, HELD, Setting, Support
-from rodfem.solids import Solid, ball, box, coil, round_arrow, straight_arrow, sweep
+from rodfem.solids import Solid, ball, box, coil, profile_of, round_arrow, straight_arrow, sweep
 
 Floats = NDArray[np.float64]
 
 GREY, DARK, STEEL, LOAD = "#9A9A9A", "#6E6E6E", "#707C8A", "#B3123E"
-BLOCK, RAIL, WIRE, ARROW = 2.4, 9.0, 0.22, 13.0
-"""Half the size of a block, half the length of rails, radius of a wire, length of an arrow; in radii of the rod."""
+BLOCK, WIRE, ARROW, RAIL = 2.4, 0.22, 13.0, 3.4
+"""Half the size of a block, radius of a wire, length of an arrow, in radii of the rod; half rails in half blocks."""
 LEAST = 1e-9
 """Load relative to the greatest one, or stiffness, below which none is drawn."""
 
@@ -40,18 +40,21 @@ def glyphs_of(setting: Setting, s: Floats, centres: Floats, frames: Floats, radi
         Axes of the picture as rows (3, 3): to the right, upwards, to the viewer.
     """
     out, up = list[Solid](), view[1]
+    widest = float(abs(profile_of(s[[0, -1]], setting.section, np.linspace(0, 2 * np.pi, 25))).max())
+    size = max(BLOCK, 1.25 * widest) * radius
+    chord = centres[-1] - centres[0]
     found = []
     for support in setting.supports:
         node = int(np.argmin(abs(s - support.s)))
-        outward = frames[node, :, 2] * (-1.0 if node == 0 else 1.0) if node in (0, len(s) - 1) else np.zeros(3)
-        found.append((support, centres[node], frames[node], outward))
-    force, moment = (max([np.linalg.norm(x.loads(R)[i]) for x, _, R, _ in found], default=0.0) for i in (0, 1))
-    for support, at, R, outward in found:
-        held = _body(support, at, R, outward, radius, up)
-        out += held + _springs(support, at, outward, radius, up)
+        side = {0: -1.0, len(s) - 1: 1.0}.get(node, 0.0)
+        found.append((support, centres[node], frames[node], side * frames[node, :, 2], side * chord))
+    force, moment = (max([np.linalg.norm(x[0].loads(x[2])[i]) for x in found], default=0.0) for i in (0, 1))
+    for support, at, R, outward, away in found:
+        held = _body(support, at, R, away, size, up)
+        out += held + _springs(support, at, outward - 0.3 * up - 0.2 * view[2], radius, up)
         if support.mass:
             out.append(ball(at, 2.2 * radius, DARK))
-        clear = BLOCK * radius * (2.2 if held else 0.5)
+        clear = 2.2 * size if held else 0.5 * BLOCK * radius
         F, M = support.loads(R)
         if np.linalg.norm(F) > LEAST * force:
             out.append(_force(at, F / force, clear, outward, radius))
@@ -60,82 +63,75 @@ def glyphs_of(setting: Setting, s: Floats, centres: Floats, frames: Floats, radi
     return out + _distributed(setting, s, centres, frames, radius, view[2])
 
 
-def _body(support: Support, at: Floats, R: Floats, outward: Floats, radius: float, up: Floats) -> list[Solid]:
-    """Body by what the directors may do, and rails by what the position may."""
+def _body(support: Support, at: Floats, R: Floats, away: Floats, size: float, up: Floats) -> list[Solid]:
+    """Body by what the directors may do, and rails by what the position may.
+
+    ``away`` is the direction from the other end of the rod, zero inside of it; ``size`` half the size of a block.
+    """
     if support.turning != HELD and not support.held.any():
         return []
     free = [e for e, held in zip(np.eye(3), support.held, strict=True) if not held]
     frame = Rotation.from_quat(support.frame[[1, 2, 3, 0]]).as_matrix()
-    size = BLOCK * radius
     if support.turning == HELD:
-        foot = frame @ (np.array([0.0, 0.0, 0.5 * size]) * _sign(frame[:, 2] @ outward))
-        out = [box(at + foot, frame, (size, size, 0.5 * size), GREY)]
-        base, below = at + foot, None
+        middle = at + 0.5 * size * frame[:, 2] * _sign(frame[:, 2] @ away)
+        block = box(middle, frame, (size, size, 0.5 * size), GREY)
+        return [block, *_rails(free, middle, frame[:, 0], 1.2 * size, size)]
+    if support.turning == AXIS:
+        axis = R @ support.axis / np.linalg.norm(support.axis)
+        body = sweep([at - 1.25 * size * axis, at + 1.25 * size * axis], 0.5 * size, DARK)
     else:
-        below = _foot(frame, free, outward, up)
-        axis = R @ support.axis if support.turning == AXIS else np.zeros(3)
-        if support.turning == AXIS:
-            axis = axis / np.linalg.norm(axis)
-            out = [sweep([at - 1.25 * size * axis, at + 1.25 * size * axis], 0.5 * size, DARK)]
-            if abs(below @ axis) > 0.9:  # the axle stands on its base
-                below = _foot(frame, [*free, axis], outward, up)
-        else:
-            out = [ball(at, 0.68 * size, DARK)]
-        side = np.cross(below, axis if axis.any() else free[0] if free else _other(below, up))
-        stand = np.column_stack([np.cross(side, below), side, below]) / np.linalg.norm(side)
-        out.append(box(at + 1.05 * size * below, -stand[:, [1, 0, 2]], (size, size, 0.95 * size), GREY, top=0.22))
-        base = at + 2.2 * size * below
-        out.append(box(base, stand, (1.5 * size, 1.2 * size, 0.2 * size), DARK))
-    return out + _rails(free, base, below, frame, radius)
+        axis, body = np.zeros(3), ball(at, 0.68 * size, DARK)
+    along = frame[:, 2] * _sign(frame[:, 2] @ away) if axis.any() or not away.any() else away / np.linalg.norm(away)
+    below = _foot(along, [*free, axis] if axis.any() else free, up)
+    side = axis if axis.any() else _other(below, free[0] if free else up)
+    side = _other(below, side)
+    stand = np.column_stack([side, np.cross(below, side), below])  # d3 from the body to its base
+    wedge = box(
+        at + 1.05 * size * below, stand * np.array([1.0, -1.0, -1.0]), (size, size, 0.95 * size), GREY, top=0.22
+    )
+    plate = box(at + 2.2 * size * below, stand, (1.4 * size, 1.4 * size, 0.2 * size), DARK)
+    return [body, wedge, plate, *_rails(free, at + 2.6 * size * below, below, 0.8 * size, size)]
 
 
-def _rails(free: list[Floats], base: Floats, below: Floats | None, frame: Floats, radius: float) -> list[Solid]:
-    """Two rails for each direction in which the body moves freely: beside a block, below a stand."""
-    size, out = BLOCK * radius, []
+def _rails(free: list[Floats], middle: Floats, normal: Floats, apart: float, size: float) -> list[Solid]:
+    """Two rails for each direction in which a body moves freely, across ``normal`` where that is possible."""
+    out = []
     for direction in free:
-        aside = _across(direction, below if below is not None else frame[:, 0], frame)
-        for sign in (-1.0, 1.0):
-            middle = base + sign * (1.2 if below is None else 0.7) * size * aside
-            if below is not None:
-                middle = middle + 0.42 * size * below
-            ends = [middle - RAIL * radius * direction, middle + RAIL * radius * direction]
-            out.append(sweep(ends, 1.3 * WIRE * radius, STEEL))
+        for aside in (apart * sign * _across(direction, normal) for sign in (-1.0, 1.0)):
+            ends = [middle + aside + sign * RAIL * size * direction for sign in (-1.0, 1.0)]
+            out.append(sweep(ends, 0.12 * size, STEEL))
     return out
 
 
-def _across(direction: Floats, other: Floats, frame: Floats) -> Floats:
+def _across(direction: Floats, other: Floats) -> Floats:
     """Unit vector across a direction, and across another where the two differ."""
     out = np.cross(direction, other)
-    if np.linalg.norm(out) < 0.1:
-        out = np.cross(direction, frame[:, 1] if abs(direction @ frame[:, 1]) < 0.9 else frame[:, 0])
-    return np.asarray(out / np.linalg.norm(out))
+    return _other(direction, direction) if np.linalg.norm(out) < 0.1 else np.asarray(out / np.linalg.norm(out))
 
 
-def _foot(frame: Floats, free: list[Floats], outward: Floats, up: Floats) -> Floats:
-    """Direction from a pin to its base: outwards along the rod where it is held there, else across, downwards."""
-    along = frame[:, 2] * _sign(frame[:, 2] @ outward)
+def _foot(along: Floats, free: list[Floats], up: Floats) -> Floats:
+    """Direction from a pin to its base: along the rod where nothing moves or turns about that, else downwards."""
     left = np.eye(3) - sum((np.outer(e, e) for e in free), np.zeros((3, 3)))
-    if np.linalg.norm(left @ along) > 0.9:
-        return along
-    down = left @ -up
-    if np.linalg.norm(down) < 0.3:
-        down = left @ _other(up, up)
-    return np.asarray(down / np.linalg.norm(down)) if np.linalg.norm(down) > 0.1 else along
+    for wanted in (along, -up, _other(up, up), np.cross(up, _other(up, up))):
+        found = left @ wanted
+        if np.linalg.norm(found) > 0.7:
+            return np.asarray(found / np.linalg.norm(found))
+    return along
 
 
-def _other(direction: Floats, up: Floats) -> Floats:
-    """Unit vector across a direction, upwards where that is possible."""
-    out = up - (up @ direction) * direction
+def _other(direction: Floats, wanted: Floats) -> Floats:
+    """Unit vector across a direction, as wanted where that is possible."""
+    out = wanted - (wanted @ direction) * direction
     if np.linalg.norm(out) < 0.3:
         out = np.cross(direction, np.eye(3)[int(np.argmin(abs(direction)))])
     return np.asarray(out / np.linalg.norm(out))
 
 
-def _springs(support: Support, at: Floats, outward: Floats, radius: float, up: Floats) -> list[Solid]:
+def _springs(support: Support, at: Floats, towards: Floats, radius: float, up: Floats) -> list[Solid]:
     """A coil along each principal direction of the stiffness of translation, a turn about each of that of rotation."""
     out: list[Solid] = []
     for direction in _stiff(support.translation_stiffness):
-        way = direction * _sign(direction @ (outward - 0.3 * up + 1e-3 * np.ones(3)))
+        way = direction * _sign(direction @ towards)
         start, end = at + 0.8 * radius * way, at + 11.0 * radius * way
         out.append(coil(start, end, 1.5 * radius, WIRE * radius, 6, STEEL))
         stand = np.column_stack([_other(way, up), np.cross(way, _other(way, up)), way])
@@ -189,10 +185,10 @@ def _distributed(
         way = force / np.linalg.norm(force)
         tip = centres[node] - 1.6 * radius * way
         if along:
-            tip = centres[node] + size / 2 * way + 4.0 * radius * _across(way, back, np.eye(3))
+            tip = centres[node] + size / 2 * way + 4.0 * radius * _across(way, back)
         out.append(straight_arrow(tip - size * way, tip, 0.3 * radius, LOAD))
     return out
 
 
-def _sign(value: float | np.floating[Any]) -> float:
+def _sign(value: Any) -> float:
     return -1.0 if value < 0 else 1.0

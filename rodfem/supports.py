@@ -1,9 +1,9 @@
-r"""What holds a rod and what loads it in one state, as plain numbers: for files, and for pictures drawn from them.
+r"""What holds a rod and what loads it: derived from a scene, and written to a file.
 
 An end is described by its properties, and named after them by one rule (:func:`~rodfem.setting.kind_of`): how many
-components of its position are held, what its directors are free to do, and whether springs hold it.  A potential of an end is a *spring*
-where its second derivative at the reference is positive semidefinite and not zero; any other (of a semi-tangential
-moment, say) is a load that no arrow shows.
+components of its position are held, what its directors are free to do, and whether springs hold it.  A potential of an
+end is a *spring* where its second derivative at the reference is positive semidefinite and not zero; any other (of a
+semi-tangential moment, say) is a load that no arrow shows.
 """
 
 from __future__ import annotations
@@ -149,7 +149,8 @@ def write(group: Any, scene: Scene, samples: Sequence[dict[str, Any]]) -> None:
     ``supports`` has a group for each place, ``left end``, ``right end``, ``attachment 1`` ...: attributes ``s``,
     ``kind``, ``held``, ``turning``, ``axis``, ``translation_stiffness``, ``rotation_stiffness``, ``mass`` and, with P
     rows, ``frame``, ``force``, ``moment``, ``follower``, ``follower_moment``, as in
-    :class:`~rodfem.setting.Support`; of a ring it is empty.  ``distributed``, where there is such a load, has ``s`` (n,), ``force`` and ``follower`` (P, n, 3).
+    :class:`~rodfem.setting.Support`; of a ring it is empty.  ``distributed``, where there is such a load, has ``s``
+    (n,), ``force`` and ``follower`` (P, n, 3).
     """
     loads = [float(sample["load"]) for sample in samples]
     out, places = group.create_group(SUPPORTS), _places(scene)

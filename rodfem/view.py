@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-TILT = np.radians(20.0)
-"""By which the picture is seen from above."""
+TILT, STEEP = np.radians([20.0, 55.0])
+"""By which a picture is seen from above; that of a closed rod, to show what is across its plane."""
 NEAR = 0.9
 """Cosine from which on a direction is taken for that of the nearest axis of space."""
 STRAIGHT = 1e-3
@@ -47,9 +47,9 @@ def view_of(
     """
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
     chord = reference[-1] - reference[0]
-    shape = moved.T @ moved / len(moved)
+    shape, tilt = moved.T @ moved / len(moved), TILT
     if np.linalg.norm(chord) < 1e-6 * size and down is None:
-        right, up = _plane(reference + moved)
+        (right, up), tilt = _plane(reference + moved), STEEP
     elif down is not None:
         up = -down / np.linalg.norm(down)
         spread = (reference - reference.mean(axis=0)).T @ (reference - reference.mean(axis=0)) / len(reference)
@@ -62,10 +62,12 @@ def view_of(
         if load is not None:
             aside = load - (load @ right) * right
             if abs(up @ aside) < 0.5 * np.linalg.norm(aside):  # nearly along the line of sight: half way to it
-                up = up + _sign(up @ aside) * aside / np.linalg.norm(aside)
+                up, tilt = up + _sign(up @ aside) * aside / np.linalg.norm(aside), 0.0
                 up /= np.linalg.norm(up)
+            elif (up @ aside) * (np.cross(right, up) @ aside) > 1e-9 * (aside @ aside):  # towards the load
+                tilt = -tilt
     back = np.cross(right, up)
-    return np.array([right, np.cos(TILT) * up - np.sin(TILT) * back, np.cos(TILT) * back + np.sin(TILT) * up])
+    return np.array([right, np.cos(tilt) * up - np.sin(tilt) * back, np.cos(tilt) * back + np.sin(tilt) * up])
 
 
 def _principal(moments: Floats, axis: Floats, least: float, other: Floats | None) -> Floats:
@@ -95,5 +97,5 @@ def _snapped(direction: Floats) -> Floats:
     return np.sign(direction[i]) * np.eye(3)[i] if abs(direction[i]) > NEAR else direction
 
 
-def _sign(value: float | np.floating[Any]) -> float:
+def _sign(value: Any) -> float:
     return -1.0 if value < 0 else 1.0
