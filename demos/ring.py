@@ -25,6 +25,8 @@ from forms.energy import bending
 from rodfem.ends import Ring
 from rodfem.scene import Ordinate, Parameter, Scene
 
+TWIST = r"twist $\int k_3\,ds/2\pi$"
+
 
 def circle(s):
     """Quaternions of the circle of radius 1 in the plane of e1 and e3: a turn by s about e2, no twist."""
@@ -44,7 +46,7 @@ def scene(options: Namespace) -> Scene:
         ends=Ring(),
         start=circle,
         states="circle",
-        ordinate=Ordinate("twist in turns", s=None, of=lambda x, c: x.k[2] / (2 * pi), label=r"twist $\int k_3\,ds/2\pi$"),
+        ordinate=Ordinate("twist in turns", s=None, of=lambda x, c: x.k[2] / (2 * pi), label=TWIST),
         span=tuple(options.span),
     )
 

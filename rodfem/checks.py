@@ -13,7 +13,7 @@ import ufl
 from forms.kinematics import UNDEFORMED
 from rodfem.ends import Attachment, Constraint, End, Ring, check_vector
 from rodfem.errors import SceneError
-from rodfem.functions import asked_for, asks_where, functions_of, functions_of_places
+from rodfem.functions import asked_for, asks_where, functions_of, functions_of_places, some_places
 
 if TYPE_CHECKING:
     from rodfem.scene import Scene
@@ -102,11 +102,9 @@ def check_load(scene: Scene) -> None:
 
 
 def check_ordinate(scene: Scene) -> None:
-    """Raise where the ordinate at a point is no number, for a state where it need not be defined but of the right type.
-
-    One along the rod is checked as all functions of a place are, by :func:`check_shapes`.
-    """
+    """Raise where the ordinate is no number, for a state where it need not be defined but of the right type."""
     if not scene.ordinate.places:
+        check_scalar("ordinate along the rod", scene.ordinate.of(some_places(scene)[1], scene.constants()))
         return
     try:
         scene.ordinate.of(np.array([0.2, 0.3, 0.4]), np.array([0.5, 0.1, 0.7, 0.5]))

@@ -23,7 +23,7 @@ def functions_of(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], str]]:
         ("start", scene.start, "start(s)"),
         ("ordinate", scene.ordinate.of, "of(r, q)")
         if scene.ordinate.places
-        else ("ordinate along the rod", scene.ordinate.of, "f(x, c)"),
+        else ("ordinate along the rod", scene.ordinate.of, "of(x, c)"),
         ("distributed force", scene.distributed, "f(c)"),
         ("distributed follower force", scene.follower, "f(c)"),
         ("potential along the rod", scene.potential, "f(x, c)"),
@@ -48,17 +48,23 @@ def functions_of(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], str]]:
 
 
 def functions_of_places(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], Any]]:
-    """Functions of a place, each with a place of the kind that it will be given: some rotation, strains, position."""
-    q = ufl.as_vector([0.5, 0.1, 0.7, 0.5])
-    R = rotation(q)
-    r, strains = ufl.as_vector([0.2, 0.3, 0.4]), (ufl.as_vector([0.01, 0.02, 1.01]), ufl.as_vector([0.1, 0.2, 0.3]))
-    point = place(q, R, scene.interval[0], r, length=scene.length)
-    rod = place(q, R, scene.interval[0], r, dr=ufl.dot(R, strains[0]), v=strains[0], k=strains[1], length=scene.length)
+    """Functions of a place in the equations, each with a place of the kind that it will be given."""
+    point, rod = some_places(scene)
     for what, function, wanted in functions_of(scene):
         if wanted == "f(x, c)" and what != "constraint":
             yield what, function, rod if "along" in what else point
     for x in scene.constraints:
         yield "constraint", getattr(x.of, "of", x.of), point if x.kind == "point" else rod
+
+
+def some_places(scene: Scene) -> tuple[Any, Any]:
+    """Return a point and a place along the rod: some rotation, strains, position."""
+    q = ufl.as_vector([0.5, 0.1, 0.7, 0.5])
+    R = rotation(q)
+    r, strains = ufl.as_vector([0.2, 0.3, 0.4]), (ufl.as_vector([0.01, 0.02, 1.01]), ufl.as_vector([0.1, 0.2, 0.3]))
+    point = place(q, R, scene.interval[0], r, length=scene.length)
+    rod = place(q, R, scene.interval[0], r, dr=ufl.dot(R, strains[0]), v=strains[0], k=strains[1], length=scene.length)
+    return point, rod
 
 
 def asked_for(scene: Scene) -> set[str]:
@@ -75,8 +81,7 @@ def asked_for(scene: Scene) -> set[str]:
         if wanted == "f(c)":
             function(c)
     for _, function, known in functions_of_places(scene):
-        if function is not scene.ordinate.of:
-            function(known, c)
+        function(known, c)
     for end in scene.sides:
         if callable(end.rotation):
             end.rotation(c)

@@ -130,17 +130,9 @@ class State:
 
     def view(self) -> Floats:
         """Axes of the picture, (3, 3)."""
-        R, loads = self.directors, self.setting.supports
-        forces = sum((x.force for x in loads), np.zeros(3))
-        down = side = None
-        if self.setting.distributed is not None:
-            total = self.setting.distributed[1].sum(axis=0)
-            down = total if total.any() else None
-        if self.setting.section is not None:
-            J = self.setting.section[1].mean(axis=0)
-            side = R[0, :, :2] @ np.linalg.eigh(J)[1][:, -1]
-        moved = self.centres - self.reference
-        return view_of(self.reference, moved, down=down, load=forces if forces.any() else None, side=side)
+        held, moved = self.setting, self.centres - self.reference
+        side = held.widest(self.directors[0])
+        return view_of(self.reference, moved, down=held.down, load=held.force, side=side)
 
     def solids(self, radius: float, view: Floats) -> list[Solid]:
         """The rod, its stripe, what holds it and what loads it."""

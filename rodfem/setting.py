@@ -92,6 +92,30 @@ class Setting:
     section: tuple[Floats, Floats] | None = None
     distributed: tuple[Floats, Floats, Floats] | None = None
 
+    @property
+    def axis(self) -> Floats | None:
+        """Direction d3 of the first support that holds it (3,); None without one."""
+        for q in (x.frame for x in self.supports if x.turning != TURNS):
+            a, b, c, d = q
+            return np.array([2 * (b * d + a * c), 2 * (c * d - a * b), a * a - b * b - c * c + d * d])
+        return None
+
+    @property
+    def force(self) -> Floats | None:
+        """Sum of the dead forces at the supports (3,), None where there is none."""
+        total = np.sum([np.zeros(3), *(x.force for x in self.supports)], axis=0)
+        return total if total.any() else None
+
+    @property
+    def down(self) -> Floats | None:
+        """Direction of the dead force along the rod (3,), of gravity, say; None where there is none."""
+        total = np.zeros(3) if self.distributed is None else self.distributed[1].sum(axis=0)
+        return total if total.any() else None
+
+    def widest(self, R: Floats) -> Floats | None:
+        """Direction (3,) in which the cross-sections are wide, where the directors are the columns of ``R`` (3, 3)."""
+        return None if self.section is None else R[:, :2] @ np.linalg.eigh(self.section[1].mean(axis=0))[1][:, -1]
+
 
 def read(group: Any, row: int | None = None) -> Setting:
     """Read what was written below a group of a file, with the section of the file; what is not there is left out.

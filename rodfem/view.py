@@ -21,6 +21,7 @@ def view_of(
     reference: Floats,
     moved: Floats,
     *,
+    axis: Floats | None = None,
     down: Floats | None = None,
     load: Floats | None = None,
     side: Floats | None = None,
@@ -31,6 +32,8 @@ def view_of(
     ----------
     reference, moved
         Centreline (n, 3) of the state that the rod has left, and displacement (n, 3) from it.
+    axis
+        Direction (3,) of the rod's axis; None: from one end of ``reference`` to the other.
     down
         Direction of a load along the rod (gravity), which is downwards in the picture.
     load
@@ -46,7 +49,7 @@ def view_of(
         shown in the plane nearest to it.
     """
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
-    chord = reference[-1] - reference[0]
+    chord = reference[-1] - reference[0] if axis is None else axis
     shape, tilt = moved.T @ moved / len(moved), TILT
     if np.linalg.norm(chord) < 1e-6 * size and down is None:
         (right, up), tilt = _plane(reference + moved), STEEP
