@@ -23,16 +23,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rodfem import supports
 from rodfem.errors import SceneError
-from rodfem.scene import Scene
 from rodfem.setting import Setting, read
+
+if TYPE_CHECKING:
+    from rodfem.scene import Scene
 
 SYMMETRY = "symmetry"
 """Name of the motion in a symmetry mode."""
@@ -113,9 +114,11 @@ def save_modes(
             group[name] = getattr(modes, name)
         group["motion"] = np.array(modes.motion, dtype=h5py.string_dtype())
         if scene is not None:
+            from rodfem.supports import write, write_section  # they need UFL, which pictures do not
+
             if first:
-                supports.write_section(file, scene)
-            supports.write(group, scene, [{name: getattr(modes, name) for name in ("load", "s", "r")}])
+                write_section(file, scene)
+            write(group, scene, [{name: getattr(modes, name) for name in ("load", "s", "r")}])
 
 
 def load_modes(path: Path, branch: str, row: int) -> Modes:
