@@ -15,6 +15,7 @@ import numpy as np
 import ufl
 from numpy.typing import NDArray
 
+from forms.kinematics import UNDEFORMED
 from forms.rotation import IDENTITY, rotation
 from rodfem.ends import Constants, End, OfPlace, Ring
 from rodfem.functions import asks_where
@@ -28,6 +29,8 @@ STATIONS = 9
 """Places along the rod at which distributed forces are recorded."""
 STEP, SMALL = 1e-3, 1e-6
 """Of differences of potentials (relative to the rod's length; in radian), and what is zero beside the greatest."""
+BENT = 1e-2
+"""Angle by which the rod is bent in differences of its energy."""
 
 
 def supports_of(scene: Scene, sample: dict[str, Any]) -> dict[str, Support]:
@@ -131,8 +134,19 @@ def turn(q: Floats, change: Floats) -> Floats:
 def section_of(scene: Scene) -> tuple[Floats, Floats]:
     """Bending stiffness (n, 2, 2) in ``k1, k2`` of the undeformed rod at n arclengths (n,), one where it is uniform."""
     places = scene.samples() if scene.depends_on_s() else [scene.interval[0]]
-    first = len(scene.free_strains)
-    return np.array(places), np.array([scene.stiffness(s)[first : first + 2, first : first + 2] for s in places])
+    return np.array(places), np.array([_bending(scene, s) for s in places])
+
+
+def _bending(scene: Scene, s: float) -> Floats:
+    """Second derivative (2, 2) of the stored energy in ``k1, k2`` at zero, by differences: pictures need no more."""
+    c, h = scene.constants(s=s), BENT / scene.length
+
+    def W(k1: float, k2: float) -> float:
+        return _number(scene.energy(ufl.as_vector(UNDEFORMED), ufl.as_vector([h * k1, h * k2, 0.0]), c))
+
+    here, ahead, aside = W(0, 0), W(1, 0), W(0, 1)
+    mixed = W(1, 1) - ahead - aside + here
+    return np.array([[ahead - 2 * here + W(-1, 0), mixed], [mixed, aside - 2 * here + W(0, -1)]]) / h**2
 
 
 def distributed_on(scene: Scene, load: float) -> tuple[Floats, Floats, Floats]:
@@ -152,19 +166,19 @@ def write(group: Any, scene: Scene, samples: Sequence[dict[str, Any]]) -> None:
     :class:`~rodfem.setting.Support`; of a ring it is empty.  ``distributed``, where there is such a load, has ``s``
     (n,), ``force`` and ``follower`` (P, n, 3).
     """
-    loads = [float(sample["load"]) for sample in samples]
+    rows = [float(sample["load"]) for sample in samples]
     out, places = group.create_group(SUPPORTS), _places(scene)
     for name, support in supports_of(scene, samples[0]).items():
         here = out.create_group(name)
-        rows = [_changing(scene, places[name][0], places[name][1], load) for load in loads]
+        changing = [_changing(scene, *places[name][:2], load) for load in rows]
         for key, value in vars(support).items():
-            if key in rows[0]:
-                here[key] = np.array([row[key] for row in rows])
+            if key in changing[0]:
+                here[key] = np.array([row[key] for row in changing])
             else:
                 here.attrs[key] = value
     if scene.distributed is not None or scene.follower is not None:
         along = group.create_group(DISTRIBUTED)
-        found = [distributed_on(scene, load) for load in loads]
+        found = [distributed_on(scene, load) for load in rows]
         along["s"] = found[0][0]
         along["force"], along["follower"] = (np.array([f[i] for f in found]) for i in (1, 2))
 
@@ -175,7 +189,7 @@ def write_section(file: Any, scene: Scene) -> None:
 
 
 def _number(value: Any) -> float:
-    return float(ufl.as_ufl(value)(()))
+    return float(value if isinstance(value, (int, float)) else ufl.as_ufl(value)(()))  # most are plain numbers
 
 
 def _vector(function: Callable[[Constants], Any] | None, c: Constants) -> Floats:
