@@ -7,7 +7,9 @@ no twist, and is under a torque C t0.  With radius 1 it buckles out of its plane
     C t0 = sqrt(n^2 - 1),    n = 2, 3, ...
 
 (Michell 1889; Zajac, J. Appl. Mech. 29 (1962) 136): at C t0 = sqrt(3) first, like a kinked cable.  What leaves there
-leads, past a figure of eight, to a circle with another link, in which the rod has passed through itself.
+leads, past a figure of eight, to a circle with another link, in which the rod has passed through itself.  The twist,
+int k3 ds / 2 pi, tells all of these apart: 0 on the first circle, 2 on the last one, and in between the link less the
+writhe, as long as the rod does not pass through itself.
 
 A ring may go anywhere: rotations, the turning of its cross-sections and the motion along itself are zero eigenvalues at
 every state.  They are found from the equations, and counted apart.
@@ -22,6 +24,8 @@ import rodfem.cli as cli
 from forms.energy import bending
 from rodfem.ends import Ring
 from rodfem.scene import Ordinate, Parameter, Scene
+
+TWIST = r"twist $\int k_3\,ds/2\pi$"
 
 
 def circle(s):
@@ -42,7 +46,7 @@ def scene(options: Namespace) -> Scene:
         ends=Ring(),
         start=circle,
         states="circle",
-        ordinate=Ordinate("distance of opposite points", s=pi, of=lambda r, q: float(np.linalg.norm(r))),
+        ordinate=Ordinate("twist in turns", s=None, of=lambda x, c: x.k[2] / (2 * pi), label=TWIST),
         span=tuple(options.span),
     )
 

@@ -13,7 +13,7 @@ import ufl
 from forms.kinematics import UNDEFORMED
 from rodfem.ends import Attachment, Constraint, End, Ring, check_vector
 from rodfem.errors import SceneError
-from rodfem.functions import asked_for, asks_where, functions_of, functions_of_places
+from rodfem.functions import asked_for, asks_where, functions_of, functions_of_places, some_places
 
 if TYPE_CHECKING:
     from rodfem.scene import Scene
@@ -44,7 +44,7 @@ def check_kinds(scene: Scene) -> None:
             raise SceneError(f"The parameter {name} is {parameter!r}: give a number or a Parameter.")
     if not (hasattr(scene.inertia, "rho_A") and hasattr(scene.inertia, "rho_I")):
         raise SceneError(f"The inertia is {scene.inertia!r}: give one, as in Inertia(rho_A=lambda c: 1.0).")
-    if not (hasattr(scene.ordinate, "of") and hasattr(scene.ordinate, "s")):
+    if not hasattr(scene.ordinate, "places"):
         raise SceneError(f"The ordinate is {scene.ordinate!r}: give an Ordinate(name, s, of).")
     for what, function, role in functions_of(scene):
         if not callable(function):
@@ -103,7 +103,10 @@ def check_load(scene: Scene) -> None:
 
 
 def check_ordinate(scene: Scene) -> None:
-    """Raise where the ordinate is no number, at some place where it need not be defined but of the right type."""
+    """Raise where the ordinate is no number, for a state where it need not be defined but of the right type."""
+    if not scene.ordinate.places:
+        check_scalar("ordinate along the rod", scene.ordinate.of(some_places(scene)[1], scene.constants()))
+        return
     try:
         scene.ordinate.of(np.array([0.2, 0.3, 0.4]), np.array([0.5, 0.1, 0.7, 0.5]))
     except SceneError as trouble:

@@ -24,7 +24,8 @@ from rodfem.continuation import Equilibria
 from rodfem.errors import SceneError
 from rodfem.fields import Fields
 from rodfem.motion import Motions
-from rodfem.scene import Scene
+from rodfem.supports import write as write_supports
+from rodfem.supports import write_section
 from rodfem.system import System
 
 COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error", "mesh")
@@ -73,7 +74,6 @@ def as_data(
         "ordinate_label": scene.ordinate.label or scene.ordinate.name,
         "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
         "range": list(span),
-        "clamped": _clamped(scene),
         "discretization": {
             "formulation": d.formulation,
             "elements": d.elements,
@@ -99,12 +99,6 @@ def as_data(
             "ranks": system.comm.size,
         },
     }
-
-
-def _clamped(scene: Scene) -> str:
-    """Say which ends hold the directors, for the picture: both, start, end or none."""
-    left, right = (end.rotation is not None for end in scene.sides)
-    return {(True, True): "both", (True, False): "start", (False, True): "end"}.get((left, right), "none")
 
 
 def _mesh_data(fields: Fields) -> dict[str, Any]:
@@ -192,8 +186,10 @@ def save_states(branch: Branch, solvers: Sequence[Equilibria], path: Path, first
 
     Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
     every further field and scalar with P rows, and under ``special/<i>`` the null vectors of its special points:
-    displacement ``r``, ``rotation`` in the space frame, and the change of ``q``.  ``solvers`` are those of the meshes
-    that points name; the rows of a mesh with fewer nodes end in nan.
+    displacement ``r``, ``rotation`` in the space frame, and the change of ``q``.  Below it are the groups of
+    :func:`rodfem.supports.write`, for pictures; the file has the name of the ``first`` branch and the bending
+    stiffness under ``section``.  ``solvers`` are those of the meshes that points name; the rows of a mesh with fewer
+    nodes end in nan.
     """
     import h5py
 
@@ -210,9 +206,13 @@ def save_states(branch: Branch, solvers: Sequence[Equilibria], path: Path, first
             parameter=system.scene.load,
             formulation=system.fields.discretization.formulation,
         )
+        if first:
+            file.attrs["first"] = branch.name
+            write_section(file, system.scene)
         group = file.create_group(f"branches/{branch.name}")
         for name in samples[0]:
             group[name] = _stacked([np.asarray(s[name]) for s in samples])
+        write_supports(group, system.scene, samples)
         for i, vectors in enumerate(modes):
             for j, mode in enumerate(vectors):
                 target = group.create_group(f"special/{i}/null_vector_{j}")

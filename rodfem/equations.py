@@ -38,6 +38,8 @@ class Equations:
         Whether that is without any term.
     energy
         Stored energy ``int W ds``.
+    ordinate
+        Ordinate of the scene where that is an integral over the rod, else None.
     """
 
     def __init__(self, fields: Fields) -> None:
@@ -80,7 +82,10 @@ class Equations:
         kinetic += self._attached_inertia(f, a, b)
         self.massless = apply_algebra_lowering(kinetic).empty()
         forms = [first, second, W * dx, metric * dx, kinetic]
-        self.residual, self.jacobian, self.energy, self.metric, self.kinetic = compat.compile_forms(forms)
+        if not scene.ordinate.places:
+            forms.append((0.0 * c.s + scene.ordinate.of(along, c)) * dx)
+        self.residual, self.jacobian, self.energy, self.metric, self.kinetic, *more = compat.compile_forms(forms)
+        self.ordinate: Any = more[0] if more else None
 
     # --- the functional --------------------------------------------------------------------------------------------
 

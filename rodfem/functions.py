@@ -30,19 +30,25 @@ def functions_of(scene: Scene) -> list[tuple[str, Callable[..., Any], Role]]:
 
 
 def functions_of_places(scene: Scene) -> Iterator[tuple[str, Callable[..., Any], Any]]:
-    """Functions of a place, each with a place of the kind that it will be given: some rotation, strains, position."""
-    q = ufl.as_vector([0.5, 0.1, 0.7, 0.5])
-    R = rotation(q)
-    r, strains = ufl.as_vector([0.2, 0.3, 0.4]), (ufl.as_vector([0.01, 0.02, 1.01]), ufl.as_vector([0.1, 0.2, 0.3]))
-    point = place(q, R, scene.interval[0], r, length=scene.length)
-    rod = place(q, R, scene.interval[0], r, dr=ufl.dot(R, strains[0]), v=strains[0], k=strains[1], length=scene.length)
+    """Functions of a place in the equations, each with a place of the kind that it will be given."""
+    point, rod = some_places(scene)
     for what, function, role in functions_of(scene):
         if role.call == "f(x, c)":
             yield what, function, rod if role.along else point
 
 
+def some_places(scene: Scene) -> tuple[Any, Any]:
+    """Return a point and a place along the rod: some rotation, strains, position."""
+    q = ufl.as_vector([0.5, 0.1, 0.7, 0.5])
+    R = rotation(q)
+    r, strains = ufl.as_vector([0.2, 0.3, 0.4]), (ufl.as_vector([0.01, 0.02, 1.01]), ufl.as_vector([0.1, 0.2, 0.3]))
+    point = place(q, R, scene.interval[0], r, length=scene.length)
+    rod = place(q, R, scene.interval[0], r, dr=ufl.dot(R, strains[0]), v=strains[0], k=strains[1], length=scene.length)
+    return point, rod
+
+
 def asked_for(scene: Scene) -> set[str]:
-    """Names of the constants that the functions of a scene ask for."""
+    """Names of the constants that the equations of a scene ask for."""
     asked: set[str] = set()
 
     class Watched(Constants):

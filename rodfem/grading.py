@@ -143,7 +143,7 @@ def pieces_of(scene: Scene) -> np.ndarray:
     The centreline is as accurate as a load at vertices only, and far less inside of elements.
     """
     a, b = scene.interval
-    inner = [s for s in (*scene.joints, scene.ordinate.s) if min(s - a, b - s) > 1e-9 * scene.length]
+    inner = [s for s in (*scene.joints, *scene.ordinate.places) if min(s - a, b - s) > 1e-9 * scene.length]
     out = [a]
     for s in sorted(inner):
         if s - out[-1] > 1e-9 * scene.length:

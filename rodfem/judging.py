@@ -53,7 +53,8 @@ def judge_users(
             continue
         report.verdict(branch.name, where, verdict, modes)
         if system.comm.rank == 0:
-            save_modes(modes, output / "modes.h5", branch.name, special.row, about, first=not saved)
+            path = output / "modes.h5"
+            save_modes(modes, path, branch.name, special.row, about, first=not saved, scene=scene)
         saved.append((branch.name, special.row))
     if not saved:
         return

@@ -23,13 +23,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rodfem.errors import SceneError
+from rodfem.setting import Setting, read
+
+if TYPE_CHECKING:
+    from rodfem.scene import Scene
 
 SYMMETRY = "symmetry"
 """Name of the motion in a symmetry mode."""
@@ -86,12 +90,22 @@ class Modes:
         )
 
 
-def save_modes(modes: Modes, path: Path, branch: str, row: int, about: Mapping[str, Any], *, first: bool) -> None:
+def save_modes(
+    modes: Modes,
+    path: Path,
+    branch: str,
+    row: int,
+    about: Mapping[str, Any],
+    *,
+    first: bool,
+    scene: Scene | None = None,
+) -> None:
     """Append the modes of one state to an HDF5 file (``first``: a new one), to be called on one rank.
 
     ``about`` says in the file's attributes what rod it is.  Group ``/branches/<branch>/<row>``, named as in
     ``states.h5``, has the state's ``load``, ``s``, ``r``, ``q`` and the arrays of :class:`Modes`; a complex number is a
-    compound of ``r`` and ``i``.
+    compound of ``r`` and ``i``.  Of a ``scene``, if given, what holds and loads it is written for pictures, as in
+    ``states.h5`` (see :func:`rodfem.supports.write`).
     """
     with h5py.File(path, "w" if first else "a") as file:
         file.attrs.update(about, normalisation="kinetic energy: mode . M mode = 1")
@@ -99,6 +113,12 @@ def save_modes(modes: Modes, path: Path, branch: str, row: int, about: Mapping[s
         for name in ("load", "s", "r", "q", *FIELDS, *LEFT):
             group[name] = getattr(modes, name)
         group["motion"] = np.array(modes.motion, dtype=h5py.string_dtype())
+        if scene is not None:
+            from rodfem.supports import write, write_section  # they need UFL, which pictures do not
+
+            if first:
+                write_section(file, scene)
+            write(group, scene, [{name: getattr(modes, name) for name in ("load", "s", "r")}])
 
 
 def load_modes(path: Path, branch: str, row: int) -> Modes:
@@ -112,6 +132,12 @@ def load_modes(path: Path, branch: str, row: int) -> Modes:
         raise SceneError(f"{path} has no modes of row {row} of a branch {branch!r}: {_contents(path)}.") from trouble
     arrays["load"] = float(arrays["load"])
     return Modes(motion=motion, **arrays)
+
+
+def load_setting(path: Path, branch: str, row: int) -> Setting:
+    """What holds and loads the rod whose modes a file has, as far as it says so."""
+    with h5py.File(path, "r") as file:
+        return read(file[f"branches/{branch}/{row}"])
 
 
 def heading(path: Path) -> str:

@@ -66,6 +66,7 @@ def needs_centreline(scene: Scene) -> str:
     known = {"v": ufl.as_vector(UNDEFORMED), "k": ufl.as_vector([0.0, 0.0, 0.0]), "length": scene.length}
     along = place(q, rotation(q), scene.interval[0], **known)
     functions = [("the potential along the rod", scene.potential)] if scene.potential else []
+    functions += [] if scene.ordinate.places else [("the ordinate", scene.ordinate.of)]
     functions += [("what is attached along the rod", x.energy) for x in scene.attachments if x.energy and x.s in inner]
     functions += [("a constraint", x.of) for x in scene.constraints if x.s is None or x.s in inner]
     for what, function in functions:

@@ -7,7 +7,7 @@ import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from itertools import cycle, pairwise, product
+from itertools import cycle, product
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +19,13 @@ from matplotlib.lines import Line2D
 from matplotlib.mathtext import MathTextParser
 from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
+
+from rodfem.plot_pieces import COUNTED, IMPERFECT, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
 
 __all__ = ["draw_diagram", "main"]
 
 Floats = NDArray[np.float64]
-Piece = tuple[str, str, Floats, int]  # branch, colour, loads and ordinates (k, 2), negative eigenvalues
 
 DPI, SIZE, FONT = 200, (7.5, 5.0), 11.0  # 1500 x 1000 pixels
 STYLE = {"font.size": FONT, "font.family": "DejaVu Sans", "axes.grid": True, "grid.color": "0.92"}
@@ -32,14 +33,14 @@ PALETTE = (  # after Okabe and Ito: hues safe for the colour-blind, then the sam
     *("#303030", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"),
     *("#003F62", "#753400", "#00573F", "#70435C", "#2F6380", "#7E5700"),
 )
-STABLE: dict[str, Any] = {"linestyle": "-", "linewidth": 3.0, "solid_capstyle": "round"}
-UNSTABLE: dict[str, Any] = {"linestyle": (0, (1.0, 1.3)), "linewidth": 1.9}
-SINGULAR = ("branch point", "fold")  # kinds at which the second variation is singular
+UNEXPLAINED = "index change unexplained"
 MARKERS: dict[str, dict[str, Any]] = {
     "branch point": {"marker": "o", "ms": 7.5, "mfc": "white", "mec": "black", "mew": 1.5},
     "fold": {"marker": "D", "ms": 6.0, "mfc": "black", "mec": "black"},
+    IMPERFECT: {"marker": "P", "ms": 9.5, "mfc": "white", "mec": "black", "mew": 1.3},
     "flutter": {"marker": "*", "ms": 13.0, "mfc": "#F0E442", "mec": "black", "mew": 1.1},
     "user": {"marker": "x", "ms": 6.5, "mec": "black", "mew": 1.6, "label": "requested load"},
+    UNEXPLAINED: {"marker": "^", "ms": 10.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
 }
 HALO = [withStroke(linewidth=3.2, foreground="white")]
 
@@ -47,7 +48,10 @@ HALO = [withStroke(linewidth=3.2, foreground="white")]
 def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     """Draw every branch as ordinate against load, with its stability and its special points.
 
-    Stable parts are solid, all others dotted, each with the number of negative eigenvalues beside it.
+    Stable parts are solid, unstable ones dotted, each with the number of negative eigenvalues beside it; those of a
+    planar rod that are stable in its plane but not in space are dashed.  Where a stable and another part lie on each
+    other, the other one is drawn inside the stable one.  A segment in which the index changes without a special point
+    that says so has a mark of warning.
 
     Parameters
     ----------
@@ -78,7 +82,7 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
         axes = figure.add_subplot(axisbelow=True)
         handles, pieces, points = _draw_branches(axes, branches)
         axes.margins(0.05, 0.08)
-        if not any(np.ptp(curve[:, 1]) for _, _, curve, _ in pieces):  # no more than the straight rod
+        if not any(np.ptp(piece.curve[:, 1]) for piece in pieces):  # no more than the straight rod
             axes.set_ylim(-1.0, 1.0)
         axes.set_xlabel(_tex(diagram["parameter_label"], always=True), fontsize=FONT + 3)
         axes.set_ylabel(_tex(diagram.get("ordinate_label") or diagram["ordinate"]))
@@ -87,21 +91,12 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
         for text in (title, footer):  # one line each: shrink what is too long
             width = text.get_window_extent().width / figure.bbox.width
             text.set_fontsize(text.get_fontsize() * min(1.0, 0.97 / max(width, 1e-9)))
-        _place_labels(axes, pieces, *_place_legend(axes, handles, pieces, points, len(branches) <= 8))
+        legend, obstacles = _place_legend(axes, handles, pieces, points, len(branches) <= 8)
+        _uncover(axes, pieces)
+        _place_labels(axes, pieces, legend, obstacles)
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=DPI, format=path.suffix[1:] or "png")
     return path
-
-
-def _segment_indices(negative: ArrayLike, special: Sequence[Mapping[str, Any]]) -> NDArray[np.int64]:
-    """Return the index (n - 1,) between rows; beside singular rows their before and after decide."""
-    rows = np.asarray(negative, dtype=np.int64)
-    indices = np.maximum(rows[:-1], rows[1:])
-    for (key, shift), point in product((("negative_before", -1), ("negative_after", 0)), special):
-        segment = int(point["row"]) + shift
-        if point["kind"] in SINGULAR and point.get(key) is not None and 0 <= segment < indices.size:
-            indices[segment] = point[key]
-    return indices
 
 
 def _draw_branches(
@@ -112,28 +107,60 @@ def _draw_branches(
     pieces: list[Piece] = []
     found: dict[str, list[tuple[float, float]]] = {}
     for branch, colour in zip(branches, cycle(PALETTE), strict=False):
-        name, columns, special = branch["name"], branch["columns"], branch.get("special", [])
-        if not len(columns["load"]) == len(columns["ordinate"]) == len(columns["negative"]):
-            raise ValueError(f"columns of branch {name!r} differ in length: try to compute the diagram anew")
-        curve = np.column_stack([np.asarray(columns[key], dtype=float) for key in ("load", "ordinate")])
-        indices = _segment_indices(columns["negative"], special)
-        cuts = [0, *(np.flatnonzero(np.diff(indices)) + 1), indices.size]
-        pieces += [(name, colour, curve[a : b + 1], int(indices[a])) for a, b in pairwise(cuts) if b > a]
-        handles.append(Line2D([], [], ls="", marker="s", ms=8, color=colour, label=name))
-        if len(curve) == 1:
-            axes.plot(*curve.T, ".", color=colour, markersize=9)
-        for point in special:
+        new = list(pieces_of(branch, colour))
+        pieces += new
+        handles.append(Line2D([], [], ls="", marker="s", ms=8, color=colour, label=branch["name"]))
+        if not new:
+            axes.plot(branch["columns"]["load"], branch["columns"]["ordinate"], ".", color=colour, markersize=9)
+        for point in branch.get("special", []):
             found.setdefault(point["kind"], []).append((point["load"], point["ordinate"]))
-    for _, colour, curve, negative in sorted(pieces, key=lambda piece: -piece[3]):  # the stable ones on top
-        axes.plot(*curve.T, color=colour, **(UNSTABLE if negative else STABLE))
-    for label, style in (("stable", STABLE), ("unstable", UNSTABLE)):
-        handles.append(Line2D([], [], color="0.45", label=label, **style))
-    handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label="negative eigenvalues"))
-    points = {kind: np.unique(np.array(found[kind], float), axis=0) for kind in MARKERS if kind in found}
+        found.setdefault(UNEXPLAINED, []).extend(_unexplained(branch))
+    for piece in sorted(pieces, key=lambda piece: -piece.negative):  # the stable ones on top: see _uncover
+        axes.plot(*piece.curve.T, color=piece.colour, **STYLES[piece.kind])
+    kinds = {piece.kind for piece in pieces} | {STABLE, UNSTABLE}
+    handles += [Line2D([], [], color="0.45", label=kind, **style) for kind, style in STYLES.items() if kind in kinds]
+    in_space = any(piece.in_space is not None for piece in pieces)
+    text = "negative eigenvalues" + (" in the plane (in space)" if in_space else "")
+    handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=text))
+    points = {kind: np.unique(np.array(found[kind], float), axis=0) for kind in MARKERS if found.get(kind)}
     for kind, places in points.items():
-        style = {"linestyle": "none", "zorder": 5, "label": kind, **MARKERS[kind]}
+        style = {"linestyle": "none", "zorder": 5, "label": _kind_label(kind, branches), **MARKERS[kind]}
         handles += axes.plot(*places.T, path_effects=HALO, **style)
     return handles, pieces, points
+
+
+def _unexplained(branch: Mapping[str, Any]) -> list[tuple[float, float]]:
+    """Middles of the segments in which the index changes without a special point that says so."""
+    load, ordinate = (branch["columns"][key] for key in ("load", "ordinate"))
+    rows = [int(change["row"]) for change in branch.get("unexplained") or ()]
+    return [((load[i] + load[i + 1]) / 2, (ordinate[i] + ordinate[i + 1]) / 2) for i in rows]
+
+
+def _kind_label(kind: str, branches: Sequence[Mapping[str, Any]]) -> str:
+    """Return the legend's words for a kind of special point; of imperfect bifurcations with their unfolding."""
+    values = [
+        abs(point["unfolding"])
+        for branch in branches
+        for point in branch.get("special", [])
+        if point["kind"] == kind == IMPERFECT and point.get("unfolding") is not None
+    ]
+    if not values:
+        return str(MARKERS[kind].get("label", kind))
+    words = dict.fromkeys(f"{value:.0e}" for value in (min(values), max(values)))
+    return f"{kind}, unfolding {' to '.join(words)}"
+
+
+def _uncover(axes: Axes, pieces: Sequence[Piece]) -> bool:
+    """Draw what is not stable once more, within stable lines that lie on it; return whether there is any such place."""
+    stable = [_dense(axes, piece.curve)[0] for piece in pieces if piece.kind == STABLE]
+    found = False
+    for piece in pieces:
+        for part in hidden(_dense(axes, piece.curve)[0], stable) if piece.kind != STABLE else ():
+            line = axes.transData.inverted().transform(part)
+            axes.plot(*line.T, color="white", linewidth=2.0, solid_capstyle="butt", zorder=2.5)
+            axes.plot(*line.T, color=piece.colour, **STYLES[piece.kind] | {"linewidth": 1.5}, zorder=2.6)
+            found = True
+    return found
 
 
 def _tex(text: str, always: bool = False) -> str:
@@ -153,7 +180,7 @@ def _footer(diagram: Mapping[str, Any]) -> str:
         phrase = f"{{formulation}} formulation, {len(diagram['meshes'])} meshes of up to {{unknowns}} unknowns"
     parts = [phrase.format(**diagram["discretization"])] if diagram.get("discretization") else []
     special = [point for branch in diagram["branches"] for point in branch.get("special", [])]
-    errors = [point.get("error_estimate") for point in special if point["kind"] in SINGULAR]
+    errors = [point.get("error_estimate") for point in special if point["kind"] in COUNTED]
     known = [abs(error) for error in errors if error is not None and math.isfinite(error)]
     if known:
         share = f" for {len(known)} of {len(errors)}" if len(known) < len(errors) else ""
@@ -186,7 +213,7 @@ def _place_legend(
         legend = axes.legend(handles=handles, fontsize=min(8.5, 195.0 / len(handles)), **style)
         axes.figure.draw_without_rendering()
         box = legend.get_window_extent().padded(8.0)
-        lines = [_dense(axes, curve)[0] for _, _, curve, _ in pieces]
+        lines = [_dense(axes, curve)[0] for curve in (piece.curve for piece in pieces)]
         marks = [axes.transData.transform(at) + around for places in points.values() for at in places]
         obstacles = np.concatenate([np.empty((0, 2)), *lines, *marks])
         if not _inside(box, obstacles):
@@ -197,11 +224,11 @@ def _place_legend(
 def _place_labels(axes: Axes, pieces: list[Piece], legend: Bbox, obstacles: Floats) -> None:
     """Write the index beside each piece, near its middle and off everything else."""
     height, taken, seen = FONT * DPI / 72.0, [legend], set()
-    curves = [(*_dense(axes, curve), name, colour, negative) for name, colour, curve, negative in pieces]
-    for curve, length, name, colour, negative in sorted(curves, key=lambda item: -item[1]):
-        needed = (name, negative) not in seen
-        seen.add((name, negative))
-        half = np.array([0.33 * height * len(str(negative)) + 6.0, 0.38 * height + 6.0])
+    curves = [(*_dense(axes, piece.curve), piece) for piece in pieces]
+    for curve, length, piece in sorted(curves, key=lambda item: -item[1]):
+        needed = (piece.branch, piece.label) not in seen
+        seen.add((piece.branch, piece.label))
+        half = np.array([0.33 * height * len(piece.label) + 6.0, 0.38 * height + 6.0])
         best, chosen = math.inf, legend
         for share, gap, side in product(np.linspace(0.1, 0.9, 13), (2.0, 8.0, 16.0), (1.0, -1.0)):
             middle = round(share * (len(curve) - 1))
@@ -216,7 +243,7 @@ def _place_labels(axes: Axes, pieces: list[Piece], legend: Bbox, obstacles: Floa
         if needed or (best < 100.0 and length > 1.6 * height):  # else no room
             taken.append(chosen)
             x, y = axes.transData.inverted().transform((chosen.min + chosen.max) / 2.0)
-            text = axes.text(x, y, str(negative), color=colour, weight="bold", ha="center", va="center")
+            text = axes.text(x, y, piece.label, color=piece.colour, weight="bold", ha="center", va="center")
             text.set(zorder=6, in_layout=False, path_effects=HALO)
 
 

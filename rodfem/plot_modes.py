@@ -21,8 +21,12 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from rodfem.errors import SceneError
-from rodfem.modes import SYMMETRY, Modes, heading, load_modes
+from rodfem.glyphs import glyphs_of
+from rodfem.modes import SYMMETRY, Modes, heading, load_modes, load_setting
 from rodfem.plot import DPI, STYLE
+from rodfem.setting import Setting
+from rodfem.solids import profile_of
+from rodfem.view import view_of
 
 __all__ = ["draw_modes", "main"]
 
@@ -62,7 +66,7 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
     SceneError
         If the file has no such modes.
     """
-    modes, output = load_modes(path, branch, row), Path(output)
+    modes, setting, output = load_modes(path, branch, row), load_setting(path, branch, row), Path(output)
     count = len(modes.value)
     for number in chosen:
         if not 1 <= number <= count:
@@ -78,7 +82,7 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
         figure.subplots_adjust(0.01, 0.01, 0.99, 1 - 0.75 / (rows * PANEL[1] + 0.4), 0.04, 0.28)
         figure.suptitle(f"{heading(path)}{branch}, load {modes.load:.6g}", fontsize=11)
         places = [figure.add_subplot(rows, columns, i + 1) for i in range(len(numbers))]
-        panels = [_Panel(axes, modes, n, moving) for axes, n in zip(places, numbers, strict=True)]
+        panels = [_Panel(axes, modes, setting, n, moving) for axes, n in zip(places, numbers, strict=True)]
         if not moving:
             for panel in panels:
                 panel.draw(1.0)
@@ -97,7 +101,7 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
 class _Panel:
     """One mode in its axes, seen across the plane in which most of it happens."""
 
-    def __init__(self, axes: Axes, modes: Modes, number: int, moving: bool) -> None:
+    def __init__(self, axes: Axes, modes: Modes, setting: Setting, number: int, moving: bool) -> None:
         self.axes, self.sides = axes, SIDES[moving]
         self.shown: PolyCollection | None = None
         s, mu = modes.s, complex(modes.value[number])
@@ -116,7 +120,9 @@ class _Panel:
         self.free = modes.motion[number] == SYMMETRY or zero
         self.color = FREE if self.free else UNSTABLE if self.root.real > 1e-9 * abs(self.root) else STABLE
         self._title(modes, number, mu)
-        self._look()
+        angles = np.linspace(0, 2 * np.pi, self.sides + 1) - np.pi / self.sides
+        self.profile = self.radius * profile_of(fine, setting.section, angles)
+        self._look(setting, fine)
         self._tube(self.r, self.frames, REST, 0)
         self._triad()
         axes.set_xlim(*self.limits[0])
@@ -131,19 +137,19 @@ class _Panel:
         what = {FREE: "zero", STABLE: "stable", UNSTABLE: "unstable" if mu.imag == 0 else "flutter"}[self.color]
         self.axes.set_title(f"{number + 1}: $\\mu$ = {value}{doubt}\n{what}: {kind}", fontsize=9, color=self.color)
 
-    def _look(self) -> None:
-        """Axes of the picture: to the right along the rod, upwards along most of the rest, and the viewer's."""
-        span = np.ptp(self.r, axis=0).max()
-        moves = [k * part for part in (self.u.real, self.u.imag) for k in (-1.0, 1.0)]
-        points = np.concatenate([self.r + move for move in moves])
-        bias = span * np.array([3e-3, 2e-3, 1e-3])  # where all directions are alike
-        _, up, right = np.linalg.eigh(np.cov(points.T) + np.diag(bias**2))[1].T
-        right = right * np.sign(right @ (self.r[-1] - self.r[0] + bias))
-        up = up * np.sign(up @ (np.real(self.u)[np.argmax(np.linalg.norm(self.u, axis=1))] + 1e-3 * bias))
-        back = np.cross(right, up)
-        tilt = np.radians(20.0)
-        self.view = np.array([right, np.cos(tilt) * up - np.sin(tilt) * back, np.cos(tilt) * back + np.sin(tilt) * up])
-        seen = points @ self.view[:2].T
+    def _look(self, setting: Setting, s: Floats) -> None:
+        """Draw what holds and loads the rod, and choose the axes of the picture: see :func:`rodfem.view.view_of`."""
+        moved = self.u.real if np.linalg.norm(self.u.real) >= np.linalg.norm(self.u.imag) else self.u.imag
+        side = setting.widest(self.frames[0])
+        self.view = view_of(self.r, moved, axis=setting.axis, down=setting.down, load=setting.force, side=side)
+        points = [self.r + sign * part for part in (self.u.real, self.u.imag) for sign in (-1.0, 1.0)]
+        solids = glyphs_of(setting, s, self.r, self.frames, self.radius, self.view)
+        if solids:
+            corners = np.concatenate([solid.points[solid.triangles] for solid in solids]) @ self.view.T
+            colors = np.concatenate([np.tile(to_rgb(x.color), (len(x.triangles), 1)) for x in solids])
+            self._facets(corners, np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), colors, 0.5)
+            points += [solid.points for solid in solids]
+        seen = np.concatenate(points) @ self.view[:2].T
         low, high = seen.min(axis=0) - 3 * self.radius, seen.max(axis=0) + 3 * self.radius
         low[0] -= 0.2 * (high - low)[0]  # room for the triad
         middle, half = (low + high) / 2, (high - low) / 2
@@ -170,34 +176,41 @@ class _Panel:
         return complex(np.exp(self.root * most * (time - 1)))
 
     def _tube(self, centres: Floats, frames: Floats, color: str, order: int) -> PolyCollection:
-        """Tube with a stripe along d1: the facets that face the viewer, far ones first, lit from above."""
-        angles = np.linspace(0, 2 * np.pi, self.sides + 1) - np.pi / self.sides
-        normals = np.einsum("nik,ka->nai", frames[:, :, :2], np.array([np.cos(angles), np.sin(angles)]))
-        surface = (centres[:, None] + self.radius * normals) @ self.view.T
+        """Rod with a stripe along d1."""
+        surface = centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], self.profile)
+        surface = surface @ self.view.T
         corners = np.stack([surface[:-1, :-1], surface[1:, :-1], surface[1:, 1:], surface[:-1, 1:]], axis=2)
         across = np.cross(corners[:, :, 2] - corners[:, :, 0], corners[:, :, 1] - corners[:, :, 3])
-        across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-300)
         base = np.tile(np.array(to_rgb(color)), (*across.shape[:2], 1))
         base[:, 0] *= 0.35  # the stripe
+        return self._facets(corners.reshape(-1, 4, 3), across.reshape(-1, 3), base.reshape(-1, 3), order)
+
+    def _facets(self, corners: Floats, across: Floats, colors: Floats, order: float) -> PolyCollection:
+        """Facets (n, k, 3) that face the viewer, far ones first, lit from above; ``across`` is their normal (n, 3)."""
+        across = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-300)
         light = 0.55 + 0.45 * np.clip(across @ np.array([-0.25, 0.75, 0.6]), 0, 1)
-        flat, shades = corners.reshape(-1, 4, 3), (base * light[..., None]).reshape(-1, 3)
-        near = np.argsort(flat[:, :, 2].mean(axis=1))
-        near = near[across.reshape(-1, 3)[near, 2] > 0]
-        shades = np.clip(shades[near], 0, 1)
-        drawn = PolyCollection(flat[near, :, :2], facecolors=shades, edgecolors=shades, linewidths=0.3, zorder=order)
+        near = np.argsort(corners[:, :, 2].mean(axis=1))
+        near = near[across[near, 2] > 0]
+        shades = np.clip(colors * light[:, None], 0, 1)[near]
+        drawn = PolyCollection(corners[near, :, :2], facecolors=shades, edgecolors=shades, linewidths=0.3, zorder=order)
         self.axes.add_collection(drawn)
         return drawn
 
     def _triad(self) -> None:
-        """The directions e1, e2, e3, in the lower left corner."""
+        """The directions e1, e2, e3, in the lower left corner; directions that look alike share a label."""
         size = 0.07 * np.ptp(self.limits[0])
         corner = self.limits[:, 0] + 1.6 * size
+        labels: list[tuple[Floats, list[str]]] = []
         for i, axis in enumerate(self.view[:2].T):
-            tip = corner + size * axis
-            self.axes.plot(*np.stack([corner, tip], axis=1), color="0.45", lw=0.9, zorder=3)
+            self.axes.plot(*np.stack([corner, corner + size * axis], axis=1), color="0.45", lw=0.9, zorder=3)
             if np.linalg.norm(axis) > 0.5:
-                self.axes.text(*(corner + 1.35 * size * axis), f"e{i + 1}", fontsize=6.5, color="0.35", ha="center",
-                               va="center", zorder=3)  # fmt: skip
+                place = next((names for at, names in labels if np.linalg.norm(at - axis) < 0.5), None)
+                if place is None:
+                    labels.append((axis, place := []))
+                place.append(f"e{i + 1}")
+        for axis, names in labels:
+            self.axes.text(*(corner + 1.35 * size * axis), ", ".join(names), fontsize=6.5, color="0.35", ha="center",
+                           va="center", zorder=3)  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

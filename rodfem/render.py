@@ -7,31 +7,41 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from rodfem.glyphs import LOAD, glyphs_of
+from rodfem.setting import Setting
+from rodfem.setting import read as read_setting
+from rodfem.solids import Solid, profile_of, rod
+from rodfem.view import view_of
 
 __all__ = ["draw_shape", "draw_shape_safely", "main"]
 
 Floats = NDArray[np.float64]
-SIZE, VIEW_ANGLE, ELEVATION = (1600, 1000), 18.0, 20.0  # pixels, degrees, degrees
-ROD, STRIPE, FIRST, SECOND, CLAMP = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73", "#9A9A9A"
+SIZE, ROOM = (1600, 1000), 0.84  # pixels, share of the height above the caption
+ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
 FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
-CLAMPED = {"both": (True, True), "start": (True, False), "end": (False, True), "none": (False, False)}
 MPI_VARIABLES = ("OMPI_", "PMI", "MPI_LOCAL")  # the beginnings of their names, PMI_ and PMIX_ alike
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
 
 
 def draw_shape(
     states: Path, branch: str, row: int, path: Path,
-    *, caption: str | None = None, radius: float | None = None, clamped: str = "both",
+    *, caption: str | None = None, radius: float | None = None,
 ) -> Path:  # fmt: skip
-    """Draw one equilibrium as a tube with a stripe along d1, arrows along d1 and d2, and clamped ends.
+    """Draw one equilibrium: the rod with a stripe along d1, arrows along d1 and d2, what holds it and what loads it.
 
-    Cross-sections lie in the plane of d1 and d2, so that shear shows.
+    Cross-sections lie in the plane of d1 and d2, so that shear shows, and have the proportion of the bending
+    stiffnesses (:func:`rodfem.solids.profile_of`).  What a file does not record is not drawn: of one without supports
+    the rod alone, round.  See :func:`rodfem.view.view_of` for the direction of view.
 
     Parameters
     ----------
@@ -44,9 +54,7 @@ def draw_shape(
     caption
         Line at the foot of the picture: scene, branch and load when None, nothing when empty.
     radius
-        Radius of the tube, nondimensional; about 1/90 of the rod's length when None.
-    clamped
-        Which ends get the block of a clamp: "both", "start", "end" or "none".
+        Mean radius of the rod, nondimensional; about 1/90 of its length when None.
 
     Returns
     -------
@@ -65,24 +73,25 @@ def draw_shape(
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
         raise ValueError(f"picture {path} has an unknown format: expected one of {FORMATS}, try shape.png")
-    if clamped not in CLAMPED:
-        raise ValueError(f"clamped={clamped!r} is unknown: expected one of {tuple(CLAMPED)}, try 'both'")
     if radius is not None and not radius > 0.0:
         raise ValueError(f"radius={radius} is not positive: expected a length, try 0.01 or leave it out")
-    centres, directors, text = _read(Path(states), branch, row)
-    length = np.linalg.norm(np.diff(centres, axis=0), axis=1).sum()
-    thickness = float(radius or min(length / 90.0, np.linalg.norm(np.ptp(centres, axis=0)) / 40.0))
-    text = text if caption is None else caption
+    state = _read(Path(states), branch, row)
+    length = np.linalg.norm(np.diff(state.centres, axis=0), axis=1).sum()
+    thickness = float(radius or min(length / 90.0, np.linalg.norm(np.ptp(state.centres, axis=0)) / 40.0))
+    text = state.caption if caption is None else caption
+    view = state.view()
+    solids = state.solids(thickness, view)
     pyvista = _import_pyvista()
     font = str(Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf"))
     plotter = pyvista.Plotter(off_screen=True, window_size=list(SIZE), lighting="light kit")
     plotter.set_background("white")
-    _add_rod(pyvista, plotter, centres, directors, thickness, CLAMPED[clamped])
-    plotter.camera_position = _camera_position(centres, 6.0 * thickness)
-    plotter.camera.view_angle = VIEW_ANGLE
-    plotter.renderer.ResetCameraClippingRange()
+    for solid in solids:
+        _add(pyvista, plotter, solid)
+    _add_directors(pyvista, plotter, state.centres, state.directors, thickness)
+    _look(plotter, np.concatenate([solid.points for solid in solids]), view, 5.0 * thickness)
     plotter.add_axes(xlabel="e1", ylabel="e2", zlabel="e3", line_width=4, viewport=(0.0, 0.76, 0.15, 1.0))
     labels = [(text, 0.5, 0.03, "black"), ("d₁", 0.935, 0.93, FIRST), ("d₂", 0.97, 0.93, SECOND)]
+    labels += [("load", 0.885, 0.93, LOAD)] if any(solid.color == LOAD for solid in solids) else []
     for label, x, y, colour in filter(lambda item: item[0], labels):
         style = {"font_size": min(20, 1400 // len(label)), "color": colour, "font_file": font}
         actor = plotter.add_text(label, position=(x, y), viewport=True, **style)
@@ -96,11 +105,49 @@ def draw_shape(
     return path
 
 
-def _read(states: Path, branch: str, row: int, count: int = 800) -> tuple[Floats, Floats, str]:
-    """Return centres (count, 3), directors (count, 3, 3) with columns d1, d2, d3, and the usual caption."""
+@dataclass(frozen=True)
+class State:
+    """A state as a picture needs it, at n places along the rod.
+
+    Attributes
+    ----------
+    s, centres, directors
+        Arclengths (n,), centreline (n, 3), and rotations (n, 3, 3) with columns d1, d2, d3.
+    reference
+        Centreline (n, 3) of the state that it has left: of the first branch, at the nearest load.
+    setting
+        What holds and loads the rod.
+    caption
+        Scene, branch and load.
+    """
+
+    s: Floats
+    centres: Floats
+    directors: Floats
+    reference: Floats
+    setting: Setting
+    caption: str
+
+    def view(self) -> Floats:
+        """Axes of the picture, (3, 3)."""
+        held, moved = self.setting, self.centres - self.reference
+        side = held.widest(self.directors[0])
+        return view_of(self.reference, moved, down=held.down, load=held.force, side=side)
+
+    def solids(self, radius: float, view: Floats) -> list[Solid]:
+        """The rod, its stripe, what holds it and what loads it."""
+        around = [np.linspace(-np.pi, np.pi, 49)[:-1], np.linspace(-0.3, 0.3, 9)]
+        profiles = [radius * profile_of(self.s, self.setting.section, angles) for angles in around]
+        out = [
+            rod(self.centres, self.directors, profiles[0], ROD),
+            rod(self.centres, self.directors, 1.02 * profiles[1], STRIPE),
+        ]
+        return out + glyphs_of(self.setting, self.s, self.centres, self.directors, radius, view)
+
+
+def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
+    """Read a state of a file, interpolated at ``count`` places; raises ValueError where there is none."""
     import h5py
-    from scipy.interpolate import CubicSpline
-    from scipy.spatial.transform import Rotation
 
     try:
         with h5py.File(states, "r") as file:
@@ -109,18 +156,28 @@ def _read(states: Path, branch: str, row: int, count: int = 800) -> tuple[Floats
                 raise ValueError(f"{states} has no branch {branch!r}: try one of {sorted(branches)}")
             if not 0 <= row <= (last := len(branches[branch]["r"]) - 1):
                 raise ValueError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
-            load, s, r, q = (branches[branch][key][row] for key in ("load", "s", "r", "q"))
-            s, r, q = (values[np.isfinite(s)] for values in (s, r, q))
+            load = float(branches[branch]["load"][row])
             symbol = {"lam": "λ"}.get(file.attrs["parameter"], file.attrs["parameter"])
             caption = f"{file.attrs['scene']} rod, {branch}, {symbol} = {load:.4g}"
+            first = file.attrs.get("first", branch)
+            left = 0 if branch == first else int(np.argmin(abs(branches[first]["load"][:] - load)))
+            s, centres, directors = _curve(branches[branch], row, count)
+            reference = _curve(branches[first], left, count)[1]
+            setting = read_setting(branches[branch], row)
     except (KeyError, OSError) as error:
         reason = "expected HDF5 with s and branches" if states.exists() else "no such file"
         raise ValueError(f"cannot read {states}, {reason}: try the states.h5 of a scene") from error
+    return State(s, centres, directors, reference, setting, caption)
+
+
+def _curve(group: Any, row: int, count: int) -> tuple[Floats, Floats, Floats]:
+    """Arclengths (count,), centres (count, 3) and directors (count, 3, 3) of a row of a branch."""
+    s, r, q = (group[key][row] for key in ("s", "r", "q"))
+    s, r, q = (values[np.isfinite(s)] for values in (s, r, q))
     opposite = np.sum(q[1:] * q[:-1], axis=1, keepdims=True) < 0.0  # q and -q are the same rotation
     q[1:] *= np.cumprod(np.where(opposite, -1.0, 1.0), axis=0)
     at = np.linspace(s[0], s[-1], count)
-    directors = Rotation.from_quat(CubicSpline(s, q)(at)[:, [1, 2, 3, 0]]).as_matrix()
-    return CubicSpline(s, r)(at), directors, caption
+    return at, CubicSpline(s, r)(at), Rotation.from_quat(CubicSpline(s, q)(at)[:, [1, 2, 3, 0]]).as_matrix()
 
 
 def _import_pyvista() -> Any:
@@ -136,53 +193,40 @@ def _import_pyvista() -> Any:
     return pyvista
 
 
-def _add_rod(
-    pyvista: Any, plotter: Any, centres: Floats, directors: Floats, radius: float, clamped: tuple[bool, bool]
-) -> None:
-    """Add tube, stripe, arrows along d1 and d2, and the ends."""
+STYLE = {"smooth_shading": True, "ambient": 0.25, "specular": 0.3, "specular_power": 25.0}
 
-    def patch(distance: float, angles: Floats) -> Any:
-        """Return the part of a tube between two angles from d1, with its normals."""
-        normals = np.einsum("nik,ka->nai", directors[:, :, :2], np.array([np.cos(angles), np.sin(angles)]))
-        n, k = normals.shape[:2]
-        corner = (np.arange(n - 1)[:, None] * k + np.arange(k - 1)).ravel()
-        quads = np.column_stack([np.full_like(corner, 4), corner, corner + 1, corner + k + 1, corner + k])
-        surface = pyvista.PolyData((centres[:, None] + distance * normals).reshape(-1, 3), quads.ravel())
-        surface.point_data.active_normals = normals.reshape(-1, 3)
-        return surface
 
-    style = {"smooth_shading": True, "ambient": 0.25, "specular": 0.3, "specular_power": 25.0}
-    plotter.add_mesh(patch(radius, np.linspace(0.0, 2.0 * np.pi, 49)), color=ROD, **style)
-    plotter.add_mesh(patch(1.02 * radius, np.linspace(-0.3, 0.3, 9)), color=STRIPE, **style)
+def _add(pyvista: Any, plotter: Any, solid: Solid) -> None:
+    """Add a solid, smooth but for its edges."""
+    faces = np.column_stack([np.full(len(solid.triangles), 3), solid.triangles]).ravel()
+    surface = pyvista.PolyData(solid.points, faces)
+    surface = surface.compute_normals(feature_angle=40.0, split_vertices=True, auto_orient_normals=False)
+    plotter.add_mesh(surface, color=solid.color, **STYLE)
+
+
+def _add_directors(pyvista: Any, plotter: Any, centres: Floats, directors: Floats, radius: float) -> None:
+    """Add arrows along d1 and d2."""
     stations = np.linspace(0, len(centres) - 1, 27).round().astype(int)[1:-1]
-    arrow = pyvista.Arrow(tip_length=0.22, tip_radius=0.075, shaft_radius=0.026, tip_resolution=24)
+    geometry = pyvista.Arrow(tip_length=0.22, tip_radius=0.075, shaft_radius=0.026, tip_resolution=24)
     for index, colour in ((0, FIRST), (1, SECOND)):
         points = pyvista.PolyData(centres[stations])
         points["director"] = directors[stations, :, index]
-        arrows = points.glyph(orient="director", scale=False, factor=4.5 * radius, geom=arrow)
-        plotter.add_mesh(arrows, color=colour, **style)
-    block = pyvista.Cube(x_length=4.8, y_length=4.8, z_length=2.4)
-    disc = pyvista.Disc(inner=0.0, outer=1.0, c_res=48)
-    for end, outward, clamp in ((0, -1.2, clamped[0]), (-1, 1.2, clamped[1])):
-        frame = np.eye(4)
-        frame[:3, :3], frame[:3, 3] = radius * directors[end], centres[end]
-        body = block.translate((0.0, 0.0, outward), inplace=False) if clamp else disc
-        plotter.add_mesh(body.transform(frame, inplace=False), color=CLAMP if clamp else ROD, ambient=0.25)
+        arrows = points.glyph(orient="director", scale=False, factor=4.5 * radius, geom=geometry)
+        plotter.add_mesh(arrows, color=colour, **STYLE)
 
 
-def _camera_position(centres: Floats, margin: float) -> list[tuple[float, ...]]:
-    """Return place, focus and upward direction of a camera at the rod's side, slightly above."""
-    bias = np.linalg.norm(np.ptp(centres, axis=0)) * np.array([3e-3, 2e-3, 1e-3])  # for symmetric shapes
-    _, up, right = np.linalg.eigh(np.cov(centres.T) + np.diag(bias**2))[1].T
-    right = right * np.sign(right @ (centres[-1] - centres[0] + 1e-3 * bias))
-    up = up * np.sign(up @ (centres.mean(axis=0) - (centres[0] + centres[-1]) / 2.0 + bias))
-    back, tilt = np.cross(right, up), np.radians(ELEVATION)
-    axes = np.array([right, np.cos(tilt) * up - np.sin(tilt) * back, np.cos(tilt) * back + np.sin(tilt) * up])
-    seen = centres @ axes.T
-    half = np.ptp(seen, axis=0) / 2.0 + margin
-    distance = half[2] + max(1.2 * half[1], half[0] * SIZE[1] / SIZE[0]) / np.tan(np.radians(VIEW_ANGLE / 2))
-    focus = (seen.min(axis=0) + seen.max(axis=0)) / 2.0 @ axes
-    return [tuple(focus + distance * axes[2]), tuple(focus), tuple(axes[1])]
+def _look(plotter: Any, points: Floats, view: Floats, margin: float) -> None:
+    """Set a camera without perspective that sees all points (n, 3), above the caption."""
+    seen = points @ view.T
+    low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
+    middle, half = (low + high) / 2, (high - low) / 2
+    scale = max(half[1] / ROOM, half[0] * SIZE[1] / SIZE[0])
+    middle[1] -= (1.0 - ROOM) * scale / 2  # the caption's line
+    focus = middle @ view
+    plotter.camera_position = [tuple(focus + 4 * (half[2] + scale) * view[2]), tuple(focus), tuple(view[1])]
+    plotter.camera.enable_parallel_projection()
+    plotter.camera.parallel_scale = scale
+    plotter.renderer.ResetCameraClippingRange()
 
 
 def draw_shape_safely(
@@ -193,7 +237,7 @@ def draw_shape_safely(
     Parameters
     ----------
     states, branch, row, path, **options
-        As for `draw_shape`; the options are caption, radius and clamped.
+        As for `draw_shape`; the options are caption and radius.
     limit
         Time that drawing may take, in seconds.
 
@@ -236,8 +280,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--row", required=True, type=int, help="row of the state, counted from 0")
     parser.add_argument("--output", type=Path, default=Path("shape.png"), help="picture to write")
     parser.add_argument("--caption", help="line at the foot of the picture")
-    parser.add_argument("--radius", type=float, help="radius of the tube, nondimensional")
-    parser.add_argument("--clamped", default="both", help="both, start, end or none")
+    parser.add_argument("--radius", type=float, help="mean radius of the rod, nondimensional")
     options = vars(parser.parse_args(arguments))
     try:
         print(draw_shape(path=options.pop("output"), **options))

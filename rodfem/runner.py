@@ -23,6 +23,7 @@ from rodfem.report import Report
 from rodfem.scene import Scene
 from rodfem.solvers import solver
 from rodfem.sweep import FREQUENCIES, Sweep
+from rodfem.typical import typical_state
 
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
 """What a picture's caption shows for TeX names."""
@@ -180,26 +181,7 @@ def _draw(output: Path, report: Report) -> None:
     branch, row, words = typical_state(data)
     caption = f"{data['title']}, {branch}, {GREEK.get(data['parameter_label'], data['parameter'])} = {words}"
     picture = output / "shape.png"
-    trouble = draw_shape_safely(output / "states.h5", branch, row, picture, caption=caption, clamped=data["clamped"])
+    trouble = draw_shape_safely(output / "states.h5", branch, row, picture, caption=caption)
     report.say(f"Pictures in {output}{os.sep}: diagram.png" + ("" if trouble else ", shape.png"))
     if trouble:
         report.say(trouble)
-
-
-def typical_state(data: dict) -> tuple[str, int, str]:
-    """Branch, row and words of the state to draw: stable, on a branch that leaves the first, well away from it."""
-    first = data["branches"][0]["name"]
-    best: tuple[tuple[bool, bool, float], str, int, str] | None = None
-    for branch in data["branches"]:
-        columns = branch["columns"]
-        near = branch["parent"] is not None and branch["parent"][0] == first
-        typical = 0.7 * max(map(abs, columns["ordinate"]))
-        for row, (load, x, negative) in enumerate(
-            zip(columns["load"], columns["ordinate"], columns["negative"], strict=True)
-        ):
-            score = (negative == 0, near, -abs(abs(x) - typical) / max(typical, 1e-12))
-            if best is None or score > best[0]:
-                best = (score, branch["name"], row, f"{load:.4g}, {'stable' if negative == 0 else f'index {negative}'}")
-    if best is None:
-        raise SceneError("The diagram has no states to draw.")
-    return best[1], best[2], best[3]

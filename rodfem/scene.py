@@ -64,18 +64,40 @@ class Inertia:
     )
 
 
+def _role_of_ordinate(ordinate: Ordinate) -> Role:
+    """Role of an ordinate's function: of numbers at a point, of UFL expressions along the rod."""
+    if ordinate.places:
+        return Role("ordinate", "of(r, q)")
+    return Role("ordinate along the rod", "of(x, c)", along=True)
+
+
 @dataclass(frozen=True)
 class Ordinate:
-    """The number that a bifurcation diagram shows against the load: ``of(r, q)`` at arclength ``s``.
+    """The number that a bifurcation diagram shows against the load: at a point, or an integral over the rod.
 
-    ``r`` (3,) is the centreline and ``q`` (4,) the unit quaternion there, as numpy arrays.  ``key`` names the record
-    ``name`` in words, ``label`` in TeX for the axis of a figure.
+    Parameters
+    ----------
+    name
+        The number in words.
+    s
+        Arclength at which it is taken; None: it is an integral over the rod.
+    of
+        With ``s``: ``of(r, q)`` of the centreline ``r`` (3,) and the unit quaternion ``q`` (4,) there, numpy arrays.
+        Without: the integrand ``of(x, c)``, a UFL expression of the state along the rod as in a scene's ``potential``
+        (see :mod:`rodfem.ends`): its energy, ``lambda x, c: W(x.v, x.k, c)``, or its twist, ``x.k[2] / (2 * pi)``.
+    label
+        The number in TeX, for the axis of a figure.
     """
 
     name: str
-    s: float
-    of: Callable[[np.ndarray, np.ndarray], float] = field(metadata={"role": Role("ordinate", "of(r, q)")})
+    s: float | None
+    of: Callable[[Any, Any], Any] = field(metadata={"role": _role_of_ordinate})
     label: str = ""
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """Arclengths at which the state is evaluated for it."""
+        return () if self.s is None else (self.s,)
 
 
 @dataclass(frozen=True)
@@ -162,10 +184,9 @@ class Scene:
             raise SceneError(f"The load {self.load!r} is not a parameter: choose one of {', '.join(self.parameters)}.")
         for name, parameter in self.parameters.items():
             parameter.check(name, parameter.value)
-        if not a <= self.ordinate.s <= b:
-            raise SceneError(
-                f"The ordinate's arclength {self.ordinate.s:g} is not on the rod: choose {a:g} <= s <= {b:g}."
-            )
+        for s in self.ordinate.places:
+            if not a <= s <= b:
+                raise SceneError(f"The ordinate's arclength {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
         self.check_span(self.span)
         check_scene(self)
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 from numpy.polynomial import legendre
 from petsc4py import PETSc
@@ -100,14 +101,16 @@ class Shape:
         self._v_dense = compat.lagrange_basis(k - 1, np.linspace(0, 1, 4 * k + 1))
         self._v_to_powers = np.linalg.inv(np.vander(2 * compat.nodes(k - 1) - 1, k, increasing=True))
         self._held_strains = np.array([0.0 if i in system.scene.free_strains else x for i, x in enumerate(UNDEFORMED)])
-        self._probe_weights = self._position_weights(system.scene.ordinate.s)
+        self._probe_weights = [self._position_weights(s) for s in system.scene.ordinate.places]
         self._cells = cells
         self.reduced = f.discretization.formulation == "reduced"
 
     def ordinate(self, x: PETSc.Vec) -> float:
         """Ordinate of the scene at the state ``x``."""
         self.system.bring(x)
-        of = self.system.scene.ordinate
+        of, integral = self.system.scene.ordinate, self.system.equations.ordinate
+        if of.s is None:
+            return float(self.system.comm.allreduce(fem.assemble_scalar(integral).real, op=MPI.SUM))
         r, q = self._at(of.s)
         return float(of.of(r, q))
 
@@ -271,7 +274,7 @@ class Shape:
     def _at(self, s: float) -> tuple[np.ndarray, np.ndarray]:
         """Centreline (3,) and unit quaternion (4,) at the ordinate's arclength."""
         system, f = self.system, self.system.fields
-        integral, value = self._probe_weights
+        ((integral, value),) = self._probe_weights
         u = f.u.x.array
         parts = np.zeros((3, 4))
         size = f.turning.size

@@ -30,6 +30,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "twisting": 1.0,
         "span": (0.0, 12.0),
     },
+    "ring": {"twisting": 1.5, "span": (0.0, 1.6)},
     "follower": {"stiffness": (1.0, 10.0, 1.0), "mass": 1.0, "rotary_inertia": (0.0, 0.0, 0.0), "span": (0.0, 25.0)},
 }
 

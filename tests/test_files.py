@@ -118,10 +118,13 @@ def test_states_are_the_rows_of_the_columns(results: dict[str, Path], formulatio
     with h5py.File(results[formulation] / "states.h5", "r") as file:
         branches = diagram(results[formulation])["branches"]
         assert set(file["branches"]) == {branch["name"] for branch in branches}
+        np.testing.assert_allclose(file["section/stiffness"], [np.eye(2)], rtol=0, atol=1e-8)
         for branch in branches:
             group, columns = file["branches"][branch["name"]], branch["columns"]
             middle = np.flatnonzero(group["s"][0] == 0.0)[0]
             np.testing.assert_array_equal(group["load"], columns["load"])
+            assert [end.attrs["kind"] for end in group["supports"].values()] == ["clamp", "clamp"]
+            assert all(len(end["force"]) == len(columns["load"]) for end in group["supports"].values())
             ordinate = np.hypot(*group["r"][:, middle, :2].T)
             np.testing.assert_allclose(ordinate, columns["ordinate"], rtol=0, atol=1e-12)
             least = group["v"][:].reshape(len(ordinate), -1).min(axis=1)

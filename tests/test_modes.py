@@ -264,6 +264,9 @@ def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:
             ((row, group),) = file["branches/branch 1"].items()
             np.testing.assert_allclose(group["r"][:], states["branches/branch 1/r"][int(row)], atol=1e-14)
             assert group["motion"].asstr()[-1] == SYMMETRY
+            assert {name: end.attrs["kind"] for name, end in group["supports"].items()} == dict.fromkeys(
+                ("left end", "right end"), "clamp"
+            )
             assert group["displacement"].shape == group["weight_rotation"].shape == (3, len(group["s"]), 3)
     run_demo(*common, "--method", "count")
     out = capfd.readouterr().out

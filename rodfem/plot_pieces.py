@@ -1,0 +1,106 @@
+"""Pieces of a diagram's branches: which rows have one index, how a piece is drawn, and where two lie on each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise, product
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+STABLE, PLANAR, UNSTABLE = "stable", "stable in the plane, unstable in space", "unstable"
+STYLES: dict[str, dict[str, Any]] = {
+    STABLE: {"linestyle": "-", "linewidth": 3.0, "solid_capstyle": "round"},
+    PLANAR: {"linestyle": (0, (3.2, 1.0)), "linewidth": 2.4},
+    UNSTABLE: {"linestyle": (0, (1.0, 1.3)), "linewidth": 1.9},
+}
+IMPERFECT = "imperfect bifurcation"
+COUNTED = ("branch point", "fold", IMPERFECT)
+"""Kinds of special points whose index before and after is that of the segments beside them."""
+SAME = 2.0
+"""Distance in pixels up to which two lines lie on each other."""
+APART = 30.0
+"""Length in pixels that they must do so for, or else they cross."""
+
+
+class Piece(NamedTuple):
+    """Consecutive segments of a branch with one index.
+
+    ``curve`` (k, 2) has loads and ordinates, ``negative`` is the index, of a planar rod in its plane, ``in_space`` that
+    among all perturbations (None where it is not known).
+    """
+
+    branch: str
+    colour: str
+    curve: Floats
+    negative: int
+    in_space: int | None
+
+    @property
+    def kind(self) -> str:
+        """:data:`STABLE`, :data:`PLANAR` or :data:`UNSTABLE`."""
+        if self.negative:
+            return UNSTABLE
+        return PLANAR if self.in_space else STABLE
+
+    @property
+    def label(self) -> str:
+        """The index, in brackets that in space."""
+        return str(self.negative) if self.in_space is None else f"{self.negative} ({self.in_space})"
+
+
+def pieces_of(branch: Mapping[str, Any], colour: str) -> Iterator[Piece]:
+    """Pieces of a branch of ``diagram.json``, in order; raises ValueError where its columns differ in length."""
+    name, columns, special = branch["name"], branch["columns"], branch.get("special", [])
+    if not len(columns["load"]) == len(columns["ordinate"]) == len(columns["negative"]):
+        raise ValueError(f"columns of branch {name!r} differ in length: try to compute the diagram anew")
+    curve = np.column_stack([np.asarray(columns[key], dtype=float) for key in ("load", "ordinate")])
+    indices = segment_indices(columns["negative"], special)
+    space = _in_space(columns.get("negative_in_space"), indices, special)
+    changes = np.flatnonzero(np.diff(indices) | np.diff(space)) + 1
+    for a, b in pairwise([0, *changes, indices.size]):
+        if b > a:
+            yield Piece(name, colour, curve[a : b + 1], int(indices[a]), int(space[a]) if space[a] >= 0 else None)
+
+
+def segment_indices(negative: ArrayLike, special: Sequence[Mapping[str, Any]]) -> NDArray[np.int64]:
+    """Return the index (n - 1,) between rows; beside singular rows their before and after decide."""
+    rows = np.asarray(negative, dtype=np.int64)
+    indices = np.maximum(rows[:-1], rows[1:])
+    for (key, shift), point in product((("negative_before", -1), ("negative_after", 0)), special):
+        segment = int(point["row"]) + shift
+        if point["kind"] in COUNTED and point.get(key) is not None and 0 <= segment < indices.size:
+            indices[segment] = point[key]
+    return indices
+
+
+def _in_space(
+    column: Sequence[int | None] | None, indices: NDArray[np.int64], special: Sequence[Mapping[str, Any]]
+) -> NDArray[np.int64]:
+    """Index among all perturbations between rows (n - 1,), -1 where it is not known: the greater one of the two rows.
+
+    That of a singular row leaves out the eigenvalues that vanish there, so that the other row decides; it is never less
+    than the index in the plane.
+    """
+    if column is None or any(x is None for x in column):
+        return np.full(indices.size, -1)
+    rows = np.array(column, dtype=np.int64)
+    rows[[int(point["row"]) for point in special if point["kind"] in COUNTED]] = 0
+    return np.maximum(np.maximum(rows[:-1], rows[1:]), indices)
+
+
+def hidden(upper: Floats, lower: Sequence[Floats]) -> list[Floats]:
+    """Parts of a line that lie on others, all given by pixels (k, 2) at equal distances of about two.
+
+    Lines that merely cross, or come from one point, do not lie on each other.
+    """
+    if not lower:
+        return []
+    others = np.concatenate(lower)
+    near = np.array([np.min(np.sum((others - point) ** 2, axis=1)) <= SAME**2 for point in upper])
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
+    parts = [upper[a:b] for a, b in zip(ends[::2], ends[1::2], strict=True)]
+    return [part for part in parts if np.sum(np.hypot(*np.diff(part, axis=0).T)) > APART]

@@ -1,0 +1,104 @@
+"""From where a picture shows a rod: along the axis across the plane in which it moves, a little from above."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+TILT, STEEP = np.radians([20.0, 55.0])
+"""By which a picture is seen from above; that of a closed rod, to show what is across its plane."""
+NEAR = 0.9
+"""Cosine from which on a direction is taken for that of the nearest axis of space."""
+STRAIGHT = 1e-3
+"""Displacement relative to the rod's size below which the rod has not moved."""
+
+
+def view_of(
+    reference: Floats,
+    moved: Floats,
+    *,
+    axis: Floats | None = None,
+    down: Floats | None = None,
+    load: Floats | None = None,
+    side: Floats | None = None,
+) -> Floats:
+    """Axes of a picture as rows (3, 3): to the right, upwards, and to the viewer.
+
+    Parameters
+    ----------
+    reference, moved
+        Centreline (n, 3) of the state that the rod has left, and displacement (n, 3) from it.
+    axis
+        Direction (3,) of the rod's axis; None: from one end of ``reference`` to the other.
+    down
+        Direction of a load along the rod (gravity), which is downwards in the picture.
+    load
+        Direction of a force across the rod, which is not along the line of sight.
+    side
+        Direction that is upwards where a straight rod has not moved.
+
+    Returns
+    -------
+    axes
+        Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and upwards is the
+        principal direction of the displacement across it.  With gravity it is the other way round.  A closed rod is
+        shown in the plane nearest to it.
+    """
+    size = float(np.linalg.norm(np.ptp(reference, axis=0)))
+    chord = reference[-1] - reference[0] if axis is None else axis
+    shape, tilt = moved.T @ moved / len(moved), TILT
+    if np.linalg.norm(chord) < 1e-6 * size and down is None:
+        (right, up), tilt = _plane(reference + moved), STEEP
+    elif down is not None:
+        up = -down / np.linalg.norm(down)
+        spread = (reference - reference.mean(axis=0)).T @ (reference - reference.mean(axis=0)) / len(reference)
+        right = _principal(shape + spread, up, STRAIGHT * size, side)
+        right = right * _sign(right @ (moved[np.argmax(np.linalg.norm(moved, axis=1))] + 1e-3 * chord))
+    else:
+        right = _snapped(chord / np.linalg.norm(chord))
+        up = _principal(shape, right, STRAIGHT * size, side)
+        up = up * _sign(up @ moved[np.argmax(np.linalg.norm(moved - np.outer(moved @ right, right), axis=1))])
+        if load is not None:
+            aside = load - (load @ right) * right
+            if abs(up @ aside) < 0.5 * np.linalg.norm(aside):  # nearly along the line of sight: half way to it
+                up, tilt = up + _sign(up @ aside) * aside / np.linalg.norm(aside), 0.0
+                up /= np.linalg.norm(up)
+            elif (up @ aside) * (np.cross(right, up) @ aside) > 1e-9 * (aside @ aside):  # towards the load
+                tilt = -tilt
+    back = np.cross(right, up)
+    return np.array([right, np.cos(tilt) * up - np.sin(tilt) * back, np.cos(tilt) * back + np.sin(tilt) * up])
+
+
+def _principal(moments: Floats, axis: Floats, least: float, other: Floats | None) -> Floats:
+    """Direction across ``axis`` of the greatest second moment; ``other``, if given, where that is below ``least^2``."""
+    out = np.eye(3) - np.outer(axis, axis)
+    values, vectors = np.linalg.eigh(out @ moments @ out)
+    found = vectors[:, -1]
+    if values[-1] < least**2:
+        found = np.eye(3)[0] if other is None else other
+        if np.linalg.norm(out @ found) < 0.1:
+            found = np.eye(3)[int(np.argmin(abs(axis)))]
+    found = out @ _snapped(found / np.linalg.norm(found))
+    return np.asarray(found / np.linalg.norm(found))
+
+
+def _plane(points: Floats) -> tuple[Floats, Floats]:
+    """Directions of the greatest two second moments of points (n, 3) about their mean."""
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    vectors = np.linalg.eigh(np.cov(points.T) + np.diag(size * np.array([3e-3, 2e-3, 1e-3])) ** 2)[1]
+    right, up = vectors[:, 2], vectors[:, 1]
+    return right * _sign(right @ np.array([3.0, 2.0, 1.0])), up * _sign(up @ np.array([1.0, 2.0, 3.0]))
+
+
+def _snapped(direction: Floats) -> Floats:
+    """Axis of space near which a unit vector is, or the vector itself."""
+    i = int(np.argmax(abs(direction)))
+    return np.sign(direction[i]) * np.eye(3)[i] if abs(direction[i]) > NEAR else direction
+
+
+def _sign(value: Any) -> float:
+    return -1.0 if value < 0 else 1.0

@@ -1,0 +1,227 @@
+"""What pictures draw: supports, loads and cross-sections as files record them, directions of view, the state chosen."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin, sqrt
+from pathlib import Path
+from typing import Any
+
+import classics
+import h5py
+import numpy as np
+import pytest
+import ufl
+from matplotlib.image import imread
+
+from forms import loads
+from forms.energy import bending
+from rodfem.ends import Attachment, End, clamped, elastic, free, hinged, pinned, sliding
+from rodfem.errors import SceneError
+from rodfem.glyphs import DARK, GREY, LOAD, STEEL
+from rodfem.render import _read, draw_shape_safely
+from rodfem.scene import Inertia, Ordinate, Parameter, Scene
+from rodfem.setting import read
+from rodfem.solids import FLATTEST, profile_of
+from rodfem.supports import supports_of, write, write_section
+from rodfem.typical import typical_state
+from rodfem.view import view_of
+
+pytestmark = pytest.mark.alone
+
+E1, E2, E3 = np.eye(3)
+S = np.linspace(0.0, 1.0, 31)
+STRAIGHT = {"s": S, "r": np.outer(S, E3), "q": np.tile([1.0, 0, 0, 0], (31, 1))}
+
+
+def column(*ends: Any, **more: Any) -> Scene:
+    """A straight rod along e3 between these ends, under a load P."""
+    return Scene(
+        name="column", interval=(0.0, 1.0), rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending(k, (1.0, 2.0, 1.0)) + 0 * c.P * k[0], parameters={"P": Parameter(1.0)},
+        ends=ends or (clamped(), free()), ordinate=Ordinate("x", s=1.0, of=lambda r, q: r[0]), span=(0.0, 5.0),
+        load="P", inertia=Inertia(rho_A=lambda c: 1.0), **more,
+    )  # fmt: skip
+
+
+def push(c: Any) -> tuple[float, float, Any]:
+    return (0.0, 0.0, -c.P)
+
+
+def along_e3(c: Any) -> tuple[float, float, None]:
+    return (0.0, 0.0, None)
+
+
+ENDS = {
+    "clamp": clamped(lambda c: (0.0, 0.0, 1.0 - c.P / 10), lambda c: (ufl.cos(c.P / 2), 0.0, 0.0, ufl.sin(c.P / 2))),
+    "slide": sliding(along_e3, force=push),
+    "hinge": hinged((0.0, 2.0, 0.0)),
+    "pin": pinned(along_e3, push),
+    "spring": elastic(lambda c: (10.0, 20.0, 0.0), lambda c: 3.0, force=push),
+    "free": free(follower=push),
+}
+
+
+def saved(path: Path, scene: Scene, load: float = 4.0, **state: Any) -> Path:
+    """A file as a run writes it, with one state on one branch."""
+    sample = STRAIGHT | {"load": load} | state
+    with h5py.File(path, "w") as file:
+        file.attrs.update(scene=scene.name, parameter=scene.load, first="straight")
+        write_section(file, scene)
+        group = file.create_group("branches/straight")
+        for name, value in sample.items():
+            group[name] = np.array([value])
+        write(group, scene, [sample])
+    return path
+
+
+def old(path: Path) -> Path:
+    """The same file as if nothing had been recorded for pictures."""
+    with h5py.File(path, "a") as file:
+        del file["section"], file["branches/straight/supports"], file.attrs["first"]
+    return path
+
+
+def colors(path: Path) -> set[str]:
+    """Colours of what is drawn at the right end, beside the rod."""
+    state = _read(path, "straight", 0)
+    return {x.color for x in state.solids(0.01, state.view())[2:] if x.points[:, 2].mean() > 0.5}
+
+
+@pytest.mark.parametrize("kind", ENDS)
+def test_each_end_is_named_by_its_properties(kind: str) -> None:
+    right = supports_of(column(clamped(), ENDS[kind]), STRAIGHT | {"load": 4.0})["right end"]
+    assert right.kind == kind
+    held = {"clamp": [1, 1, 1], "slide": [1, 1, 0], "hinge": [1, 1, 1], "pin": [1, 1, 0]}.get(kind, [0, 0, 0])
+    np.testing.assert_array_equal(right.held, np.array(held, dtype=bool))
+    force, follower = (
+        [0, 0, -4.0] if kind in kinds else [0, 0, 0] for kinds in (("slide", "pin", "spring"), ("free",))
+    )
+    np.testing.assert_array_equal(right.force, force)
+    np.testing.assert_array_equal(right.follower, follower)
+    np.testing.assert_array_equal(right.axis, [0, 2.0, 0] if kind == "hinge" else [0, 0, 0])
+    np.testing.assert_allclose(right.frame, [cos(2.0), 0, 0, sin(2.0)] if kind == "clamp" else [1, 0, 0, 0], atol=1e-15)
+    sprung = kind == "spring"
+    np.testing.assert_allclose(right.translation_stiffness, sprung * np.diag([10.0, 20.0, 0.0]), atol=1e-6)
+    np.testing.assert_allclose(right.rotation_stiffness, sprung * 3.0 * np.eye(3), atol=1e-3)
+
+
+def test_what_is_no_spring_and_what_is_attached() -> None:
+    """A semi-tangential moment has a potential, but holds nothing; an attachment is an end without an end."""
+    moment = End(energy=lambda x, c: loads.semi_tangential(x.d1, x.d2, c.P))
+    assert supports_of(column(clamped(), moment), STRAIGHT | {"load": 4.0})["right end"].kind == "free"
+    foot = End(position=lambda c: (0.0, 0.0, 0.0), energy=lambda x, c: loads.rotational_spring(x.q, 3.0))
+    left = supports_of(column(foot, free(push)), STRAIGHT | {"load": 4.0})["left end"]
+    assert left.kind == "pin" and left.rotation_stiffness.any() and not left.translation_stiffness.any()
+    spring = Attachment(0.5, force=push, mass=lambda c: 2.0, energy=lambda x, c: loads.spring(x.r, (7.0, 0.0, 0.0)))
+    there = supports_of(column(attachments=(spring,)), STRAIGHT | {"load": 4.0})["attachment 1"]
+    assert (there.kind, there.s, there.mass, there.force[2]) == ("spring", 0.5, 2.0, -4.0)
+    assert there.translation_stiffness[0, 0] == pytest.approx(7.0)
+    assert supports_of(classics.ring(), STRAIGHT | {"load": 0.0}) == {}
+
+
+def test_record_of_every_row_can_be_read_back(folder: Path) -> None:
+    scene = column(clamped(), ENDS["clamp"], distributed=lambda c: (0.0, c.P * c.s, 0.0))
+    with h5py.File(folder / "states.h5", "w") as file:
+        write_section(file, scene)
+        write(file.create_group("b"), scene, [STRAIGHT | {"load": load} for load in (1.0, 3.0)])
+        for row, load in enumerate((1.0, 3.0)):
+            setting = read(file["b"], row)
+            assert [x.kind for x in setting.supports] == ["clamp", "clamp"]
+            np.testing.assert_allclose(setting.supports[1].frame, [cos(load / 2), 0, 0, sin(load / 2)], atol=1e-15)
+            assert setting.distributed is not None and setting.section is not None
+            s, force, _ = setting.distributed
+            np.testing.assert_allclose(force[:, 1], load * s)
+            np.testing.assert_allclose(setting.section[1], [np.diag([2.0, 1.0])], atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", ENDS)
+def test_only_what_holds_an_end_is_drawn(folder: Path, kind: str) -> None:
+    file = saved(folder / "states.h5", column(clamped(), ENDS[kind]))
+    expected = {"clamp": {GREY}, "slide": {GREY, STEEL}, "hinge": {DARK, GREY}, "pin": {DARK, GREY, STEEL}}
+    found = expected.get(kind, {"spring": {GREY, STEEL}}.get(kind, set()))
+    assert colors(file) & {GREY, DARK, STEEL} == found
+    assert (LOAD in colors(file)) == (kind not in ("clamp", "hinge"))
+    assert not colors(old(file))
+
+
+def test_picture_shows_a_clamp_where_there_is_one(folder: Path) -> None:
+    """Pixels: a grey block at the left end, and none at the free end."""
+    pytest.importorskip("pyvista")
+    file = saved(folder / "states.h5", column(clamped(), free()))
+    assert draw_shape_safely(file, "straight", 0, folder / "shape.png", caption="") is None
+    pixels = imread(folder / "shape.png")[300:840, :, :3]  # without the triad and the caption
+    grey = (np.ptp(pixels, axis=2) < 0.08) & (abs(pixels.mean(axis=2) - 0.55) < 0.2)
+    assert np.count_nonzero(grey[:, :800]) > 2000 and np.count_nonzero(grey[:, 800:]) < 20
+
+
+def test_a_load_arrow_has_the_direction_of_the_load(folder: Path) -> None:
+    """A follower force turns with the end: the arrow's head is where the director points."""
+    half = sqrt(0.5)
+    turned = {"q": np.tile([half, 0, half, 0], (31, 1)), "r": np.outer(S, E1)}  # d3 = e1
+    state = _read(saved(folder / "states.h5", column(clamped(), free(follower=push)), **turned), "straight", 0)
+    (arrow,) = [x for x in state.solids(0.01, state.view()) if x.color == LOAD]
+    head, tail = (arrow.points[arrow.points[:, 0].argsort()[[0, -1]]]) @ E1
+    assert 1.0 < head < tail  # it pushes against the tip, from outside
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_cross_sections_have_the_proportion_of_the_stiffnesses(angle: float) -> None:
+    """Bending stiffness of the outline, ``int (x_2^2, -x_1 x_2; -x_1 x_2, x_1^2) dA`` by triangles from its centre."""
+    turn = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
+    B = turn @ np.diag([1.0, 10.0]) @ turn.T
+    J = B[::-1, ::-1] * np.array([[1, -1], [-1, 1]])
+    (outline,) = profile_of(np.zeros(1), (np.zeros(1), J[None]), np.linspace(0, 2 * pi, 4001)[:-1])
+    after = np.roll(outline, -1, axis=0)
+    area = (outline[:, 0] * after[:, 1] - outline[:, 1] * after[:, 0]) / 2
+    moments = [np.einsum("i,ij,ik->jk", area, a, b) for a in (outline, after) for b in (outline, after)]
+    both = [np.einsum("i,ij,ik->jk", area, x, x) for x in (outline, after)]
+    second = (sum(moments) + sum(both)) / 12
+    np.testing.assert_allclose(second / np.trace(second), J / np.trace(J), atol=1e-6)
+
+
+def test_cross_sections_stay_visible() -> None:
+    """Tapered as the stiffness is, ``B = a^4``; never flatter than a bound, and round without a record."""
+    s, angles = np.array([0.0, 1.0]), np.linspace(0, 2 * pi, 401)
+    flat = [np.array([np.diag([1.0, thin])] * 2) for thin in (1e-9, 0.0)]
+    both = (np.array([16 * np.eye(2), np.eye(2)]), *flat)
+    size = [[np.ptp(x, axis=0) for x in profile_of(s, (s, J), angles)] for J in both]
+    np.testing.assert_allclose(size[0], [[2, 2], [1, 1]], rtol=1e-6)
+    np.testing.assert_allclose([a / b for a, b in (*size[1], *size[2])], FLATTEST, rtol=1e-6)
+    np.testing.assert_allclose(np.ptp(profile_of(s, None, angles), axis=1), 2.0)
+
+
+def test_view_shows_the_plane_of_the_motion_and_tilts_nothing() -> None:
+    bump = np.sin(pi * S)[:, None]
+    for way in (E1, E2, np.array([0.6, 0.8, 0.0]), -E2):
+        right, up, _ = view_of(STRAIGHT["r"], 0.3 * bump * way)
+        np.testing.assert_allclose(right, E3, atol=1e-12)  # clamps are not tilted
+        assert up @ way > 0.85
+    right, up, _ = view_of(STRAIGHT["r"], 0.3 * bump * E1, down=-E3)
+    np.testing.assert_allclose([abs(right @ E1), right @ E3, up @ E1], [1.0, 0.0, 0.0], atol=1e-12)
+    assert up @ E3 > 0.9  # gravity is downwards
+    _, up, _ = view_of(STRAIGHT["r"], 0.3 * bump * E2, load=E1)
+    assert min(abs(up @ E1), abs(up @ E2)) > 0.6  # neither of both is along the line of sight
+
+
+def branch(name: str, negative: list[int], special: list[dict] = [], **more: Any) -> dict[str, Any]:  # noqa: B006
+    rows = [float(i) for i in range(len(negative))]
+    columns = {"load": rows, "ordinate": rows, "negative": negative, "arclength": rows, **more.pop("columns", {})}
+    return {"name": name, "parent": None, "columns": columns, "special": special, **more}
+
+
+def singular(row: int, multiplicity: int = 1) -> dict[str, Any]:
+    return {"row": row, "kind": "branch point", "multiplicity": multiplicity}
+
+
+def test_typical_state_is_well_inside_what_it_is_said_to_be() -> None:
+    first = branch("straight", [0, 0, 1, 1], [singular(2)])
+    leaves = branch("branch 1", [0] * 6 + [1] * 6, [singular(0), singular(5)], parent=["straight", 0])
+    assert typical_state({"branches": [first, leaves]}) == ("branch 1", 3, "3, stable")
+    unstable = branch("branch 1", [0, 2, 1, 1, 1, 1], [singular(0)], parent=["straight", 0])
+    assert typical_state({"branches": [first, unstable]}) == ("branch 1", 4, "4, unstable, index 1")
+    planar = branch("straight", [0] * 6, columns={"negative_in_space": [0, 1, 1, 1, 1, 1]})
+    assert typical_state({"branches": [planar | {"name": "x"}]})[2] == "0, stable"
+    planar["columns"]["negative_in_space"] = [1] * 6
+    assert typical_state({"branches": [planar]})[2] == "3, stable in the plane, unstable in space, index 1"
+    with pytest.raises(SceneError, match="no states"):
+        typical_state({"branches": [branch("straight", [])]})
