@@ -23,6 +23,8 @@ from rodfem.stability.rank import rank_of
 from rodfem.topology import link
 from rodfem.tracer import Tracer, equivalent, near
 
+TAIL = 8
+"""Rows before the end of a side branch among which its mirror image is recognised."""
 COLLAPSED = 1e-6
 """A first state whose smallest stretch is below this is no rod."""
 
@@ -199,6 +201,8 @@ class Explorer(Tracer):
                 first = branch.points[1]
                 if special.meets is None and self._traced_already(branch, special):
                     continue
+                if self._came_from(parent, special, first):
+                    continue
                 self.trace(branch)
         self._judge_from_the_side(special, self.branches[before:])
 
@@ -224,6 +228,13 @@ class Explorer(Tracer):
     def _name(self, parent: Branch) -> str:
         siblings = sum(b.parent is not None and b.parent[0] == parent.name for b in self.branches)
         return f"{parent.name + '.' if parent.depth else 'branch '}{siblings + 1}"
+
+    def _came_from(self, parent: Branch, special: Special, point: Point) -> bool:
+        """Whether what leaves the end of a side branch is that branch again, or its mirror image."""
+        if special.zero_of != "slope":
+            return False
+        tail = replace(parent, points=[self.here(p) for p in parent.points[-TAIL:]])
+        return any(equivalent(point, other, 1e-7) for other in states_at(self.follower, [tail], point.load))
 
     def _traced_already(self, branch: Branch, special: Special) -> bool:
         """Whether another branch ended at this branch point coming along the same way."""
