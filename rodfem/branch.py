@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from petsc4py import PETSc
+
+if TYPE_CHECKING:
+    from rodfem.stability.cluster import Cluster
 
 FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
 FLUTTER, DIVERGENCE = "flutter", "divergence"
@@ -17,7 +21,9 @@ class Point:
 
     ``slope`` is the load's component of the tangent, ``drift`` the largest drift scalar (zero but for round-off),
     ``error`` the last Newton correction, ``mesh`` the number of the discretisation that ``x`` belongs to, and
-    ``estimate`` the error of the discretisation in load and ordinate, where an accuracy was asked for.
+    ``estimate`` the error of the discretisation in load and ordinate, where an accuracy was asked for.  Of frequencies
+    ``omega2`` are the eigenvalues (real and imaginary part), ``motion`` what the rod does in each, and ``curve`` the
+    numbers of their curves against the load.
     """
 
     x: PETSc.Vec
@@ -35,6 +41,7 @@ class Point:
     spectrum: list[float] = field(default_factory=list)
     omega2: list[list[float]] = field(default_factory=list)
     motion: list[str] = field(default_factory=list)
+    curve: list[int] = field(default_factory=list)
     negative_in_space: int | None = None
     mesh: int = 0
     estimate: float = float("nan")
@@ -74,7 +81,8 @@ class Special:
     ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` that of the
     discretisation: of the load for folds and branch points, of the ordinate at user points and ends. ``coupling``
     is the cosine between the null vector and the derivative of the equations in the load: zero at a branch point,
-    not at a fold.
+    not at a fold.  ``omega2`` is the double eigenvalue of flutter, ``cluster`` the
+    :class:`~rodfem.stability.cluster.Cluster` of the eigenvalues that collide.
     """
 
     kind: str
@@ -94,6 +102,7 @@ class Special:
     law: Law | None = None
     omega2: float = float("nan")
     omega2_error: float = float("nan")
+    cluster: Cluster | None = None
 
     @property
     def multiplicity(self) -> int:

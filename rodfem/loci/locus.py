@@ -30,6 +30,7 @@ from rodfem.loci.curve import Criterion, Half, Tracer
 from rodfem.loci.plane import Interval, Node, Plane
 from rodfem.loci.singular import Singular
 from rodfem.report import number
+from rodfem.stability.cluster import as_vectors
 from rodfem.system import System
 
 STEPS = Steps(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
@@ -182,7 +183,10 @@ def locus(
         )
     with system.clock.purpose("locus"), plane.kept():
         criterion = _criterion(solver, plane, special)
-        guess = Node(p, special.point.x, p, special.point.x, p, omega2=special.omega2, modes=list(special.null_vectors))
+        modes = list(special.null_vectors)
+        if special.cluster is not None:
+            modes = as_vectors(system, special.cluster.basis)
+        guess = Node(p, special.point.x, p, special.point.x, p, omega2=special.omega2, modes=modes)
         first = criterion.correct(p, special.point.x, (np.array([0.0, 1.0]) * plane.width, None), guess, 0.1)
         tracer = Tracer(criterion, plane, steps)
         onwards = tracer.run(first)

@@ -26,10 +26,10 @@ from slepc4py import SLEPc
 from rodfem import compat
 from rodfem.copied import Copy
 from rodfem.errors import ConvergenceError
-from rodfem.factors import LONG, PETSC_ERR_LIB
+from rodfem.factors import PETSC_ERR_LIB, factors_of, is_cut
 from rodfem.stability import character
 from rodfem.stability.dense import finite_eigenpairs
-from rodfem.stability.pencil import assemble_pencil, shift_invert
+from rodfem.stability.pencil import LARGE, Inverse, assemble_pencil, shift_invert, with_factors
 from rodfem.system import System
 
 FAR = 1e5
@@ -40,6 +40,10 @@ which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than t
 """
 DENSE = 3
 """A pencil smaller than this many Krylov spaces is solved by dense reductions: it may have few finite eigenvalues."""
+REAL = 1e-7
+"""An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
+MULTIPLE = 1e-8
+"""Eigenvalues that differ by less than this, relative, share the name of their motions."""
 EPS = float(np.finfo(float).eps)
 
 
@@ -56,6 +60,15 @@ class Frequencies:
     kinds: tuple[str, ...] = ()
     vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
 
+    @property
+    def noise(self) -> float:
+        """What tells an eigenvalue from zero."""
+        return REAL * max(1.0, float(abs(self.values).min(initial=np.inf)))
+
+    def diverged(self) -> int:
+        """Number of negative real eigenvalues."""
+        return int(((self.values.imag == 0) & (self.values.real < -self.noise)).sum())
+
     def unstable(self, tolerance: float) -> int:
         """Number of eigenvalues with a negative real part or a non-zero imaginary part."""
         return int(((self.values.real < -tolerance) | (abs(self.values.imag) > tolerance)).sum())
@@ -68,6 +81,11 @@ class _Pair:
     value: complex
     parts: list[np.ndarray]
     error: float
+
+    @property
+    def vector(self) -> np.ndarray:
+        """The vector on this rank, complex."""
+        return np.asarray(self.parts[0] + 1j * (0.0 if len(self.parts) < 2 else self.parts[1]))
 
 
 class Vibration:
@@ -130,7 +148,8 @@ class Vibration:
     def _whole(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """The pencil; of a rod that is not long all of it on each rank, which solves alone."""
         pencil = self.matrix, self.mass
-        if self.system.comm.size == 1 or self.matrix.getSize()[0] >= LONG:
+        comm = self.system.comm
+        if comm.size == 1 or is_cut(comm, self.matrix.getSize()[0]):
             return pencil
         if not self._copies:
             self._copies = [Copy(matrix) for matrix in pencil]
@@ -149,16 +168,55 @@ class Vibration:
             found = sorted(found, key=lambda p: abs(p.value - target))[: number + 2]
             third = abs(found[min(2, len(found) - 1)].value - target)
             found = [p for p in found if abs(p.value - target) <= FAR * third]
-            kinds = [character.name(character.shares(self.system, self.turned, p.parts)) for p in found]
+            kinds = self._kinds(found)
         order = sorted(range(len(found)), key=lambda i: (round(found[i].value.real, 9), found[i].value.imag))
         return Frequencies(
             np.array([found[i].value for i in order]),
             np.array([found[i].error for i in order]),
             tuple(kinds[i] for i in order),
-            np.stack(
-                [found[i].parts[0] + 1j * (0.0 if len(found[i].parts) < 2 else found[i].parts[1]) for i in order], 1
-            ),
+            np.stack([found[i].vector for i in order], 1),
         )
+
+    def _kinds(self, found: list[_Pair]) -> list[str]:
+        """Names of the motions; those of a multiple eigenvalue are the name of all that it does.
+
+        Its vectors are any in its invariant subspace: bending about d1 in one state and about d2 in the next.
+        """
+        kinds = [""] * len(found)
+        for i, p in enumerate(found):
+            if kinds[i]:
+                continue
+            equal = [j for j, q in enumerate(found) if abs(p.value - q.value) < MULTIPLE * abs(p.value)] or [i]
+            parts = p.parts
+            if len(equal) > 1:
+                vectors = self.orthonormal(np.stack([found[j].vector for j in equal], axis=1))
+                parts = [*vectors.real.T, *vectors.imag.T]
+            for j in equal:
+                kinds[j] = character.name(character.shares(self.system, self.turned, parts))
+        return kinds
+
+    def weighed(self, vectors: np.ndarray) -> np.ndarray:
+        """``M X`` for real or complex vectors (n, k), with any PETSc."""
+        if np.iscomplexobj(vectors):
+            return np.asarray(self.weighed(vectors.real) + 1j * self.weighed(vectors.imag))
+        out, x = np.empty_like(vectors), self.system.new_vector()
+        for i, column in enumerate(vectors.T):
+            x.array[:] = column
+            out[:, i] = (self.mass * x).array_r.real
+        return out
+
+    def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """``a^* b`` of all ranks' rows."""
+        return np.asarray(self.system.comm.allreduce(a.conj().T @ b))
+
+    def squares(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Products of each column of ``a`` with the same of ``b``, real parts."""
+        return np.asarray(self.system.comm.allreduce(np.sum(a.conj() * b, axis=0).real))
+
+    def orthonormal(self, vectors: np.ndarray) -> np.ndarray:
+        """Basis of the span of complex vectors (n, k), orthonormal in the mass."""
+        squares, turn = np.linalg.eigh(self.product(vectors, self.weighed(vectors)))
+        return np.asarray(vectors @ (turn / np.sqrt(np.maximum(squares, EPS * squares[-1]))))
 
     def _dense(self, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
         """All finite eigenvalues of a pencil that is small enough for dense matrices."""
@@ -210,15 +268,22 @@ class Vibration:
             made.destroy()
         return out[:number]
 
-    @staticmethod
-    def _solve(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex) -> SLEPc.EPS:
-        """Run SLEPc; raises :class:`ConvergenceError` where it finds nothing at all.
+    def _solve(self, matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex) -> SLEPc.EPS:
+        """Run SLEPc; raises :class:`ConvergenceError` where it finds nothing at all, or has no factors to do so.
 
         A small pencil has few finite eigenvalues, and a Krylov space that holds all of them breaks down on the Jordan
         blocks of the infinite ones: it is then made smaller.
         """
+        inverse = self._inverse(matrix, mass, target)
         while number:
-            solver = shift_invert(matrix, mass, number, target, symmetric=False)
+            if inverse is None:
+                solver = shift_invert(matrix, mass, number, target, symmetric=False)
+            else:
+                solver = with_factors(matrix, mass, number, target, inverse, symmetric=False)
+            try:
+                solver.setUp()
+            except PETSc.Error as trouble:
+                raise ConvergenceError(_singular(target)) from trouble
             try:
                 solver.solve()
             except PETSc.Error as trouble:
@@ -230,6 +295,27 @@ class Vibration:
             solver.destroy()
             number //= 2
         raise ConvergenceError(f"SLEPc found no eigenvalue near {target:.6g}: use a richer discretisation.")
+
+    def _inverse(self, matrix: PETSc.Mat, mass: PETSc.Mat, target: complex) -> Inverse | None:
+        """Inverse of ``matrix - target mass`` for a large pencil, piece by piece on several ranks; None: SLEPc's own.
+
+        MUMPS, SLEPc's choice on several ranks, gives up on a long rod: the zero block of the multipliers delays more
+        pivots than its analysis has made room for.
+        """
+        if matrix.size[0] < LARGE:
+            return None
+        shifted = matrix.copy()
+        shifted.axpy(-target, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        comm = matrix.comm.tompi4py()
+        factors = factors_of("lu", comm, matrix.size[0], self.system.fields.dense_rows, {8: 0}, prefix="rodfem_st_")
+        factors(shifted)
+        if not factors.regular:
+            raise ConvergenceError(_singular(target))
+        return Inverse(factors, shifted if comm.size > 1 else None)
+
+
+def _singular(target: complex) -> str:
+    return f"The pencil is singular at the shift {target:.6g}: choose another load, or another discretisation."
 
 
 def dense(matrix: PETSc.Mat) -> np.ndarray:
