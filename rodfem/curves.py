@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from rodfem.stability.cluster import groups
-from rodfem.stability.vibration import Frequencies, Vibration
+from rodfem.stability.vibration import ALIKE, Frequencies, Vibration, groups
 
 STRANGE = 1.0
 """Sum of the share of a vector outside a curve's and of the relative change, above which another curve begins."""
@@ -53,7 +52,7 @@ class Curves:
         weighed = vibration.weighed(found.vectors)
         energy = np.maximum(vibration.squares(found.vectors, weighed), 1e-300)
         outside = np.ones((len(last.values), len(found.values)))
-        for group in groups(last.values):
+        for group in groups(last.values, ALIKE):
             basis = vibration.orthonormal(last.vectors[:, group])
             share = (abs(vibration.product(basis, weighed)) ** 2).sum(axis=0) / energy
             outside[group] = 1.0 - np.minimum(share, 1.0)

@@ -11,8 +11,8 @@ from scipy.optimize import linear_sum_assignment
 
 from rodfem.errors import ConvergenceError
 from rodfem.locate import real_root, zero_uncertainty
-from rodfem.stability.cluster import Cluster, Measured, groups
-from rodfem.stability.vibration import MULTIPLE, Frequencies
+from rodfem.stability.cluster import Cluster, Measured
+from rodfem.stability.vibration import MULTIPLE, Frequencies, groups
 
 MOVED = 0.3
 """A complex eigenvalue that changes by more than this, relative, in a step may be another one."""

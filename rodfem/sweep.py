@@ -178,12 +178,21 @@ class Sweep:
             after_it = negative + event.change
             if i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
                 after_it = b.negative  # of all eigenvalues that are recorded
+            if event.cluster is not None:
+                self._name(point, event.cluster)
             special = Special(event.kind, point, negative, after_it, event.uncertainty, omega2=event.omega2)
             special.cluster, special.note = event.cluster, event.note
             if point is not a and point is not b:
                 branch.points.append(point)
             self._special(branch, special)
             negative = after_it
+
+    def _name(self, point: Point, cluster: Cluster) -> None:
+        """Name the motions of the eigenvalues that collide at a point by all that they do: their vectors are one."""
+        name = self.vibration.motion(cluster.basis)
+        distance = [abs(complex(*value) - cluster.mean) for value in point.omega2]
+        for i in np.argsort(distance, kind="stable")[: cluster.size]:
+            point.motion[i] = name
 
     def _collisions(self, a: Point, b: Point, before: Frequencies, after: Frequencies) -> list[_Event]:
         """Collisions between two loads, those at one and the same load together."""

@@ -427,6 +427,15 @@ def beck(tip: float = 0.0, middle: float = 0.0, span: tuple[float, float] = (10.
     )  # fmt: skip
 
 
+def partly_following(share: float, span: tuple[float, float], strong: float = 10.0) -> Scene:
+    """A thrust on the tip, a ``share`` of which follows it; diverges where the share is below one half."""
+    thrust = free(force=lambda c: (0.0, 0.0, -(1 - c.share) * c.P), follower=lambda c: (0.0, 0.0, -c.share * c.P))
+    return column(
+        "partly", (clamped(), thrust), span, inertia=BEAM,
+        constants={"P": span[0], "B2": strong, "share": share},
+    )  # fmt: skip
+
+
 def leipholz() -> Scene:
     return column(
         "leipholz", (clamped(), free()), (30.0, 45.0), follower=push, inertia=BEAM,

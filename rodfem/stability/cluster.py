@@ -18,7 +18,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.stability.vibration import MULTIPLE, REAL, Frequencies, Vibration
+from rodfem.stability.vibration import REAL, Frequencies, Vibration
 from rodfem.system import System
 
 LEAST = 0.25
@@ -83,19 +83,6 @@ def as_vectors(system: System, columns: np.ndarray) -> list[PETSc.Vec]:
         vector.array[:] = column
         vector.assemble()
         out.append(vector)
-    return out
-
-
-def groups(values: np.ndarray) -> list[list[int]]:
-    """Places of eigenvalues in groups of equal ones, in ascending order of the first of each."""
-    out: list[list[int]] = []
-    for i, value in enumerate(values):
-        for group in out:
-            if abs(value - values[group[0]]) < MULTIPLE * abs(value):
-                group.append(i)
-                break
-        else:
-            out.append([i])
     return out
 
 

@@ -24,9 +24,10 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem import compat
+from rodfem.condensed import Condensed
 from rodfem.copied import Copy
 from rodfem.errors import ConvergenceError
-from rodfem.factors import PETSC_ERR_LIB, factors_of, is_cut
+from rodfem.factors import PETSC_ERR_LIB, Factors, Mumps, factors_of, is_cut
 from rodfem.stability import character
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.pencil import LARGE, Inverse, assemble_pencil, shift_invert, with_factors
@@ -43,7 +44,11 @@ DENSE = 3
 REAL = 1e-7
 """An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
 MULTIPLE = 1e-8
-"""Eigenvalues that differ by less than this, relative, share the name of their motions."""
+"""Eigenvalues that differ by less than this, relative, are one that is multiple."""
+ALIKE = 1e-6
+"""Eigenvalues that differ by less than this, relative, have one name: where another is near the shift, digits go."""
+NEAR_ZERO = 1e-2
+"""Share of the farthest eigenvalue below which differences of others are relative to this share."""
 EPS = float(np.finfo(float).eps)
 
 
@@ -183,17 +188,18 @@ class Vibration:
         Its vectors are any in its invariant subspace: bending about d1 in one state and about d2 in the next.
         """
         kinds = [""] * len(found)
-        for i, p in enumerate(found):
-            if kinds[i]:
-                continue
-            equal = [j for j, q in enumerate(found) if abs(p.value - q.value) < MULTIPLE * abs(p.value)] or [i]
-            parts = p.parts
-            if len(equal) > 1:
-                vectors = self.orthonormal(np.stack([found[j].vector for j in equal], axis=1))
-                parts = [*vectors.real.T, *vectors.imag.T]
-            for j in equal:
-                kinds[j] = character.name(character.shares(self.system, self.turned, parts))
+        for group in groups(np.array([p.value for p in found]), ALIKE):
+            if len(group) == 1:
+                name = character.name(character.shares(self.system, self.turned, found[group[0]].parts))
+            else:
+                name = self.motion(self.orthonormal(np.stack([found[j].vector for j in group], axis=1)))
+            for j in group:
+                kinds[j] = name
         return kinds
+
+    def motion(self, basis: np.ndarray) -> str:
+        """Name of all that the vectors of a ``basis`` (n, k) do, at the state last assembled."""
+        return character.name(character.shares(self.system, self.turned, [*basis.real.T, *basis.imag.T]))
 
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
         """``M X`` for real or complex vectors (n, k), with any PETSc."""
@@ -300,18 +306,37 @@ class Vibration:
         """Inverse of ``matrix - target mass`` for a large pencil, piece by piece on several ranks; None: SLEPc's own.
 
         MUMPS, SLEPc's choice on several ranks, gives up on a long rod: the zero block of the multipliers delays more
-        pivots than its analysis has made room for.
+        pivots than its analysis has made room for.  KLU's factors fill in where the pencil is of twice the size.
         """
-        if matrix.size[0] < LARGE:
+        rows, comm = matrix.size[0], matrix.comm.tompi4py()
+        doubled = rows > self.matrix.size[0]
+        if rows < LARGE or (doubled and comm.size == 1):
             return None
         shifted = matrix.copy()
         shifted.axpy(-target, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        comm = matrix.comm.tompi4py()
-        factors = factors_of("lu", comm, matrix.size[0], self.system.fields.dense_rows, {8: 0}, prefix="rodfem_st_")
+        dense_rows, prefix = self.system.fields.dense_rows, "rodfem_st_"
+        if doubled:
+            factors: Factors = Condensed(dense_rows, Mumps("lu", {8: 0}, prefix=prefix))
+        else:
+            factors = factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=prefix)
         factors(shifted)
         if not factors.regular:
             raise ConvergenceError(_singular(target))
         return Inverse(factors, shifted if comm.size > 1 else None)
+
+
+def groups(values: np.ndarray, tolerance: float = MULTIPLE) -> list[list[int]]:
+    """Places of eigenvalues in groups of equal ones, in the order of the first of each."""
+    out: list[list[int]] = []
+    least = NEAR_ZERO * abs(values).max(initial=0.0)
+    for i, value in enumerate(values):
+        for group in out:
+            if abs(value - values[group[0]]) < tolerance * max(abs(value), least):
+                group.append(i)
+                break
+        else:
+            out.append([i])
+    return out
 
 
 def _singular(target: complex) -> str:
