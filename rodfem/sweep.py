@@ -18,6 +18,7 @@ from petsc4py import PETSc
 from scipy.optimize import brentq, newton
 
 from rodfem.accuracy import Transfer
+from rodfem.balance import BALANCED, no_equilibrium
 from rodfem.branch import DIVERGENCE, END, FLUTTER, USER, Branch, Point, Special
 from rodfem.continuation import Equilibria
 from rodfem.curves import Curves
@@ -128,7 +129,7 @@ class Sweep:
             energy=solver.energy(x),
             stretch=solver.shape.stretch(x),
             negative=found.unstable(found.noise),
-            zero=int((abs(values) < REAL).sum()),
+            zero=int((abs(values) < REAL).sum()) + system.active_drifts(),
             slope=float("nan"),
             drift=0.0,
             error=0.0,
@@ -330,10 +331,12 @@ class Sweep:
 
 def at_load(solver: Equilibria, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none."""
-    solver.system.set_phase(None)
+    system = solver.system
+    system.set_phase(guess)
     x, outcome = solver.at_load(guess, load)
-    if not outcome.converged:
-        raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
+    drift = max((abs(system.scalar(x, f"drift{i}")) for i in range(len(system.drifts))), default=0.0)
+    if not outcome.converged or drift > BALANCED * system.stiffness_scale:  # held by a phase condition alone
+        raise ConvergenceError(no_equilibrium(solver, guess, load))
     return x
 
 

@@ -30,7 +30,15 @@ from rodfem.errors import ConvergenceError
 from rodfem.factors import PETSC_ERR_LIB, Factors, Mumps, factors_of, is_cut
 from rodfem.stability import character
 from rodfem.stability.dense import finite_eigenpairs
-from rodfem.stability.pencil import LARGE, Inverse, assemble_pencil, shift_invert, with_factors
+from rodfem.stability.pencil import (
+    LARGE,
+    Inverse,
+    assemble_pencil,
+    exclude_modes,
+    shift_invert,
+    symmetry_modes,
+    with_factors,
+)
 from rodfem.system import System
 
 FAR = 1e5
@@ -105,9 +113,15 @@ class Vibration:
         self._own = slice(None)
 
     def assemble(self, x: PETSc.Vec) -> None:
-        """Assemble the pencil at the state ``x``."""
+        """Assemble the pencil at the state ``x``, at which the phase conditions must be set.
+
+        Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
+        """
         with self.system.clock("assembly"):
+            modes = symmetry_modes(self.system, x)
             assemble_pencil(self.system, x, self.matrix, self.mass)
+            if modes:
+                exclude_modes(self.system, modes, self.matrix, self.mass)
             f = self.system.fields
             self.turned = f.u.x.array[f.dofs[f.turning.name]]
 
