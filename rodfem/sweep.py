@@ -38,6 +38,8 @@ SEEN = 0.5
 """A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
+TOGETHER = 1e-6
+"""Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
 NONE = Frequencies(np.zeros(0, dtype=complex), np.zeros(0))
 
 
@@ -273,14 +275,24 @@ class Sweep:
                     f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
                 )
                 return []
-        events: list[_Event] = []
+        together: list[list[float]] = []
         for load in sorted(found):
-            change = 1 if last > first else -1
-            if events and abs(load - events[-1].load) < SAME * max(1.0, abs(load)):
-                events[-1].change += change
+            if together and abs(load - together[-1][0]) < TOGETHER * max(1.0, abs(load)):
+                together[-1].append(load)
             else:
-                events.append(_Event(DIVERGENCE, load, change, 1e-11 * max(1.0, abs(load)), 0.0))
-        return events
+                together.append([load])
+        return [self._divergence(a.x, group, 1 if last > first else -1) for group in together]
+
+    def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> _Event:
+        """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
+        vibration, number = self.vibration, len(loads)
+        vibration.assemble(self._state(guess, loads[0]))
+        found = vibration.near(number + 2, -1e-3)
+        cluster = cluster_of(vibration, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
+        load = loads[0]
+        if number > 1:
+            load = _zero(self._measured(self.solver, vibration, guess), cluster, load)
+        return _Event(DIVERGENCE, load, sign * number, 1e-11 * max(1.0, abs(load)), 0.0, cluster)
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
         """Real eigenvalues at a load near the origin, in ascending order."""
@@ -309,19 +321,23 @@ class Sweep:
                     s.error_estimate = max(abs(load - s.point.load), floor)
                     s.omega2_error = max(abs(mu - s.omega2), 1e-12 * abs(mu))
                 elif s.kind == DIVERGENCE:
-                    s.error_estimate = max(abs(_zero(richer, vibration, x, s.point.load) - s.point.load), floor)
+                    measured, cluster = self._measured(richer, vibration, x), self._transferred(transfer, s)
+                    s.error_estimate = max(abs(_zero(measured, cluster, s.point.load) - s.point.load), floor)
                 asked = self.plan.accuracy
                 if asked is not None and s.error_estimate > asked * max(1.0, abs(s.point.load)):
                     s.note = s.note or f"accuracy {asked:g} not reached"
+
+    def _transferred(self, transfer: Transfer, s: Special) -> Cluster:
+        """The cluster of a special point on another discretisation."""
+        assert s.cluster is not None
+        columns = [transfer(v, state=False).array_r.real for v in as_vectors(self.solver.system, s.cluster.basis)]
+        return Cluster(np.stack(columns, axis=1), s.cluster.mean)
 
     def _richer_flutter(
         self, richer: Equilibria, vibration: Vibration, transfer: Transfer, guess: PETSc.Vec, s: Special
     ) -> tuple[float, float]:
         """Flutter load on the richer discretisation, and the double eigenvalue."""
-        assert s.cluster is not None
-        columns = [transfer(v, state=False).array_r.real for v in as_vectors(self.solver.system, s.cluster.basis)]
-        cluster = Cluster(np.stack(columns, axis=1), s.cluster.mean)
-        measured = self._measured(richer, vibration, guess)
+        measured, cluster = self._measured(richer, vibration, guess), self._transferred(transfer, s)
         if s.note:  # double there, whatever the mesh
             return s.point.load, measured(s.point.load, cluster).cluster.mean
         width = max(0.05 * abs(s.point.load), 0.01 * abs(self.plan.span[1] - self.plan.span[0]))
@@ -340,12 +356,10 @@ def at_load(solver: Equilibria, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     return x
 
 
-def _zero(solver: Equilibria, vibration: Vibration, guess: PETSc.Vec, load: float) -> float:
-    """Load near ``load`` at which the eigenvalue nearest to the origin vanishes."""
+def _zero(measured: AtLoad, cluster: Cluster, load: float) -> float:
+    """Load near ``load`` at which the mean of the eigenvalues of a cluster vanishes."""
 
-    def mu(load: float) -> float:
-        vibration.assemble(at_load(solver, guess, load))
-        values = vibration.near(2, 0.0).values
-        return float(values[np.argmin(abs(values))].real)
+    def mean(load: float) -> float:
+        return measured(load, cluster).cluster.mean
 
-    return float(newton(mu, load, x1=load + 1e-4 * max(1.0, abs(load)), tol=1e-12 * max(1.0, abs(load))))
+    return float(newton(mean, load, x1=load + 1e-4 * max(1.0, abs(load)), tol=1e-12 * max(1.0, abs(load))))

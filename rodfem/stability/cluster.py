@@ -21,6 +21,8 @@ from rodfem.errors import ConvergenceError
 from rodfem.stability.vibration import REAL, Frequencies, Vibration
 from rodfem.system import System
 
+BESIDE = 1e-3
+"""Distance from zero at which eigenvalues near zero are looked for: the matrix is singular there."""
 LEAST = 0.25
 """Share of a vector in an invariant subspace below which it is none of its."""
 
@@ -61,7 +63,7 @@ def measure(vibration: Vibration, cluster: Cluster) -> Measured:
     """Find a cluster known from a state nearby at the state last assembled; raises :class:`ConvergenceError`."""
     basis, size = _real_span(vibration, cluster.basis), cluster.size
     for number in (size + 2, 3 * size + 10):
-        found = vibration.near(number, 0.97 * cluster.mean)
+        found = vibration.near(number, 0.97 * cluster.mean if abs(cluster.mean) > BESIDE else -BESIDE)
         weighed = vibration.weighed(found.vectors)
         inside = vibration.product(basis, weighed)
         energy = vibration.squares(found.vectors, weighed)
