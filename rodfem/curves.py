@@ -25,6 +25,7 @@ class Curves:
         self.vibration, self.count = vibration, 0
         self._last: Frequencies | None = None
         self._numbers: list[int] = []
+        self._spans: list[tuple[list[int], np.ndarray]] = []
 
     def numbers(self, found: Frequencies, *, keep: bool = True) -> list[int]:
         """Numbers of the curves of eigenvalues found at the state last assembled, which go on from the load before.
@@ -33,8 +34,10 @@ class Curves:
         """
         numbers = [-1] * len(found.values)
         last = self._last
+        weighed = self.vibration.weighed(found.vectors)
+        energy = np.maximum(self.vibration.squares(found.vectors, weighed), 1e-300)
         if last is not None:
-            cost = self._distances(last, found)
+            cost = self._distances(last, found, weighed, energy)
             for i, j in zip(*linear_sum_assignment(cost), strict=True):
                 if cost[i, j] < STRANGE:
                     numbers[j] = self._numbers[i]
@@ -44,17 +47,22 @@ class Curves:
             self.count += 1
         if keep:
             self._last, self._numbers = found, numbers
+            self._spans = [(group, self._span(found, group, energy)) for group in groups(found.values, ALIKE)]
         return numbers
 
-    def _distances(self, last: Frequencies, found: Frequencies) -> np.ndarray:
+    def _span(self, found: Frequencies, group: list[int], energy: np.ndarray) -> np.ndarray:
+        """Basis of the span of some vectors, orthonormal in the mass."""
+        vectors = found.vectors[:, group]
+        return vectors / np.sqrt(energy[group]) if len(group) == 1 else self.vibration.orthonormal(vectors)
+
+    def _distances(self, last: Frequencies, found: Frequencies, weighed: np.ndarray, energy: np.ndarray) -> np.ndarray:
         """Share of each vector found outside the span of each one before, plus the relative change of the values."""
-        vibration = self.vibration
-        weighed = vibration.weighed(found.vectors)
-        energy = np.maximum(vibration.squares(found.vectors, weighed), 1e-300)
-        outside = np.ones((len(last.values), len(found.values)))
-        for group in groups(last.values, ALIKE):
-            basis = vibration.orthonormal(last.vectors[:, group])
-            share = (abs(vibration.product(basis, weighed)) ** 2).sum(axis=0) / energy
+        bases = np.concatenate([basis for _, basis in self._spans], axis=1)
+        parts = abs(self.vibration.product(bases, weighed)) ** 2 / energy
+        outside, begin = np.ones((len(last.values), len(found.values))), 0
+        for group, basis in self._spans:
+            share = parts[begin : begin + basis.shape[1]].sum(axis=0)
             outside[group] = 1.0 - np.minimum(share, 1.0)
+            begin += basis.shape[1]
         a, b = last.values[:, None], found.values[None, :]
         return np.asarray(outside + abs(a - b) / np.maximum(np.maximum(abs(a), abs(b)), 1.0))

@@ -351,7 +351,8 @@ def at_load(solver: Equilibria, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     system.set_phase(guess)
     x, outcome = solver.at_load(guess, load)
     drift = max((abs(system.scalar(x, f"drift{i}")) for i in range(len(system.drifts))), default=0.0)
-    if not outcome.converged or drift > BALANCED * system.stiffness_scale:  # held by a phase condition alone
+    held = drift > 0 and drift > BALANCED * system.stiffness_scale  # by a phase condition alone
+    if not outcome.converged or held:
         raise ConvergenceError(no_equilibrium(solver, guess, load))
     return x
 

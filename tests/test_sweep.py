@@ -113,7 +113,7 @@ def test_divergence_is_marked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_moment_that_nothing_balances(monkeypatch: pytest.MonkeyPatch) -> None:
     """On two pins under a moment at one end the rod can but spin: no equilibrium, and no smaller range has one."""
     with pytest.raises(
-        ConvergenceError, match="turn the whole rod about e3 with a moment of 0[.]28, and no support resists"
+        ConvergenceError, match=r"turn the whole rod about e3 with a moment of 0[.]28, and no support resists"
     ):
         swept(classics.driven(balanced=False), monkeypatch)
 

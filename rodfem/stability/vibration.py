@@ -20,6 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.sparse as sp
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
@@ -217,6 +218,9 @@ class Vibration:
 
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
         """``M X`` for real or complex vectors (n, k), with any PETSc."""
+        if self.system.comm.size == 1:
+            start, columns, values = self.mass.getValuesCSR()
+            return np.asarray(sp.csr_matrix((values.real, columns, start), shape=self.mass.size) @ vectors)
         if np.iscomplexobj(vectors):
             return np.asarray(self.weighed(vectors.real) + 1j * self.weighed(vectors.imag))
         out, x = np.empty_like(vectors), self.system.new_vector()
