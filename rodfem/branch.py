@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from petsc4py import PETSc
+
+if TYPE_CHECKING:
+    from rodfem.stability.cluster import Cluster
 
 FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
 NOT_TRACED = "not traced"
@@ -23,7 +27,9 @@ class Point:
     load the one with less of it need not be the one with less total energy.  ``slope`` is the load's component of the
     tangent, ``drift`` the largest drift scalar (zero but for round-off), ``error`` the last Newton correction, ``mesh``
     the number of the discretisation that ``x`` belongs to, and ``estimate`` the error of the discretisation in load and
-    ordinate, where an accuracy was asked for.
+    ordinate, where an accuracy was asked for.  Of
+    frequencies ``omega2`` are the eigenvalues (real and imaginary part), ``motion`` what the rod does in each, and
+    ``curve`` the numbers of their curves against the load.
     """
 
     x: PETSc.Vec
@@ -41,6 +47,7 @@ class Point:
     spectrum: list[float] = field(default_factory=list)
     omega2: list[list[float]] = field(default_factory=list)
     motion: list[str] = field(default_factory=list)
+    curve: list[int] = field(default_factory=list)
     negative_in_space: int | None = None
     mesh: int = 0
     estimate: float = float("nan")
@@ -82,6 +89,8 @@ class Special:
     is the cosine between the null vector and the derivative of the equations in the load: zero at a branch point,
     not at a fold.  ``unfolding`` is the size of the unfolding parameters that make it a branch point, relative to the
     metric as eigenvalues are (:mod:`rodfem.unfolding`): round-off, unless an imperfection has taken it apart.
+    ``omega2`` is the double eigenvalue of flutter, ``cluster`` the :class:`~rodfem.stability.cluster.Cluster` of the
+    eigenvalues that collide.
     """
 
     kind: str
@@ -102,6 +111,7 @@ class Special:
     omega2: float = float("nan")
     omega2_error: float = float("nan")
     unfolding: float = float("nan")
+    cluster: Cluster | None = None
 
     @property
     def multiplicity(self) -> int:

@@ -123,6 +123,7 @@ def _branch_data(branch: Branch) -> dict[str, Any]:
     if any(p.omega2 for p in branch.points):
         columns["omega2"] = [p.omega2 for p in branch.points]
         columns["motion"] = [p.motion for p in branch.points]
+        columns["curve"] = [p.curve for p in branch.points]
         columns["unstable"] = [p.negative for p in branch.points]
     return {
         "name": branch.name,

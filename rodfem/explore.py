@@ -149,7 +149,7 @@ class Explorer(Tracer):
                 "scene a start that is in equilibrium under the load, too."
             )
         follower.inertia.assemble(point.x)
-        bordered = Bordered(follower.inertia, freedoms)
+        bordered = Bordered(system, follower.inertia.matrix, freedoms, follower.inertia.constraints)
         bordered.factor([follower.inertia.metric * v for v in vectors])
         right = follower.inertia.border.copy()
         right.scale(-1.0)

@@ -41,9 +41,14 @@ BALANCED = {"mat_mumps_icntl_7": 4}
 """One that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
 
 
+def is_cut(comm: MPI.Comm, unknowns: int) -> bool:
+    """Whether a rod of so many unknowns is cut at the ranks."""
+    return bool(comm.size > 1 and unknowns >= LONG)
+
+
 def ordering(matrix: PETSc.Mat) -> dict[str, int]:
     """MUMPS's ordering for a matrix on all its ranks."""
-    return DENSE_ROWS if matrix.comm.size == 1 or matrix.size[0] < LONG else BALANCED
+    return BALANCED if is_cut(matrix.comm.tompi4py(), matrix.size[0]) else DENSE_ROWS
 
 
 def prefer_options(prefix: str, values: dict[str, Any]) -> None:
@@ -97,7 +102,7 @@ def factors_of(
     from rodfem.condensed import Condensed  # they are made of the former
     from rodfem.copied import Copied
 
-    return Copied(factors) if unknowns < LONG else Condensed(scalars, factors)
+    return Condensed(scalars, factors) if is_cut(comm, unknowns) else Copied(factors)
 
 
 def lu_package(comm: MPI.Comm, prefix: str) -> str:

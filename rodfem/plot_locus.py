@@ -12,8 +12,13 @@ from matplotlib.figure import Figure
 
 from rodfem.plot import DPI, FONT, HALO, MARKERS, PALETTE, SIZE, STYLE, _tex
 
-COLORS = {"branch point": PALETTE[1], "fold": PALETTE[2], "flutter": PALETTE[3]}
-STYLES = {"branch point": "-", "fold": (0, (5.0, 1.5)), "flutter": (0, (5.0, 1.2, 1.0, 1.2))}
+COLORS = {"branch point": PALETTE[1], "fold": PALETTE[2], "flutter": PALETTE[3], "divergence": PALETTE[4]}
+STYLES = {
+    "branch point": "-",
+    "fold": (0, (5.0, 1.5)),
+    "flutter": (0, (5.0, 1.2, 1.0, 1.2)),
+    "divergence": (0, (2.0, 1.0)),
+}
 POINTS: dict[str, dict[str, Any]] = {
     "start": {**MARKERS["user"], "label": "start"},
     "turns": {"marker": "|", "ms": 9.0, "mec": "black", "mew": 1.4, "label": "turning point"},
@@ -85,8 +90,12 @@ def _footer(loci: Sequence[Mapping[str, Any]]) -> str:
     d = loci[0]["discretization"]
     errors = [max(e) for one in loci for e in one["columns"]["error"] if e[0] is not None]
     text = f"{d['formulation']} formulation, {d['elements']} elements of degree {d['degree']}, {d['unknowns']} unknowns"
-    if not errors:
-        return text
-    worst = f"{max(errors):.1e}".replace("e-0", "e-")
     points = sum(len(one["columns"]["error"]) for one in loci)
-    return f"{text}; curves accurate to {worst} (estimated at {len(errors)} of {points} points)"
+    failed = sum(len(one.get("without_estimate", [])) for one in loci)
+    if errors:
+        worst = f"{max(errors):.1e}".replace("e-0", "e-")
+        text += f"; curves accurate to {worst} (estimated at {len(errors)} of {points} points"
+        text += f", without success at {failed} more)" if failed else ")"
+    elif failed:
+        text += f"; the error could not be estimated at any of {failed} points"
+    return text

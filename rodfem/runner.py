@@ -9,7 +9,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from rodfem import compat
-from rodfem.branch import BRANCH_POINT, FLUTTER, FOLD, Branch
+from rodfem.branch import END, USER, Branch
 from rodfem.clock import Clock
 from rodfem.continuation import Equilibria, Follower
 from rodfem.diagram import as_data, save_json, save_states
@@ -146,7 +146,7 @@ def _loci(
     saved: list[dict] = []
     for branch in branches:
         for special in branch.special:
-            if special.kind not in (FOLD, BRANCH_POINT, FLUTTER) or special.meets is not None:
+            if special.kind in (USER, END) or special.meets is not None:
                 continue
             if plan.accuracy is not None:
                 report.say("\nA locus stays on the mesh of its special point: its own estimate says how accurate it is")

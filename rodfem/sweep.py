@@ -11,21 +11,23 @@ passes through zero the rod diverges: the eigenvalue itself is smooth there.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 from scipy.optimize import brentq, newton
 
 from rodfem.accuracy import Transfer
+from rodfem.balance import BALANCED, no_equilibrium
 from rodfem.branch import DIVERGENCE, END, FLUTTER, USER, Branch, Point, Special
 from rodfem.continuation import Equilibria
+from rodfem.curves import Curves
 from rodfem.errors import ConvergenceError
-from rodfem.locate import real_root, zero_uncertainty
+from rodfem.flutter import AtLoad, locate_flutter, unmatched
 from rodfem.plan import Plan
 from rodfem.report import Report
-from rodfem.stability.vibration import Frequencies, Vibration
+from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
+from rodfem.stability.vibration import MULTIPLE, REAL, Frequencies, Vibration
 from rodfem.system import System
 
 LOADS = 101
@@ -36,8 +38,22 @@ SEEN = 0.5
 """A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
-REAL = 1e-7
-"""An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
+TOGETHER = 1e-6
+"""Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
+NONE = Frequencies(np.zeros(0, dtype=complex), np.zeros(0))
+
+
+@dataclass
+class _Event:
+    """A special point between two loads, before it is evaluated: by how much ``change`` of the unstable eigenvalues."""
+
+    kind: str
+    load: float
+    change: int
+    uncertainty: float
+    omega2: float
+    cluster: Cluster | None = None
+    note: str = ""
 
 
 class Sweep:
@@ -49,8 +65,9 @@ class Sweep:
         self.span = plan.over(solver.system.scene)
         self.vibration = Vibration(solver.system)
         self.number = plan.spectrum or FREQUENCIES
-        self.pairs: list[complex] = []
+        self.curves, self.last = Curves(self.vibration), NONE
         self.branches: list[Branch] = []
+        self._load = solver.system.scene.load
 
     @property
     def solvers(self) -> Sequence[Equilibria]:
@@ -66,13 +83,15 @@ class Sweep:
         a, b = self.span
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
         x, _ = self.solver.first(a)
+        grid: list[Point] = []
         for load in loads if a < b else loads[::-1]:
             x = self._state(x, float(load))
-            before = self.pairs
+            before = self.last
             point = self._point(x)
-            if branch.points:
-                self._between(branch, branch.points[-1], point, before, self.pairs)
+            if grid:
+                self._between(branch, grid[-1], point, before, self.last)
             branch.points.append(point)
+            grid.append(point)
             if load in self.plan.at:
                 self._special(branch, Special(USER, point, point.negative, point.negative, 1e-12 * max(1.0, abs(load))))
             self.report.progress(branch, point)
@@ -95,12 +114,14 @@ class Sweep:
     def _state(self, guess: PETSc.Vec, load: float) -> PETSc.Vec:
         return at_load(self.solver, guess, load)
 
-    def _point(self, x: PETSc.Vec) -> Point:
+    def _point(self, x: PETSc.Vec, *, on_the_way: bool = True) -> Point:
+        """Evaluate the records of the equilibrium ``x``; a special point is not ``on_the_way`` of the curves."""
         solver, system = self.solver, self.solver.system
         found = self._leftmost(x)
+        curves = self.curves.numbers(found, keep=on_the_way)
+        if on_the_way:
+            self.last = found
         values = found.values
-        self.pairs = [complex(v) for v in values if v.imag > 0]
-        unstable = found.unstable(REAL * max(1.0, float(abs(values).min())))
         load = system.scalar(x)
         return Point(
             x=x,
@@ -110,13 +131,14 @@ class Sweep:
             ordinate=solver.shape.ordinate(x),
             energy=solver.energy(x),
             stretch=solver.shape.stretch(x),
-            negative=unstable,
-            zero=int((abs(values) < REAL).sum()),
+            negative=found.unstable(found.noise),
+            zero=int((abs(values) < REAL).sum()) + system.active_drifts(),
             slope=float("nan"),
             drift=0.0,
             error=0.0,
             omega2=[[float(v.real), float(v.imag)] for v in values[: self.number]],
             motion=list(found.kinds[: self.number]),
+            curve=curves[: self.number],
         )
 
     def _leftmost(self, x: PETSc.Vec) -> Frequencies:
@@ -127,80 +149,151 @@ class Sweep:
         self.vibration.assemble(x)
         near = self.vibration.near(max(self.number, FREQUENCIES) + 6, -1e-3)
         reach = SEEN * abs(near.values).max()
-        found = list(zip(near.values, near.errors, near.kinds, strict=True))
-        for pair in (p for p in self.pairs if abs(p) > reach):
+        found = list(zip(near.values, near.errors, near.kinds, near.vectors.T, strict=True))
+        for pair in (v for v in self.last.values if v.imag > 0 and abs(v) > reach):
             beside = self.vibration.near(2, pair * (1 + 1e-4))
-            for value, error, kind in zip(beside.values, beside.errors, beside.kinds, strict=True):
-                for v in (value, value.conjugate()) if abs(value.imag) > REAL * abs(value) else (value,):
-                    if all(abs(v - other) > 1e-7 * max(1.0, abs(v)) for other, _, _ in found):
-                        found.append((v, error, kind))
+            for value, error, kind, vector in zip(
+                beside.values, beside.errors, beside.kinds, beside.vectors.T, strict=True
+            ):
+                both = [(value, vector), (value.conjugate(), vector.conj())]
+                for v, x_v in both if abs(value.imag) > REAL * abs(value) else both[:1]:
+                    if all(abs(v - other) > 1e-7 * max(1.0, abs(v)) for other, *_ in found):
+                        found.append((v, error, kind, x_v))
         real = [(complex(v.real) if abs(v.imag) < REAL * abs(v) else complex(v), *rest) for v, *rest in found]
-        values, errors, kinds = zip(*sorted(real, key=lambda f: (round(f[0].real, 6), f[0].imag)), strict=True)
-        return Frequencies(np.array(values), np.array(errors), kinds)
+        order = sorted(real, key=lambda f: (round(f[0].real, 6), f[0].imag))
+        values, errors, kinds, vectors = zip(*order, strict=True)
+        return Frequencies(np.array(values), np.array(errors), kinds, np.stack(vectors, axis=1))
 
-    def _between(self, branch: Branch, a: Point, b: Point, before: list[complex], after: list[complex]) -> None:
-        """Locate flutter between two loads, where the number of complex pairs changes; else divergence."""
-        pairs = [before, after]
-        if len(before) == len(after):
-            self._diverging(branch, a, b)
-            return
+    def _between(self, branch: Branch, a: Point, b: Point, before: Frequencies, after: Frequencies) -> None:
+        """Locate what happens between two loads: eigenvalues that collide, and real ones that pass through zero."""
         with self.solver.system.clock.purpose("location"):
-            few, many = sorted(pairs, key=len)
-            new = max(many, key=lambda v: min((abs(v - w) for w in few), default=np.inf))
-            middle = (a.load + b.load) / 2
-            try:
-                located = locate_flutter(
-                    lambda load, center: discriminant(self.solver, self.vibration, load, center, a.x),
-                    middle,
-                    abs(b.load - a.load),
-                    new.real,
-                )
-            except ConvergenceError as trouble:
-                self.report.warn(f"{len(few)} complex pairs become {len(many)} near {middle:.6g}: {trouble}")
-                self.pairs = after
-                return
-            load, uncertainty, mu = located
-            x = self._state(a.x, load)
-            point = self._point(x)
-            self.pairs = after
-        special = Special(FLUTTER, point, a.negative, b.negative, uncertainty, omega2=mu)
-        branch.points.append(point)
-        self._special(branch, special)
-
-    def _diverging(self, branch: Branch, a: Point, b: Point) -> None:
-        """Locate the loads between two at which a real eigenvalue passes through zero; equal ones are one point."""
-        pairs, loads = len(self.pairs), sorted((a.load, b.load))
-        first, last = (p.negative - 2 * pairs for p in (a, b))
-        with self.solver.system.clock.purpose("location"):
-            found: list[float] = []
-            for number in range(min(first, last), max(first, last)):
-
-                def mu(load: float, number: int = number) -> float:
-                    return self._real(a.x, load)[number]
-
-                try:
-                    load = float(brentq(mu, *loads, xtol=1e-12 * max(map(abs, loads))))
-                except (ConvergenceError, IndexError, ValueError):
-                    self.report.warn(
-                        f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
-                    )
-                    return
-                found.append(load)
-            groups: list[list[float]] = []
-            for load in sorted(found, reverse=b.load < a.load):
-                if groups and abs(load - groups[-1][0]) < SAME * max(1.0, abs(load)):
-                    groups[-1].append(load)
-                else:
-                    groups.append([load])
-            before, kept = a.negative, self.pairs
-            for group in groups:
-                point = self._point(self._state(a.x, group[0]))
-                after = before + (len(group) if last > first else -len(group))
+            events = self._collisions(a, b, before, after)
+            real = [f.diverged() for f in (before, after)]
+            for event in events:
+                if event.omega2 < 0:  # both are unstable before and after, but fewer are real
+                    real[0] -= event.change
+                    event.change = 0
+            events += self._diverging(a, b, *real)
+        events.sort(key=lambda e: abs(e.load - a.load))
+        negative = a.negative
+        for i, event in enumerate(events):
+            point = a if event.load == a.load else b if event.load == b.load else None
+            point = point or self._point(self._state(a.x, event.load), on_the_way=False)
+            after_it = negative + event.change
+            if i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
+                after_it = b.negative  # of all eigenvalues that are recorded
+            if event.cluster is not None:
+                self._name(point, event.cluster)
+            special = Special(event.kind, point, negative, after_it, event.uncertainty, omega2=event.omega2)
+            special.cluster, special.note = event.cluster, event.note
+            if point is not a and point is not b:
                 branch.points.append(point)
-                located_to = 1e-11 * max(1.0, abs(point.load))
-                self._special(branch, Special(DIVERGENCE, point, before, after, located_to, omega2=0.0))
-                before = after
-            self.pairs = kept
+            self._special(branch, special)
+            negative = after_it
+
+    def _name(self, point: Point, cluster: Cluster) -> None:
+        """Name the motions of the eigenvalues that collide at a point by all that they do: their vectors are one."""
+        name = self.vibration.motion(cluster.basis)
+        distance = [abs(complex(*value) - cluster.mean) for value in point.omega2]
+        for i in np.argsort(distance, kind="stable")[: cluster.size]:
+            point.motion[i] = name
+
+    def _collisions(self, a: Point, b: Point, before: Frequencies, after: Frequencies) -> list[_Event]:
+        """Collisions between two loads, those at one and the same load together."""
+        events: list[_Event] = []
+        for here, there, found, others, sign in ((b, a, after, before, 1), (a, b, before, after, -1)):
+            for chosen in unmatched(found, others.values):
+                try:
+                    event = self._collision(here, there, found, chosen)
+                except ConvergenceError as trouble:
+                    value = found.values[chosen[0]]
+                    self.report.warn(
+                        f"The eigenvalue {value:.6g} at {self._load} = {here.load:.6g} was not "
+                        f"followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
+                    )
+                    continue
+                if event is None:
+                    continue
+                event.change *= sign
+                same = [e for e in events if abs(e.load - event.load) < SAME * max(1.0, abs(e.load))]
+                if same:
+                    same[0].change += event.change
+                    if abs(event.omega2) < abs(same[0].omega2):
+                        same[0].omega2, same[0].cluster = event.omega2, event.cluster
+                else:
+                    events.append(event)
+        return events
+
+    def _collision(self, here: Point, there: Point, found: Frequencies, chosen: list[int]) -> _Event | None:
+        """Collision, on the way ``there``, of eigenvalues complex ``here``; None where they are complex there too."""
+        x, vibration = here.x, self.vibration
+        vibration.assemble(x)
+        cluster = cluster_of(vibration, found, chosen)
+        vibration.assemble(there.x)
+        other = measure(vibration, cluster)
+        scale = abs(other.values).max()
+        if abs(other.discriminant) < (MULTIPLE * scale) ** 2:
+            side = ">" if here.load > there.load else "<"
+            note = (
+                f"the frequencies are double at {self._load} = {there.load:.6g} and become complex at once: "
+                f"flutter at every {self._load} {side} {there.load:.6g} next to it"
+            )
+            floor = 1e-12 * max(1.0, abs(there.load))
+            return _Event(FLUTTER, there.load, cluster.size, floor, other.cluster.mean, other.cluster, note)
+        if other.discriminant < 0:
+            return None
+        located = locate_flutter(
+            self._measured(self.solver, vibration, here.x),
+            cluster,
+            (there.load + here.load) / 2,
+            abs(here.load - there.load),
+        )
+        return _Event(FLUTTER, located.load, cluster.size, located.uncertainty, located.cluster.mean, located.cluster)
+
+    @staticmethod
+    def _measured(solver: Equilibria, vibration: Vibration, guess: PETSc.Vec) -> AtLoad:
+        """How a cluster is measured at a load: at the equilibrium near ``guess``."""
+
+        def measured(load: float, cluster: Cluster) -> Measured:
+            vibration.assemble(at_load(solver, guess, load))
+            return measure(vibration, cluster)
+
+        return measured
+
+    def _diverging(self, a: Point, b: Point, first: int, last: int) -> list[_Event]:
+        """Locate the loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``."""
+        loads = sorted((a.load, b.load))
+        found: list[float] = []
+        for number in range(min(first, last), max(first, last)):
+
+            def mu(load: float, number: int = number) -> float:
+                return self._real(a.x, load)[number]
+
+            try:
+                found.append(float(brentq(mu, *loads, xtol=1e-12 * max(map(abs, loads)))))
+            except (ConvergenceError, IndexError, ValueError):
+                self.report.warn(
+                    f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
+                )
+                return []
+        together: list[list[float]] = []
+        for load in sorted(found):
+            if together and abs(load - together[-1][0]) < TOGETHER * max(1.0, abs(load)):
+                together[-1].append(load)
+            else:
+                together.append([load])
+        return [self._divergence(a.x, group, 1 if last > first else -1) for group in together]
+
+    def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> _Event:
+        """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
+        vibration, number = self.vibration, len(loads)
+        vibration.assemble(self._state(guess, loads[0]))
+        found = vibration.near(number + 2, -1e-3)
+        cluster = cluster_of(vibration, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
+        load = loads[0]
+        if number > 1:
+            load = _zero(self._measured(self.solver, vibration, guess), cluster, load)
+        return _Event(DIVERGENCE, load, sign * number, 1e-11 * max(1.0, abs(load)), 0.0, cluster)
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
         """Real eigenvalues at a load near the origin, in ascending order."""
@@ -225,106 +318,50 @@ class Sweep:
                 s.ordinate_error = max(abs(richer.shape.ordinate(x) - s.point.ordinate), floor)
                 s.error_estimate = s.ordinate_error
                 if s.kind == FLUTTER:
-                    load, _, mu = self._richer_flutter(richer, vibration, guess, s)
+                    load, mu = self._richer_flutter(richer, vibration, transfer, guess, s)
                     s.error_estimate = max(abs(load - s.point.load), floor)
                     s.omega2_error = max(abs(mu - s.omega2), 1e-12 * abs(mu))
                 elif s.kind == DIVERGENCE:
-                    s.error_estimate = max(abs(_zero(richer, vibration, x, s.point.load) - s.point.load), floor)
+                    measured, cluster = self._measured(richer, vibration, x), self._transferred(transfer, s)
+                    s.error_estimate = max(abs(_zero(measured, cluster, s.point.load) - s.point.load), floor)
                 asked = self.plan.accuracy
                 if asked is not None and s.error_estimate > asked * max(1.0, abs(s.point.load)):
                     s.note = s.note or f"accuracy {asked:g} not reached"
 
-    @staticmethod
+    def _transferred(self, transfer: Transfer, s: Special) -> Cluster:
+        """The cluster of a special point on another discretisation."""
+        assert s.cluster is not None
+        columns = [transfer(v, state=False).array_r.real for v in as_vectors(self.solver.system, s.cluster.basis)]
+        return Cluster(np.stack(columns, axis=1), s.cluster.mean)
+
     def _richer_flutter(
-        richer: Equilibria, vibration: Vibration, guess: PETSc.Vec, s: Special
-    ) -> tuple[float, float, float]:
-        """Flutter load on the richer discretisation, its uncertainty, and the double eigenvalue."""
-
-        def f(load: float, center: float) -> tuple[float, float]:
-            return discriminant(richer, vibration, load, center, guess)
-
-        return locate_flutter(f, s.point.load, 0.05 * abs(s.point.load), s.omega2)
+        self, richer: Equilibria, vibration: Vibration, transfer: Transfer, guess: PETSc.Vec, s: Special
+    ) -> tuple[float, float]:
+        """Flutter load on the richer discretisation, and the double eigenvalue."""
+        measured, cluster = self._measured(richer, vibration, guess), self._transferred(transfer, s)
+        if s.note:  # double there, whatever the mesh
+            return s.point.load, measured(s.point.load, cluster).cluster.mean
+        width = max(0.05 * abs(s.point.load), 0.01 * abs(self.span[1] - self.span[0]))
+        located = locate_flutter(measured, cluster, s.point.load, width)
+        return located.load, located.cluster.mean
 
 
 def at_load(solver: Equilibria, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none."""
-    solver.system.set_phase(None)
+    system = solver.system
+    system.set_phase(guess)
     x, outcome = solver.at_load(guess, load)
-    if not outcome.converged:
-        raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
+    drift = max((abs(system.scalar(x, f"drift{i}")) for i in range(len(system.drifts))), default=0.0)
+    held = drift > 0 and drift > BALANCED * system.stiffness_scale  # by a phase condition alone
+    if not outcome.converged or held:
+        raise ConvergenceError(no_equilibrium(solver, guess, load))
     return x
 
 
-def _zero(solver: Equilibria, vibration: Vibration, guess: PETSc.Vec, load: float) -> float:
-    """Load near ``load`` at which the eigenvalue nearest to the origin vanishes."""
+def _zero(measured: AtLoad, cluster: Cluster, load: float) -> float:
+    """Load near ``load`` at which the mean of the eigenvalues of a cluster vanishes."""
 
-    def mu(load: float) -> float:
-        vibration.assemble(at_load(solver, guess, load))
-        values = vibration.near(2, 0.0).values
-        return float(values[np.argmin(abs(values))].real)
+    def mean(load: float) -> float:
+        return measured(load, cluster).cluster.mean
 
-    return float(newton(mu, load, x1=load + 1e-4 * max(1.0, abs(load)), tol=1e-12 * max(1.0, abs(load))))
-
-
-def discriminant(
-    solver: Equilibria, vibration: Vibration, load: float, center: float, guess: PETSc.Vec
-) -> tuple[float, float]:
-    """Discriminant ``((mu1 - mu2)/2)^2`` of the two eigenvalues nearest to ``center`` at ``load``, and their mean.
-
-    ``guess`` is an equilibrium at a load nearby.  Where the rod bends alike in all planes each eigenvalue comes twice,
-    its motion in any plane: of those no two equal ones are taken, and the names of the motions say nothing.
-    """
-    vibration.assemble(at_load(solver, guess, load))
-    found = vibration.near(4, 0.97 * center)
-    values = found.values
-    repeated = [sum(abs(p - v) < SAME * abs(p) for v in values) > 1 for p in values]
-    best: tuple[float, complex, complex] | None = None
-    for i, p in enumerate(values):
-        for j, q in enumerate(values[i + 1 :], start=i + 1):
-            alike = found.kinds[i] == found.kinds[j] or (repeated[i] and repeated[j])
-            both_real = abs(p.imag) + abs(q.imag) < REAL * abs(p) and alike and abs(p - q) >= SAME * abs(p)
-            conjugate = abs(p - q.conjugate()) < REAL * abs(p)
-            if both_real or conjugate:
-                distance = abs((p + q) / 2 - center) + 0.1 * abs(p - q)
-                if best is None or distance < best[0]:
-                    best = (distance, p, q)
-    if best is None:
-        raise ConvergenceError(f"No pair of eigenvalues near {center:.6g} at load {load:.8g}: use a smaller range.")
-    p, q = best[1], best[2]
-    return float((((p - q) / 2) ** 2).real), float(((p + q) / 2).real)
-
-
-def locate_flutter(
-    f: Callable[[float, float], tuple[float, float]], load: float, width: float, center: float
-) -> tuple[float, float, float]:
-    """Load at which the discriminant ``f(load, center)`` vanishes, its uncertainty, and the double eigenvalue there.
-
-    Chebyshev interpolation on a piece that is moved to the zero and shrunk until the last coefficient says that
-    it is sharp.
-    """
-    half, best = width, (load, np.inf, center)
-    for _ in range(12):
-        t = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
-        values = []
-        for node in load + half * t:
-            values.append(f(float(node), center))
-        d, mean = np.array([v[0] for v in values]), np.array([v[1] for v in values])
-        series = chebyshev.chebfit(t, d, 5)
-        root = real_root(series, 0.0)
-        if root is None:
-            slope = (d[-1] - d[0]) / (2 * half)
-            load += float(np.clip(-(d[0] + d[-1]) / 2 / slope, -2 * half, 2 * half))
-            continue
-        load += half * root
-        center = float(chebyshev.chebval(root, chebyshev.chebfit(t, mean, 5)))
-        uncertainty = max(half * zero_uncertainty(series, root), 1e-12 * abs(load))
-        if abs(root) < 1 and uncertainty < best[1]:
-            best = (load, uncertainty, center)
-        elif best[1] < 1e-8 * abs(load):
-            break
-        if best[1] < 1e-11 * abs(load):
-            break
-        half /= 4
-    if not np.isfinite(best[1]):
-        raise ConvergenceError(f"The flutter load near {load:.6g} could not be located: use a smaller range.")
-    return best
+    return float(newton(mean, load, x1=load + 1e-4 * max(1.0, abs(load)), tol=1e-12 * max(1.0, abs(load))))

@@ -74,7 +74,7 @@ def unfold(follower: Follower, special: Special) -> Unfolded | None:
     k, x = len(special.null_vectors), special.point.x.copy()
     system.set_phase(x)
     inertia.assemble(x)
-    bordered = Bordered(inertia, k)
+    bordered = Bordered(system, inertia.matrix, k, inertia.constraints)
     psi = [inertia.metric * v for v in special.null_vectors]
     equations = system.new_vector()
     moved, before = 0.0, np.inf

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
+from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
 
@@ -66,3 +67,22 @@ def double(P: float, mu: float, J: float = 0.0) -> np.ndarray:
         return [beck(z[1], z[0], 1.0, J).real, beck(complex(z[1], 1e-20), z[0], 1.0, J).imag / 1e-20]
 
     return fsolve(equations, [P, mu], xtol=1e-13)
+
+
+def tip(mu: complex, P: float, share: float) -> complex:
+    """Zero at the eigenvalues of ``w'''' + P w'' = mu w`` under a thrust, a ``share`` of which follows the tip."""
+    A = np.eye(4, k=1, dtype=complex)
+    A[3, 0], A[3, 2] = mu, -P
+    y = expm(A)[:, 2:]
+    return complex(np.linalg.det(np.array([y[2], y[3] + (1 - share) * P * y[1]])))
+
+
+def flutter(share: float, P: float, mu: float) -> tuple[float, float]:
+    """Load and eigenvalue at which two of them meet, from about ``P``, ``mu``."""
+
+    def equations(z: np.ndarray) -> list[float]:
+        h = 1e-20
+        return [tip(z[1], z[0], share).real, tip(complex(z[1], h), z[0], share).imag / h]
+
+    found = fsolve(equations, [P, mu], xtol=1e-13)
+    return float(found[0]), float(found[1])

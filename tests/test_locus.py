@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from math import pi
 from pathlib import Path
 from types import SimpleNamespace
 
+import classics
 import closed_form
 import numpy as np
 import pytest
-from exact import double
+from exact import double, flutter
 from integration import Problem, Rod
 from mpi4py import MPI
 from rods import explored, follower, specials
@@ -28,7 +30,7 @@ from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.loci.locus import Locus, locus
 from rodfem.plan import Plan
-from rodfem.plot_locus import draw_locus
+from rodfem.plot_locus import _footer, draw_locus
 from rodfem.report import Report
 from rodfem.scene import Ordinate, Parameter, Scene
 from rodfem.sweep import Sweep
@@ -175,6 +177,64 @@ def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None
     for (P, J), mu in zip(found.values, found.omega2, strict=True):
         assert [P, mu] == pytest.approx(double(P, mu, J).tolist(), rel=3e-11)
     assert abs(found.values[-1, 0] - double(20.0, 120.0, 0.004)[0]) <= 10 * found.error[-1].max() <= 1e-9
+
+
+def swept(scene: Scene) -> tuple[Equilibria, Branch]:
+    """Frequencies over the range of a scene, and what computed them."""
+    solver = Equilibria(System(scene, Discretization("pointwise", 4, 6)))
+    (branch,) = Sweep(solver, Plan(scene.span, error_bars=False), Report(quiet=True), lambda: None).run()
+    return solver, branch
+
+
+def test_flutter_of_a_rod_that_bends_alike(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    """Two pairs of frequencies meet at once: where each does in its plane, down to where the double one vanishes."""
+    monkeypatch.setattr("rodfem.sweep.LOADS", 6)
+    solver, branch = swept(classics.partly_following(1.0, (15.0, 25.0), strong=1.0))
+    (special,) = specials(branch, "flutter")
+    assert (special.negative_before, special.negative_after) == (0, 4)
+    found = locus(solver, special, "share", ((15.0, 25.0), (0.0, 1.0)), error_bars=5)
+    assert found.ended[1] == "share = 1, its bound"
+    assert found.ended[0].startswith("the double eigenvalue vanishes: divergence near P = 17.06957")
+    for (P, share), mu in list(zip(found.values, found.omega2, strict=True))[4::4]:
+        assert flutter(share, P + 0.01, mu + 0.1) == pytest.approx((P, mu), rel=1e-9, abs=1e-7)
+    P, share = found.values[0]
+    assert np.cos(np.sqrt(P)) * (share - 1) == pytest.approx(share, abs=1e-9)
+    assert np.isfinite(found.error[~np.isnan(found.error)]).all()
+    assert np.nanmax(found.error) < 1e-9
+
+
+@pytest.mark.parametrize(("strong", "which"), [(10.0, 0), (1.0, 1)])
+def test_divergence(strong: float, which: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``cos sqrt P = share/(share - 1)``: one curve, through both loads of a share, which turns at one half."""
+    monkeypatch.setattr("rodfem.sweep.LOADS", 6)
+    solver, branch = swept(classics.partly_following(0.2, (0.0, 25.0), strong))
+    both = specials(branch, "divergence")
+    assert [s.point.load for s in both] == pytest.approx([np.arccos(-0.25) ** 2, (2 * pi - np.arccos(-0.25)) ** 2])
+    found = locus(solver, both[which], "share", ((0.0, 25.0), (-0.5, 0.6)), steps=WIDE, error_bars=3)
+    P, share = found.values.T
+    assert abs(np.cos(np.sqrt(P)) * (share - 1) - share).max() < 1e-9
+    assert set(found.ended) == {"P = 25, its bound", "share = -0.5, its bound"}
+    (turn,) = found.marks
+    assert turn.kind == "turns in share"
+    assert found.values[turn.row] == pytest.approx([pi**2, 0.5], abs=1e-6)
+    assert np.nanmax(found.error) < 1e-9
+
+
+def test_errors_that_are_not_known_are_said_to_be_so() -> None:
+    found = replace(straight(), error=straight().error.copy())
+    rows = np.flatnonzero(~np.isnan(found.error[:, 0]))
+    known = found.error[rows[1:]].max()
+    found.error[rows[0]] = np.inf
+    data = found.data()
+    json.dumps(data, allow_nan=False)
+    assert data["without_estimate"] == [rows[0]]
+    assert data["columns"]["error"][rows[0]] == [None, None]
+    n, worst = len(found.values), f"{known:.1e}".replace("e-0", "e-")
+    assert _footer([data]).endswith(
+        f"curves accurate to {worst} (estimated at {len(rows) - 1} of {n} points, without success at 1 more)"
+    )
+    found.error[rows] = np.inf
+    assert _footer([found.data()]).endswith(f"the error could not be estimated at any of {len(rows)} points")
 
 
 def test_nothing_is_left_behind() -> None:

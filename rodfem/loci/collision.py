@@ -1,15 +1,14 @@
 r"""Where two frequencies of a rod under a load without a potential collide, in the plane of two parameters.
 
-Two eigenvalues ``mu1``, ``mu2`` of the pencil ``S x = mu M x`` collide where ``D = ((mu1 - mu2)/2)^2`` vanishes.  The
-eigenvalues have a square root there, but ``D`` is smooth in both parameters, so that ``D(a, b) = 0`` is a smooth curve
-as long as the gradient of ``D`` does not vanish: the boundary of flutter (Seyranian & Mailybaev, *Multiparameter
+Two eigenvalues ``mu1``, ``mu2`` of the pencil ``S x = mu M x`` collide where ``D = ((mu1 - mu2)/2)^2`` vanishes (see
+:mod:`rodfem.stability.cluster`: two pairs of equal ones where the rod bends alike in all planes).  The eigenvalues have
+a square root there, but ``D`` is smooth in both parameters, so that ``D(a, b) = 0`` is a smooth curve as long as the
+gradient of ``D`` does not vanish: the boundary of flutter (Seyranian & Mailybaev, *Multiparameter
 Stability Theory with Mechanical Applications*, World Scientific 2003, chapters 2 and 5).  A point of it is found on a
 given line of the plane by the secant method for ``D``, its tangent from central differences.
 """
 
 from __future__ import annotations
-
-from itertools import combinations
 
 import numpy as np
 from petsc4py import PETSc
@@ -17,8 +16,8 @@ from petsc4py import PETSc
 from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError
 from rodfem.loci.plane import Node, Plane
+from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure
 from rodfem.stability.vibration import Vibration
-from rodfem.sweep import REAL
 
 FIRST = 1e-4
 """First step of the secants, relative to the bounds."""
@@ -45,19 +44,21 @@ class Collision:
     ) -> Node:
         """Point of the curve on the line through ``p`` across ``tangent``; raises :class:`ConvergenceError`.
 
-        ``near`` is a point of the curve whose double eigenvalue is close by.
+        ``near`` is a point of the curve whose double eigenvalue and invariant subspace (``modes``) are close by.
         """
         width, forward = self.plane.width, tangent[0] / self.plane.width
         forward = forward / np.linalg.norm(forward)
         across = np.array([-forward[1], forward[0]])
         self.plane.line(p, across * width)
-        t, last, omega2, x = self._collide(x, near.omega2, reach)
-        p = p + t * across * width
-        gradient = np.zeros(2)
+        basis = np.stack([v.array_r.real for v in near.modes], axis=1)
+        t, last, here, x = self._collide(x, Cluster(basis, near.omega2), reach)
+        p, omega2 = p + t * across * width, here.cluster.mean
+        gradient, clearest = np.zeros(2), here
         for which in (0, 1):
             self.plane.line(p, (np.arange(2) == which) * width)
-            low, high = (self._discriminant(h, x, omega2)[0] for h in (-DIFFERENCE, DIFFERENCE))
-            gradient[which] = (high - low) / (2 * DIFFERENCE)
+            low, high = (self._measured(h, x, Cluster(basis, omega2))[0] for h in (-DIFFERENCE, DIFFERENCE))
+            gradient[which] = (high.discriminant - low.discriminant) / (2 * DIFFERENCE)
+            clearest = max((clearest, low, high), key=lambda m: m.spread)
         if not np.linalg.norm(gradient):
             raise ConvergenceError("the discriminant is constant")
         dq = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
@@ -66,48 +67,36 @@ class Collision:
         self.solver.system.set_load(x, float(p[0]))
         located = np.maximum(last * abs(across) * width, 1e-12 * np.maximum(1.0, abs(p)))
         ordinate = self.solver.shape.ordinate(x)
-        return Node(p, x, dq * width, self.solver.system.new_vector(), located, ordinate=ordinate, omega2=omega2)
+        still, modes = self.solver.system.new_vector(), as_vectors(self.solver.system, clearest.cluster.basis)
+        return Node(p, x, dq * width, still, located, ordinate=ordinate, omega2=omega2, modes=modes)
 
-    def _collide(self, x: PETSc.Vec, omega2: float, reach: float) -> tuple[float, float, float, PETSc.Vec]:
-        """Zero of ``D`` on the line last set, from t = 0, by secants: t, its last change, the double eigenvalue, state.
+    def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> tuple[float, float, Measured, PETSc.Vec]:
+        """Zero of ``D`` on the line last set, from t = 0, by secants: t, its last change, the cluster, state.
 
         Secants end where they no longer shrink: ``D`` has a round-off of about ``eps mu^2``.
         """
         t, other = 0.0, FIRST
-        value, omega2, x = self._discriminant(t, x, omega2)
-        at_other = self._discriminant(other, x, omega2)[0]
+        now, x = self._measured(t, x, cluster)
+        at_other = self._measured(other, x, cluster)[0].discriminant
         before = np.inf
         for _ in range(12):
-            if value == at_other:
+            if now.discriminant == at_other:
                 break
-            step = -value * (other - t) / (at_other - value)
+            step = -now.discriminant * (other - t) / (at_other - now.discriminant)
             if abs(step) < SHARP or (abs(step) < NOISE and abs(step) > 0.3 * before):
-                return t, abs(step), omega2, x
-            other, at_other, before = t, value, abs(step)
+                return t, abs(step), now, x
+            other, at_other, before = t, now.discriminant, abs(step)
             t += step
             if abs(t) > reach:
                 break
-            value, omega2, x = self._discriminant(t, x, omega2)
+            now, x = self._measured(t, x, Cluster(cluster.basis, now.cluster.mean))
         raise ConvergenceError("two eigenvalues do not collide near by")
 
-    def _discriminant(self, t: float, guess: PETSc.Vec, center: float) -> tuple[float, float, PETSc.Vec]:
-        """``D`` of the pair nearest to ``center`` at ``t`` on the line last set, its mean, and the state there.
-
-        Two real eigenvalues are a pair only if they are of the same kind of motion: others pass by each other.
-        """
+    def _measured(self, t: float, guess: PETSc.Vec, cluster: Cluster) -> tuple[Measured, PETSc.Vec]:
+        """The cluster at ``t`` on the line last set, and the state there."""
         self.solver.system.set_phase(None)
         x, outcome = self.solver.at_load(guess, t)
         if not outcome.converged:
             raise ConvergenceError("no equilibrium is found there")
         self.vibration.assemble(x)
-        found = self.vibration.near(4, 0.97 * center)
-        best: tuple[float, float, float] | None = None
-        for (i, a), (j, b) in combinations(enumerate(found.values), 2):
-            both_real = abs(a.imag) + abs(b.imag) < REAL * abs(a) and found.kinds[i] == found.kinds[j]
-            if both_real or abs(a - b.conjugate()) < REAL * abs(a):
-                distance = abs((a + b) / 2 - center) + 0.1 * abs(a - b)
-                if best is None or distance < best[0]:
-                    best = (distance, float((((a - b) / 2) ** 2).real), float(((a + b) / 2).real))
-        if best is None:
-            raise ConvergenceError("no pair of eigenvalues is found there")
-        return best[1], best[2], x
+        return measure(self.vibration, cluster), x

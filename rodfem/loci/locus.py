@@ -1,11 +1,11 @@
 r"""Loci of special points in the plane of two parameters: the boundary of stability.
 
-A fold, a branch point or a flutter load ``lam`` of a scene moves as another of its parameters does.  Its curve in the
-plane of both is followed by pseudo-arclength continuation of the equations that define it, in the space of the state
-and *both* parameters (see :mod:`rodfem.loci.singular` and :mod:`rodfem.loci.collision`): neither is the independent
-one, so that the curve may turn back with respect to either, and a fold's curve goes through cusps, where it is smooth
-but for its projection on the plane.  Both directions are followed, to the bounds, exactly, or to where the special
-point changes its kind.
+A fold, a branch point, a flutter or a divergence load ``lam`` of a scene moves as another of its parameters does.  Its
+curve in the plane of both is followed by pseudo-arclength continuation of the equations that define it, in the space of
+the state and *both* parameters (see :mod:`rodfem.loci.singular` and :mod:`rodfem.loci.collision`): neither is the
+independent one, so that the curve may turn back with respect to either, and a fold's curve goes through cusps, where it
+is smooth but for its projection on the plane.  Both directions are followed, to the bounds, exactly, or to where the
+special point changes its kind.
 
 Arclength is measured with the parameters relative to the widths of their bounds, and the state in its metric.
 """
@@ -21,15 +21,17 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.accuracy import Richer, Transfer
-from rodfem.branch import BRANCH_POINT, FLUTTER, FOLD, Special
+from rodfem.branch import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, Special
 from rodfem.continuation import Equilibria, Follower, Steps
 from rodfem.diagram import save_json
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.loci.collision import Collision
 from rodfem.loci.curve import Criterion, Half, Tracer
 from rodfem.loci.plane import Interval, Node, Plane
-from rodfem.loci.singular import Singular
+from rodfem.loci.singular import Singular, null_vectors
 from rodfem.report import number
+from rodfem.stability.cluster import as_vectors
+from rodfem.stability.inertia import Inertia
 from rodfem.system import System
 
 STEPS = Steps(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
@@ -51,7 +53,7 @@ class Locus:
     Attributes
     ----------
     kind
-        ``fold``, ``branch point`` or ``flutter``.
+        ``fold``, ``branch point``, ``flutter`` or ``divergence``.
     names, bounds
         The two parameters, the scene's load first, and their intervals.
     values
@@ -60,14 +62,14 @@ class Locus:
         The scene's ordinate, (n,).
     index
         Index of the equilibria on the two sides of the curve, (n, 2): the eigenvalues that vanish on it positive, and
-        negative.  -1 for flutter.
+        negative.  -1 for flutter and divergence.
     omega2
         The double eigenvalue of flutter, (n,), nan for others.
     located_to
         How far the parameters are uncertain for the given discretisation, (n, 2).
     error
         How far, measured across the curve, that of a discretisation one degree richer is away in either parameter, (n,
-        2); nan where it was not computed.
+        2); nan where it was not asked for, inf where the richer one does not find the point.
     marks
         Rows at which the curve turns in a parameter, cusps, and rows (away from the start) before which another
         eigenvalue has passed through zero, not located.
@@ -105,7 +107,7 @@ class Locus:
         columns["ordinate"] = self.ordinate.tolist()
         for key, table in (("index", self.index), ("located_to", self.located_to)):
             columns[key] = table.tolist()
-        columns["error"] = [[None if np.isnan(v) else v for v in row] for row in self.error.tolist()]
+        columns["error"] = [[v if np.isfinite(v) else None for v in row] for row in self.error.tolist()]
         columns["omega2"] = [None if np.isnan(v) else v for v in self.omega2.tolist()]
         same = ("scene", "title", "kind", "ordinate_name", "start", "constants", "discretization")
         return {name: getattr(self, name) for name in same} | {
@@ -113,6 +115,7 @@ class Locus:
             "labels": list(self.labels),
             "bounds": [list(b) for b in self.bounds],
             "columns": columns,
+            "without_estimate": np.flatnonzero(np.isinf(self.error[:, 0])).tolist(),
             "marks": [{"kind": m.kind, "row": m.row} for m in self.marks],
             "ended": list(self.ended),
         }
@@ -153,10 +156,10 @@ def locus(
     Parameters
     ----------
     solver
-        The :class:`~rodfem.continuation.Follower` that found the special point, or for flutter the
+        The :class:`~rodfem.continuation.Follower` that found the special point, or for flutter and divergence the
         :class:`~rodfem.continuation.Equilibria` of the sweep.  It is left as it was found.
     special
-        A fold, a branch point, or a flutter load.
+        A fold, a branch point, a flutter load or a divergence load.
     parameter
         Name of the second parameter of the scene.
     bounds
@@ -181,8 +184,9 @@ def locus(
             f"The special point at {scene.load} = {p[0]:g}, {parameter} = {p[1]:g} is outside the bounds: widen them."
         )
     with system.clock.purpose("locus"), plane.kept():
-        criterion = _criterion(solver, plane, special)
-        guess = Node(p, special.point.x, p, special.point.x, p, omega2=special.omega2, modes=list(special.null_vectors))
+        plane.look(p, 0)
+        guess = _guess(solver, special, p)
+        criterion = _criterion(solver, plane, special.kind, guess)
         first = criterion.correct(p, special.point.x, (np.array([0.0, 1.0]) * plane.width, None), guess, 0.1)
         tracer = Tracer(criterion, plane, steps)
         onwards = tracer.run(first)
@@ -228,15 +232,32 @@ def locus(
     )
 
 
-def _criterion(solver: Equilibria, plane: Plane, special: Special) -> Criterion:
-    """What defines the locus of a special point."""
-    if special.kind == FLUTTER:
-        return Collision(solver, plane)
-    if special.kind not in (FOLD, BRANCH_POINT):
-        raise SceneError(f"A point of the kind {special.kind!r} has no locus: choose a fold, branch point or flutter.")
-    if not isinstance(solver, Follower):
+def _guess(solver: Equilibria, special: Special, p: np.ndarray) -> Node:
+    """The special point as a point of the plane; raises :class:`SceneError` for a kind that has no locus."""
+    if special.kind not in (FOLD, BRANCH_POINT, FLUTTER, DIVERGENCE):
+        raise SceneError(
+            f"A point of the kind {special.kind!r} has no locus: choose a fold, branch point, flutter or divergence."
+        )
+    if special.kind in (FOLD, BRANCH_POINT) and not isinstance(solver, Follower):
         raise SceneError("The locus of a fold or a branch point needs the follower that found it.")
-    return Singular(solver, plane, special.null_vectors, special.kind == FOLD)
+    x, left = special.point.x, list[PETSc.Vec]()
+    modes = list(special.null_vectors)
+    if special.kind == FLUTTER:
+        if special.cluster is None or special.note:
+            raise SceneError(f"This flutter has no locus: {special.note or 'it was not found by a sweep'}.")
+        modes = as_vectors(solver.system, special.cluster.basis)
+    if special.kind == DIVERGENCE:
+        number = abs(special.negative_after - special.negative_before)
+        solver.system.set_phase(x)
+        modes, left = null_vectors(Inertia(solver.system), x, number)
+    return Node(p, x, p, x, p, omega2=special.omega2 if special.kind == FLUTTER else np.nan, modes=modes, left=left)
+
+
+def _criterion(solver: Equilibria, plane: Plane, kind: str, near: Node) -> Criterion:
+    """What defines the locus of a kind of special points, one of which is ``near``."""
+    if kind == FLUTTER:
+        return Collision(solver, plane)
+    return Singular(solver, plane, near.modes, kind == FOLD, near.left)
 
 
 def _estimate(
@@ -259,10 +280,10 @@ def _estimate(
     for row in rows:
         node = nodes[row]
         x = transfer(node.x, state=True)
-        modes = [transfer(v, state=False) for v in node.modes]
-        near = Node(node.p, x, node.dp, x, node.p, omega2=node.omega2, modes=modes)
+        modes, left = ([transfer(v, state=False) for v in side] for side in (node.modes, node.left))
+        near = Node(node.p, x, node.dp, x, node.p, omega2=node.omega2, modes=modes, left=left)
         if criterion is None:
-            criterion = Collision(richer, other) if kind == FLUTTER else Singular(richer, other, modes, kind == FOLD)  # type: ignore[arg-type]
+            criterion = _criterion(richer, other, kind, near)
         along = node.dp
         if np.linalg.norm(along / plane.width) < 1e-3:  # a cusp
             along = nodes[min(row + 1, len(nodes) - 1)].p - nodes[max(row - 1, 0)].p

@@ -24,7 +24,8 @@ class Node:
 
     ``rest`` counts the negative eigenvalues other than those that vanish here (-1: not counted).  At folds ``coupling``
     (2,) is the derivative of the equations in the two parameters along the null vector, in units of the bounds, and
-    ``curvature`` the second one along it.  ``omega2`` is a double eigenvalue, ``modes`` are the null vectors.
+    ``curvature`` the second one along it.  ``omega2`` is a double eigenvalue.  ``modes`` are the null vectors, or a
+    basis of the double eigenvalue's invariant subspace; ``left`` the left null vectors where they are others.
     """
 
     p: np.ndarray
@@ -39,6 +40,7 @@ class Node:
     curvature: float = 0.0
     coupling: np.ndarray = field(default_factory=lambda: np.zeros(2))
     modes: list[PETSc.Vec] = field(default_factory=list)
+    left: list[PETSc.Vec] = field(default_factory=list)
 
     def reversed(self) -> Node:
         """The same point with the opposite tangent."""

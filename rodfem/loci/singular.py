@@ -1,7 +1,8 @@
 r"""Equilibria whose second variation is singular, as a regular system of equations in two parameters.
 
 Let ``F(x, a, b) = 0`` be the equations of equilibrium with the phase conditions of the symmetries that the state
-breaks, and ``S = F_x``, which is symmetric.  With vectors ``psi`` near ``M phi``, ``phi`` the null vectors, the matrix
+breaks, and ``S = F_x``, which is symmetric where all loads have a potential.  With vectors ``psi`` near ``M phi``,
+``phi`` the null vectors, the matrix
 
     ( S       psi )  ( V )     ( 0 )
     ( psi^t   0   )  ( G )  =  ( I )
@@ -25,8 +26,13 @@ beta psi = 0``, ``psi.(x - x0) = 0`` and ``tr G = 0`` are regular in ``(x, beta,
 for.  Where it does not vanish the parameter destroys the branch point.  Null vectors that a symmetry relates are
 several columns of ``psi``, and ``G`` is a multiple of the identity.
 
-The index comes for free: the negative eigenvalues of the bordered matrix, less all constraints and the columns of
-``psi``, are those of the second variation on what is orthogonal to the null vectors.
+*Divergence* under loads without a potential: ``S`` is not symmetric.  The columns of the border are near ``M`` times
+the left null vectors, its rows near ``M`` times the right ones, and with ``W`` the solution of the transposed bordered
+equations the derivative of ``G`` is ``-W^t S_z V``; else all is as for a branch point.  No square root appears where
+divergence meets flutter, a double zero eigenvalue with one null vector: ``S`` is as singular there as elsewhere.
+
+The index of a symmetric ``S`` comes for free: the negative eigenvalues of the bordered matrix, less all constraints and
+the columns of ``psi``, are those of the second variation on what is orthogonal to the null vectors.
 """
 
 from __future__ import annotations
@@ -36,12 +42,12 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation import Follower
+from rodfem.continuation import Equilibria, Follower
 from rodfem.errors import ConvergenceError
 from rodfem.loci.plane import Node, Plane
 from rodfem.newton import ROUND_OFF, TOLERANCE
 from rodfem.stability.bordered import Bordered
-from rodfem.stability.inertia import combine
+from rodfem.stability.inertia import Inertia, combine, orthonormalize
 
 DIFFERENCE = 1e-4
 """Step of the central differences for the third derivatives, in the metric: they are of no account to the result."""
@@ -57,13 +63,14 @@ class Destroyed(ConvergenceError):
 
 @dataclass
 class _Linear:
-    """What is known at a state: residual solve, responses to the two parameters, null vectors, derivatives of G."""
+    """What is known at a state: residual solve, responses to the two parameters, right and left null vectors, G_z."""
 
     s0: PETSc.Vec
     b0: np.ndarray
     response: list[PETSc.Vec]
     b: np.ndarray
     v: list[PETSc.Vec]
+    w: list[PETSc.Vec]
     g: float
     spread: float
     grad_x: PETSc.Vec
@@ -72,20 +79,35 @@ class _Linear:
 
 
 class Singular:
-    """Corrects states to where the second variation is singular; ``fold`` or a branch point."""
+    """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence."""
 
-    def __init__(self, follower: Follower, plane: Plane, vectors: list[PETSc.Vec], fold: bool) -> None:
-        """Take the null vectors of a special point."""
-        self.follower, self.system, self.plane, self.fold = follower, follower.system, plane, fold
-        self.metric = follower.inertia.metric
-        self.borders = len(vectors)
-        self.psi: list[PETSc.Vec] = []
-        self._adopt(vectors)
-        follower.inertia.assemble(vectors[0])  # for its pattern
-        self.bordered = Bordered(follower.inertia, len(vectors))
+    def __init__(
+        self,
+        solver: Equilibria,
+        plane: Plane,
+        vectors: list[PETSc.Vec],
+        fold: bool,
+        left: list[PETSc.Vec] | None = None,
+    ) -> None:
+        """Take the null vectors of a special point, and the ``left`` ones where the matrix is not symmetric."""
+        self.solver, self.system, self.plane, self.fold = solver, solver.system, plane, fold
+        self.saddle = solver.inertia if isinstance(solver, Follower) else Inertia(solver.system)
+        self.metric = self.saddle.metric
+        self._adopt(vectors, left or [])
+        self.saddle.assemble(vectors[0])  # for its pattern
+        constraints = None if left else self.saddle.constraints
+        self.bordered = Bordered(self.system, self.saddle.matrix, len(vectors), constraints)
+        self.turned: Bordered | None = None
+        if left:
+            self._transposed = self.saddle.matrix.transpose(PETSc.Mat())
+            self.turned = Bordered(self.system, self._transposed, len(vectors), None)
 
-    def _adopt(self, vectors: list[PETSc.Vec]) -> None:
+    def _adopt(self, vectors: list[PETSc.Vec], left: list[PETSc.Vec]) -> None:
         """Border with these vectors from now on, made orthonormal in the metric."""
+        self.phi = [self.metric * v for v in self._orthonormal(vectors)]
+        self.psi = [self.metric * v for v in self._orthonormal(left)] if left else self.phi
+
+    def _orthonormal(self, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
         done: list[PETSc.Vec] = []
         for vector in vectors:
             v = vector.copy()
@@ -94,7 +116,7 @@ class Singular:
                 v.axpy(-(self.metric * other).dot(v), other)
             v.scale(1.0 / self.system.norm(v))
             done.append(v)
-        self.psi = [self.metric * v for v in done]
+        return done
 
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Size of a step: parameters over the widths of their bounds, the state in the metric."""
@@ -111,7 +133,7 @@ class Singular:
         With None for the state's part of the tangent the plane is that of the parameters alone: a line of theirs.
         ``near`` is a point of the curve whose null vectors are close by.
         """
-        self._adopt(near.modes)
+        self._adopt(near.modes, near.left)
         p, x, origin = np.array(p, dtype=float), x.copy(), (np.array(p, dtype=float), x.copy())
         self.system.set_phase(x)
         row_p = tangent[0] / self.plane.width**2
@@ -160,20 +182,21 @@ class Singular:
         dp = z[:2] * self.plane.width
         return dp, combine(free, np.array([1.0, *dp, *z[2:]]))
 
-    def _columns(self, p: np.ndarray, x: PETSc.Vec, v: PETSc.Vec | None) -> tuple[list[PETSc.Vec], PETSc.Vec]:
-        """Derivatives of ``F`` in both parameters at ``x``, and ``S v``."""
+    def _columns(self, p: np.ndarray, x: PETSc.Vec, w: PETSc.Vec | None) -> tuple[list[PETSc.Vec], PETSc.Vec]:
+        """Derivatives of ``F`` in both parameters at ``x``, and ``S^t w``."""
         system, scratch, columns = self.system, self.system.new_vector(), []
         x, image = x.copy(), scratch
         for which in (0, 1):
             self.plane.look(p, which)
             system.set_load(x, float(p[which]))
             system.residual(x, scratch)
-            matrix = system.jacobian(self.follower.axis)
-            column = matrix * self.follower.axis
+            matrix = system.jacobian(self.solver.axis)
+            column = matrix * self.solver.axis
             system.set_load(column, 0.0)
             columns.append(column)
-            if v is not None and which == 0:
-                image = matrix * v
+            if w is not None and which == 0:
+                image = matrix.createVecRight()
+                matrix.multTranspose(w, image)
                 system.set_load(image, 0.0)
         self.plane.look(p, 0)
         return columns, image
@@ -189,45 +212,56 @@ class Singular:
         right.scale(-1.0)
         if not np.isfinite(right.norm()):
             raise ConvergenceError("the stored energy is not defined there")
-        self.follower.inertia.assemble(x)
-        rest = bordered.factor(self.psi)
+        self.saddle.assemble(x)
+        rest = bordered.factor(self.psi, self.phi)
         gauge = np.zeros(k)
         if not self.fold:
             gone = x.copy()
             gone.axpy(-1.0, reference)
-            gauge = np.array([-w.dot(gone) for w in self.psi])
+            gauge = np.array([-w.dot(gone) for w in self.phi])
         s0, b0 = bordered.solve(right, gauge)
         solved = [bordered.solve(None, e) for e in np.eye(k)]
         v, G = [w for w, _ in solved], np.array([row for _, row in solved])
         g = float(np.trace(G)) / k
         spread = float(abs(G - g * np.eye(k)).max())
         if old is not None:
-            return _Linear(s0, b0, old.response, old.b, v, g, spread, old.grad_x, old.grad_p, rest)
+            return _Linear(s0, b0, old.response, old.b, v, old.w, g, spread, old.grad_x, old.grad_p, rest)
         responses = []
         for column in columns:
             column.scale(-1.0)
             responses.append(bordered.solve(column, np.zeros(k)))
-        grad_x, grad_p = self._gradient(p, x, v)
+        w = self._left(v)
+        grad_x, grad_p = self._gradient(p, x, v, w)
         b = np.array([row for _, row in responses])
-        return _Linear(s0, b0, [w for w, _ in responses], b, v, g, spread, grad_x, grad_p, rest)
+        return _Linear(s0, b0, [y for y, _ in responses], b, v, w, g, spread, grad_x, grad_p, rest)
 
-    def _gradient(self, p: np.ndarray, x: PETSc.Vec, v: list[PETSc.Vec]) -> tuple[PETSc.Vec, np.ndarray]:
-        """Derivatives of ``tr G / k``: as ``S`` is a second derivative, ``v.S_z v`` is ``z.d/de S(x + e v) v``."""
+    def _left(self, v: list[PETSc.Vec]) -> list[PETSc.Vec]:
+        """Left null vectors at the state last factored, those of the columns of ``psi``; the right ones by symmetry."""
+        if self.turned is None:
+            return v
+        self.saddle.matrix.transpose(self._transposed)
+        self.turned.factor(self.phi, self.psi)
+        return [self.turned.solve(None, e)[0] for e in np.eye(len(self.psi))]
+
+    def _gradient(
+        self, p: np.ndarray, x: PETSc.Vec, v: list[PETSc.Vec], w: list[PETSc.Vec]
+    ) -> tuple[PETSc.Vec, np.ndarray]:
+        """Derivatives of ``tr G / k``: as ``S`` is a derivative itself, ``w.S_z v`` is ``z.d/de S(x + e v)^t w``."""
         grad_x, grad_p = self.system.new_vector(), np.zeros(2)
-        for w in v:
+        for right, left in zip(v, w, strict=True):
             for sign in (1.0, -1.0):
                 y = x.copy()
-                y.axpy(sign * DIFFERENCE, w)
-                columns, image = self._columns(p, y, w)
+                y.axpy(sign * DIFFERENCE, right)
+                columns, image = self._columns(p, y, left)
                 factor = -sign / (2 * DIFFERENCE * len(v))
                 grad_x.axpy(factor, image)
-                grad_p += factor * np.array([column.dot(w) for column in columns])
+                grad_p += factor * np.array([column.dot(left) for column in columns])
         return grad_x, grad_p
 
     def _node(self, p: np.ndarray, x: PETSc.Vec, along: tuple[np.ndarray, PETSc.Vec | None], last: np.ndarray) -> Node:
         """Evaluate tangent, count and records at a point of the locus, and border with its null vectors."""
         at = self._linear(p, x, x, None)
-        scale = self.follower.inertia.scale
+        scale = self.saddle.scale
         if not self.fold and abs(at.b0).max() > IMPERFECT * scale:
             raise Destroyed(f"{self.plane.names[1]} is an imperfection that destroys the branch point")
         if at.spread > FEWER * scale:
@@ -256,9 +290,35 @@ class Singular:
             dp / size,
             dx,
             located,
-            ordinate=self.follower.shape.ordinate(x),
+            ordinate=self.solver.shape.ordinate(x),
             rest=at.rest,
             curvature=float(curvature) if self.fold else 0.0,
             coupling=coupling if self.fold else np.zeros(2),
             modes=at.v,
+            left=[] if self.turned is None else at.w,
         )
+
+
+def null_vectors(saddle: Inertia, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
+    """Right and left null vectors of the tangent matrix at ``x``, not symmetric, with the ``number`` it has there.
+
+    By solves with borders that are arbitrary at first.  Of several the left ones are turned such that each is along
+    the right one of the same number as far as it can be: where a symmetry relates them ``G`` is a multiple of one.
+    """
+    system, metric = saddle.system, saddle.metric
+    saddle.assemble(x)
+    transposed = saddle.matrix.transpose(PETSc.Mat())
+    straight, turned = (Bordered(system, matrix, number, None) for matrix in (saddle.matrix, transposed))
+    right = left = [saddle.seed(i) for i in range(number)]
+    for _ in range(3):
+        orthonormalize(right, metric)
+        orthonormalize(left, metric)
+        phi, psi = ([metric * v for v in side] for side in (right, left))
+        straight.factor(psi, phi)
+        turned.factor(phi, psi)
+        right, left = ([one.solve(None, e)[0] for e in np.eye(number)] for one in (straight, turned))
+    orthonormalize(right, metric)
+    orthonormalize(left, metric)
+    overlap = np.array([[(metric * v).dot(w) for w in left] for v in right])
+    u, _, vt = np.linalg.svd(overlap)
+    return right, [combine(left, column) for column in (vt.T @ u.T).T]

@@ -1,4 +1,4 @@
-"""The saddle matrix of a state with dense borders that make it regular where it is singular."""
+"""A matrix with dense borders that make it regular where it is singular."""
 
 from __future__ import annotations
 
@@ -6,20 +6,25 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.stability.inertia import Inertia, inertia_factors
+from rodfem.factors import factors_of
+from rodfem.stability.inertia import inertia_factors
+from rodfem.system import System
 
 
 class Bordered:
-    """The symmetric matrix ``S`` of a state with dense borders, its LDL^t factors and its count."""
+    """A square ``matrix`` of a system with dense borders, a column and a row each, and its factors.
 
-    def __init__(self, inertia: Inertia, borders: int) -> None:
-        """Allocate for a number of borders, with the pattern of the matrix that ``inertia`` has assembled."""
-        self.inertia, self.k = inertia, borders
-        self.system = inertia.system
-        self.comm, self.last = self.system.comm, self.system.has_scalars
+    Those of a symmetric one, ``constraints`` of whose eigenvalues are negative whatever the state, count the rest; with
+    None it is not symmetric, and nothing is counted.
+    """
+
+    def __init__(self, system: System, matrix: PETSc.Mat, borders: int, constraints: int | None) -> None:
+        """Allocate for a number of borders of a matrix that was assembled once."""
+        self.system, self.given, self.k, self.constraints = system, matrix, borders, constraints
+        self.comm, self.last = system.comm, system.has_scalars
         self.extra = borders if self.last else 0
-        self.n = self.system.fields.unknowns
-        start, columns, _ = self.inertia.matrix.getValuesCSR()
+        self.n = system.fields.unknowns
+        start, columns, _ = self.given.getValuesCSR()
         rows = len(start) - 1
         lengths = np.concatenate([np.diff(start) + borders, np.full(self.extra, self.n + borders)])
         self.start = np.concatenate([[0], np.cumsum(lengths)]).astype(PETSc.IntType)
@@ -34,25 +39,36 @@ class Bordered:
         size = (rows + self.extra, self.n + borders)
         self.matrix = PETSc.Mat().createAIJ((size, size), comm=self.comm)
         self.matrix.setPreallocationCSR((self.start, self.columns, self.values))
-        self.factors = inertia_factors(self.comm, self.n + borders, self.system.fields.dense_rows + borders)
+        sizes = self.n + borders, system.fields.dense_rows + borders
+        if constraints is None:
+            self.factors = factors_of("lu", self.comm, *sizes, {8: 0})
+        else:
+            self.factors = inertia_factors(self.comm, *sizes)
         self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))
 
-    def factor(self, psi: list[PETSc.Vec]) -> int:
-        """Factor with ``S`` as last assembled; negative eigenvalues of ``S`` off the borders."""
-        self.values[: self.own][~self._border] = self.inertia.matrix.getValuesCSR()[2]
-        local = np.stack([v.array_r for v in psi], axis=1)
-        self.values[: self.own][self._border] = local.ravel()
-        parts = self.comm.gather(local, root=self.comm.size - 1)
+    def factor(self, columns: list[PETSc.Vec], rows: list[PETSc.Vec] | None = None) -> int:
+        """Factor with the matrix as last assembled; its negative eigenvalues off the borders, -1 without a count.
+
+        The ``rows`` of the borders are the same as the ``columns`` unless given.
+        """
+        self.values[: self.own][~self._border] = self.given.getValuesCSR()[2].real
+        local = [np.stack([v.array_r.real for v in side], axis=1) for side in (columns, rows or columns)]
+        self.values[: self.own][self._border] = local[0].ravel()
+        parts = self.comm.gather(local[1], root=self.comm.size - 1)
         if parts is not None:
-            rows = np.zeros((self.k, self.n + self.k))
-            rows[:, : self.n] = np.concatenate(parts).T
-            self.values[self.own :] = rows.ravel()
+            below = np.zeros((self.k, self.n + self.k))
+            below[:, : self.n] = np.concatenate(parts).T
+            self.values[self.own :] = below.ravel()
         self.matrix.setValuesCSR(self.start, self.columns, self.values)
         self.matrix.assemble()
         with self.system.clock("stability"):
             self.factors(self.matrix)
+            if self.constraints is None:
+                if not self.factors.regular:
+                    raise ConvergenceError("another eigenvalue vanishes")
+                return -1
             negative, zero = self.factors.inertia()
-        rest = negative - self.inertia.constraints - self.system.active_drifts() - self.k
+        rest = negative - self.constraints - self.system.active_drifts() - self.k
         if zero or rest < 0:
             raise ConvergenceError("another eigenvalue vanishes")
         return int(rest)

@@ -49,9 +49,9 @@ def both_sides(vibration: Vibration, number: int) -> BothSides:
             )
     comm = vibration.system.comm
     X, Z = right.vectors[:, chosen], left.vectors[:, partners]
-    X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * weighed(vibration, X), axis=0)).real)
-    X = X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * weighed(vibration, X), axis=0))))
-    Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ weighed(vibration, X)).T)
+    X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * vibration.weighed(X), axis=0)).real)
+    X = X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * vibration.weighed(X), axis=0))))
+    Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ vibration.weighed(X)).T)
     values = right.values[chosen]
     return BothSides(
         np.where(abs(values.imag) < ROUND_OFF * abs(values), values.real, values),
@@ -59,18 +59,5 @@ def both_sides(vibration: Vibration, number: int) -> BothSides:
         tuple(right.kinds[i] for i in chosen),
         X,
         Z,
-        weighed(vibration, Z),
+        vibration.weighed(Z),
     )
-
-
-def weighed(vibration: Vibration, vectors: np.ndarray) -> np.ndarray:
-    """``M X`` for complex vectors (n, k), with any PETSc."""
-    out = np.empty_like(vectors)
-    x = vibration.system.new_vector()
-    for i, column in enumerate(vectors.T):
-        parts = []
-        for part in (column.real, column.imag):
-            x.array[:] = part
-            parts.append((vibration.mass * x).array_r.real)
-        out[:, i] = parts[0] + 1j * parts[1]
-    return out

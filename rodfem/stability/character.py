@@ -30,7 +30,9 @@ def shares(system: System, turned: np.ndarray, parts: list[np.ndarray]) -> np.nd
         dofs = f.dofs[f.turning.name][cells]
         dq = f.turning.change(turned[cells], np.where(f.number[dofs] < 0, 0.0, f.u.x.array[dofs]))
         scalar, v = q[cells][..., :1], q[cells][..., 1:]
-        w = scalar * dq[..., 1:] - dq[..., :1] * v - np.cross(v, dq[..., 1:])
+        dv = dq[..., 1:]
+        across = v[..., [1, 2, 0]] * dv[..., [2, 0, 1]] - v[..., [2, 0, 1]] * dv[..., [1, 2, 0]]  # v x dv
+        w = scalar * dv - dq[..., :1] * v - across
         square += (w**2 * size).sum(axis=(0, 1))
     square = system.comm.allreduce(square)
     return np.asarray(square / max(square.sum(), 1e-300))

@@ -122,49 +122,68 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
 
 
 class Inverse:
-    """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
+    """Python context of a PETSc preconditioner that solves with factors made elsewhere.
 
-    def __init__(self, factors: Factors) -> None:
+    Of a given ``matrix`` they are the factors, and one step of iterative refinement follows: the pieces of a cut rod
+    lose digits where they are joined.
+    """
+
+    def __init__(self, factors: Factors, matrix: PETSc.Mat | None = None) -> None:
         """Keep the factors."""
-        self.factors = factors
+        self.factors, self.matrix = factors, matrix
+        if matrix is not None:
+            self._residual, self._correction = matrix.createVecRight(), matrix.createVecRight()
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
         """Solve for ``z``."""
         self.factors.solve(b, z)
+        if self.matrix is not None:
+            self.matrix.mult(z, self._residual)
+            self._residual.aypx(-1.0, b)
+            self.factors.solve(self._residual, self._correction)
+            z.axpy(1.0, self._correction)
 
 
 def with_factors(
     matrix: PETSc.Mat,
     mass: PETSc.Mat,
     number: int,
-    target: float,
-    factors: Factors,
-    start: PETSc.Vec,
+    target: complex,
+    inverse: Inverse,
+    start: PETSc.Vec | None = None,
     deflated: Sequence[PETSc.Vec] = (),
+    *,
+    symmetric: bool = True,
 ) -> SLEPc.EPS:
-    """Set up the same for a symmetric pencil, with the factors of ``matrix - target mass`` and a first vector.
+    """Set up the same with the ``inverse`` of ``matrix - target mass`` from factors made elsewhere, and a first vector.
 
-    Its vectors are right up to what has no mass.  Eigenvectors that are ``deflated`` are not found.
+    Vectors of a symmetric pencil are right up to what has no mass: who has the factors purifies all of them at once.
+    Eigenvectors that are ``deflated`` are not found.
     """
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_")
     solver.setOperators(matrix, mass)
-    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP if symmetric else SLEPc.EPS.ProblemType.GNHEP)
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTarget(target)
-    solver.setTolerances(tol=1e-9, max_it=300)  # of vectors: the error of eigenvalues is the square
-    solver.setDimensions(number, number + max(number, LEAST))
-    solver.setInitialSpace([start])
+    if symmetric:
+        solver.setTolerances(tol=1e-9, max_it=300)  # of vectors: the error of eigenvalues is the square
+        solver.setDimensions(number, number + max(number, LEAST))
+        solver.setPurify(False)
+    else:
+        solver.setTolerances(tol=1e-13, max_it=300)
+        solver.setDimensions(number, 2 * number + 20)
+    if start is not None:
+        solver.setInitialSpace([start])
     if deflated:
         solver.setDeflationSpace(list(deflated))
-    solver.setPurify(False)  # who has the factors does it for all vectors at once
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)
     transform.setMatMode(SLEPc.ST.MatMode.SHELL)
     ksp = transform.getKSP()
     ksp.setType("preonly")
     ksp.getPC().setType("python")
-    ksp.getPC().setPythonContext(Inverse(factors))
+    ksp.getPC().setPythonContext(inverse)
     solver.setFromOptions()
     return solver
 

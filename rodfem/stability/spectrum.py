@@ -24,7 +24,7 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError
 from rodfem.factors import Factors, solving
 from rodfem.stability.inertia import Inertia, inertia_factors
-from rodfem.stability.pencil import assemble_pencil, exclude_modes, symmetry_modes, with_factors
+from rodfem.stability.pencil import Inverse, assemble_pencil, exclude_modes, symmetry_modes, with_factors
 from rodfem.system import dense_columns
 
 HIT = 1e-8
@@ -192,7 +192,8 @@ class Spectrum:
         if len(self._last):  # a space that is invariant already would miss all else
             start.scale(NOISE / self.system.norm(start))
             start.array[:] += self._last
-        solver = with_factors(self.matrix, self.mass, number, self.shift, self._solving.factors, start, self._deflated)
+        inverse = Inverse(self._solving.factors)
+        solver = with_factors(self.matrix, self.mass, number, self.shift, inverse, start, self._deflated)
         solver.solve()
         found = solver.getConverged()
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])

@@ -20,16 +20,26 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.sparse as sp
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem import compat
+from rodfem.condensed import Condensed
 from rodfem.copied import Copy
 from rodfem.errors import ConvergenceError
-from rodfem.factors import LONG, PETSC_ERR_LIB
+from rodfem.factors import PETSC_ERR_LIB, Factors, Mumps, factors_of, is_cut
 from rodfem.stability import character
 from rodfem.stability.dense import finite_eigenpairs
-from rodfem.stability.pencil import assemble_pencil, shift_invert
+from rodfem.stability.pencil import (
+    LARGE,
+    Inverse,
+    assemble_pencil,
+    exclude_modes,
+    shift_invert,
+    symmetry_modes,
+    with_factors,
+)
 from rodfem.system import System
 
 FAR = 1e5
@@ -40,6 +50,14 @@ which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than t
 """
 DENSE = 3
 """A pencil smaller than this many Krylov spaces is solved by dense reductions: it may have few finite eigenvalues."""
+REAL = 1e-7
+"""An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
+MULTIPLE = 1e-8
+"""Eigenvalues that differ by less than this, relative, are one that is multiple."""
+ALIKE = 1e-6
+"""Eigenvalues that differ by less than this, relative, have one name: where another is near the shift, digits go."""
+NEAR_ZERO = 1e-2
+"""Share of the farthest eigenvalue below which differences of others are relative to this share."""
 EPS = float(np.finfo(float).eps)
 
 
@@ -56,6 +74,15 @@ class Frequencies:
     kinds: tuple[str, ...] = ()
     vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
 
+    @property
+    def noise(self) -> float:
+        """What tells an eigenvalue from zero."""
+        return REAL * max(1.0, float(abs(self.values).min(initial=np.inf)))
+
+    def diverged(self) -> int:
+        """Number of negative real eigenvalues."""
+        return int(((self.values.imag == 0) & (self.values.real < -self.noise)).sum())
+
     def unstable(self, tolerance: float) -> int:
         """Number of eigenvalues with a negative real part or a non-zero imaginary part."""
         return int(((self.values.real < -tolerance) | (abs(self.values.imag) > tolerance)).sum())
@@ -68,6 +95,11 @@ class _Pair:
     value: complex
     parts: list[np.ndarray]
     error: float
+
+    @property
+    def vector(self) -> np.ndarray:
+        """The vector on this rank, complex."""
+        return np.asarray(self.parts[0] + 1j * (0.0 if len(self.parts) < 2 else self.parts[1]))
 
 
 class Vibration:
@@ -82,9 +114,15 @@ class Vibration:
         self._own = slice(None)
 
     def assemble(self, x: PETSc.Vec) -> None:
-        """Assemble the pencil at the state ``x``."""
+        """Assemble the pencil at the state ``x``, at which the phase conditions must be set.
+
+        Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
+        """
         with self.system.clock("assembly"):
+            modes = symmetry_modes(self.system, x)
             assemble_pencil(self.system, x, self.matrix, self.mass)
+            if modes:
+                exclude_modes(self.system, modes, self.matrix, self.mass)
             f = self.system.fields
             self.turned = f.u.x.array[f.dofs[f.turning.name]]
 
@@ -130,7 +168,8 @@ class Vibration:
     def _whole(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """The pencil; of a rod that is not long all of it on each rank, which solves alone."""
         pencil = self.matrix, self.mass
-        if self.system.comm.size == 1 or self.matrix.getSize()[0] >= LONG:
+        comm = self.system.comm
+        if comm.size == 1 or is_cut(comm, self.matrix.getSize()[0]):
             return pencil
         if not self._copies:
             self._copies = [Copy(matrix) for matrix in pencil]
@@ -149,16 +188,59 @@ class Vibration:
             found = sorted(found, key=lambda p: abs(p.value - target))[: number + 2]
             third = abs(found[min(2, len(found) - 1)].value - target)
             found = [p for p in found if abs(p.value - target) <= FAR * third]
-            kinds = [character.name(character.shares(self.system, self.turned, p.parts)) for p in found]
+            kinds = self._kinds(found)
         order = sorted(range(len(found)), key=lambda i: (round(found[i].value.real, 9), found[i].value.imag))
         return Frequencies(
             np.array([found[i].value for i in order]),
             np.array([found[i].error for i in order]),
             tuple(kinds[i] for i in order),
-            np.stack(
-                [found[i].parts[0] + 1j * (0.0 if len(found[i].parts) < 2 else found[i].parts[1]) for i in order], 1
-            ),
+            np.stack([found[i].vector for i in order], 1),
         )
+
+    def _kinds(self, found: list[_Pair]) -> list[str]:
+        """Names of the motions; those of a multiple eigenvalue are the name of all that it does.
+
+        Its vectors are any in its invariant subspace: bending about d1 in one state and about d2 in the next.
+        """
+        kinds = [""] * len(found)
+        for group in groups(np.array([p.value for p in found]), ALIKE):
+            if len(group) == 1:
+                name = character.name(character.shares(self.system, self.turned, found[group[0]].parts))
+            else:
+                name = self.motion(self.orthonormal(np.stack([found[j].vector for j in group], axis=1)))
+            for j in group:
+                kinds[j] = name
+        return kinds
+
+    def motion(self, basis: np.ndarray) -> str:
+        """Name of all that the vectors of a ``basis`` (n, k) do, at the state last assembled."""
+        return character.name(character.shares(self.system, self.turned, [*basis.real.T, *basis.imag.T]))
+
+    def weighed(self, vectors: np.ndarray) -> np.ndarray:
+        """``M X`` for real or complex vectors (n, k), with any PETSc."""
+        if self.system.comm.size == 1:
+            start, columns, values = self.mass.getValuesCSR()
+            return np.asarray(sp.csr_matrix((values.real, columns, start), shape=self.mass.size) @ vectors)
+        if np.iscomplexobj(vectors):
+            return np.asarray(self.weighed(vectors.real) + 1j * self.weighed(vectors.imag))
+        out, x = np.empty_like(vectors), self.system.new_vector()
+        for i, column in enumerate(vectors.T):
+            x.array[:] = column
+            out[:, i] = (self.mass * x).array_r.real
+        return out
+
+    def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """``a^* b`` of all ranks' rows."""
+        return np.asarray(self.system.comm.allreduce(a.conj().T @ b))
+
+    def squares(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Products of each column of ``a`` with the same of ``b``, real parts."""
+        return np.asarray(self.system.comm.allreduce(np.sum(a.conj() * b, axis=0).real))
+
+    def orthonormal(self, vectors: np.ndarray) -> np.ndarray:
+        """Basis of the span of complex vectors (n, k), orthonormal in the mass."""
+        squares, turn = np.linalg.eigh(self.product(vectors, self.weighed(vectors)))
+        return np.asarray(vectors @ (turn / np.sqrt(np.maximum(squares, EPS * squares[-1]))))
 
     def _dense(self, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
         """All finite eigenvalues of a pencil that is small enough for dense matrices."""
@@ -210,15 +292,22 @@ class Vibration:
             made.destroy()
         return out[:number]
 
-    @staticmethod
-    def _solve(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex) -> SLEPc.EPS:
-        """Run SLEPc; raises :class:`ConvergenceError` where it finds nothing at all.
+    def _solve(self, matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex) -> SLEPc.EPS:
+        """Run SLEPc; raises :class:`ConvergenceError` where it finds nothing at all, or has no factors to do so.
 
         A small pencil has few finite eigenvalues, and a Krylov space that holds all of them breaks down on the Jordan
         blocks of the infinite ones: it is then made smaller.
         """
+        inverse = self._inverse(matrix, mass, target)
         while number:
-            solver = shift_invert(matrix, mass, number, target, symmetric=False)
+            if inverse is None:
+                solver = shift_invert(matrix, mass, number, target, symmetric=False)
+            else:
+                solver = with_factors(matrix, mass, number, target, inverse, symmetric=False)
+            try:
+                solver.setUp()
+            except PETSc.Error as trouble:
+                raise ConvergenceError(_singular(target)) from trouble
             try:
                 solver.solve()
             except PETSc.Error as trouble:
@@ -230,6 +319,46 @@ class Vibration:
             solver.destroy()
             number //= 2
         raise ConvergenceError(f"SLEPc found no eigenvalue near {target:.6g}: use a richer discretisation.")
+
+    def _inverse(self, matrix: PETSc.Mat, mass: PETSc.Mat, target: complex) -> Inverse | None:
+        """Inverse of ``matrix - target mass`` for a large pencil, piece by piece on several ranks; None: SLEPc's own.
+
+        MUMPS, SLEPc's choice on several ranks, gives up on a long rod: the zero block of the multipliers delays more
+        pivots than its analysis has made room for.  KLU's factors fill in where the pencil is of twice the size.
+        """
+        rows, comm = matrix.size[0], matrix.comm.tompi4py()
+        doubled = rows > self.matrix.size[0]
+        if rows < LARGE or (doubled and comm.size == 1):
+            return None
+        shifted = matrix.copy()
+        shifted.axpy(-target, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        dense_rows, prefix = self.system.fields.dense_rows, "rodfem_st_"
+        if doubled:
+            factors: Factors = Condensed(dense_rows, Mumps("lu", {8: 0}, prefix=prefix))
+        else:
+            factors = factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=prefix)
+        factors(shifted)
+        if not factors.regular:
+            raise ConvergenceError(_singular(target))
+        return Inverse(factors, shifted if comm.size > 1 else None)
+
+
+def groups(values: np.ndarray, tolerance: float = MULTIPLE) -> list[list[int]]:
+    """Places of eigenvalues in groups of equal ones, in the order of the first of each."""
+    out: list[list[int]] = []
+    least = NEAR_ZERO * abs(values).max(initial=0.0)
+    for i, value in enumerate(values):
+        for group in out:
+            if abs(value - values[group[0]]) < tolerance * max(abs(value), least):
+                group.append(i)
+                break
+        else:
+            out.append([i])
+    return out
+
+
+def _singular(target: complex) -> str:
+    return f"The pencil is singular at the shift {target:.6g}: choose another load, or another discretisation."
 
 
 def dense(matrix: PETSc.Mat) -> np.ndarray:

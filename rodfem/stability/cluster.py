@@ -1,0 +1,96 @@
+r"""Eigenvalues of a rod under loads without a potential that meet, followed by their invariant subspace.
+
+Two eigenvalues are not smooth where they meet, and their vectors become one; what belongs to both is smooth in every
+parameter as long as no other eigenvalue joins them: their invariant subspace, their mean ``c``, and the mean square of
+their distances from it, ``D = ((mu1 - mu2)/2)^2``, positive before and negative after the collision.
+
+A rod that bends alike in all planes has all eigenvalues twice, and two pairs meet at once.  They are one cluster of
+four, with ``c`` the mean of all and ``D`` the mean of ``(mu - c)^2``: the same numbers, and as smooth.  Which
+eigenvalues are the cluster's is decided by the share of their vectors in the invariant subspace of a state nearby, not
+by their values or by the names of their motions: the vectors of a double eigenvalue are any in a plane.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.errors import ConvergenceError
+from rodfem.stability.vibration import REAL, Frequencies, Vibration
+from rodfem.system import System
+
+BESIDE = 1e-3
+"""Distance from zero at which eigenvalues near zero are looked for: the matrix is singular there."""
+LEAST = 0.25
+"""Share of a vector in an invariant subspace below which it is none of its."""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Real ``basis`` (n, size) of an invariant subspace, this rank's n unknowns, and its eigenvalues' ``mean``."""
+
+    basis: np.ndarray
+    mean: float
+
+    @property
+    def size(self) -> int:
+        """Number of eigenvalues."""
+        return int(self.basis.shape[1])
+
+
+@dataclass(frozen=True)
+class Measured:
+    """``D``, the eigenvalues and the invariant subspace of a cluster at one state."""
+
+    discriminant: float
+    values: np.ndarray
+    cluster: Cluster
+
+    @property
+    def spread(self) -> float:
+        """Distance of the eigenvalues from their mean, relative: how well they and their vectors are told apart."""
+        return float(np.sqrt(abs(self.discriminant)) / max(abs(self.values).max(), 1e-300))
+
+
+def cluster_of(vibration: Vibration, found: Frequencies, chosen: list[int]) -> Cluster:
+    """Cluster of the ``chosen`` ones of eigenvalues found at the state last assembled, closed under conjugation."""
+    return Cluster(_real_span(vibration, found.vectors[:, chosen]), float(found.values[chosen].real.mean()))
+
+
+def measure(vibration: Vibration, cluster: Cluster) -> Measured:
+    """Find a cluster known from a state nearby at the state last assembled; raises :class:`ConvergenceError`."""
+    basis, size = _real_span(vibration, cluster.basis), cluster.size
+    for number in (size + 2, 3 * size + 10):
+        found = vibration.near(number, 0.97 * cluster.mean if abs(cluster.mean) > BESIDE else -BESIDE)
+        weighed = vibration.weighed(found.vectors)
+        inside = vibration.product(basis, weighed)
+        energy = vibration.squares(found.vectors, weighed)
+        share = (abs(inside) ** 2).sum(axis=0) / energy
+        chosen = sorted(np.argsort(-share, kind="stable")[:size].tolist())
+        values = found.values[chosen]
+        closed = abs(values.imag.sum()) < REAL * abs(values).max()
+        if len(chosen) == size and closed and share[chosen].min() > LEAST:
+            here = cluster_of(vibration, found, chosen)
+            return Measured(float(((values - here.mean) ** 2).mean().real), values, here)
+    raise ConvergenceError(f"the {size} eigenvalues near {cluster.mean:.6g} are not found again")
+
+
+def as_vectors(system: System, columns: np.ndarray) -> list[PETSc.Vec]:
+    """Columns (n, k) of this rank's values as vectors of a system."""
+    out = []
+    for column in columns.T:
+        vector = system.new_vector()
+        vector.array[:] = column
+        vector.assemble()
+        out.append(vector)
+    return out
+
+
+def _real_span(vibration: Vibration, vectors: np.ndarray) -> np.ndarray:
+    """Real basis (n, k), orthonormal in the mass, of the span of ``vectors`` (n, k), closed under conjugation."""
+    parts = np.concatenate([vectors.real, vectors.imag], axis=1) if np.iscomplexobj(vectors) else vectors
+    squares, turn = np.linalg.eigh(vibration.product(parts, vibration.weighed(parts)))
+    last = slice(len(squares) - vectors.shape[1], None)
+    return np.asarray(parts @ (turn[:, last] / np.sqrt(np.maximum(squares[last], 1e-300))))
