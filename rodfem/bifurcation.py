@@ -42,7 +42,11 @@ def special_at(follower: Follower, located: Located, arclength: float, still: Se
     tangent = located.tangent
     tangent.scale(1.0 / system.norm(tangent))
     point = follower.point(x, arclength, tangent)
-    null_count = max(point.zero - system.active_drifts(), 1)
+    null_count = point.zero - system.active_drifts()
+    if null_count < 1:  # what was interpolated has no zero there: two branches were taken for one
+        raise ConvergenceError(
+            f"No eigenvalue vanishes at load {point.load:.8g}, where one was expected to: use smaller steps (--step)."
+        )
     _, vectors = inertia.nearest(null_count, accuracy=1e-8)
     vectors = across(system, vectors, still)
     coupling = max(coupling_of(follower, x, v) for v in vectors)

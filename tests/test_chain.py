@@ -1,0 +1,147 @@
+"""The index of each row is that of its own state, and from row to row it changes by what the special points say."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+from typing import Any
+
+import numpy as np
+import pytest
+from classics import ON_AXIS, RIGID, ROUND, WIDE, circle, column, explore, push
+from rows import verify
+
+from forms.energy import bending
+from rodfem import Discretization, Ordinate, Parameter, Plan, Ring, Scene, Steps, clamped, free, judge, pinned, sliding
+from rodfem.branch import BRANCH_POINT
+from rodfem.chain import Row, breaks, chained
+from rodfem.continuation import Follower
+from rodfem.explore import Explorer
+from rodfem.report import Report
+from rodfem.system import System
+
+EULER = pi**2 / 4
+"""Buckling load of the clamped-free column."""
+
+
+def localised(turns: int = 27) -> Scene:
+    """A rod twisted by many turns and pulled by T between clamps: van der Heijden & Thompson (2000), in other units."""
+    return Scene(
+        name="localised", interval=(0.0, 1.0), rod=RIGID, load="T", span=(3200.0, 2450.0),
+        energy=lambda v, k, c: bending(k, (1.0, 1.0, c.C)),
+        parameters={"T": Parameter(3200.0), "C": Parameter(0.789 / 1.345)},
+        ends=(clamped(), sliding(ON_AXIS, (cos(turns * pi), 0.0, 0.0, sin(turns * pi)), lambda c: (0.0, 0.0, c.T))),
+        start=lambda s: np.stack([np.cos(turns * pi * s), 0 * s, 0 * s, np.sin(turns * pi * s)], axis=1),
+        ordinate=Ordinate("end shortening", s=1.0, of=lambda r, q: 1 - r[2]),
+    )  # fmt: skip
+
+
+def test_a_rod_under_high_tension() -> None:
+    """Its eigenvalues are a thousand times as sensitive to its state as those of a rod without load.
+
+    The count at the prediction is another one than at the equilibrium; the paper's reduction is a third opinion.
+    """
+    solver = Follower(System(localised(), Discretization("reduced", 40, 6)))
+    plan = Plan((3200.0, 2450.0), depth=1, error_bars=False)
+    branches = Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+    verify(solver, branches)
+    (buckled,) = branches[1:]
+    assert {p.negative for p in buckled.points[1:]} == {1}
+    for point in buckled.points[10::8]:
+        solver.system.set_phase(point.x)
+        assert judge(solver, point.x, "reduction").negative == 1
+
+
+@pytest.mark.parametrize("apart", [3e-3, 1e-4, 1e-6])
+def test_neighbours_in_one_step(apart: float) -> None:
+    """A pinned column that bends almost alike about both axes: P = pi^2 B, each with its own index on either side."""
+    scene = column(
+        "neighbours", (clamped(), free(push)), (0.0, 4.0), constants={"B1": 1.0, "B2": 1.0 + apart}
+    )  # fmt: skip
+    first, second = explore(scene).special()
+    assert [s.point.load for s in (first, second)] == pytest.approx([EULER, EULER * (1 + apart)], abs=1e-11)
+    assert [(s.negative_before, s.negative_after) for s in (first, second)] == [(0, 1), (1, 2)]
+
+
+@pytest.mark.parametrize("half", [1e-6, 1e-5, 1e-3])
+def test_a_range_about_the_buckling_load(half: float) -> None:
+    """The eigenvalue that vanishes is within the tolerance of zero at every row but the ends."""
+    scene = column("range", (clamped(), free(push)), (EULER - half, EULER + half))
+    found = explore(scene)
+    (special,) = found.special()
+    assert special.point.load == pytest.approx(EULER, abs=1e-11)
+    assert (special.negative_before, special.negative_after) == (0, 1)
+
+
+def test_a_double_point_that_the_mesh_splits() -> None:
+    """Michell's ring of C = 1.5 at its fourth mode, C t0 = sqrt(15): one point, where two eigenvalues vanish."""
+    scene = column(
+        "ring", Ring(odd=True), (2.4, 2.7), load="k", constants={"k": 2.4, "B2": 1.0, "C": 1.5}, start=circle, **ROUND,
+        energy=lambda v, k, c: bending((k[0], k[1], k[2] - c.k), (c.B1, c.B2, c.C)),
+    )  # fmt: skip
+    solver = Follower(System(scene, Discretization("auto", 8, 6)))
+    plan = Plan(scene.span, depth=0, steps=WIDE)
+    (branch,) = Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+    (special,) = [s for s in branch.special if s.kind == BRANCH_POINT]
+    assert (special.negative_before, special.negative_after, special.multiplicity) == (4, 6, 2)
+    assert abs(special.point.load - np.sqrt(15) / 1.5) < special.error_estimate
+    assert "does not tell apart" in special.note
+    assert not branch.unexplained
+
+
+def test_a_family_at_the_first_load() -> None:
+    """At P = 0 a ring under a radial dead load may turn freely; its branch leads across that family.
+
+    The circle buckles in its plane at P = n^2 under a dead radial load (Bodner 1958); turned, it falls at once.
+    """
+
+    def load(c: Any) -> tuple[Any, ...]:
+        import ufl
+
+        return (c.P * ufl.cos(c.s), 0.0, -c.P * ufl.sin(c.s))
+
+    scene = column(
+        "dead ring", Ring(), (0.0, 5.0), start=circle, planar="e2", constants={"B2": 1.0}, distributed=load, **ROUND
+    )  # fmt: skip
+    (branch,) = explore(scene, elements=12).branches
+    assert branch.ended == "end of range"
+    assert len(branch.points) < 60
+    assert [s.point.load for s in branch.special if s.kind == BRANCH_POINT] == pytest.approx([4.0], abs=1e-8)
+
+
+def test_what_is_not_explained_is_kept() -> None:
+    """With the special point taken out of a branch its rows contradict each other."""
+    found = explore(column("euler", (pinned(), pinned(ON_AXIS, push)), (0.0, 30.0), constants={"B2": 1.3}))
+    branch = found.branches[0]
+    singular = [s for s in branch.special if s.kind == BRANCH_POINT]
+    assert breaks(branch.points, branch.special) == []
+    rows = [p for p in branch.points if p is not singular[0].point]
+    (broken,) = breaks(rows, singular[1:])
+    assert (broken.before, broken.after) == (0, 1)
+    assert broken.a.load < singular[0].point.load < broken.b.load
+    assert "index changes from 0 to 1" in str(broken)
+    a, b = Row(branch.points[0], 0, 0), Row(branch.points[-1], 2, 2)
+    assert chained(a.low, a.high, singular, b.low, b.high)
+    assert not chained(a.low, a.high, singular[:1], b.low, b.high)
+    assert not chained(a.low, a.high, singular[::-1], b.low, b.high)
+
+
+def test_steps_that_do_not_explain_are_repeated() -> None:
+    """A ring whose stiffness varies by 1e-4 along it: the double point at P = 3 is broken, and passed without a jump.
+
+    The imperfect ring has one branch of stable states; a jump would leave it on the circle, with index 2.
+    """
+    import ufl
+
+    from forms import loads
+
+    scene = column(
+        "nearly uniform", Ring(), (2.6, 3.4), start=circle, planar="e2", constants={"P": 2.6, "B2": 1.0, "e": 1e-4},
+        potential=lambda x, c: loads.pressure(x.r, x.dr, c.P), **ROUND,
+        energy=lambda v, k, c: (1 + c.e * ufl.cos(2 * c.s)) * bending(k, (c.B1, c.B2, c.C)),
+    )  # fmt: skip
+    solver = Follower(System(scene, Discretization("auto", 12, 6)))
+    plan = Plan(scene.span, depth=0, steps=Steps(largest=0.1), error_bars=False)
+    (branch,) = Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+    assert {p.negative for p in branch.points} == {0}
+    assert not branch.unexplained
+    assert abs(branch.points[-1].ordinate - 2.0) > 0.3

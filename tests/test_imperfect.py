@@ -1,0 +1,162 @@
+"""Branch points that an imperfection takes apart, against the elastica in closed form."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+import numpy as np
+import pytest
+from classics import ON_AXIS, SUPPORTS, Found, column, push
+from scipy.optimize import brentq, minimize_scalar
+from scipy.special import ellipk, ellipkinc
+
+from rodfem import Discretization, Ordinate, Plan, Scene, clamped, free, pinned
+from rodfem.branch import BRANCH_POINT, FOLD, IMPERFECT
+from rodfem.continuation import Follower
+from rodfem.explore import Explorer
+from rodfem.report import Report
+from rodfem.system import System
+from rodfem.unfolding import unfold
+
+EULER = pi**2 / 4
+
+
+def cantilever(lateral: float, more: Any = None) -> Scene:
+    """A column that bends in the plane of e2, under a dead load -P along e3 and a small one along e2."""
+    ends = (clamped(), free(lambda c: (0.0, c.e, -c.P)))
+    return column(
+        "cantilever", ends, (0.0, 4.0), constants={"e": lateral},
+        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[1]),
+    )  # fmt: skip
+
+
+def diagram(scene: Scene, depth: int = 1, mesh: Discretization | None = None, **plan: Any) -> Found:
+    """Branches of a scene and their solver, with the default steps."""
+    solver = Follower(System(scene, mesh or Discretization("reduced", 8, 6)))
+    explorer = Explorer(
+        solver, Plan(scene.span, depth=depth, error_bars=False, **plan), Report(quiet=True), lambda: None
+    )
+    return Found(solver, explorer.run())
+
+
+def load_of(k: float, lateral: float, side: float) -> float:
+    """Load P at which an elastica of modulus ``k`` is in equilibrium with the lateral load.
+
+    The resultant R = (P^2 + e^2)^(1/2) makes the angle d = atan(e/P) with the axis.  The angle of the rod from R obeys
+    a'' = -R sin a, is d at the clamp and sin(a/2) = k at the tip: sqrt(R) = K(k) - side F(asin(sin(d/2)/k), k), with
+    ``side`` 1 where the rod bends to the side of the lateral load and -1 where it bends against it.
+    """
+
+    def misfit(P: float) -> float:
+        d = np.arctan2(lateral, P)
+        amplitude = np.arcsin(min(np.sin(d / 2) / k, 1.0))
+        return np.hypot(P, lateral) - (ellipk(k * k) - side * ellipkinc(amplitude, k * k)) ** 2
+
+    return float(brentq(misfit, 0.5, 20.0, xtol=1e-15, rtol=1e-15))
+
+
+def fold_of(lateral: float) -> float:
+    """Least load of the branch that bends against the lateral load."""
+    expected = np.log((lateral / EULER) ** (1 / 3))
+    found = minimize_scalar(
+        lambda x: load_of(np.exp(x), lateral, -1.0), bracket=(expected - 0.7, expected, expected + 0.7), tol=1e-9
+    )
+    return float(found.fun)
+
+
+@pytest.mark.parametrize("lateral", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_both_pieces_of_a_broken_pitchfork(lateral: float) -> None:
+    """The first branch is stable all along; the detached one has a fold, and no branch point is left.
+
+    Folds as recorded by an independent program: 2.48237448836, 2.46755109761, 2.46740260027 for 1e-3, 1e-6, 1e-9.
+    """
+    found = diagram(cantilever(lateral))
+    first = found.branches[0]
+    assert {p.negative for p in first.points} == {0}
+    assert [s.kind for s in first.special] == ["end"]
+    tip = first.points[-1].ordinate
+    if lateral > 1e-4:  # steps do not jump there, and nothing tells of the detached branch: a search finds it
+        found = diagram(cantilever(lateral), at=(3.0,), tries=24)
+    assert len(found.branches) == 2
+    detached = found.branches[1]
+    (fold,) = [s for s in detached.special if s.kind in (FOLD, BRANCH_POINT, IMPERFECT)]
+    assert fold.kind == FOLD
+    assert fold.point.load == pytest.approx(fold_of(lateral), abs=2e-11)
+    assert {fold.negative_before, fold.negative_after} == {0, 1}
+    assert not detached.unexplained
+    against = min(p.ordinate for p in detached.points)
+    assert against == pytest.approx(-tip, abs=10 * lateral + 1e-9)
+    assert {round(p.load, 9) for p in (detached.points[0], detached.points[-1])} == {4.0}
+
+
+def test_unfolding_is_the_work_of_the_imperfection() -> None:
+    """``beta`` is minus the work of the lateral load on the null vector, sin(pi s / 2) sqrt(2) of unit size."""
+    values = []
+    for lateral in (0.0, 1e-6):
+        straight = diagram(cantilever(0.0), depth=0)
+        special = straight.special()[0]
+        solver = Follower(System(cantilever(lateral), Discretization("reduced", 8, 6)))
+        found = unfold(solver, special)
+        assert found is not None
+        assert found.load == pytest.approx(EULER, abs=1e-11)
+        values.append(found)
+    assert values[0].size <= values[0].noise
+    work = 1e-6 * np.sqrt(2) * 2 / pi  # of the lateral load on r2(1) = int theta ds
+    assert values[1].size == pytest.approx(work, rel=1e-6)
+    assert values[1].size > values[1].noise
+
+
+def test_perfect_points_stay_what_they_are() -> None:
+    found = diagram(cantilever(0.0))
+    (special,) = found.special()
+    assert special.kind == BRANCH_POINT
+    assert special.unfolding < 1e-14
+    assert special.point.load == pytest.approx(EULER, abs=2e-12)
+    assert special.law is not None
+    assert special.law.kind == "supercritical pitchfork"
+
+
+def test_a_mesh_without_the_symmetry_of_the_rod() -> None:
+    """Unequal elements take a pitchfork apart that the reversal of the rod makes: a richer mesh tells."""
+    ends = (pinned(), pinned(ON_AXIS, push))
+    scene = column(
+        "arch", ends, (0.0, 12.0), constants={"B2": 3.0}, ordinate=Ordinate("middle", s=0.5, of=lambda r, q: r[1]),
+        energy=lambda v, k, c: 0.5 * ((k[0] - 0.3) ** 2 + c.B2 * k[1] ** 2 + c.C * k[2] ** 2),
+    )  # fmt: skip
+    graded = Discretization("reduced", 4, 4, (0.0, 0.1, 0.35, 0.8, 1.0))
+    kinds = {s.kind for b in diagram(scene, 0, graded).branches for s in b.special}
+    assert IMPERFECT not in kinds
+
+
+def test_what_steps_do_not_resolve_is_called_imperfect() -> None:
+    """The bend of 1e-13 is sharper than the least step: the point is recorded with the size of its unfolding."""
+    found = diagram(cantilever(1e-13), depth=0)
+    (special,) = [s for s in found.branches[0].special if s.kind != "end"]
+    assert special.kind == IMPERFECT
+    assert special.note == "imperfect, unfolding 9e-14"
+    assert special.unfolding == pytest.approx(1e-13 * np.sqrt(2) * 2 / pi, rel=1e-3)
+
+
+@pytest.mark.parametrize("beside", [1e-12, 1e-9, 1e-6])
+def test_a_load_beside_a_branch_point(beside: float) -> None:
+    """The branch that leaves there has its row at that load, and goes on: sqrt(P) = K(k), tip 2 k / sqrt(P).
+
+    The tip grows with the root of what P exceeds the critical load by, which round-off changes by 4e-15.
+    """
+    scene = column("beside", SUPPORTS["clamped-free"], (0.0, 4.0), ordinate=cantilever(0.0).ordinate)
+    found = diagram(scene, at=(EULER + beside,))
+    buckled = found.branches[1]
+    assert buckled.ended == "end of range"
+    (row,) = [s.point for s in buckled.special if s.kind == "user"]
+    assert row.load == EULER + beside
+    k = brentq(lambda k: ellipk(k * k) ** 2 - row.load, 1e-9, 0.9, xtol=1e-16)
+    expected = 2 * k / np.sqrt(row.load)
+    assert abs(row.ordinate) == pytest.approx(expected, rel=4e-15 / beside + 1e-8)
+
+
+def test_a_search_finds_the_detached_branch_once() -> None:
+    """Its mirror image is nearly an equilibrium at 1e-9: deflating that would hide it."""
+    found = diagram(cantilever(1e-9), 0, at=(3.0,), tries=2)
+    assert [b.name for b in found.branches] == ["straight", "found 1 at 3"]
+    assert [s.kind for s in found.branches[1].special if s.kind != "user"] == ["end", "fold", "end"]
