@@ -53,13 +53,6 @@ class Law:
     uncertainty: float
     side: int
 
-    def __str__(self) -> str:
-        """Return the law in words."""
-        if self.side == 0:
-            return f"{self.kind}: a family of equilibria at one and the same load"
-        x = "x" if self.power == 1 else f"x^{self.power}"
-        return f"{self.kind}, load = load_b {self.coefficient:+.6g} {x} + ... (+-{self.uncertainty:.0e})"
-
     def judge(self, index_below: int, index_above: int) -> None:
         """Name a pitchfork by the index of the branch that it leaves at loads just below and just above."""
         if self.kind == "pitchfork":

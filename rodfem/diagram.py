@@ -134,7 +134,7 @@ def _special_data(s: Special) -> dict[str, Any]:
         "coupling": s.coupling,
         "meets": list(s.meets) if s.meets else None,
         "omega2": _plain(s.omega2),
-        "law": None if s.law is None else asdict(s.law),
+        "law": None if s.law is None else asdict(s.law) | {"uncertainty": _plain(s.law.uncertainty)},
         "note": s.note,
     }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import isfinite
 
 from petsc4py import PETSc
 
@@ -13,7 +14,7 @@ from rodfem.branch import BRANCH_POINT, Branch, Point, Special
 from rodfem.continuation import Follower
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.pitchfork import law_of
+from rodfem.pitchfork import law_of, origin_of
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.search.deflation import further, starts, states_at
@@ -155,7 +156,11 @@ class Explorer(Tracer):
             return
         from_the_side = special.zero_of == "slope"
         with self.follower.system.clock.purpose("location"):
-            special.law = law_of(self.follower, special, special.null_vectors[0] if from_the_side else direction)
+            way = special.null_vectors[0] if from_the_side else direction
+            special.law = law_of(self.follower, origin_of(self.follower, special), way)
+        if special.law is not None and isfinite(special.error_estimate):
+            with self.follower.system.clock.purpose("error bars"):
+                self.meshes.richer(special.point.mesh).law(special, way, special.law)
         if special.law is not None and not from_the_side:
             indices = special.negative_before, special.negative_after
             special.law.judge(*(indices if special.point.slope > 0 else reversed(indices)))

@@ -1,6 +1,6 @@
 """Watching over the accuracy of a branch while it is traced.
 
-The error of a point is computed one degree richer now and then; in between the decay of its Legendre coefficients
+The error of a point is computed on a richer mesh now and then; in between the decay of its Legendre coefficients
 tells how it has changed since (:mod:`rodfem.grading`), which costs next to nothing.  Where it is too large,
 :class:`TooCoarse` is raised: the explorer then has a mesh made for that very state, carries the last points over, and
 goes on there (:mod:`rodfem.meshes`).
@@ -150,10 +150,10 @@ class Watch:
         richer = self.meshes.richer(point.mesh)
         richer.follower.damp(self.meshes.followers[point.mesh].system.damping > 0)
         try:
-            x = richer.again(point, fixed_load=self._at_bound(point), sharp=self.accuracy < SHARP)
+            again = richer.again(point, fixed_load=self._at_bound(point))
         except ConvergenceError:
             return float("inf")
-        index, drifts = richer.follower.inertia.count(x), richer.system.active_drifts()
+        index, drifts = richer.follower.inertia.count(again.x), richer.system.active_drifts()
         apart = index.negative > point.negative + max(point.zero - drifts, 0) or point.negative > index.negative + max(
             index.zero - drifts, 0
         )
@@ -166,8 +166,10 @@ class Watch:
                 point,
                 float("inf"),
                 [m.copy() for m in modes],
-                why=f"index {point.negative}, {index.negative} one degree richer",
+                why=f"index {point.negative}, {index.negative} on a richer mesh",
             )
-        load, ordinate = richer.system.scalar(x), richer.follower.shape.ordinate(x)
-        pairs = (load, point.load), (ordinate, point.ordinate)
-        return max(1e-14, *(abs(a - b) / max(1.0, abs(b)) for a, b in pairs))
+        found = (
+            (point.load, again.load, again.load_left),
+            (point.ordinate, again.ordinate, again.ordinate_left),
+        )
+        return max(richer.bound(*values) / max(1.0, abs(values[0])) for values in found)
