@@ -1,98 +1,69 @@
 r"""Error bars: every special point is computed again on a richer discretisation, started from the first.
 
 Elements half as long, of one degree more.  With errors ``e`` of the first and ``e'`` of the richer result their
-difference is ``d = e - e'``, so that ``|e| <= |d| / (1 - |e' / e|)``.  What elements of length h and degree k miss of a
-state falls like h^(k+1), what they miss of loads and of positions at vertices like h^(2k): halving alone leaves at most
-``2^-(k+1)`` of an error, also where elements are so long that one degree more does not lower it, or turns its sign.
-To that bound comes what location and arithmetic leave open of the richer result.
+difference is ``d = e - e'``, so that ``|e| <= |d| / (1 - rho)`` with ``rho >= |e' / e|``.  Halving alone leaves
+``2^-(k+1)`` of what elements of degree k miss of a smooth state, and about the square of that of loads, and of
+positions at vertices.  How smooth it is the states themselves tell: by the last Legendre coefficients of the strains on
+the two meshes, whose ratio bounds that of loads and positions amply.  To that comes what location and arithmetic leave
+open of the richer result.
 
 The state, its tangent and the null vector are interpolated, so that this costs a few solves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.optimize import brentq
 
-from rodfem import compat
-from rodfem.branch import BRANCH_POINT, END, FOLD, Law, Point, Special
-from rodfem.continuation import Equilibria, Follower
+from rodfem.branch import BRANCH_POINT, FOLD, Law, Point, Special
+from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError
-from rodfem.fields import HIGHEST
+from rodfem.grading import Gauge, weights_of
 from rodfem.locate import WINDOW, refine
 from rodfem.newton import correct
 from rodfem.pitchfork import ROUND_OFF, Origin, law_of, ordinate_along
-from rodfem.system import System
+from rodfem.transfer import Transfer, richer_system
 
+AMPLE, MOST = 2.0, 0.75
+"""Times the ratio of the last coefficients that an error is taken to fall by, for one that is small by accident; and
+what is left at most: beyond, neither mesh resolves the state."""
+RESOLVED = 1e-9
+"""Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
 STEADY = 3.0
 """Times the change in one more step of Newton's method, that a result is uncertain by."""
 
 
-def richer_system(system: System) -> System:
-    """Return the system of the same rod on halves of its elements, of one degree more (but of the highest one)."""
-    d = system.fields.discretization
-    halves = replace(d, vertices=tuple(map(float, system.fields.all_vertices())))
-    finer = halves.finer(2, richer=int(d.degree < HIGHEST))
-    return System(system.scene, finer, system.comm, system.clock, symmetries=system.symmetries)
+def halved(degree: int) -> float:
+    """Part of the error of a smooth state, on elements of a degree, that ones half as long leave at most."""
+    return float(0.5 ** (degree + 1))
 
 
-def bound(value: float, richer: float, degree: int, left: float) -> float:
-    """Bound of the error of a value on elements of a ``degree``, where the ``richer`` one is uncertain by ``left``."""
-    return (abs(richer - value) + left) / (1 - 0.5 ** (degree + 1))
-
-
-class Transfer:
-    """Interpolates vectors of one system to another whose elements are those of the first, or parts of them."""
-
-    def __init__(self, source: System, target: System) -> None:
-        """Tabulate the bases of the source at the nodes of the target."""
-        self.source, self.target = source, target
-        old, new = source.fields, target.fields
-        vertices = old.all_vertices()
-        self._owned = slice(0, old.owned_cells)
-        self._order = np.argsort(np.concatenate(source.comm.allgather(old.vertices[self._owned, 0])))
-        self._parents = np.searchsorted(vertices, new.vertices.mean(axis=1)) - 1
-        first, size = vertices[self._parents, None], np.diff(vertices)[self._parents, None]
-        places, which = np.unique(np.round((new.vertices - first) / size, 9), axis=0, return_inverse=True)
-        self._members = [np.flatnonzero(which.ravel() == i) for i in range(len(places))]
-        degrees = {b.name: b.degree for b in old.blocks}
-        self._bases = {
-            b.name: [compat.lagrange_basis(degrees[b.name], a + (z - a) * compat.nodes(b.degree)) for a, z in places]
-            for b in new.blocks
-        }
-
-    def __call__(self, vector: PETSc.Vec, *, state: bool) -> PETSc.Vec:
-        """Interpolate a state, or (``state=False``) a direction, which is zero where a state is clamped."""
-        old, new = self.source.fields, self.target.fields
-        clamped = new.u.x.array.copy()
-        self.source.bring(vector)
-        values = old.u.x.array.copy()
-        if not state:
-            values[old.number < 0] = 0.0
-        for name, bases in self._bases.items():
-            every = np.concatenate(self.source.comm.allgather(values[old.dofs[name][self._owned]]))[self._order]
-            for members, basis in zip(self._members, bases, strict=True):
-                new.u.x.array[new.dofs[name][members]] = np.einsum("pn,cni->cpi", basis, every[self._parents[members]])
-        new.u.x.array[new.copies] = values[old.copies[0]]
-        out = self.target.take()
-        fixed = new.number < 0
-        new.u.x.array[fixed] = clamped[fixed]
-        return out
+def bound(value: complex, richer: complex, left: float, rho: float) -> float:
+    """Bound of the error of a value of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``."""
+    return (abs(richer - value) + left) / (1 - rho)
 
 
 @dataclass(frozen=True)
 class Again:
-    """A point computed again: state, load and ordinate, and what location and arithmetic leave open of these two."""
+    """A point computed again: state, load and ordinate, what location and arithmetic leave open of these two.
+
+    ``rho`` is the part of the errors of the first discretisation that is left.
+    """
 
     x: PETSc.Vec
     load: float
     ordinate: float
     load_left: float
     ordinate_left: float
+    rho: float
+
+    def errors(self, point: Point) -> tuple[float, float]:
+        """Bounds of the errors in load and ordinate of the point as first computed."""
+        load = bound(point.load, self.load, self.load_left, self.rho)
+        return load, bound(point.ordinate, self.ordinate, self.ordinate_left, self.rho)
 
 
 class Richer:
@@ -103,11 +74,17 @@ class Richer:
         self.coarse, self.system = follower, richer_system(follower.system)
         self.follower = Follower(self.system)
         self.transfer = Transfer(follower.system, self.system)
-        self._origins: list[tuple[Special, Origin]] = []
+        self._origins: list[tuple[Special, Origin, float]] = []
+        weights = weights_of(self.system.scene)
+        self._gauges = Gauge(follower, weights), Gauge(self.follower, weights)
 
-    def bound(self, value: float, richer: float, left: float) -> float:
-        """Bound of the error of a value of the first discretisation; see :func:`bound`."""
-        return bound(value, richer, self.coarse.system.fields.discretization.degree, left)
+    def rho(self, before: Sequence[PETSc.Vec], after: Sequence[PETSc.Vec]) -> float:
+        """Part of the errors of a state (and its null vector) that is left on the richer discretisation."""
+        degree = self.coarse.system.fields.discretization.degree
+        first, last = (g.unresolved(x, more) for g, (x, *more) in zip(self._gauges, (before, after), strict=True))
+        if degree < 3 or last < RESOLVED:  # the last coefficients are the strains themselves, or round-off
+            return halved(degree)
+        return max(halved(degree), min(AMPLE * last / max(first, RESOLVED), MOST))
 
     def estimate(self, special: Special) -> None:
         """Set ``error_estimate`` and ``ordinate_error`` of a special point, bounds of what it may be in error by.
@@ -115,7 +92,7 @@ class Richer:
         They are infinite where the richer discretisation does not find the point.
         """
         if special.zero_of == "stretch":
-            return  # it has its own estimate: see zero_stretch
+            return  # it has its own estimate: see :mod:`rodfem.zero_stretch`
         point, at_a_load = special.point, special.kind not in (FOLD, BRANCH_POINT)
         self.system.damping = self.coarse.system.damping
         try:
@@ -124,9 +101,8 @@ class Richer:
             special.error_estimate = special.ordinate_error = float("inf")
             special.note = f"no error estimate: {trouble}"
             return
-        special.ordinate_error = self.bound(point.ordinate, again.ordinate, again.ordinate_left)
-        load_error = max(self.bound(point.load, again.load, again.load_left), special.located_to)
-        special.error_estimate = special.ordinate_error if at_a_load else load_error
+        load_error, special.ordinate_error = again.errors(point)
+        special.error_estimate = special.ordinate_error if at_a_load else max(load_error, special.located_to)
 
     def again(self, point: Point, *, fixed_load: bool) -> Again:
         """Solve for a point on the richer discretisation, at its load or across its tangent.
@@ -150,18 +126,20 @@ class Richer:
         x.axpy(-1.0, step)
         last = system.scalar(x), self.follower.shape.ordinate(x)
         moved = np.abs(np.subtract(last, (load, ordinate)))
-        return Again(x, *last, *(STEADY * moved + ROUND_OFF * np.maximum(1.0, np.abs(last))))
+        left = STEADY * moved + ROUND_OFF * np.maximum(1.0, np.abs(last))
+        return Again(x, *last, float(left[0]), float(left[1]), self.rho([point.x], [x]))
 
     def law(self, special: Special, direction: PETSc.Vec, law: Law) -> None:
         """Set the uncertainty of a law of the first discretisation: that of the rod's law, infinite without another."""
-        origin = next((o for known, o in self._origins if known is special), None)
         self.system.damping = self.coarse.system.damping
-        way = self.transfer(direction, state=False)
-        again = None if origin is None else law_of(self.follower, origin, way)
+        way, again, rho = self.transfer(direction, state=False), None, 0.0
+        for known, origin, left in self._origins:
+            if known is special:
+                again, rho = law_of(self.follower, origin, way), left
         if again is None or (again.kind, again.power) != (law.kind, law.power):
             law.uncertainty = float("inf")
         else:
-            law.uncertainty = self.bound(law.coefficient, again.coefficient, again.uncertainty)
+            law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
 
     def _located(self, special: Special) -> Again:
         """The fold or branch point on the richer discretisation, and its ordinate."""
@@ -182,55 +160,6 @@ class Richer:
         ordinate = follower.shape.ordinate(found.x)
         slope = ordinate_along(follower, found.x, found.tangent)
         left = abs(slope) * found.along + ROUND_OFF * max(1.0, abs(ordinate))
-        self._origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left)))
-        return Again(found.x, found.load, ordinate, found.uncertainty, left)
-
-
-def zero_stretch(follower: Follower, coarse: Point) -> Special:
-    """Sharpen the point at which the smallest stretch vanishes; raises :class:`ConvergenceError` where that fails.
-
-    A strain converges like ``h^k`` only, far slower than a load does.  The point is computed on meshes two and
-    four times as fine, one degree richer (the forms of :class:`Richer` serve); the finer one is kept.  Its error is a
-    quarter of their difference at most, all of it for linear elements.
-    """
-    system, d = follower.system, follower.system.fields.discretization
-    sample = follower.shape.sample(coarse.x)
-    found: list[tuple[float, float, float, float]] = []
-    for factor in (2, 4):
-        mesh = d.finer(factor, richer=int(d.degree < HIGHEST))
-        fine = Equilibria(System(system.scene, mesh, system.comm, system.clock, symmetries=system.symmetries))
-        state = fine.shape.restore(sample)
-
-        def stretch(load: float, fine: Equilibria = fine, guess: PETSc.Vec = state) -> float:
-            fine.system.set_phase(guess)
-            x, outcome = fine.at_load(guess, load, reach=1.0)
-            if not outcome.converged:
-                raise ConvergenceError(f"no equilibrium near load {load:.8g} on the finer mesh")
-            x.copy(guess)
-            return fine.shape.stretch(guess)
-
-        load = _bracketed_zero(stretch, coarse, abs(system.scene.span[1] - system.scene.span[0]))
-        last = stretch(load)
-        found.append((load, fine.shape.ordinate(state), fine.energy(state), last))
-        sample = fine.shape.sample(state)
-    (load2, ordinate2, *_), (load, ordinate, energy, last) = found
-    x = follower.shape.restore(sample)
-    point = replace(coarse, x=x, load=load, ordinate=ordinate, energy=energy, stretch=last)
-    special = Special(END, point, point.negative, point.negative, 1e-10 * max(1.0, abs(load)), zero_of="stretch")
-    left = 1.0 if d.degree == 1 else 0.25
-    special.error_estimate = max(left * abs(load - load2), special.located_to)
-    special.ordinate_error = max(left * abs(ordinate - ordinate2), special.located_to)
-    special.note = f"computed with {4 * d.elements} elements of degree {d.degree + 1}"
-    return special
-
-
-def _bracketed_zero(stretch: Callable[[float], float], coarse: Point, span: float) -> float:
-    """Load at which ``stretch`` vanishes: bracketed by steps from the coarse load along the branch, then solved for."""
-    a, value = coarse.load, stretch(coarse.load)
-    step = np.copysign(2e-4 * span, coarse.slope if value > 0 else -coarse.slope)
-    for _ in range(14):
-        b, other = a + step, stretch(a + step)
-        if value * other <= 0:
-            return float(brentq(stretch, a, b, xtol=1e-12 * span))
-        a, value, step = b, other, 1.7 * step
-    raise ConvergenceError("the zero of the stretch was not found on the finer mesh")
+        rho = self.rho([point.x, special.null_vectors[0]], [found.x, follower.inertia.sharpened(mode)])
+        self._origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
+        return Again(found.x, found.load, ordinate, found.uncertainty, left, rho)

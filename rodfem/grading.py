@@ -90,6 +90,20 @@ class Gauge:
 
     def __call__(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec] = ()) -> Smoothness:
         """Smoothness of a state and of changes of it (null vectors) together."""
+        shape = self.solver.shape
+        starts, rows = shape.gather(shape.start), shape.gather(self._squares(x, directions))
+        order = np.argsort(starts)
+        vertices = np.append(starts[order], self.solver.system.scene.interval[1])
+        return _decay(vertices, np.sqrt(rows[order]))
+
+    def unresolved(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec] = ()) -> float:
+        """Norm of the last two coefficients over that of all, or one, of a state and of changes of it together."""
+        system = self.solver.system
+        parts = system.comm.allreduce(self.solver.shape.size @ self._squares(x, directions))
+        return float(np.sqrt(parts[-2:].sum() / max(parts.sum(), system.scene.length)))
+
+    def _squares(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec]) -> np.ndarray:
+        """Squared coefficients of the strains on the elements of this rank, (elements, degree)."""
         fields, shape = self.solver.system.fields, self.solver.shape
         squares = np.zeros((fields.owned_cells, fields.discretization.degree))
         for vector in (x, *directions):
@@ -102,10 +116,7 @@ class Gauge:
                 if name == fields.turning.name:
                     series *= (2 / shape.size)[:, None, None]
                 squares += series**2 @ weights**2
-        starts, rows = shape.gather(shape.start), shape.gather(squares)
-        order = np.argsort(starts)
-        vertices = np.append(starts[order], self.solver.system.scene.interval[1])
-        return _decay(vertices, np.sqrt(rows[order]))
+        return squares
 
 
 def weights_of(scene: Scene) -> list[tuple[str, np.ndarray]]:

@@ -11,22 +11,22 @@ passes through zero the rod diverges: the eigenvalue itself is smooth there.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 from scipy.optimize import brentq, newton
 
-from rodfem.accuracy import Transfer
+from rodfem.accuracy import bound, halved
 from rodfem.branch import DIVERGENCE, END, FLUTTER, USER, Branch, Point, Special
 from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError
 from rodfem.locate import real_root, zero_uncertainty
+from rodfem.pitchfork import ROUND_OFF
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.stability.vibration import Frequencies, Vibration
-from rodfem.system import System
+from rodfem.transfer import Transfer, richer_system
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
@@ -36,6 +36,8 @@ SEEN = 0.5
 """A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
+MEAN = 10.0
+"""Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
 REAL = 1e-7
 """An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
 
@@ -212,23 +214,22 @@ class Sweep:
     def _error_bars(self, branch: Branch) -> None:
         with self.solver.system.clock.purpose("error bars"):
             system = self.solver.system
-            d = system.fields.discretization
-            richer = Equilibria(
-                System(system.scene, replace(d, degree=d.degree + 1), system.comm, system.clock, system.fields.mesh)
-            )
+            richer = Equilibria(richer_system(system))
             vibration, transfer = Vibration(richer.system), Transfer(system, richer.system)
+            rho = halved(system.fields.discretization.degree)
             for s in branch.special:
-                floor = max(s.located_to, 1e-12 * max(1.0, abs(s.point.load)))
-                guess = transfer(s.point.x, state=True)
-                x = at_load(richer, guess, s.point.load)
-                s.ordinate_error = max(abs(richer.shape.ordinate(x) - s.point.ordinate), floor)
-                s.error_estimate = s.ordinate_error
+                point = s.point
+                guess = transfer(point.x, state=True)
+                x = at_load(richer, guess, point.load)
+                left = ROUND_OFF * max(1.0, abs(point.ordinate))
+                s.ordinate_error = s.error_estimate = bound(point.ordinate, richer.shape.ordinate(x), left, rho)
                 if s.kind == FLUTTER:
-                    load, _, mu = self._richer_flutter(richer, vibration, guess, s)
-                    s.error_estimate = max(abs(load - s.point.load), floor)
-                    s.omega2_error = max(abs(mu - s.omega2), 1e-12 * abs(mu))
+                    load, left, mu = self._richer_flutter(richer, vibration, guess, s)
+                    s.error_estimate = max(bound(point.load, load, left, rho), s.located_to)
+                    s.omega2_error = bound(s.omega2, mu, MEAN * abs(mu) * max(left / abs(load), ROUND_OFF), rho)
                 elif s.kind == DIVERGENCE:
-                    s.error_estimate = max(abs(_zero(richer, vibration, x, s.point.load) - s.point.load), floor)
+                    load = _zero(richer, vibration, x, point.load)
+                    s.error_estimate = max(bound(point.load, load, s.located_to, rho), s.located_to)
                 asked = self.plan.accuracy
                 if asked is not None and s.error_estimate > asked * max(1.0, abs(s.point.load)):
                     s.note = s.note or f"accuracy {asked:g} not reached"

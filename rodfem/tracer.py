@@ -9,7 +9,6 @@ from math import isnan
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.accuracy import zero_stretch
 from rodfem.bifurcation import find_special, midpoint
 from rodfem.branch import BRANCH_POINT, END, USER, Branch, Point, Special
 from rodfem.continuation import VERTICAL, Follower, distance, follow, hermite
@@ -19,6 +18,7 @@ from rodfem.meshes import Meshes, TooCoarse
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.watch import Watch
+from rodfem.zero_stretch import zero_stretch
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""

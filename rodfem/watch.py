@@ -168,8 +168,5 @@ class Watch:
                 [m.copy() for m in modes],
                 why=f"index {point.negative}, {index.negative} on a richer mesh",
             )
-        found = (
-            (point.load, again.load, again.load_left),
-            (point.ordinate, again.ordinate, again.ordinate_left),
-        )
-        return max(richer.bound(*values) / max(1.0, abs(values[0])) for values in found)
+        values = point.load, point.ordinate
+        return max(e / max(1.0, abs(v)) for e, v in zip(again.errors(point), values, strict=True))

@@ -158,6 +158,13 @@ class Inertia:
             self.factors.solve(image, self.system.workspace)
             return 1.0 / image.dot(self.system.workspace) + self.shift
 
+    def sharpened(self, mode: PETSc.Vec) -> PETSc.Vec:
+        """Vector of metric norm 1 by one step of inverse iteration from ``mode``, with the factors last made."""
+        out = self.system.new_vector()
+        self.factors.solve(self.metric * mode, out)
+        out.scale(1.0 / np.sqrt(out.dot(self.metric * out).real))
+        return out
+
     def noise(self, mode: PETSc.Vec) -> float:
         r"""Round-off in the eigenvalue of a ``mode`` of metric norm 1, of the matrix last assembled.
 
