@@ -162,16 +162,16 @@ def interpolate(samples: list[Sample], zero_of: str, guess: float, noise: float 
     slope_at = float(chebyshev.chebval(root, slope))
     left = zero_uncertainty(f, root)
     tail = abs(load[-1]) + abs(slope_at) * left
-    uncertainty = max(tail, ROUND_OFF * max(1.0, abs(load_at)))
+    floor = ROUND_OFF * max(1.0, abs(load_at))
     moved = abs(noise / float(chebyshev.chebval(root, chebyshev.chebder(f)))) if zero_of == "mu" else 0.0
-    arithmetic = abs(slope_at) * moved
+    arithmetic = floor + abs(slope_at) * moved
     weights, slopes = _barycentric(t, root)
     states = [p.x for p in samples]
     x, tangent = combine(states, weights), combine(states, slopes / half)
     before = [p.below for p in samples if p.s < middle + half * root] or [samples[0].below]
     after = [p.below for p in samples if p.s >= middle + half * root] or [samples[-1].below]
     return Located(
-        *(middle + half * root, x, tangent, load_at, slope_at / half, uncertainty + arithmetic),
+        *(middle + half * root, x, tangent, load_at, slope_at / half, max(tail - floor, 0.0) + arithmetic),
         *(before[-1], after[0], half * (left + moved), arithmetic),
     )
 
