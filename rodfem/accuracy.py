@@ -43,7 +43,7 @@ def halved(degree: int) -> float:
 
 def bound(value: complex, richer: complex, left: float, rho: float) -> float:
     """Bound of the error of a value of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``."""
-    return (abs(richer - value) + left) / (1 - rho)
+    return abs(richer - value) / (1 - rho) + left
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ class Point:
 
 @dataclass
 class Law:
-    """``load = load_b + coefficient x^power + ...``, the uncertainty of the coefficient, and the kind of bifurcation.
+    """``load = load_b + coefficient x^power + ...``, a bound of the coefficient's error, and the kind of bifurcation.
 
     ``side`` is the sign of the load's change on the bifurcating branch.
     """
@@ -64,8 +64,9 @@ class Law:
 class Special:
     """A special point: what it is, how precisely it was located, its null vectors, and the index on either side.
 
-    ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` that of the
-    discretisation: of the load for folds and branch points, of the ordinate at user points and ends. ``coupling``
+    ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` bounds its error, that of the
+    discretisation included: of the load for folds and branch points, of the ordinate at user points and ends;
+    ``ordinate_error`` bounds that of the ordinate at all (see :mod:`rodfem.accuracy`). ``coupling``
     is the cosine between the null vector and the derivative of the equations in the load: zero at a branch point,
     not at a fold.
     """

@@ -4,7 +4,7 @@ On each element the Legendre coefficients of the strains (curvature and stretch,
 like ``A rho^-j``, for singularities of the state at a distance ``h (rho - 1/rho) / 4`` across the rod (Trefethen,
 Approximation Theory and Approximation Practice, chapter 8).  With elements of degree k the strains are missed by
 ``A rho^-k``, and loads and positions, being stationary, by the *square* of that, integrated along the rod; the factor
-in front is measured by a computation one degree richer.  On an element of another size the distance stays, and ``rho``
+in front is measured by a computation on a richer mesh.  On an element of another size the distance stays, and ``rho``
 follows: how large an element may be at each place is had in closed form.
 """
 

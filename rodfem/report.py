@@ -45,9 +45,8 @@ def _law(law: Law) -> str:
     """Local law of a branch point in words."""
     if law.side == 0:
         return f"{law.kind}: a family of equilibria at one and the same load"
-    value, _, bar = number(abs(law.coefficient), law.uncertainty).partition(" ")
-    x = "x" if law.power == 1 else f"x^{law.power}"
-    return f"{law.kind}, load = load_b {'-' if law.coefficient < 0 else '+'} {value} {x} + ... {bar}"
+    sign, x = "-" if law.coefficient < 0 else "+", "x" if law.power == 1 else f"x^{law.power}"
+    return f"{law.kind}, load = load_b {sign} {number(abs(law.coefficient), law.uncertainty)} {x} + ..."
 
 
 def _index(special: Special) -> str:
@@ -133,9 +132,7 @@ class Report:
     def accuracy(self, used: Sequence[System], worst: float, asked: float) -> None:
         """Say with which meshes a branch was traced, and the error of the worst of its points."""
         word = "" if worst <= asked else f", above the {asked:g} asked for"
-        self.say(
-            f"  largest estimated error {rounded_up(worst):.0e}{word}; {'; '.join(_mesh(system) for system in used)}"
-        )
+        self.say(f"  largest error {rounded_up(worst):.0e}{word}; {'; '.join(_mesh(system) for system in used)}")
 
     def branch(self, branch: Branch) -> None:
         """Head a new branch."""
