@@ -117,7 +117,7 @@ class Meshes:
                     return known
         s = old.system
         with s.clock("setup"):
-            new = Follower(System(s.scene, mesh, s.comm, s.clock), old.modes)
+            new = Follower(System(s.scene, mesh, s.comm, s.clock, symmetries=s.symmetries), old.modes)
         new.mesh = len(self.followers)
         self.followers.append(new)
         return new
