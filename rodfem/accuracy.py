@@ -32,6 +32,8 @@ AMPLE, MOST = 2.0, 0.75
 what is left at most: beyond, neither mesh resolves the state."""
 RESOLVED = 1e-9
 """Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
+NARROW = 1 / 128
+"""Part of the usual window that is enough to find a special point again, beside itself."""
 STEADY = 3.0
 """Times the change in one more step of Newton's method, that a result is uncertain by."""
 
@@ -156,7 +158,10 @@ class Richer:
             y.axpy(s, tangent)
             return y, tangent
 
-        found = refine(follower, curve, 0.0, WINDOW / 8, mode, special.zero_of, beside=point.load)
+        try:
+            found = refine(follower, curve, 0.0, NARROW * WINDOW, mode, special.zero_of, beside=point.load)
+        except ConvergenceError:  # it lies farther away
+            found = refine(follower, curve, 0.0, WINDOW, mode, special.zero_of, beside=point.load)
         ordinate = follower.shape.ordinate(found.x)
         slope = ordinate_along(follower, found.x, found.tangent)
         left = abs(slope) * found.along + ROUND_OFF * max(1.0, abs(ordinate))

@@ -20,7 +20,8 @@ from rodfem.errors import ConvergenceError
 from rodfem.newton import correct
 from rodfem.system import System, combine
 
-NODES = 6
+NODES, FEWER = 6, 4
+"""Number of nodes of an interpolant, and of one over a very short piece."""
 WINDOW = 0.02
 """Half length of the piece of a branch, in the metric, on which a special point is interpolated."""
 ROUND_OFF = 1e-12
@@ -211,11 +212,12 @@ def refine(
     """Solve at Chebyshev nodes around ``center``, moved until the zero lies among them, shrunk until it is sharp.
 
     Where only the distance of its load from the one ``beside`` it is wanted, that to :data:`PART` of itself is sharp
-    enough, and nothing is counted.
+    enough, :data:`FEWER` nodes do, and nothing is counted.
     """
     best: Located | None = None
+    count = NODES if beside is None else FEWER
     for _ in range(10):
-        nodes = center + half * np.cos(np.pi * (np.arange(NODES)[::-1] + 0.5) / NODES)
+        nodes = center + half * np.cos(np.pi * (np.arange(count)[::-1] + 0.5) / count)
         samples = [sample(follower, curve, s, mode, counted=beside is None) for s in nodes]
         located = interpolate(samples, zero_of, center, follower.inertia.noise(mode))
         if located is not None and abs(located.s - center) <= half:
