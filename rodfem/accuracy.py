@@ -1,54 +1,71 @@
-"""Error bars: every special point is computed again on a richer discretisation, started from the first.
+r"""Error bars: every special point is computed again on a richer discretisation, started from the first.
 
-Same mesh, one degree more: with an error of order ``h^(2k)`` the richer result is much nearer to the truth, and
-the difference estimates the error of the first.  The state, its tangent and the null vector are interpolated, so
-that this costs a few solves.
+Elements half as long, of one degree more.  With errors ``e`` of the first and ``e'`` of the richer result their
+difference is ``d = e - e'``, so that ``|e| <= |d| / (1 - rho)`` with ``rho >= |e' / e|``.  Halving alone leaves
+``2^-(k+1)`` of what elements of degree k miss of a smooth state, and about the square of that of loads, and of
+positions at vertices.  How smooth it is the states themselves tell: by the last Legendre coefficients of the strains on
+the two meshes, whose ratio bounds that of loads and positions amply.  To that comes what location and arithmetic leave
+open of the richer result.
+
+The state, its tangent and the null vector are interpolated, so that this costs a few solves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.optimize import brentq
 
-from rodfem import compat
-from rodfem.branch import BRANCH_POINT, END, FOLD, Point, Special
-from rodfem.continuation import Equilibria, Follower
+from rodfem.branch import BRANCH_POINT, FOLD, Law, Point, Special
+from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError
+from rodfem.grading import Gauge, weights_of
 from rodfem.locate import WINDOW, refine
 from rodfem.newton import correct
-from rodfem.system import System
+from rodfem.pitchfork import ROUND_OFF, Origin, law_of, ordinate_along
+from rodfem.transfer import Transfer, richer_system
+
+AMPLE, MOST = 2.0, 0.75
+"""Times the ratio of the last coefficients that an error is taken to fall by, for one that is small by accident; and
+what is left at most: beyond, neither mesh resolves the state."""
+RESOLVED = 1e-9
+"""Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
+NARROW = 1 / 128
+"""Part of the usual window that is enough to find a special point again, beside itself."""
+STEADY = 3.0
+"""Times the change in one more step of Newton's method, that a result is uncertain by."""
 
 
-class Transfer:
-    """Interpolates vectors of one system to another on the same mesh with another degree."""
+def halved(degree: int) -> float:
+    """Part of the error of a smooth state, on elements of a degree, that ones half as long leave at most."""
+    return float(0.5 ** (degree + 1))
 
-    def __init__(self, source: System, target: System) -> None:
-        """Tabulate the bases of the source at the nodes of the target."""
-        self.source, self.target = source, target
-        degrees = {b.name: b.degree for b in source.fields.blocks}
-        self.bases = {
-            b.name: compat.lagrange_basis(degrees[b.name], compat.nodes(b.degree)) for b in target.fields.blocks
-        }
 
-    def __call__(self, vector: PETSc.Vec, *, state: bool) -> PETSc.Vec:
-        """Interpolate a state, or (``state=False``) a direction, which is zero where a state is clamped."""
-        old, new = self.source.fields, self.target.fields
-        clamped = new.u.x.array.copy()
-        self.source.bring(vector)
-        values = old.u.x.array.copy()
-        if not state:
-            values[old.number < 0] = 0.0
-        for name, basis in self.bases.items():
-            new.u.x.array[new.dofs[name]] = np.einsum("pn,cni->cpi", basis, values[old.dofs[name]])
-        new.u.x.array[new.copies] = values[old.copies]
-        out = self.target.take()
-        fixed = new.number < 0
-        new.u.x.array[fixed] = clamped[fixed]
-        return out
+def bound(value: complex, richer: complex, left: float, rho: float) -> float:
+    """Bound of the error of a value of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``."""
+    return abs(richer - value) / (1 - rho) + left
+
+
+@dataclass(frozen=True)
+class Again:
+    """A point computed again: state, load and ordinate, what location and arithmetic leave open of these two.
+
+    ``rho`` is the part of the errors of the first discretisation that is left.
+    """
+
+    x: PETSc.Vec
+    load: float
+    ordinate: float
+    load_left: float
+    ordinate_left: float
+    rho: float
+
+    def errors(self, point: Point) -> tuple[float, float]:
+        """Bounds of the errors in load and ordinate of the point as first computed."""
+        load = bound(point.load, self.load, self.load_left, self.rho)
+        return load, bound(point.ordinate, self.ordinate, self.ordinate_left, self.rho)
 
 
 class Richer:
@@ -56,55 +73,79 @@ class Richer:
 
     def __init__(self, follower: Follower) -> None:
         """Compile and allocate the richer system."""
-        self.coarse, system = follower, follower.system
-        d = system.fields.discretization
-        self.system = System(
-            system.scene, replace(d, degree=d.degree + 1), system.comm, system.clock, system.fields.mesh
-        )
+        self.coarse, self.system = follower, richer_system(follower.system)
         self.follower = Follower(self.system)
-        self.transfer = Transfer(system, self.system)
+        self.transfer = Transfer(follower.system, self.system)
+        self._origins: list[tuple[Special, Origin, float]] = []
+        weights = weights_of(self.system.scene)
+        self._gauges = Gauge(follower, weights), Gauge(self.follower, weights)
+
+    def rho(self, before: Sequence[PETSc.Vec], after: Sequence[PETSc.Vec]) -> float:
+        """Part of the errors of a state (and its null vector) that is left on the richer discretisation."""
+        degree = self.coarse.system.fields.discretization.degree
+        first, last = (g.unresolved(x, more) for g, (x, *more) in zip(self._gauges, (before, after), strict=True))
+        if degree < 3 or last < RESOLVED:  # the last coefficients are the strains themselves, or round-off
+            return halved(degree)
+        return max(halved(degree), min(AMPLE * last / max(first, RESOLVED), MOST))
 
     def estimate(self, special: Special) -> None:
-        """Set ``error_estimate`` and ``ordinate_error`` of a special point.
+        """Set ``error_estimate`` and ``ordinate_error`` of a special point, bounds of what it may be in error by.
 
-        They are never below what the location and the arithmetic leave uncertain, and infinite where the richer
-        discretisation does not find the point.
+        They are infinite where the richer discretisation does not find the point.
         """
         if special.zero_of == "stretch":
-            return  # it has its own estimate: see zero_stretch
-        floor = max(special.located_to, 1e-12 * max(1.0, abs(special.point.load)))
+            return  # it has its own estimate: see :mod:`rodfem.zero_stretch`
+        point, at_a_load = special.point, special.kind not in (FOLD, BRANCH_POINT)
+        self.system.damping = self.coarse.system.damping
         try:
-            load, ordinate = self._again(special)
+            again = self.again(point, fixed_load=True) if at_a_load else self._located(special)
         except ConvergenceError as trouble:
             special.error_estimate = special.ordinate_error = float("inf")
             special.note = f"no error estimate: {trouble}"
             return
-        special.ordinate_error = max(abs(ordinate - special.point.ordinate), floor)
-        at_a_load = special.kind not in (FOLD, BRANCH_POINT)
-        special.error_estimate = special.ordinate_error if at_a_load else max(abs(load - special.point.load), floor)
+        load_error, special.ordinate_error = again.errors(point)
+        special.error_estimate = special.ordinate_error if at_a_load else max(load_error, special.located_to)
 
-    def again(self, point: Point, *, fixed_load: bool, sharp: bool = False) -> PETSc.Vec:
-        """State of a point on the richer discretisation, at its load or across its tangent, ``sharp`` to round-off.
+    def again(self, point: Point, *, fixed_load: bool) -> Again:
+        """Solve for a point on the richer discretisation, at its load or across its tangent.
 
-        Raises :class:`ConvergenceError` where there is none.
+        One more step of Newton's method tells what arithmetic leaves open.  Raises :class:`ConvergenceError` where
+        there is no such point.
         """
-        x = self.transfer(point.x, state=True)
+        system, x = self.system, self.transfer(point.x, state=True)
         row = self.follower.axis
         if not fixed_load and point.tangent is not None:
             row = self.follower.row(self.transfer(point.tangent, state=False))
-        self.system.set_phase(x)
-        if not all(correct(self.system, x, row, reach=1.0).converged for _ in range(1 + sharp)):
+        system.set_phase(x)
+        if not correct(system, x, row, reach=1.0).converged:
             raise ConvergenceError(
                 f"the richer discretisation has no equilibrium near load {point.load:.8g}: use more elements"
             )
-        return x
+        load, ordinate = system.scalar(x), self.follower.shape.ordinate(x)
+        equations, step = system.new_vector(), system.new_vector()
+        system.residual(x, equations)
+        system.solve(equations, step)
+        x.axpy(-1.0, step)
+        last = system.scalar(x), self.follower.shape.ordinate(x)
+        moved = np.abs(np.subtract(last, (load, ordinate)))
+        left = STEADY * moved + ROUND_OFF * np.maximum(1.0, np.abs(last))
+        return Again(x, *last, float(left[0]), float(left[1]), self.rho([point.x], [x]))
 
-    def _again(self, special: Special) -> tuple[float, float]:
-        """Load and ordinate of the special point on the richer discretisation."""
-        follower, point = self.follower, special.point
+    def law(self, special: Special, direction: PETSc.Vec, law: Law) -> None:
+        """Set the uncertainty of a law of the first discretisation: that of the rod's law, infinite without another."""
         self.system.damping = self.coarse.system.damping
-        if special.kind not in (FOLD, BRANCH_POINT):
-            return point.load, follower.shape.ordinate(self.again(point, fixed_load=True))
+        way, again, rho = self.transfer(direction, state=False), None, 0.0
+        for known, origin, left in self._origins:
+            if known is special:
+                again, rho = law_of(self.follower, origin, way), left
+        if again is None or (again.kind, again.power) != (law.kind, law.power):
+            law.uncertainty = float("inf")
+        else:
+            law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
+
+    def _located(self, special: Special) -> Again:
+        """The fold or branch point on the richer discretisation, and its ordinate."""
+        follower, point = self.follower, special.point
         if point.tangent is None:
             raise ConvergenceError("the branch has no tangent there")
         x = self.transfer(point.x, state=True)
@@ -117,54 +158,13 @@ class Richer:
             y.axpy(s, tangent)
             return y, tangent
 
-        located = refine(follower, curve, 0.0, WINDOW / 2, mode, special.zero_of)
-        return located.load, follower.shape.ordinate(located.x)
-
-
-def zero_stretch(follower: Follower, coarse: Point) -> Special:
-    """Sharpen the point at which the smallest stretch vanishes; raises :class:`ConvergenceError` where that fails.
-
-    A strain converges like ``h^k`` only, far slower than a load does.  The point is computed on meshes two and
-    four times as fine, one degree richer (the forms of :class:`Richer` serve); the finer one is kept, and their
-    difference is its error.
-    """
-    system, d = follower.system, follower.system.fields.discretization
-    sample = follower.shape.sample(coarse.x)
-    found: list[tuple[float, float, float, float]] = []
-    for factor in (2, 4):
-        fine = Equilibria(System(system.scene, d.finer(factor, richer=1), system.comm, system.clock))
-        state = fine.shape.restore(sample)
-
-        def stretch(load: float, fine: Equilibria = fine, guess: PETSc.Vec = state) -> float:
-            fine.system.set_phase(guess)
-            x, outcome = fine.at_load(guess, load, reach=1.0)
-            if not outcome.converged:
-                raise ConvergenceError(f"no equilibrium near load {load:.8g} on the finer mesh")
-            x.copy(guess)
-            return fine.shape.stretch(guess)
-
-        load = _bracketed_zero(stretch, coarse, abs(system.scene.span[1] - system.scene.span[0]))
-        last = stretch(load)
-        found.append((load, fine.shape.ordinate(state), fine.energy(state), last))
-        sample = fine.shape.sample(state)
-    (load2, ordinate2, *_), (load, ordinate, energy, last) = found
-    x = follower.shape.restore(sample)
-    point = replace(coarse, x=x, load=load, ordinate=ordinate, energy=energy, stretch=last)
-    special = Special(END, point, point.negative, point.negative, 1e-10 * max(1.0, abs(load)), zero_of="stretch")
-    left = 1.0 if d.degree == 1 else 0.25
-    special.error_estimate = max(left * abs(load - load2), special.located_to)
-    special.ordinate_error = max(left * abs(ordinate - ordinate2), special.located_to)
-    special.note = f"computed with {4 * d.elements} elements of degree {d.degree + 1}"
-    return special
-
-
-def _bracketed_zero(stretch: Callable[[float], float], coarse: Point, span: float) -> float:
-    """Load at which ``stretch`` vanishes: bracketed by steps from the coarse load along the branch, then solved for."""
-    a, value = coarse.load, stretch(coarse.load)
-    step = np.copysign(2e-4 * span, coarse.slope if value > 0 else -coarse.slope)
-    for _ in range(14):
-        b, other = a + step, stretch(a + step)
-        if value * other <= 0:
-            return float(brentq(stretch, a, b, xtol=1e-12 * span))
-        a, value, step = b, other, 1.7 * step
-    raise ConvergenceError("the zero of the stretch was not found on the finer mesh")
+        try:
+            found = refine(follower, curve, 0.0, NARROW * WINDOW, mode, special.zero_of, beside=point.load)
+        except ConvergenceError:  # it lies farther away
+            found = refine(follower, curve, 0.0, WINDOW, mode, special.zero_of, beside=point.load)
+        ordinate = follower.shape.ordinate(found.x)
+        slope = ordinate_along(follower, found.x, found.tangent)
+        left = abs(slope) * found.along + ROUND_OFF * max(1.0, abs(ordinate))
+        rho = self.rho([point.x, special.null_vectors[0]], [found.x, follower.inertia.sharpened(mode)])
+        self._origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
+        return Again(found.x, found.load, ordinate, found.uncertainty, left, rho)

@@ -55,7 +55,7 @@ class Point:
 
 @dataclass
 class Law:
-    """``load = load_b + coefficient x^power + ...``, the uncertainty of the coefficient, and the kind of bifurcation.
+    """``load = load_b + coefficient x^power + ...``, a bound of the coefficient's error, and the kind of bifurcation.
 
     ``side`` is the sign of the load's change on the bifurcating branch.
     """
@@ -65,13 +65,6 @@ class Law:
     power: int
     uncertainty: float
     side: int
-
-    def __str__(self) -> str:
-        """Return the law in words."""
-        if self.side == 0:
-            return f"{self.kind}: a family of equilibria at one and the same load"
-        x = "x" if self.power == 1 else f"x^{self.power}"
-        return f"{self.kind}, load = load_b {self.coefficient:+.6g} {x} + ... (+-{self.uncertainty:.0e})"
 
     def judge(self, index_below: int, index_above: int) -> None:
         """Name a pitchfork by the index of the branch that it leaves at loads just below and just above."""
@@ -84,8 +77,9 @@ class Law:
 class Special:
     """A special point: what it is, how precisely it was located, its null vectors, and the index on either side.
 
-    ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` that of the
-    discretisation: of the load for folds and branch points, of the ordinate at user points and ends. ``coupling``
+    ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` bounds its error, that of the
+    discretisation included: of the load for folds and branch points, of the ordinate at user points and ends;
+    ``ordinate_error`` bounds that of the ordinate at all (see :mod:`rodfem.accuracy`). ``coupling``
     is the cosine between the null vector and the derivative of the equations in the load: zero at a branch point,
     not at a fold.  ``unfolding`` is the size of the unfolding parameters that make it a branch point, relative to the
     metric as eigenvalues are (:mod:`rodfem.unfolding`): round-off, unless an imperfection has taken it apart.

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from dolfinx import fem
@@ -170,11 +171,18 @@ class Follower(Equilibria):
         self.corrector = Corrector(self.inertia)
         self.modes = spectrum
         self.spectrum = Spectrum(self.inertia) if spectrum else None
-        varies = not system.scene.is_quadratic() or system.scene.depends_on_s()
-        self.convexity = Convexity(system) if varies else None
-        self.space = (
-            None if system.scene.planar is None or system.scene.without_potential(in_space=True) else InSpace(system)
-        )
+
+    @cached_property
+    def convexity(self) -> Convexity | None:
+        """Convexity of the stored energy, where it varies along a branch."""
+        scene = self.system.scene
+        return Convexity(self.system) if not scene.is_quadratic() or scene.depends_on_s() else None
+
+    @cached_property
+    def space(self) -> InSpace | None:
+        """Index in space of a planar rod, where all its loads have a potential there."""
+        scene = self.system.scene
+        return None if scene.planar is None or scene.without_potential(in_space=True) else InSpace(self.system)
 
     def is_stable(self, x: PETSc.Vec) -> bool:
         """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""

@@ -153,7 +153,7 @@ def _special_data(s: Special) -> dict[str, Any]:
         "meets": list(s.meets) if s.meets else None,
         "followed": s.switched,
         "omega2": _plain(s.omega2),
-        "law": None if s.law is None else asdict(s.law),
+        "law": None if s.law is None else asdict(s.law) | {"uncertainty": _plain(s.law.uncertainty)},
         "unfolding": _plain(s.unfolding),
         "note": s.note,
     }

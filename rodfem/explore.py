@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isfinite
 
 import numpy as np
 from petsc4py import PETSc
@@ -14,7 +15,7 @@ from rodfem.branch import BRANCH_POINT, Branch, Point, Special
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.gaps import Gap, arms
-from rodfem.pitchfork import law_of
+from rodfem.pitchfork import law_of, origin_of
 from rodfem.search.deflation import SAME, further, states_at
 from rodfem.search.orbit import Orbits
 from rodfem.stability.blocks import Blocks
@@ -212,7 +213,11 @@ class Explorer(Tracer):
             return
         from_the_side = special.zero_of == "slope"
         with self.follower.system.clock.purpose("location"):
-            special.law = law_of(self.follower, special, special.null_vectors[0] if from_the_side else direction)
+            way = special.null_vectors[0] if from_the_side else direction
+            special.law = law_of(self.follower, origin_of(self.follower, special), way)
+        if special.law is not None and isfinite(special.error_estimate):
+            with self.follower.system.clock.purpose("error bars"):
+                self.meshes.richer(special.point.mesh).law(special, way, special.law)
         if special.law is not None and not from_the_side:
             indices = special.negative_before, special.negative_after
             special.law.judge(*(indices if special.point.slope > 0 else reversed(indices)))

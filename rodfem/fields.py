@@ -26,6 +26,8 @@ from rodfem.turning import ByAngle, ByQuaternion, Turning
 
 FORMULATIONS = ("auto", "reduced", "pointwise")
 LOAD = "load"
+HIGHEST = 12
+"""Highest degree of elements."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,8 @@ class Discretization:
             raise SceneError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(FORMULATIONS)}.")
         if self.elements < 1:
             raise SceneError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
-        if not 1 <= self.degree <= 12:
-            raise SceneError(f"Degree {self.degree} is not available: choose 1 to 12.")
+        if not 1 <= self.degree <= HIGHEST:
+            raise SceneError(f"Degree {self.degree} is not available: choose 1 to {HIGHEST}.")
         if self.vertices is not None:
             if len(self.vertices) != self.elements + 1:
                 raise SceneError(
@@ -307,6 +309,11 @@ class Fields:
         self.scalars |= {name: self.unknowns + i for i, name in enumerate(names)}
         self.unknowns += len(names)
         self.local_unknowns += len(names) if self.comm.rank == self.comm.size - 1 else 0
+
+    def all_vertices(self) -> np.ndarray:
+        """Arclengths at which elements meet, of all ranks in ascending order, (E + 1,)."""
+        mine = self.vertices[: self.owned_cells, 0]
+        return np.append(np.sort(np.concatenate(self.comm.allgather(mine))), self.scene.interval[1])
 
     @property
     def dense_rows(self) -> int:

@@ -4,7 +4,7 @@ On each element the Legendre coefficients of the strains (curvature and stretch,
 like ``A rho^-j``, for singularities of the state at a distance ``h (rho - 1/rho) / 4`` across the rod (Trefethen,
 Approximation Theory and Approximation Practice, chapter 8).  With elements of degree k the strains are missed by
 ``A rho^-k``, and loads and positions, being stationary, by the *square* of that, integrated along the rod; the factor
-in front is measured by a computation one degree richer.  On an element of another size the distance stays, and ``rho``
+in front is measured by a computation on a richer mesh.  On an element of another size the distance stays, and ``rho``
 follows: how large an element may be at each place is had in closed form.
 """
 
@@ -90,6 +90,20 @@ class Gauge:
 
     def __call__(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec] = ()) -> Smoothness:
         """Smoothness of a state and of changes of it (null vectors) together."""
+        shape = self.solver.shape
+        starts, rows = shape.gather(shape.start), shape.gather(self._squares(x, directions))
+        order = np.argsort(starts)
+        vertices = np.append(starts[order], self.solver.system.scene.interval[1])
+        return _decay(vertices, np.sqrt(rows[order]))
+
+    def unresolved(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec] = ()) -> float:
+        """Norm of the last two coefficients over that of all, or one, of a state and of changes of it together."""
+        system = self.solver.system
+        parts = system.comm.allreduce(self.solver.shape.size @ self._squares(x, directions))
+        return float(np.sqrt(parts[-2:].sum() / max(parts.sum(), system.scene.length)))
+
+    def _squares(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec]) -> np.ndarray:
+        """Squared coefficients of the strains on the elements of this rank, (elements, degree)."""
         fields, shape = self.solver.system.fields, self.solver.shape
         squares = np.zeros((fields.owned_cells, fields.discretization.degree))
         for vector in (x, *directions):
@@ -102,10 +116,7 @@ class Gauge:
                 if name == fields.turning.name:
                     series *= (2 / shape.size)[:, None, None]
                 squares += series**2 @ weights**2
-        starts, rows = shape.gather(shape.start), shape.gather(squares)
-        order = np.argsort(starts)
-        vertices = np.append(starts[order], self.solver.system.scene.interval[1])
-        return _decay(vertices, np.sqrt(rows[order]))
+        return squares
 
 
 def weights_of(scene: Scene) -> list[tuple[str, np.ndarray]]:
@@ -129,8 +140,10 @@ def _decay(vertices: np.ndarray, coefficients: np.ndarray) -> Smoothness:
         first = max(min(degree // 2 - 1, last - 3), 0)
         if last - first < 2:
             continue
-        j = np.arange(first, last)
-        slope, level = np.polyfit(j, np.log(row[first:last]), 1)
+        j, logarithms = np.arange(first, last), np.log(row[first:last])
+        middle = (first + last - 1) / 2
+        slope = (j - middle) @ logarithms / ((j - middle) @ (j - middle))  # of the line of least squares
+        level = logarithms.mean() - slope * middle
         decay[e] = np.clip(np.exp(-slope), LEAST_DECAY, MOST_DECAY)
         above = row[first:last] * decay[e] ** j
         amplitude[e] = max(np.exp(level), above[-1])

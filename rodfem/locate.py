@@ -20,13 +20,16 @@ from rodfem.errors import ConvergenceError
 from rodfem.newton import correct
 from rodfem.system import System, combine
 
-NODES = 6
+NODES, FEWER = 6, 4
+"""Number of nodes of an interpolant, and of one over a very short piece."""
 WINDOW = 0.02
 """Half length of the piece of a branch, in the metric, on which a special point is interpolated."""
 ROUND_OFF = 1e-12
 """What Newton's tolerance and the conditioning near a singular point leave open in a load, relative to it or to one."""
 SHARP = 1e-11
 """Uncertainty of a load, for the given mesh, at which a special point needs no sharper interpolation."""
+PART = 0.02
+"""Part of a distance between two loads to which it is wanted."""
 
 NARROWER = 6
 """How many times a bracket is narrowed until the eigenvalue that crosses is found among those nearest to zero."""
@@ -103,23 +106,34 @@ def eigenvalue(
     raise ConvergenceError(f"Eigenvalue number {order} is not among those nearest zero; use smaller steps (--step).")
 
 
-def sample(follower: Follower, curve: Curve, s: float, mode: PETSc.Vec, persistent: int = 0) -> Sample:
+def sample(
+    follower: Follower, curve: Curve, s: float, mode: PETSc.Vec, persistent: int = 0, counted: bool = True
+) -> Sample:
     """Solve at ``s`` and evaluate ``1 / (mode . M S^-1 M mode)`` there.
 
     For a ``mode`` near the null vector this is the eigenvalue that vanishes, up to second order in their
     difference, but unlike the ordered eigenvalues it is smooth where others come by; its zero is where ``S`` is
-    singular.  Eigenvalues within the tolerance of zero, of which ``persistent`` stay zero, count by its sign.
+    singular.  Eigenvalues within the tolerance of zero, of which ``persistent`` stay zero, count by its sign.  Unless
+    ``counted``, they are among those below: one factorisation instead of two.
     """
-    x = solve_at(follower, curve, s)
-    index = follower.inertia.count(x)
-    mu = follower.inertia.response(mode)
+    x, inertia = solve_at(follower, curve, s), follower.inertia
+    if not counted:
+        inertia.assemble(x)
+        below = inertia.below(inertia.tolerance)
+        return Sample(s, x, follower.system.scalar(x), inertia.response(mode), below)
+    index = inertia.count(x)
+    mu = inertia.response(mode)
     crossing = index.zero - follower.system.active_drifts() - persistent  # small ones take the sign of this one
     return Sample(s, x, follower.system.scalar(x), mu, index.negative + (crossing if mu < 0 else 0))
 
 
 @dataclass
 class Located:
-    """A zero found on a piece of a branch: parameter, state, direction, load, slope of the load, uncertainty, index."""
+    """A zero found on a piece of a branch: parameter, state, direction, load, slope of the load, uncertainty, index.
+
+    The ``uncertainty`` is of the load, ``along`` is that of the parameter, and ``arithmetic`` the part of the first
+    that no sharper interpolation lowers.
+    """
 
     s: float
     x: PETSc.Vec
@@ -129,13 +143,16 @@ class Located:
     uncertainty: float
     before: int
     after: int
+    along: float
+    arithmetic: float
 
 
-def interpolate(samples: list[Sample], zero_of: str, guess: float) -> Located | None:
+def interpolate(samples: list[Sample], zero_of: str, guess: float, noise: float = 0.0) -> Located | None:
     """Zero of ``mu`` or of the load's slope by Chebyshev interpolation; None where it is not near the piece.
 
-    The uncertainty of the load is what the last coefficients of the two interpolants can contribute at the zero, and at
-    least what the solver's tolerance leaves open.
+    The uncertainty of the load is what the last coefficients of the two interpolants can contribute at the zero, at
+    least what the solver's tolerance leaves open, and what round-off of size ``noise`` in ``mu``, the same in all
+    samples, moves the zero by.
     """
     s = np.array([p.s for p in samples])
     middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
@@ -149,14 +166,20 @@ def interpolate(samples: list[Sample], zero_of: str, guess: float) -> Located | 
         return None
     load_at = float(chebyshev.chebval(root, load)) + loads[0]
     slope_at = float(chebyshev.chebval(root, slope))
-    tail = abs(load[-1]) + abs(slope_at) * zero_uncertainty(f, root)
-    uncertainty = max(tail, ROUND_OFF * max(1.0, abs(load_at)))
+    left = zero_uncertainty(f, root)
+    tail = abs(load[-1]) + abs(slope_at) * left
+    floor = ROUND_OFF * max(1.0, abs(load_at))
+    moved = abs(noise / float(chebyshev.chebval(root, chebyshev.chebder(f)))) if zero_of == "mu" else 0.0
+    arithmetic = floor + abs(slope_at) * moved
     weights, slopes = _barycentric(t, root)
     states = [p.x for p in samples]
     x, tangent = combine(states, weights), combine(states, slopes / half)
     before = [p.below for p in samples if p.s < middle + half * root] or [samples[0].below]
     after = [p.below for p in samples if p.s >= middle + half * root] or [samples[-1].below]
-    return Located(middle + half * root, x, tangent, load_at, slope_at / half, uncertainty, before[-1], after[0])
+    return Located(
+        *(middle + half * root, x, tangent, load_at, slope_at / half, max(tail - floor, 0.0) + arithmetic),
+        *(before[-1], after[0], half * (left + moved), arithmetic),
+    )
 
 
 def real_root(series: np.ndarray, guess: float) -> float | None:
@@ -183,16 +206,30 @@ def _barycentric(nodes: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def refine(
-    follower: Follower, curve: Curve, center: float, half: float, mode: PETSc.Vec, zero_of: str, persistent: int = 0
+    follower: Follower,
+    curve: Curve,
+    center: float,
+    half: float,
+    mode: PETSc.Vec,
+    zero_of: str,
+    persistent: int = 0,
+    beside: float | None = None,
 ) -> Located:
-    """Solve at Chebyshev nodes around ``center``, moved until the zero lies among them, shrunk until it is sharp."""
+    """Solve at Chebyshev nodes around ``center``, moved until the zero lies among them, shrunk until it is sharp.
+
+    Where only the distance of its load from the one ``beside`` it is wanted, that to :data:`PART` of itself is sharp
+    enough, :data:`FEWER` nodes do, and nothing is counted.
+    """
     best: Located | None = None
+    count = NODES if beside is None else FEWER
     for _ in range(10):
-        nodes = center + half * np.cos(np.pi * (np.arange(NODES)[::-1] + 0.5) / NODES)
-        samples = [sample(follower, curve, s, mode, persistent) for s in nodes]
-        located = interpolate(samples, zero_of, center)
+        nodes = center + half * np.cos(np.pi * (np.arange(count)[::-1] + 0.5) / count)
+        samples = [sample(follower, curve, s, mode, persistent, counted=beside is None) for s in nodes]
+        located = interpolate(samples, zero_of, center, follower.inertia.noise(mode))
         if located is not None and abs(located.s - center) <= half:
-            if located.uncertainty < SHARP or (best is not None and located.uncertainty > 0.1 * best.uncertainty):
+            sharp = SHARP if beside is None else max(SHARP, PART * abs(located.load - beside))
+            settled = best is not None and located.uncertainty > 0.1 * best.uncertainty
+            if settled or located.uncertainty - located.arithmetic < sharp:
                 return located if best is None or located.uncertainty < best.uncertainty else best
             best, center, half = located, located.s, half / 4
         elif located is not None:

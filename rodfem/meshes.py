@@ -86,7 +86,7 @@ class Meshes:
         return self._gauges[number]
 
     def richer(self, number: int) -> Richer:
-        """Companion of a mesh one degree richer, made when it is first asked for."""
+        """Companion of a mesh, on halves of its elements one degree richer, made when it is first asked for."""
         if number not in self._richer:
             self._richer[number] = Richer(self.followers[number])
         return self._richer[number]
@@ -117,16 +117,14 @@ class Meshes:
                     return known
         s = old.system
         with s.clock("setup"):
-            new = Follower(System(s.scene, mesh, s.comm, s.clock), old.modes)
+            new = Follower(System(s.scene, mesh, s.comm, s.clock, symmetries=s.symmetries), old.modes)
         new.mesh = len(self.followers)
         self.followers.append(new)
         return new
 
     def vertices(self, number: int) -> np.ndarray:
         """Arclengths at which the elements of a mesh meet, (E + 1,)."""
-        shape = self.followers[number].shape
-        starts = np.sort(shape.gather(shape.start))
-        return np.append(starts, shape.system.scene.interval[1])
+        return self.followers[number].system.fields.all_vertices()
 
     # --- points on another mesh --------------------------------------------------------------------------------
 

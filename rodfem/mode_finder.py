@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.accuracy import Transfer
+from rodfem.accuracy import bound, halved
 from rodfem.continuation import Equilibria
 from rodfem.errors import SceneError
 from rodfem.modes import LEFT, SYMMETRY, Modes
@@ -18,21 +17,22 @@ from rodfem.stability.both_sides import both_sides
 from rodfem.stability.inertia import orthonormalize
 from rodfem.stability.judge import Judge, Verdict
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
-from rodfem.system import System, combine
+from rodfem.system import combine
+from rodfem.transfer import Transfer, richer_system
 
 EQUAL = 1e-6
 """Eigenvalues closer than this, relative to the greatest, are one: their modes are any basis of a plane."""
 SEEN = 1e-3
 """A functional to which a mode responds less than this, relative to the greatest response, does not see it."""
 FLOOR = 1e-12
-"""Errors of eigenvalues are not said to be smaller than this, relative to the greatest."""
+"""What arithmetic leaves open of an eigenvalue at least, relative to the greatest."""
 
 
 class ModeFinder:
     """Finds the modes of states of one :class:`~rodfem.system.System`."""
 
     def __init__(self, solver: Equilibria, error_bars: bool = True) -> None:
-        """Take what computes equilibria; ``error_bars`` are from a second discretisation, one degree richer."""
+        """Take what computes equilibria; ``error_bars`` are from a second, richer discretisation."""
         self.judge, self.motions = Judge(solver), Motions(solver.system)
         self.system, self.error_bars = solver.system, error_bars
         self._richer: tuple[Equilibria, Judge, Transfer] | None = None
@@ -147,13 +147,9 @@ class ModeFinder:
     # --- others ------------------------------------------------------------------------------------------------
 
     def _errors(self, x: PETSc.Vec, values: np.ndarray) -> np.ndarray:
-        """Differences to the eigenvalues of the same state on the richer discretisation; inf where there is none."""
+        """Bounds from the eigenvalues of the same state on a richer discretisation; inf where there is none."""
         if self._richer is None:
-            d = self.system.fields.discretization
-            richer = System(
-                self.system.scene, replace(d, degree=d.degree + 1), self.system.comm, self.system.clock,
-                self.system.fields.mesh,
-            )  # fmt: skip
+            richer = richer_system(self.system)
             solver = Equilibria(richer)
             self._richer = solver, Judge(solver), Transfer(self.system, richer)
         solver, judge, transfer = self._richer
@@ -163,10 +159,10 @@ class ModeFinder:
         if not outcome.converged:
             return np.full(len(values), np.inf)
         others = judge(y, number=2 * len(values) + 2 if np.iscomplexobj(values) else len(values)).values
-        floor = FLOOR * max(1.0, float(abs(values).max()))
+        rho, left = halved(self.system.fields.discretization.degree), FLOOR * max(1.0, float(abs(values).max()))
         if np.iscomplexobj(values):
-            return np.array([max(float(abs(others - v).min()), floor) for v in values])
-        return np.maximum(abs(others - values), floor)
+            others = np.array([others[np.argmin(abs(others - v))] for v in values])
+        return np.array([bound(v, other, left, rho) for v, other in zip(values, others, strict=True)])
 
 
 def equal(values: np.ndarray) -> list[list[int]]:

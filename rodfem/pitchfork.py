@@ -8,6 +8,9 @@ that it leaves is higher, else subcritical.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 from petsc4py import PETSc
 
@@ -17,48 +20,101 @@ from rodfem.newton import correct
 
 AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 """Amplitudes, in the metric, at which the branch is solved: the positive half of eight Chebyshev nodes."""
+ROUND_OFF = 1e-12
+"""What arithmetic leaves open of an ordinate at least, relative to it or to one."""
+BESIDE = 1e-3
+"""Distance along a branch, in the metric, over which the slope of the ordinate is taken."""
 
 
-def law_of(follower: Follower, special: Special, direction: PETSc.Vec) -> Law | None:
-    """Law of the branch that leaves ``special`` along ``direction``; None where it cannot be had from nearby points.
+@dataclass(frozen=True)
+class Origin:
+    """A branch point: state, load and ordinate, and what its location leaves open of these two."""
+
+    x: PETSc.Vec
+    load: float
+    ordinate: float
+    load_left: float
+    ordinate_left: float
+
+
+def origin_of(follower: Follower, special: Special) -> Origin:
+    """Branch point of a mesh; along a branch its ordinate is as uncertain as its load, times the ratio of slopes."""
+    p = special.point
+    left = ROUND_OFF * max(1.0, abs(p.ordinate))
+    if p.tangent is not None and p.slope:
+        left += abs(ordinate_along(follower, p.x, p.tangent) / p.slope) * special.located_to
+    return Origin(p.x, p.load, p.ordinate, special.located_to, left)
+
+
+def ordinate_along(follower: Follower, x: PETSc.Vec, direction: PETSc.Vec) -> float:
+    """Change of the ordinate of ``x`` along a direction, of unit size in the metric."""
+    beside = x.copy()
+    beside.axpy(BESIDE / follower.system.norm(direction), direction)
+    return (follower.shape.ordinate(beside) - follower.shape.ordinate(x)) / BESIDE
+
+
+def law_of(follower: Follower, origin: Origin, direction: PETSc.Vec) -> Law | None:
+    """Law of the branch that leaves ``origin`` along ``direction``; None where it cannot be had from nearby points.
 
     At a pitchfork the load is an even function of the amplitude, and the ordinate an even or an odd one;
-    polynomials through four amplitudes give their leading coefficients, and through three the uncertainty.
+    polynomials through four amplitudes give their leading coefficients.  Uncertain is what those through three miss,
+    what the load is odd by, and what the location of the branch point leaves open: of loads and ordinates that are
+    measured from it, divided by the square of an amplitude.
     """
     row = follower.row(direction)
-    loads, ordinates = [], []
-    for amplitude in (*AMPLITUDES, -AMPLITUDES[-1]):
-        near = _near(follower, special, direction, row, float(amplitude))
-        if near is None:
-            return None
-        loads.append(near[0])
-        ordinates.append(near[1])
+    near = [_near(follower, origin, direction, row, float(a)) for a in (*AMPLITUDES, -AMPLITUDES[-1])]
+    if None in near:
+        return None
+    loads, ordinates = np.array(near, dtype=float).T
     plus, minus = loads[-2], loads[-1]
     span = follower.system.scene.span
     if max(map(abs, loads)) < VERTICAL * abs(span[1] - span[0]):
         return Law("vertical branch", 0.0, 1, max(map(abs, loads)) / max(map(abs, ordinates)), 0)
-    if abs(plus - minus) > 0.1 * (abs(plus) + abs(minus)):
-        slopes = [(p - loads[-1]) / (q - ordinates[-1]) for p, q in zip(loads[:-1], ordinates[:-1], strict=True)]
-        return Law("transcritical", slopes[-1], 1, abs(slopes[-1] - slopes[-2]), int(np.sign(plus)))
+    uneven = abs(plus - minus) / (abs(plus) + abs(minus))
+    if uneven > 0.1:
+        best = _slope(loads, ordinates)
+        left = abs(best - _slope(loads[[2, 4]], ordinates[[2, 4]])) + _left(_slope, loads, ordinates, origin)
+        return Law("transcritical", best, 1, left, int(np.sign(plus)))
     growth = abs(ordinates[0] / ordinates[3]) if ordinates[3] else np.inf
     odd = growth < (AMPLITUDES[0] / AMPLITUDES[3]) ** 1.5
-    best, rough = (_leading(np.array(loads[:4]), np.array(ordinates[:4]), odd, count) for count in (4, 3))
+
+    def leading(loads: np.ndarray, ordinates: np.ndarray, count: int = 4) -> float:
+        return _leading(loads[:4], ordinates[:4], odd, count)
+
+    best = leading(loads, ordinates)
     if not np.isfinite(best):
         return None
-    return Law("pitchfork", best, 2 if odd else 1, abs(best - rough), int(np.sign(plus)))
+    left = abs(best - leading(loads, ordinates, 3)) + uneven * abs(best) + _left(leading, loads, ordinates, origin)
+    return Law("pitchfork", best, 2 if odd else 1, left, int(np.sign(plus)))
 
 
 def _near(
-    follower: Follower, special: Special, direction: PETSc.Vec, row: PETSc.Vec, amplitude: float
+    follower: Follower, origin: Origin, direction: PETSc.Vec, row: PETSc.Vec, amplitude: float
 ) -> tuple[float, float] | None:
     """Changes of load and ordinate at an amplitude of the bifurcating branch; None where Newton's method fails."""
-    system, p = follower.system, special.point
-    x = p.x.copy()
+    system = follower.system
+    x = origin.x.copy()
     x.axpy(amplitude, direction)
     system.set_phase(x)
     if not correct(system, x, row, reach=2.0 * abs(amplitude)).converged:
         return None
-    return system.scalar(x) - p.load, follower.shape.ordinate(x) - p.ordinate
+    return system.scalar(x) - origin.load, follower.shape.ordinate(x) - origin.ordinate
+
+
+def _left(
+    of: Callable[[np.ndarray, np.ndarray], float], loads: np.ndarray, ordinates: np.ndarray, origin: Origin
+) -> float:
+    """Greatest change of a coefficient with loads and ordinates that are uncertain as those of the origin are."""
+    best, left = of(loads, ordinates), 0.0
+    for one in np.eye(len(loads)):
+        left += abs(of(loads + one * origin.load_left, ordinates) - best)
+        left += abs(of(loads, ordinates + one * origin.ordinate_left) - best)
+    return left
+
+
+def _slope(loads: np.ndarray, ordinates: np.ndarray) -> float:
+    """Slope of the load in the ordinate from the last two points, on both sides of the branch point."""
+    return float((loads[-2] - loads[-1]) / (ordinates[-2] - ordinates[-1]))
 
 
 def _leading(loads: np.ndarray, ordinates: np.ndarray, odd: bool, count: int) -> float:

@@ -20,6 +20,7 @@ from rodfem.branch import (
     IMPERFECT,
     USER,
     Branch,
+    Law,
     Point,
     Special,
     not_followed,
@@ -39,22 +40,31 @@ STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
 
 
 def rounded_up(error: float) -> float:
-    """Return an error with one digit, never smaller than it is (but for a thousandth of itself)."""
+    """Return an error with one digit, never smaller than it is (but for round-off)."""
     if not (isfinite(error) and error > 0):
         return error
     power = floor(log10(error))
-    return float(f"{ceil(error / 10.0**power - 1e-3)}e{power}")
+    return float(f"{ceil(error / 10.0**power * (1 - 1e-12))}e{power}")
 
 
 def number(value: float, error: float) -> str:
-    """Write a number with the digits that its error supports, and the error rounded up: ``0.3216501 (3e-07)``."""
+    """Write a number with the digits that its error supports, and its bar: ``0.3216501 (3e-07)``.
+
+    The bar is rounded up; to the error it adds what the digits left out amount to.
+    """
     if not isfinite(error):
         return f"{value:.8g} (no estimate)"
-    error = rounded_up(error)
-    digits = 0
-    while 10.0 ** (-digits) > error and digits < 13:
-        digits += 1
-    return f"{round(value, digits) + 0.0:.{digits}f} ({error:.0e})"
+    digits = min(max(-floor(log10(rounded_up(error)) + 1e-9), 0), 13) if error > 0 else 13
+    shown = round(value, digits) + 0.0
+    return f"{shown:.{digits}f} ({rounded_up(error + abs(value - shown)):.0e})"
+
+
+def _law(law: Law) -> str:
+    """Local law of a branch point in words."""
+    if law.side == 0:
+        return f"{law.kind}: a family of equilibria at one and the same load"
+    sign, x = "-" if law.coefficient < 0 else "+", "x" if law.power == 1 else f"x^{law.power}"
+    return f"{law.kind}, load = load_b {sign} {number(abs(law.coefficient), law.uncertainty)} {x} + ..."
 
 
 def _index(special: Special) -> str:
@@ -155,9 +165,7 @@ class Report:
     def accuracy(self, used: Sequence[System], worst: float, asked: float) -> None:
         """Say with which meshes a branch was traced, and the error of the worst of its points."""
         word = "" if worst <= asked else f", above the {asked:g} asked for"
-        self.say(
-            f"  largest estimated error {rounded_up(worst):.0e}{word}; {'; '.join(_mesh(system) for system in used)}"
-        )
+        self.say(f"  largest error {rounded_up(worst):.0e}{word}; {'; '.join(_mesh(system) for system in used)}")
 
     def branch(self, branch: Branch) -> None:
         """Head a new branch."""
@@ -188,8 +196,9 @@ class Report:
         )
 
     def law(self, special: Special) -> None:
-        """Print the local law of a branch point."""
-        self.say(f"\nAt load {special.point.load:.8g}: {special.law} (x: change of the ordinate)")
+        """Print the local law of a branch point, if it has one."""
+        if special.law is not None:
+            self.say(f"\nAt load {special.point.load:.8g}: {_law(special.law)}; x is the change of the ordinate")
 
     def finished(self, branch: Branch) -> None:
         """Close a branch: its last point and why it ended."""
@@ -200,9 +209,7 @@ class Report:
     def table(self, branches: Sequence[Branch], system: System) -> None:
         """Print the final table: every special point with its error bar."""
         scene = system.scene
-        self.say(
-            f"\nSpecial points (in brackets the estimated error of the discretisation; ordinate: {scene.ordinate.name})"
-        )
+        self.say(f"\nSpecial points (in brackets a bound of the error; ordinate: {scene.ordinate.name})")
         self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
         for branch in branches:
             for s in branch.special:

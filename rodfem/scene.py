@@ -345,6 +345,14 @@ class Scene:
 
     def stiffness(self, s: float | None = None) -> np.ndarray:
         """Second derivative of ``W`` in the m free strains and ``k`` at the undeformed state, (m + 3, m + 3)."""
+        return self._stiffness if s is None else self._stiffness_at(s)
+
+    @cached_property
+    def _stiffness(self) -> np.ndarray:
+        """Stiffness at the middle, differentiated once: systems and their companions ask for it."""
+        return self._stiffness_at(None)
+
+    def _stiffness_at(self, s: float | None) -> np.ndarray:
         free_v = self.free_strains
         x = ufl.variable(ufl.as_vector([UNDEFORMED[i] for i in free_v] + [0.0] * 3))
         v = [ufl.as_ufl(value) for value in UNDEFORMED]

@@ -11,24 +11,25 @@ passes through zero the rod diverges: the eigenvalue itself is smooth there.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from petsc4py import PETSc
 from scipy.optimize import brentq, newton
 
-from rodfem.accuracy import Transfer
+from rodfem.accuracy import bound, halved
 from rodfem.balance import BALANCED, no_equilibrium
 from rodfem.branch import DIVERGENCE, END, FLUTTER, USER, Branch, Point, Special
 from rodfem.continuation import Equilibria
 from rodfem.curves import Curves
 from rodfem.errors import ConvergenceError
 from rodfem.flutter import AtLoad, locate_flutter, unmatched
+from rodfem.pitchfork import ROUND_OFF
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
 from rodfem.stability.vibration import MULTIPLE, REAL, Frequencies, Vibration
-from rodfem.system import System
+from rodfem.transfer import Transfer, richer_system
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
@@ -38,6 +39,8 @@ SEEN = 0.5
 """A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
+MEAN = 10.0
+"""Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
 TOGETHER = 1e-6
 """Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
 NONE = Frequencies(np.zeros(0, dtype=complex), np.zeros(0))
@@ -306,24 +309,24 @@ class Sweep:
     def _error_bars(self, branch: Branch) -> None:
         with self.solver.system.clock.purpose("error bars"):
             system = self.solver.system
-            d = system.fields.discretization
-            richer = Equilibria(
-                System(system.scene, replace(d, degree=d.degree + 1), system.comm, system.clock, system.fields.mesh)
-            )
+            richer = Equilibria(richer_system(system))
             vibration, transfer = Vibration(richer.system), Transfer(system, richer.system)
+            rho = halved(system.fields.discretization.degree)
             for s in branch.special:
-                floor = max(s.located_to, 1e-12 * max(1.0, abs(s.point.load)))
-                guess = transfer(s.point.x, state=True)
-                x = at_load(richer, guess, s.point.load)
-                s.ordinate_error = max(abs(richer.shape.ordinate(x) - s.point.ordinate), floor)
-                s.error_estimate = s.ordinate_error
+                point = s.point
+                guess = transfer(point.x, state=True)
+                x = at_load(richer, guess, point.load)
+                left = ROUND_OFF * max(1.0, abs(point.ordinate))
+                s.ordinate_error = s.error_estimate = bound(point.ordinate, richer.shape.ordinate(x), left, rho)
                 if s.kind == FLUTTER:
-                    load, mu = self._richer_flutter(richer, vibration, transfer, guess, s)
-                    s.error_estimate = max(abs(load - s.point.load), floor)
-                    s.omega2_error = max(abs(mu - s.omega2), 1e-12 * abs(mu))
+                    load, left, mu = self._richer_flutter(richer, vibration, transfer, guess, s)
+                    s.error_estimate = max(bound(point.load, load, left, rho), s.located_to)
+                    relative = left / max(abs(load), abs(self.span[1] - self.span[0]) * ROUND_OFF)
+                    s.omega2_error = bound(s.omega2, mu, MEAN * abs(mu) * max(relative, ROUND_OFF), rho)
                 elif s.kind == DIVERGENCE:
                     measured, cluster = self._measured(richer, vibration, x), self._transferred(transfer, s)
-                    s.error_estimate = max(abs(_zero(measured, cluster, s.point.load) - s.point.load), floor)
+                    load = _zero(measured, cluster, point.load)
+                    s.error_estimate = max(bound(point.load, load, s.located_to, rho), s.located_to)
                 asked = self.plan.accuracy
                 if asked is not None and s.error_estimate > asked * max(1.0, abs(s.point.load)):
                     s.note = s.note or f"accuracy {asked:g} not reached"
@@ -336,14 +339,14 @@ class Sweep:
 
     def _richer_flutter(
         self, richer: Equilibria, vibration: Vibration, transfer: Transfer, guess: PETSc.Vec, s: Special
-    ) -> tuple[float, float]:
-        """Flutter load on the richer discretisation, and the double eigenvalue."""
+    ) -> tuple[float, float, float]:
+        """Flutter load on the richer discretisation, its uncertainty there, and the double eigenvalue."""
         measured, cluster = self._measured(richer, vibration, guess), self._transferred(transfer, s)
         if s.note:  # double there, whatever the mesh
-            return s.point.load, measured(s.point.load, cluster).cluster.mean
+            return s.point.load, 0.0, measured(s.point.load, cluster).cluster.mean
         width = max(0.05 * abs(s.point.load), 0.01 * abs(self.span[1] - self.span[0]))
         located = locate_flutter(measured, cluster, s.point.load, width)
-        return located.load, located.cluster.mean
+        return located.load, located.uncertainty, located.cluster.mean
 
 
 def at_load(solver: Equilibria, guess: PETSc.Vec, load: float) -> PETSc.Vec:

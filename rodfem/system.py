@@ -11,6 +11,7 @@ the load, and one drift scalar for each symmetry.  The last two kinds are border
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -60,14 +61,15 @@ class System:
         comm: MPI.Comm = MPI.COMM_WORLD,
         clock: Clock | None = None,
         mesh: Any = None,
+        symmetries: Sequence[Symmetry | Shift] | None = None,
     ) -> None:
-        """Compile the forms and allocate all matrices once; on a given mesh if there is one."""
+        """Compile the forms and allocate all matrices once; on a given mesh, with known symmetries if they are."""
         self.scene, self.comm, self.damping = scene, comm, 0.0
         self.clock = clock or Clock()
         self.fields = Fields(scene, discretization, comm, mesh)
         self.equations = Equations(self.fields)
         _set_clamps(self.fields)
-        self.symmetries = self._symmetries() if scene.conservative else []
+        self.symmetries = self._symmetries(symmetries) if scene.conservative else []
         self.fields.add_drifts(len(self.symmetries))
         number, self.scalars = self.fields.number, self.fields.scalars
         self.load_index = self.scalars[LOAD]
@@ -94,8 +96,10 @@ class System:
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
         self.lu = factors_of("lu", comm, self.fields.unknowns, self.fields.dense_rows, {8: 0})
 
-    def _symmetries(self) -> list[Symmetry | Shift]:
+    def _symmetries(self, known: Sequence[Symmetry | Shift] | None) -> list[Symmetry | Shift]:
         """Symmetries of the scene; found with few elements, which have the same ones, where there are many."""
+        if known is not None:
+            return list(known)
         fields, equations = self.fields, self.equations
         if fields.unknowns > FEW:
             few = replace(fields.discretization, elements=max(6, 2 * len(self.scene.joints) + 2), vertices=None)

@@ -10,7 +10,6 @@ from math import inf, isnan
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.accuracy import zero_stretch
 from rodfem.bifurcation import find_special, midpoint, renew
 from rodfem.branch import BRANCH_POINT, END, IMPERFECT, NOT_TRACED, USER, Branch, Point, Special
 from rodfem.chain import Row, chained, explain, merge_doubles
@@ -23,6 +22,7 @@ from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.stability.band import resolve
 from rodfem.watch import Watch
+from rodfem.zero_stretch import zero_stretch
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""

@@ -1,6 +1,6 @@
 """Watching over the accuracy of a branch while it is traced.
 
-The error of a point is computed one degree richer now and then; in between the decay of its Legendre coefficients
+The error of a point is computed on a richer mesh now and then; in between the decay of its Legendre coefficients
 tells how it has changed since (:mod:`rodfem.grading`), which costs next to nothing.  Where it is too large,
 :class:`TooCoarse` is raised: the explorer then has a mesh made for that very state, carries the last points over, and
 goes on there (:mod:`rodfem.meshes`).
@@ -13,6 +13,7 @@ from math import isfinite, isnan
 
 import numpy as np
 
+from rodfem.accuracy import Again, Richer
 from rodfem.branch import Branch, Point, Special
 from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError
@@ -150,24 +151,34 @@ class Watch:
         richer = self.meshes.richer(point.mesh)
         richer.follower.damp(self.meshes.followers[point.mesh].system.damping > 0)
         try:
-            x = richer.again(point, fixed_load=self._at_bound(point), sharp=self.accuracy < SHARP)
+            again = richer.again(point, fixed_load=self._at_bound(point))
         except ConvergenceError:
             return float("inf")
-        index, drifts = richer.follower.inertia.count(x), richer.system.active_drifts()
-        apart = index.negative > point.negative + max(point.zero - drifts, 0) or point.negative > index.negative + max(
-            index.zero - drifts, 0
-        )
-        if apart and point.arclength > self.excused:
+        negative = self._index(point, richer, again)
+        if negative != point.negative and point.arclength > self.excused:
             follower = self.meshes.followers[point.mesh]
             follower.system.set_phase(point.x)
             follower.inertia.count(point.x)
-            modes = follower.inertia.nearest(abs(index.negative - point.negative), accuracy=1e-2)[1]
+            modes = follower.inertia.nearest(abs(negative - point.negative), accuracy=1e-2)[1]
             raise TooCoarse(
                 point,
                 float("inf"),
                 [m.copy() for m in modes],
-                why=f"index {point.negative}, {index.negative} one degree richer",
+                why=f"index {point.negative}, {negative} on a richer mesh",
             )
-        load, ordinate = richer.system.scalar(x), richer.follower.shape.ordinate(x)
-        pairs = (load, point.load), (ordinate, point.ordinate)
-        return max(1e-14, *(abs(a - b) / max(1.0, abs(b)) for a, b in pairs))
+        values = point.load, point.ordinate
+        return max(e / max(1.0, abs(v)) for e, v in zip(again.errors(point), values, strict=True))
+
+    @staticmethod
+    def _index(point: Point, richer: Richer, again: Again) -> int:
+        """Index on the richer mesh; the point's own where eigenvalues that are zero on one of the two make up for it.
+
+        One factorisation tells that it is the same; only where it does not a second tells zero eigenvalues from others.
+        """
+        inertia, drifts = richer.follower.inertia, richer.system.active_drifts()
+        inertia.assemble(again.x)
+        below = inertia.below(-inertia.tolerance)
+        if below < point.negative:
+            index = inertia.count(again.x)
+            return point.negative if point.negative <= index.negative + max(index.zero - drifts, 0) else index.negative
+        return point.negative if below <= point.negative + max(point.zero - drifts, 0) else below

@@ -344,6 +344,21 @@ def arch(half: float, dead: bool) -> Scene:
     )  # fmt: skip
 
 
+def deep_arch() -> Scene:
+    """A circular arch of 215 degrees and radius one, clamped and hinged, with a dead load at its crown."""
+    half = 215 * pi / 360
+    foot, depth = sin(half), 1 - cos(half)
+    return column(
+        "deep arch",
+        (clamped(lambda c: (depth, 0.0, -foot), (cos(half / 2), 0.0, -sin(half / 2), 0.0)),
+         pinned(lambda c: (depth, 0.0, foot))),
+        (0.0, 12.0), interval=(-half, half), start=circle, planar="e2", constants={"B2": 1.0},
+        energy=lambda v, k, c: bending((k[0], k[1] - 1.0, k[2]), (c.B1, c.B2, c.C)),
+        attachments=(Attachment(0.0, force=lambda c: (c.P, 0.0, 0.0)),),
+        ordinate=Ordinate("crown", s=0.0, of=lambda r, q: float(r[0])),
+    )  # fmt: skip
+
+
 def bathe() -> Scene:
     """The bend of 45 degrees of Bathe and Bolourchi, loaded out of its plane (here e2)."""
     E, GA, radius = 1e7, 5e6, 100.0

@@ -157,8 +157,9 @@ def errors(found: list[Branch]) -> list[tuple[str, float, float]]:
 )
 def test_error_estimates_bound_the_error(formulation: str, elements: int, degree: int) -> None:
     for name, true, estimate in errors(branches(formulation, elements, degree)):
-        assert true <= 3 * estimate, name
-        assert estimate <= 30 * true + 2e-11, name  # no scaremongering either
+        assert true <= estimate, name
+        most = 30 if "stretch" in name else 3  # no scaremongering either
+        assert estimate <= most * true + 2e-11, name
 
 
 def test_formulations_agree_within_their_estimates() -> None:

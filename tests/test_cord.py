@@ -39,7 +39,7 @@ def test_straight_state(turns: float, span: tuple[float, float]) -> None:
     found = specials(straight, "branch point")
     assert len(found) == len(expected) > 0
     for i, (s, lam) in enumerate(zip(found, expected, strict=True)):
-        assert abs(s.point.load - lam) <= 3 * s.error_estimate
+        assert abs(s.point.load - lam) <= s.error_estimate
         assert s.error_estimate <= 3e-7
         assert (s.negative_before, s.negative_after, s.multiplicity) == (i, i + 1, 1)
     for p in straight.points:
@@ -53,7 +53,7 @@ def test_range_that_ends_on_a_branch_point() -> None:
     found = explored("cord", turns=1, span=(30, 0), elements=6, depth=1)
     assert [b.name for b in found.branches] == ["straight", "branch 1"]
     (s,) = specials(found["straight"], "branch point")
-    assert abs(s.point.load) <= 3 * s.error_estimate <= 1e-9
+    assert abs(s.point.load) <= s.error_estimate <= 3e-10
     assert (s.negative_before, s.negative_after, s.law.kind) == (0, 1, "vertical branch")
     family = found["branch 1"]
     assert family.ended == "closed loop"
@@ -78,7 +78,7 @@ def test_perversions(name: str) -> None:
     (p,) = user_points(default()[name], 40.0)
     (s,) = [s for s in default()[name].special if s.point is p]
     _, end = SHOOTING.solve(shot(default(), p))
-    assert abs(1 - end[9] - p.ordinate) <= 3 * s.error_estimate <= 1e-9
+    assert abs(1 - end[9] - p.ordinate) <= s.error_estimate + 1e-11 <= 4e-10
     assert p.energy == pytest.approx(end[10], abs=1e-8)
     assert p.negative == {"branch 1": 0, "branch 2": 2}[name]
     if name == "branch 1":
@@ -91,7 +91,7 @@ def test_fold() -> None:
     (fold,) = specials(branch, "fold")
     p, _ = SHOOTING.solve(shot(default(), fold.point), shot=[0, 1, 2, 3, 5])  # the load instead of a moment
     assert p[2] == pytest.approx(7.8065554232, abs=1e-10)
-    assert abs(fold.point.load - p[2]) <= 3 * fold.error_estimate <= 3e-9
+    assert abs(fold.point.load - p[2]) <= fold.error_estimate + 1e-10 <= 1e-9  # 1e-10: what shooting leaves open
     assert (fold.negative_before, fold.negative_after) == (1, 2)
     for q in branch.points[1:]:
         if q is not fold.point:
@@ -103,7 +103,7 @@ def test_first_branch_ends_on_planar_coils() -> None:
     assert first.ended.startswith("meets another branch")
     meeting = first.special[-1]
     lam = brentq(lambda x: SHOOTING.singular(np.array([0, 0, x, 0, coil(x)[2] - K0, 0])), 35.5, 36.1, xtol=1e-10)
-    assert abs(meeting.point.load - lam) <= 3 * meeting.error_estimate <= 1e-7
+    assert abs(meeting.point.load - lam) <= meeting.error_estimate <= 3e-8
     assert above.points[1].load > meeting.point.load > below.points[1].load
     assert ({p.negative for p in above.points[1:]}, {p.negative for p in below.points[1:]}) == ({1}, {0})
     assert (above.points[-1].load, below.points[-1].load) == (60.0, 0.0)
@@ -111,7 +111,7 @@ def test_first_branch_ends_on_planar_coils() -> None:
         ordinate, energy, _ = coil(p.load)
         assert (p.ordinate, p.energy) == pytest.approx((ordinate, energy), abs=1e-6)
     for s in above.special + below.special:
-        assert abs(s.point.ordinate - coil(s.point.load)[0]) <= 3 * s.ordinate_error
+        assert abs(s.point.ordinate - coil(s.point.load)[0]) <= s.ordinate_error
 
 
 @pytest.mark.parametrize("name", ["branch 1", "branch 2", "branch 1.1"])

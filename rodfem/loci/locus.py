@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.accuracy import Richer, Transfer
+from rodfem.accuracy import Richer
 from rodfem.branch import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, Special
 from rodfem.continuation import Equilibria, Follower, Steps
 from rodfem.diagram import save_json
@@ -33,6 +33,7 @@ from rodfem.report import number
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.inertia import Inertia
 from rodfem.system import System
+from rodfem.transfer import Transfer
 
 STEPS = Steps(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""

@@ -23,6 +23,8 @@ from rodfem.factors import Factors, factors_of
 from rodfem.system import System, combine
 
 EPS = float(np.finfo(float).eps)
+NOISE = 8.0
+"""Round-off in an eigenvalue over what random errors of the matrix's entries sum up to: the largest ratio seen."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +157,25 @@ class Inertia:
             image = self.metric * mode
             self.factors.solve(image, self.system.workspace)
             return 1.0 / image.dot(self.system.workspace) + self.shift
+
+    def sharpened(self, mode: PETSc.Vec) -> PETSc.Vec:
+        """Vector of metric norm 1 by one step of inverse iteration from ``mode``, with the factors last made."""
+        out = self.system.new_vector()
+        self.factors.solve(self.metric * mode, out)
+        out.scale(1.0 / np.sqrt(out.dot(self.metric * out).real))
+        return out
+
+    def noise(self, mode: PETSc.Vec) -> float:
+        r"""Round-off in the eigenvalue of a ``mode`` of metric norm 1, of the matrix last assembled.
+
+        First-order perturbation theory: entries ``S_ij`` that err by ``eps |S_ij|`` each, at random, move it by
+        ``eps sqrt(sum (S_ij mode_i mode_j)^2)``; :data:`NOISE` times that is returned.
+        """
+        first, columns, values = self.matrix.getValuesCSR()
+        every = np.concatenate(self.system.comm.allgather(mode.array_r.real))
+        rows = np.repeat(mode.array_r.real, np.diff(first))
+        squares = float(np.sum((values.real * rows * every[columns]) ** 2))
+        return float(NOISE * EPS * np.sqrt(self.system.comm.allreduce(squares)))
 
     def seed(self, i: int) -> PETSc.Vec:
         """Vector with a bit of everything but the scalars."""
