@@ -9,6 +9,7 @@ import dolfinx.mesh
 import numpy as np
 import ufl
 from dolfinx import fem
+from ufl.algorithms.analysis import extract_type
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 
 from forms import inertia, lagrangian, loads
@@ -38,6 +39,8 @@ class Equations:
         Whether that is without any term.
     energy
         Stored energy ``int W ds``.
+    uniform
+        Whether the equations do not have the arclength in them, and nothing acts at points inside the rod.
     """
 
     def __init__(self, fields: Fields) -> None:
@@ -79,6 +82,7 @@ class Equations:
             kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c)) * dx
         kinetic += self._attached_inertia(f, a, b)
         self.massless = apply_algebra_lowering(kinetic).empty()
+        self.uniform = not extract_type(first, ufl.SpatialCoordinate) and not scene.joints
         forms = [first, second, W * dx, metric * dx, kinetic]
         self.residual, self.jacobian, self.energy, self.metric, self.kinetic = compat.compile_forms(forms)
 
