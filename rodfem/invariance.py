@@ -30,8 +30,12 @@ EXACT = 1e-10
 """Of the sum of magnitudes of what adds up to the change of the functional, the part that is round-off."""
 SLIDING = 1e-8
 """The same for the motion of a closed rod along itself: the error of a fine mesh."""
+STATES = 3
+"""Number of states at which equations are asked: each gives as many conditions as there are unknowns."""
 SLIDES = 8
 """Number of states at which that is asked."""
+WILD = 1e4
+"""A state whose forces are greater by this factor than the least is not asked: round-off of its hides all others."""
 DECAY = 0.6
 """Ratio of one Fourier coefficient of a generic state to the next."""
 SMOOTH = 0.35
@@ -44,23 +48,30 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
     u, kept = fields.u.x.array, fields.u.x.array.copy()
     single = [Symmetry(row, parts) for row in np.eye(len(parts))]
     moved = np.zeros((len(parts),) * 2)
-    rows, held = [np.zeros((1, len(parts)))], [np.zeros((1, len(parts)))]
-    for seed in range(len(parts) + 6):
+    rows, sizes, held = [], [], [np.zeros((1, len(parts)))]
+    for seed in range(len(parts) + 6 if fields.scene.conservative else STATES):
         generic_state(fields, kept, seed)
         changes = np.array([s.change(fields) for s in single])
-        if fields.scene.conservative:
-            rows.append(_change_of_functional(fields, equations, changes)[None])
-        elif seed < 3:  # each gives as many conditions as there are unknowns
-            rows.append(_change_of_equations(fields, equations, single, changes))
+        asked = _change_of_functional if fields.scene.conservative else _change_of_equations
+        row, size = asked(fields, equations, single, changes)
+        rows.append(row)
+        sizes.append(size)
         held.append(changes[:, _held(fields)].T)
         free = changes[:, fields.number >= 0]
         moved += fields.comm.allreduce(free @ free.T, op=MPI.SUM)
     u[:] = kept
-    scale = np.sqrt(np.maximum(np.diag(moved), 1e-300))
-    local = np.linalg.qr(np.vstack(held), mode="r")
-    null = _null_space(np.vstack([*rows, *fields.comm.allgather(local)]))
-    sizes, combinations = np.linalg.eigh(null.T @ (moved / scale.max() ** 2) @ null)
-    basis = simplest(null @ combinations[:, sizes > EXACT])
+    free = _null_space(np.vstack(fields.comm.allgather(np.linalg.qr(np.vstack(held), mode="r"))))
+    greatest = np.nan_to_num(np.max(sizes, axis=1), nan=np.inf)
+    asked_at = np.flatnonzero(greatest <= WILD * greatest.min())
+    terms = abs(free.T) @ np.max([sizes[i] for i in asked_at], axis=0)
+    terms = np.where(terms > 0, terms, 1.0)
+    null = free @ (_null_space(np.vstack([rows[i] for i in asked_at]) @ free / terms) / terms[:, None])
+    if null.shape[1] == 0:
+        return []
+    null = np.linalg.qr(null)[0]
+    scale = np.diag(moved).max(initial=1e-300)
+    squares, combinations = np.linalg.eigh(null.T @ (moved / scale) @ null)
+    basis = simplest(null @ combinations[:, squares > EXACT])
     return [Symmetry(w, parts) for w in basis.T]
 
 
@@ -75,12 +86,13 @@ def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
         return Symmetry(none, parts, along=1.0)
     if not fields.scene.conservative:
         return None
-    kept = fields.u.x.array.copy()
+    single, kept = [Symmetry(row, parts) for row in np.eye(len(parts))], fields.u.x.array.copy()
     rows, held = [], []
     for seed in range(len(parts) + SLIDES):
         generic_state(fields, kept, seed, SMOOTH)
-        changes = np.array([*(Symmetry(row, parts).change(fields) for row in np.eye(len(parts))), derivative(fields)])
-        rows.append(_change_of_functional(fields, equations, changes))
+        changes = np.array([*(s.change(fields) for s in single), derivative(fields)])
+        row, terms = _change_of_functional(fields, equations, single, changes)
+        rows.append(row[0] / terms.max())
         held.append(changes[:-1, _held(fields)].T)
     fields.u.x.array[:] = kept
     free = _null_space(np.vstack(held))
@@ -94,37 +106,50 @@ def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
 
 def _null_space(rows: np.ndarray) -> np.ndarray:
     """Orthonormal null vectors of conditions (..., m) of size one, (m, number)."""
+    if rows.shape[1] == 0:
+        return np.zeros((0, 0))
     _, singular, vectors = np.linalg.svd(np.linalg.qr(np.vstack([rows, np.zeros((rows.shape[1],) * 2)]), mode="r"))
     return np.asarray(vectors[singular < EXACT * max(singular[0], 1.0)].T)
 
 
-def _change_of_functional(fields: Fields, equations: Equations, changes: np.ndarray) -> np.ndarray:
-    """``dL(x)[g]`` for each of the ``changes`` (m, local size), over the greatest sum of magnitudes of its terms."""
+def _change_of_functional(
+    fields: Fields, equations: Equations, single: list[Symmetry], changes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """``dL(x)[g]`` of the ``changes`` (m, local size) by each generator, (1, m), and the sums of magnitudes, (m,)."""
     residual = np.zeros(len(fields.u.x.array))
     fem.assemble_vector(residual, equations.residual)
     sums = fields.comm.allreduce(np.array([changes @ residual, abs(changes) @ abs(residual)]), op=MPI.SUM)
-    return np.asarray(sums[0] / max(sums[1].max(), 1e-300))
+    return sums[:1], sums[1]
 
 
 def _change_of_equations(
     fields: Fields, equations: Equations, single: list[Symmetry], changes: np.ndarray
-) -> np.ndarray:
-    """``dF(x)[g] + A^t F(x)`` for each generator, (conditions, m), relative; on one rank that has all of the rod."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), and sums of magnitudes, (m,); for one rank alone."""
     residual = np.zeros(len(fields.u.x.array))
     fem.assemble_vector(residual, equations.residual)
-    tangent = compat.local_table(equations.jacobian)
     whole = residual.copy()  # a scalar has a copy in each cell: all of its equation
     whole[fields.copies] = residual[fields.copies].sum(axis=0)
-    table = np.array([tangent @ g + s.linear(fields).T @ whole for s, g in zip(single, changes, strict=True)])
-    rows = _summed(fields, table)
-    return np.asarray(np.linalg.qr(rows / max(abs(tangent).dot(abs(changes).max(axis=0)).max(), 1e-300), mode="r"))
+    tangent, back = compat.local_table(equations.jacobian), [s.linear(fields).T for s in single]
+    table = _summed(fields, np.array([tangent @ g for g in changes]), copies=True)
+    table += _summed(fields, np.array([A @ whole for A in back]))
+    sizes = _summed(fields, np.array([abs(tangent) @ abs(g) for g in changes]), copies=True)
+    sizes += _summed(fields, np.array([abs(A) @ abs(whole) for A in back]))
+    return np.asarray(np.linalg.qr(table, mode="r")), np.linalg.norm(sizes, axis=0)
 
 
-def _summed(fields: Fields, table: np.ndarray) -> np.ndarray:
-    """Components of covectors (m, local size) along the free unknowns, of which a scalar has a copy in each cell."""
+def _summed(fields: Fields, table: np.ndarray, *, copies: bool = False) -> np.ndarray:
+    """Components of covectors (m, local size) along the free unknowns, (unknowns, m): without that along the load.
+
+    A scalar has a copy in each cell; with ``copies`` each has a share of its component, else each has all of it.
+    """
     free = np.flatnonzero(fields.number >= 0)
     out = np.zeros((fields.unknowns, len(table)))
-    np.add.at(out, fields.number[free], table[:, free].T)
+    if copies:
+        np.add.at(out, fields.number[free], table[:, free].T)
+    else:
+        out[fields.number[free]] = table[:, free].T
+        out[fields.number[fields.copies[0]]] = table[:, fields.copies[0]].T
     return np.delete(out, fields.scalars[LOAD], axis=0)
 
 
@@ -181,15 +206,29 @@ def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generat
     values = wave()
     if block.name == "q":
         u, v = np.linalg.qr(rng.normal(size=(4, 2)))[0].T
+        clamps = [end.fixed_rotation for end in scene.sides if end.fixed_rotation is not None]
+        u = np.array(clamps[0]) if clamps else u  # far from a clamp a rotation would come to it in a jump
         if isinstance(ends, Ring) and ends.odd:  # of one sign at the start and of the other at the end
             half = np.pi * x
             values = (u + 0.3 * values) * np.cos(half) + (v + 0.3 * wave()) * np.sin(half)
         else:
             values = u + 0.3 * values
         values = fields.turning.normalised(values)
+    if block.name == fields.turning.name and not closed:
+        values = _toward_clamps(fields, values, x)
     if block.name == "angle" and closed:
         first, last = fields.turning.start(scene.start, np.array(scene.interval), scene.interval)
         values = values + (last - first) * x
     if block.name == "v":
         values = 0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains]
     return values
+
+
+def _toward_clamps(fields: Fields, values: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Rotations (..., size) that are those of clamps at the ends: a jump there would be a curvature without bound."""
+    scene, turning = fields.scene, fields.turning
+    for end, s, at_end in zip(scene.sides, scene.interval, ((1 - x) ** 3, x**3), strict=True):
+        if end.fixed_rotation is not None:
+            clamp = turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)
+            values = (1 - at_end) * values + at_end * clamp
+    return turning.normalised(values) if turning.name == "q" else values

@@ -21,7 +21,7 @@ from scipy.optimize import brentq, newton
 from rodfem.accuracy import Transfer
 from rodfem.branch import DIVERGENCE, END, FLUTTER, USER, Branch, Point, Special
 from rodfem.continuation import Equilibria
-from rodfem.errors import ConvergenceError
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.locate import real_root, zero_uncertainty
 from rodfem.plan import Plan
 from rodfem.report import Report
@@ -36,6 +36,8 @@ SEEN = 0.5
 """A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
+DRIVEN = 1e-7
+"""Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
 REAL = 1e-7
 """An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
 
@@ -65,10 +67,14 @@ class Sweep:
         a, b = self.plan.span
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
         x, _ = self.solver.first(a)
+        for motion in self.solver.system.free_motions():
+            self.report.say(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         for load in loads if a < b else loads[::-1]:
             x = self._state(x, float(load))
             before = self.pairs
             point = self._point(x)
+            for notice in self.solver.system.verification.read():
+                self.report.warn(notice)
             if branch.points:
                 self._between(branch, branch.points[-1], point, before, self.pairs)
             branch.points.append(point)
@@ -110,7 +116,7 @@ class Sweep:
             energy=solver.energy(x),
             stretch=solver.shape.stretch(x),
             negative=unstable,
-            zero=int((abs(values) < REAL).sum()),
+            zero=int((abs(values) < REAL).sum()) + system.active_drifts(),
             slope=float("nan"),
             drift=0.0,
             error=0.0,
@@ -247,10 +253,17 @@ class Sweep:
 
 def at_load(solver: Equilibria, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none."""
-    solver.system.set_phase(None)
+    system, name = solver.system, solver.system.scene.load
+    system.set_phase(guess)
     x, outcome = solver.at_load(guess, load)
     if not outcome.converged:
-        raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
+        raise ConvergenceError(f"No equilibrium at {name} = {load:g}: use a smaller range.")
+    if system.drift(x) > DRIVEN * system.stiffness_scale:
+        raise SceneError(
+            f"There is no equilibrium at {name} = {load:g}: nothing holds the rod against the "
+            f"{' or the '.join(system.free_motions())}, and the loads drive it; hold that motion at one end, or "
+            "balance the loads."
+        )
     return x
 
 

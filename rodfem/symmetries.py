@@ -114,13 +114,18 @@ def derivative(fields: Fields) -> np.ndarray:
 
 
 def mismatch(fields: Fields) -> float:
-    """Greatest jump between elements of the rotation's derivative: how far the mesh is from moving along itself."""
-    block = next(b for b in fields.blocks if b.name == fields.turning.name)
-    dofs, slopes = fields.dofs[block.name].ravel(), _slopes(fields, block).ravel()
-    low, high = np.full(len(fields.number), np.inf), np.full(len(fields.number), -np.inf)
-    np.minimum.at(low, dofs, slopes)
-    np.maximum.at(high, dofs, slopes)
-    return float(fields.comm.allreduce((high - low)[dofs].max(), op=MPI.MAX))
+    """Greatest jump between elements of the derivative of rotation or centreline.
+
+    It tells how far the mesh is from moving along itself.
+    """
+    worst = 0.0
+    for block in (b for b in fields.blocks if b.name in (fields.turning.name, "r")):
+        dofs, slopes = fields.dofs[block.name].ravel(), _slopes(fields, block).ravel()
+        low, high = np.full(len(fields.number), np.inf), np.full(len(fields.number), -np.inf)
+        np.minimum.at(low, dofs, slopes)
+        np.maximum.at(high, dofs, slopes)
+        worst = max(worst, float((high - low)[dofs].max()))
+    return float(fields.comm.allreduce(worst, op=MPI.MAX))
 
 
 def _slopes(fields: Fields, block: Block) -> np.ndarray:

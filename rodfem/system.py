@@ -299,7 +299,7 @@ class System:
             combinations.append(rest / np.linalg.norm(rest))
             sizes.append(self.norm(combine(generators, combinations[-1])))
             self.bring(reference)
-            least.append(max(MESH * mismatch(self.fields), SYMMETRIC_STATE))
+            least.append(max(MESH * mismatch(self.fields), 10 * SYMMETRIC_STATE))
         broken = np.array(sizes) >= least
         self.kept = np.array(combinations)[~broken]
         for i in np.flatnonzero(broken):
@@ -340,6 +340,15 @@ class System:
     def active_drifts(self) -> int:
         """Number of symmetries that the current reference state breaks: as many zero eigenvalues belong to it."""
         return sum(phase is not None for phase in self.phases)
+
+    def free_motions(self) -> list[str]:
+        """In words the motions that carry the reference state through equivalent ones, one for each phase condition."""
+        out = []
+        for weights in self.broken.values():
+            sums = sum((w * s.weights for w, s in zip(weights, self.symmetries, strict=True)), 0.0 * weights[:1])
+            along = sum(w * s.along for w, s in zip(weights, self.symmetries, strict=True))
+            out.append(str(Symmetry(sums, self.symmetries[0].parts, along)))
+        return out
 
     # --- set-up ------------------------------------------------------------------------------------------------
 
