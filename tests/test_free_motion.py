@@ -64,7 +64,7 @@ def test_greenhill_between_pins(kind: str) -> None:
     """The straight rod diverges at M = 2 pi (Greenhill 1883)."""
     found = classics.sweep(scene(kind))
     points = found.special("divergence")
-    assert points[0].point.load == pytest.approx(2 * pi, rel=1e-9)
+    assert points[0].point.load == pytest.approx(2 * pi, rel=1e-7)  # a double eigenvalue
     assert (points[0].negative_before, points[-1].negative_after) == (0, 2)
     assert {p.zero for p in found.branches[0].points if abs(p.load - 2 * pi) > 0.01} == {1}
 
