@@ -185,10 +185,8 @@ def assemble_matrix(matrix: PETSc.Mat, form: Any, rows: np.ndarray, columns: np.
     if not COMPLEX:
         fem.petsc.assemble_matrix(matrix, form)
         return
-    local = fem.assemble_matrix(form)  # this rank's cells only: PETSc brings the parts of other ranks' rows there
     shape = (len(rows), len(columns))
-    size = int(np.asarray(local.indptr)[-1])
-    table = sp.csr_matrix((local.data[:size], local.indices[:size], local.indptr), shape=(len(local.indptr) - 1,) * 2)
+    table = local_table(form)
     entries = table[: shape[0], : shape[1]].tocoo()
     row, column = rows[entries.row], columns[entries.col]
     kept = (row >= 0) & (column >= 0)
@@ -201,6 +199,13 @@ def assemble_matrix(matrix: PETSc.Mat, form: Any, rows: np.ndarray, columns: np.
         addv=True,
         rowmap=used.astype(PETSc.IntType),
     )
+
+
+def local_table(form: Any) -> sp.csr_matrix:
+    """A bilinear form between all local degrees of freedom; of this rank's cells only."""
+    local = fem.assemble_matrix(form)  # PETSc brings the parts of other ranks' rows there
+    size = int(np.asarray(local.indptr)[-1])
+    return sp.csr_matrix((local.data[:size], local.indices[:size], local.indptr), shape=(len(local.indptr) - 1,) * 2)
 
 
 @contextmanager

@@ -39,6 +39,8 @@ STILL = 1e-6
 """Damping of Newton's method at a start that may move freely at its load, over the lowest bending eigenvalue."""
 STRAYED = 0.3
 """Distance from the start beyond which an equilibrium is not the one that the start stands for."""
+HELD = 1e-8
+"""Drift, over the lowest bending eigenvalue, above which phase conditions hold a state off the equilibrium."""
 ON_BOUND = 1e-8
 """A load beyond a bound by less than this, of the span, is on it: branches of equal loads may lie there."""
 
@@ -140,6 +142,10 @@ class Equilibria:
             x = self.start(load, bent)
             self.system.set_phase(x)
             outcome = relax(self.system, x, self.axis)
+            for _ in range(3):  # phase conditions taken far away may hold a state off the equilibrium
+                if outcome.converged and self.system.drift(x) > HELD * self.system.stiffness_scale:
+                    self.system.set_phase(x)
+                    x, outcome = self.at_load(x, load)
             if outcome.converged and self.is_stable(x):
                 return x, outcome
             if first is None or (outcome.converged and not first[1].converged):
@@ -218,7 +224,7 @@ class Follower(Equilibria):
             negative=index.negative,
             zero=index.zero,
             slope=float("nan") if tangent is None else system.scalar(tangent),
-            drift=max((abs(system.scalar(x, f"drift{i}")) for i in range(len(system.drifts))), default=0.0),
+            drift=system.drift(x),
             error=outcome.error if outcome else 0.0,
             spectrum=self._leftmost(x, index),
             negative_in_space=None if self.space is None else self.space.count(x).negative,

@@ -92,7 +92,7 @@ class Corrector:
         inertia, self.regular = self.inertia, False
         if not self.system.scene.conservative:  # S is not symmetric
             return False
-        inertia.assemble(x)
+        inertia.assemble(x, right)
         try:
             self._below = inertia.below(0.0)
         except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong

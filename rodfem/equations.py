@@ -9,6 +9,7 @@ import dolfinx.mesh
 import numpy as np
 import ufl
 from dolfinx import fem
+from ufl.algorithms.analysis import extract_type
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 
 from forms import inertia, lagrangian, loads
@@ -40,6 +41,8 @@ class Equations:
         Stored energy ``int W ds``.
     ordinate
         Ordinate of the scene where that is an integral over the rod, else None.
+    uniform
+        Whether the equations do not have the arclength in them, and nothing acts at points inside the rod.
     """
 
     def __init__(self, fields: Fields) -> None:
@@ -81,6 +84,7 @@ class Equations:
             kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c)) * dx
         kinetic += self._attached_inertia(f, a, b)
         self.massless = apply_algebra_lowering(kinetic).empty()
+        self.uniform = not extract_type(first, ufl.SpatialCoordinate) and not scene.joints
         forms = [first, second, W * dx, metric * dx, kinetic]
         if not scene.ordinate.places:
             forms.append((0.0 * c.s + scene.ordinate.of(along, c)) * dx)

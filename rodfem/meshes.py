@@ -21,7 +21,7 @@ from rodfem.fields import Discretization
 from rodfem.grading import Gauge, cheapest, cost, first_mesh, weights_of
 from rodfem.newton import correct
 from rodfem.scene import Scene
-from rodfem.symmetries import is_uniform_ring
+from rodfem.symmetries import may_slide
 from rodfem.system import System
 
 FINEST, COARSEST = 1e-10, 1e-1
@@ -44,7 +44,7 @@ def check_accuracy(accuracy: float) -> None:
 
 def internal_accuracy(scene: Scene, accuracy: float) -> float:
     """Accuracy to work with: a mesh breaks the symmetry of a uniform ring along itself, which must not be seen."""
-    return min(accuracy, OF_A_RING) if is_uniform_ring(scene) else accuracy
+    return min(accuracy, OF_A_RING) if may_slide(scene) and not scene.depends_on_s() else accuracy
 
 
 def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) -> Discretization:

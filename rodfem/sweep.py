@@ -18,11 +18,10 @@ from petsc4py import PETSc
 from scipy.optimize import brentq, newton
 
 from rodfem.accuracy import bound, halved
-from rodfem.balance import BALANCED, no_equilibrium
 from rodfem.branch import DIVERGENCE, END, FLUTTER, USER, Branch, Point, Special
 from rodfem.continuation import Equilibria
 from rodfem.curves import Curves
-from rodfem.errors import ConvergenceError
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.flutter import AtLoad, locate_flutter, unmatched
 from rodfem.pitchfork import ROUND_OFF
 from rodfem.plan import Plan
@@ -39,6 +38,8 @@ SEEN = 0.5
 """A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
+DRIVEN = 1e-7
+"""Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
 MEAN = 10.0
 """Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
 TOGETHER = 1e-6
@@ -87,10 +88,14 @@ class Sweep:
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
         x, _ = self.solver.first(a)
         grid: list[Point] = []
+        for motion in self.solver.system.free_motions():
+            self.report.say(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         for load in loads if a < b else loads[::-1]:
             x = self._state(x, float(load))
             before = self.last
             point = self._point(x)
+            for notice in self.solver.system.verification.read():
+                self.report.warn(notice)
             if grid:
                 self._between(branch, grid[-1], point, before, self.last)
             branch.points.append(point)
@@ -351,13 +356,17 @@ class Sweep:
 
 def at_load(solver: Equilibria, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none."""
-    system = solver.system
+    system, name = solver.system, solver.system.scene.load
     system.set_phase(guess)
     x, outcome = solver.at_load(guess, load)
-    drift = max((abs(system.scalar(x, f"drift{i}")) for i in range(len(system.drifts))), default=0.0)
-    held = drift > 0 and drift > BALANCED * system.stiffness_scale  # by a phase condition alone
-    if not outcome.converged or held:
-        raise ConvergenceError(no_equilibrium(solver, guess, load))
+    if not outcome.converged:
+        raise ConvergenceError(f"No equilibrium at {name} = {load:g}: use a smaller range.")
+    if system.drift(x) > DRIVEN * system.stiffness_scale:
+        raise SceneError(
+            f"There is no equilibrium at {name} = {load:g}: nothing holds the rod against the "
+            f"{' or the '.join(system.free_motions())}, and the loads drive it; hold that motion at one end, or "
+            "balance the loads."
+        )
     return x
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,12 +26,16 @@ from rodfem.clock import Clock
 from rodfem.equations import Equations
 from rodfem.factors import factors_of
 from rodfem.fields import LOAD, Discretization, Fields
+from rodfem.invariance import find_motion_along, find_symmetries
 from rodfem.pattern import bordered_pattern, metric_pattern, new_matrix
 from rodfem.scene import Scene
-from rodfem.symmetries import Shift, Symmetry, find_symmetries, is_uniform_ring
+from rodfem.symmetries import Symmetry, may_slide, mismatch
+from rodfem.verification import Verification
 
 FEW = 4000
 """Number of unknowns up to which symmetries are sought on the mesh itself."""
+FINE = 128
+"""Number of elements of a mesh on which a rod may move along itself as well as in truth."""
 SYMMETRIC_STATE = 1e-6
 """A generator smaller than this (in the metric) is zero: the state has the symmetry itself."""
 
@@ -48,6 +53,12 @@ class System:
         Symmetric matrix of the squared size of a change of state: rotations, centreline, and the load over its span.
     lu
         LU factors of the last Jacobian given to :meth:`factor`.
+    symmetries
+        Those found in the equations of the scene; the motion of a closed rod along itself comes last.
+    drifting
+        Drift scalars of the state that :meth:`residual` was last asked of.
+    verification
+        What verifies the symmetries at the states where the second variation is assembled.
     damping
         Multiple of the metric added to every Jacobian.  Not zero where a state belongs to a family of equilibria at one
         and the same load that no symmetry explains: the Jacobian is singular there, and Newton's method must not move
@@ -61,7 +72,7 @@ class System:
         comm: MPI.Comm = MPI.COMM_WORLD,
         clock: Clock | None = None,
         mesh: Any = None,
-        symmetries: Sequence[Symmetry | Shift] | None = None,
+        symmetries: Sequence[Symmetry] | None = None,
     ) -> None:
         """Compile the forms and allocate all matrices once; on a given mesh, with known symmetries if they are."""
         self.scene, self.comm, self.damping = scene, comm, 0.0
@@ -69,7 +80,7 @@ class System:
         self.fields = Fields(scene, discretization, comm, mesh)
         self.equations = Equations(self.fields)
         _set_clamps(self.fields)
-        self.symmetries = self._symmetries(symmetries) if scene.conservative else []
+        self.symmetries = self._symmetries() if symmetries is None else list(symmetries)
         self.fields.add_drifts(len(self.symmetries))
         number, self.scalars = self.fields.number, self.fields.scalars
         self.load_index = self.scalars[LOAD]
@@ -93,21 +104,35 @@ class System:
         self.phases: list[PETSc.Vec | None] = [None] * len(self.drifts)
         self.broken: dict[int, np.ndarray] = {}
         self._phase_offset = [0.0] * len(self.drifts)
+        self._reference: PETSc.Vec | None = None
+        self.drifting = np.zeros(len(self.drifts))
+        self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
         self.lu = factors_of("lu", comm, self.fields.unknowns, self.fields.dense_rows, {8: 0})
 
-    def _symmetries(self, known: Sequence[Symmetry | Shift] | None) -> list[Symmetry | Shift]:
-        """Symmetries of the scene; found with few elements, which have the same ones, where there are many."""
-        if known is not None:
-            return list(known)
+    def _symmetries(self) -> list[Symmetry]:
+        """Symmetries of the scene; found with few elements, which have the same ones, where there are many.
+
+        The motion of a closed rod along itself comes last.
+        """
+        scene, d = self.scene, self.fields.discretization
         fields, equations = self.fields, self.equations
-        if fields.unknowns > FEW:
-            few = replace(fields.discretization, elements=max(6, 2 * len(self.scene.joints) + 2), vertices=None)
-            fields = Fields(self.scene, few, MPI.COMM_SELF)
-            _set_clamps(fields)
-            equations = Equations(fields)
-        found: list[Symmetry | Shift] = list(find_symmetries(fields, equations))
-        return [*found, Shift()] if is_uniform_ring(self.scene) else found
+        if fields.unknowns > FEW or not scene.conservative:
+            fields, equations = self._elsewhere(replace(d, elements=max(6, 2 * len(scene.joints) + 2), vertices=None))
+        found = find_symmetries(fields, equations)
+        if not may_slide(scene):
+            return found
+        if not equations.uniform:
+            elements = FINE + len(scene.joints)
+            fields, equations = self._elsewhere(replace(d, elements=elements, degree=max(d.degree, 6), vertices=None))
+        along = find_motion_along(fields, equations)
+        return found if along is None else [*found, along]
+
+    def _elsewhere(self, discretization: Discretization) -> tuple[Fields, Equations]:
+        """The scene on another mesh, all of it on each rank."""
+        fields = Fields(self.scene, discretization, MPI.COMM_SELF)
+        _set_clamps(fields)
+        return fields, Equations(fields)
 
     # --- vectors -----------------------------------------------------------------------------------------------
 
@@ -141,8 +166,12 @@ class System:
 
     def bring(self, x: PETSc.Vec) -> None:
         """Put ``x`` into the dolfinx function on which the forms are assembled."""
+        self.fields.u.x.array[self._numbered] = self.gathered(x)
+
+    def gathered(self, x: PETSc.Vec) -> np.ndarray:
+        """Values of a vector at this rank's free local degrees of freedom, in ascending order; overwritten later."""
         self._gather.scatter(x, self.x_local, addv=PETSc.InsertMode.INSERT_VALUES)
-        self.fields.u.x.array[self._numbered] = self.x_local.array_r.real
+        return np.asarray(self.x_local.array_r.real)
 
     def take(self) -> PETSc.Vec:
         """Vector of the values that the dolfinx function holds; drift scalars are zero."""
@@ -166,7 +195,7 @@ class System:
             out.setValues(self._equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)
             out.assemble()
             for i, (phase, index) in enumerate(zip(self.phases, self.drifts, strict=True)):
-                drift = self.scalar(x, f"drift{i}")
+                drift = self.drifting[i] = self.scalar(x, f"drift{i}")
                 value = drift
                 if phase is not None:
                     out.axpy(drift, phase)
@@ -205,7 +234,7 @@ class System:
             matrix.setValues([index], own, phase.array_r, addv=True)
             matrix.setValues(own, [index], phase.array_r, addv=True)
 
-    @property
+    @cached_property
     def stiffness_scale(self) -> float:
         """Lowest bending eigenvalue of the rod relative to the metric, up to a number about one."""
         return float(np.linalg.eigvalsh(self.scene.stiffness()[-3:, -3:])[0] * np.pi**2 / self.scene.length)
@@ -251,20 +280,20 @@ class System:
         The symmetries form a linear space.  Those combinations of their generators that vanish at the reference state
         are its own symmetries and have no phase condition; the others, orthonormal in the metric, have one each.
         """
-        count = len(self.drifts)
+        count, dropped = len(self.drifts), self.verification.dropped
         self.phases, self._phase_offset, self.kept = [None] * count, [0.0] * count, np.eye(count)
-        self.broken = {}
-        if reference is None or count == 0:
+        self.broken, self._reference = {}, None if reference is None else reference.copy()
+        if reference is None or count == len(dropped):
             return
         generators = [self.generator(reference, i) for i in range(count)]
         images = [self.metric * g for g in generators]
-        exact = [i for i, s in enumerate(self.symmetries) if not isinstance(s, Shift)]
+        exact = [i for i, s in enumerate(self.symmetries) if not s.along and i not in dropped]
         gram = np.array([[np.real(generators[i].dot(images[j])) for j in exact] for i in exact])
         squares, turn = np.linalg.eigh(gram.reshape(len(exact), len(exact)))
         combinations, sizes = list((np.eye(count)[:, exact] @ turn).T), list(np.sqrt(np.maximum(squares, 0.0)))
         least = [SYMMETRIC_STATE] * len(exact)
         last = self.symmetries[-1]
-        if isinstance(last, Shift):  # what of the motion along itself the exact ones do not do as well
+        if last.along and count - 1 not in dropped:  # what of the motion along itself the exact ones do not do as well
             rest = np.eye(count)[-1]
             for weights, size in zip(combinations, sizes, strict=True):
                 if size >= SYMMETRIC_STATE:
@@ -272,13 +301,29 @@ class System:
             combinations.append(rest / np.linalg.norm(rest))
             sizes.append(self.norm(combine(generators, combinations[-1])))
             self.bring(reference)
-            least.append(max(MESH * last.mismatch(self.fields), SYMMETRIC_STATE))
+            least.append(max(MESH * mismatch(self.fields), 10 * SYMMETRIC_STATE))
         broken = np.array(sizes) >= least
         self.kept = np.array(combinations)[~broken]
         for i in np.flatnonzero(broken):
             phase = combine(images, combinations[i] / sizes[i])
             self.phases[i], self._phase_offset[i] = phase, np.real(phase.dot(reference))
             self.broken[self.drifts[i]] = combinations[i] / sizes[i]
+
+    def verify(self, matrix: PETSc.Mat, x: PETSc.Vec, equations: PETSc.Vec | None = None) -> bool:
+        """Verify the symmetries at the state ``x``, where ``S`` is ``matrix`` and the equations are given (None: zero).
+
+        Where one is none the phase conditions are taken anew without it, and False is returned: the borders of the
+        matrix are to be assembled again.
+        """
+        if not self.symmetries or self.verification(matrix, x, equations):
+            return True
+        self.set_phase(self._reference)
+        self.bring(x)
+        return False
+
+    def drift(self, x: PETSc.Vec) -> float:
+        """Greatest drift scalar of a state: zero, but for round-off, at an equilibrium."""
+        return max((abs(self.scalar(x, f"drift{i}")) for i in range(len(self.drifts))), default=0.0)
 
     def equivalent_directions(self, x: PETSc.Vec, direction: PETSc.Vec) -> list[PETSc.Vec]:
         """Directions into which the symmetries that the state ``x`` has itself carry a direction, to first order.
@@ -297,6 +342,15 @@ class System:
     def active_drifts(self) -> int:
         """Number of symmetries that the current reference state breaks: as many zero eigenvalues belong to it."""
         return sum(phase is not None for phase in self.phases)
+
+    def free_motions(self) -> list[str]:
+        """In words the motions that carry the reference state through equivalent ones, one for each phase condition."""
+        out = []
+        for weights in self.broken.values():
+            sums = sum((w * s.weights for w, s in zip(weights, self.symmetries, strict=True)), 0.0 * weights[:1])
+            along = sum(w * s.along for w, s in zip(weights, self.symmetries, strict=True))
+            out.append(str(Symmetry(sums, self.symmetries[0].parts, along)))
+        return out
 
     # --- set-up ------------------------------------------------------------------------------------------------
 

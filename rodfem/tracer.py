@@ -474,6 +474,8 @@ class Tracer:
         return equivalent(a, b, max(tolerance, across), across**0.5)
 
     def _check_symmetry(self, point: Point) -> None:
+        for notice in self.follower.system.verification.read():
+            self.report.warn(notice)
         if point.drift > 1e-6 * self.follower.inertia.scale:
             self.watch.drifting(point)
             raise ConvergenceError(

@@ -445,13 +445,6 @@ def beck(tip: float = 0.0, middle: float = 0.0, span: tuple[float, float] = (10.
     )  # fmt: skip
 
 
-def driven(balanced: bool, kind: str = "moment") -> Scene:
-    """A rod of equal stiffness on two pins under a moment about its axis, at both ends or at one."""
-    first = {kind: lambda c: (0.0, 0.0, -c.P)} if balanced else {}
-    ends = End(position=lambda c: (0.0, 0.0, 0.0), **first), End(position=ON_AXIS, **{kind: lambda c: (0.0, 0.0, c.P)})
-    return column("driven", ends, (0.0, 7.0), constants={"B2": 1.0}, inertia=BEAM)
-
-
 def partly_following(share: float, span: tuple[float, float], strong: float = 10.0) -> Scene:
     """A thrust on the tip, a ``share`` of which follows it; diverges where the share is below one half."""
     thrust = free(force=lambda c: (0.0, 0.0, -(1 - c.share) * c.P), follower=lambda c: (0.0, 0.0, -c.share * c.P))

@@ -28,7 +28,6 @@ from rodfem.report import Report
 from rodfem.search.deflated import FLOW, MOST, DeflatedNewton
 from rodfem.search.guesses import turned_state
 from rodfem.search.mirror import Mirror, mirrors
-from rodfem.symmetries import is_uniform_ring
 from rodfem.system import combine
 
 IMAGE = 1e-12
@@ -112,7 +111,9 @@ class Deflation(DeflatedNewton):
         self.bases: list[PETSc.Vec] = []
         self.found: list[Point] = []
         self.energies: list[float] = []
-        self.slides = is_uniform_ring(scene)  # then states shifted along the rod are one, and known by their energy
+        self.slides = any(
+            s.along for s in self.system.symmetries
+        )  # then states shifted along the rod are one, and known by their energy
         self.tally = Tally(f"{scene.load} = {load:.10g}", mirrors=[str(m) for m in self.mirrors])
         for point in known:
             self._deflate(point.x)

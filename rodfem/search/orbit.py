@@ -18,7 +18,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.stability.inertia import orthonormalize
-from rodfem.symmetries import Symmetry
 from rodfem.system import System, combine
 
 FREQUENCIES = (0.5, 1.0)
@@ -99,7 +98,7 @@ class Orbits:
         some = system.new_vector()
         some.set(1.0)
         for i, symmetry in enumerate(system.symmetries):
-            if isinstance(symmetry, Symmetry):
+            if not symmetry.along:
                 constant, change = system.generator(system.new_vector(), i), system.generator(some, i)
                 change.axpy(-1.0, constant)
                 if constant.norm() > 0 and change.norm() < 1e-12 * constant.norm():

@@ -75,8 +75,18 @@ class Inertia:
         self.resolution = 0.0
         self._vectors: list[PETSc.Vec] = []
 
-    def assemble(self, x: PETSc.Vec) -> None:
-        """Assemble ``S`` at ``x``, with the phase conditions that are active, and ``border``."""
+    def assemble(self, x: PETSc.Vec, equations: PETSc.Vec | None = None) -> None:
+        """Assemble ``S`` at ``x``, with the phase conditions that are active, and ``border``.
+
+        The symmetries are verified there; ``equations`` are those at ``x``, None at an equilibrium.
+        """
+        self._assemble(x)
+        with self.system.clock("stability"):
+            sound = self.system.verify(self.matrix, x, equations)
+        if not sound:
+            self._assemble(x)
+
+    def _assemble(self, x: PETSc.Vec) -> None:
         system = self.system
         with system.clock("assembly"):
             system.bring(x)

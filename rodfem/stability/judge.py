@@ -59,7 +59,7 @@ class Verdict:
     ----------
     negative, zero
         Index and number of zero eigenvalues (symmetry modes included); under non-conservative loads the number of
-        eigenvalues found that have a negative real part or an imaginary part, and 0.
+        eigenvalues found that have a negative real part or an imaginary part, and that of free motions.
     values, vectors, errors
         Left-most eigenvalues ``mu = omega^2`` without symmetry modes (under non-conservative loads those nearest zero),
         their vectors (without multipliers where constraints were reduced), and backward errors.  No vectors where mu is
@@ -166,7 +166,7 @@ class Judge:
             bad = int(((values.real < -1e-7 * scale) | (abs(values.imag) > 1e-7 * scale)).sum())
             nothing = np.zeros(0)
             return Verdict(
-                *(bad, 0, values, vectors, errors, 0.0, nothing, nothing, False),
+                *(bad, self.system.active_drifts(), values, vectors, errors, 0.0, nothing, nothing, False),
                 *(perf_counter() - started, self._made, method, reason),
             )
         found = self._index(x)
@@ -343,7 +343,7 @@ class Judge:
         if self._blocks is None or self._blocks.coordinates != coordinates:
             self._blocks = Blocks(self.system, coordinates)
         blocks = self._blocks
-        modes = symmetry_modes(self.system, x) if self.conservative else {}
+        modes = symmetry_modes(self.system, x)
         pencil = blocks.assemble(x)
         self._map = gathered(pencil.T) if pencil.T is not None else None
         if not modes:

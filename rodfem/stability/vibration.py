@@ -13,6 +13,9 @@ imaginary parts, ``S - (a + i b) M`` is the real matrix ::
 
 whose pencil with ``diag(M, M)`` has the eigenvalues ``mu - (a + i b)`` and their conjugates; those with vectors
 of the form ``(x, -i x)`` belong to the first kind.
+
+A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``M g`` on both sides: an eigenvector
+``x`` of ``mu`` becomes ``x - g (g.Mx)`` with the multiplier ``-mu (g.Mx)``, and all of the spectrum is left but a zero.
 """
 
 from __future__ import annotations
@@ -38,6 +41,7 @@ from rodfem.stability.pencil import (
     exclude_modes,
     shift_invert,
     symmetry_modes,
+    weighed_modes,
     with_factors,
 )
 from rodfem.system import System
@@ -112,6 +116,7 @@ class Vibration:
         self.turned = np.zeros((0, 0, 4))
         self._copies: list[Copy] = []
         self._own = slice(None)
+        self._free: dict[int, PETSc.Vec] = {}
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Assemble the pencil at the state ``x``, at which the phase conditions must be set.
@@ -119,10 +124,13 @@ class Vibration:
         Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
         """
         with self.system.clock("assembly"):
-            modes = symmetry_modes(self.system, x)
             assemble_pencil(self.system, x, self.matrix, self.mass)
-            if modes:
-                exclude_modes(self.system, modes, self.matrix, self.mass)
+            self.system.verify(self.matrix, x)
+            free = symmetry_modes(self.system, x)
+            if free:
+                exclude_modes(self.system, free, self.matrix, self.mass)
+            self._free = {i: mode for i, (mode, _) in weighed_modes(self.system, free, self.mass).items()}
+            self.system.bring(x)
             f = self.system.fields
             self.turned = f.u.x.array[f.dofs[f.turning.name]]
 
@@ -188,6 +196,8 @@ class Vibration:
             found = sorted(found, key=lambda p: abs(p.value - target))[: number + 2]
             third = abs(found[min(2, len(found) - 1)].value - target)
             found = [p for p in found if abs(p.value - target) <= FAR * third]
+            for pair in found:
+                self._complete(pair)
             kinds = self._kinds(found)
         order = sorted(range(len(found)), key=lambda i: (round(found[i].value.real, 9), found[i].value.imag))
         return Frequencies(
@@ -241,6 +251,17 @@ class Vibration:
         """Basis of the span of complex vectors (n, k), orthonormal in the mass."""
         squares, turn = np.linalg.eigh(self.product(vectors, self.weighed(vectors)))
         return np.asarray(vectors @ (turn / np.sqrt(np.maximum(squares, EPS * squares[-1]))))
+
+    def _complete(self, pair: _Pair) -> None:
+        """Add to a vector, in place, the part of it along free motions, which its multipliers tell."""
+        begin, end = self.matrix.getOwnershipRange()
+        for index, mode in self._free.items():
+            mine = [part[index - begin] if begin <= index < end else 0.0 for part in pair.parts]
+            multiplier = complex(*self.system.comm.allreduce(np.array([*mine, 0.0][:2])))
+            if abs(pair.value) > 0:
+                share = -multiplier / pair.value
+                for part, along in zip(pair.parts, (share.real, share.imag), strict=False):
+                    part += along * mode.array_r.real
 
     def _dense(self, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
         """All finite eigenvalues of a pencil that is small enough for dense matrices."""

@@ -1,0 +1,76 @@
+"""Rods that nothing keeps from turning about their axis, under moments without a potential."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import pi
+from typing import Any
+
+import classics
+import numpy as np
+import pytest
+
+from rodfem import Discretization, End, Scene, SceneError, judge
+from rodfem.continuation import Equilibria
+from rodfem.system import System
+
+
+def scene(kind: str, balanced: bool = True) -> Scene:
+    """Greenhill's rod between pins, one of which slides along the axis."""
+    ends = (
+        End(position=lambda c: (0.0, 0.0, 0.0), **({kind: lambda c: (0.0, 0.0, -c.M)} if balanced else {})),
+        End(position=lambda c: (0.0, 0.0, None), **{kind: lambda c: (0.0, 0.0, c.M)}),
+    )
+    return classics.column(
+        "pinned", ends, (0.0, 7.0), load="M", constants={"M": 0.0, "B2": 1.0}, inertia=classics.BEAM
+    )  # fmt: skip
+
+
+@cache
+def solver(kind: str) -> Equilibria:
+    return Equilibria(System(scene(kind), Discretization("auto", 4, 6)))
+
+
+def straight(found: Equilibria, load: float) -> Any:
+    x, outcome = found.first(load)
+    assert outcome.converged
+    return x
+
+
+KINDS = pytest.mark.parametrize("kind", ["moment", "follower_moment"])
+
+
+@pytest.mark.short
+@KINDS
+def test_symmetries_without_a_potential(kind: str) -> None:
+    names = {str(s) for s in solver(kind).system.symmetries}
+    assert names == {"rotation about e3", "turning of the cross-sections about d3"}
+
+
+@pytest.mark.short
+@KINDS
+@pytest.mark.parametrize("method", ["shift-invert", "reduction", "dense"])
+def test_frequencies_beside_the_free_motion(kind: str, method: str) -> None:
+    """Without a moment those of a pinned beam, each twice: (n pi)^4; the turning about the axis is left out."""
+    found = solver(kind)
+    verdict = judge(found, straight(found, 0.0), method, 4)
+    assert (verdict.negative, verdict.zero) == (0, 1)
+    values = np.sort(verdict.values.real)[:4]
+    np.testing.assert_allclose(values, [pi**4, pi**4, (2 * pi) ** 4, (2 * pi) ** 4], rtol=1e-5)
+
+
+@KINDS
+def test_greenhill_between_pins(kind: str) -> None:
+    """The straight rod diverges at M = 2 pi (Greenhill 1883)."""
+    found = classics.sweep(scene(kind))
+    points = found.special("divergence")
+    assert points[0].point.load == pytest.approx(2 * pi, rel=1e-7)  # a double eigenvalue
+    assert (points[0].negative_before, points[-1].negative_after) == (0, 2)
+    assert {p.zero for p in found.branches[0].points if abs(p.load - 2 * pi) > 0.01} == {1}
+
+
+@KINDS
+def test_a_motion_that_a_load_drives(kind: str) -> None:
+    """A moment at one end that nothing balances turns the rod for ever."""
+    with pytest.raises(SceneError, match="nothing holds the rod against the rotation about e3"):
+        classics.sweep(scene(kind, balanced=False))
