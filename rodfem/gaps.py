@@ -11,7 +11,6 @@ from dataclasses import replace
 
 from rodfem.branch import Point, Special
 from rodfem.continuation import Follower
-from rodfem.locate import ROUND_OFF
 from rodfem.meshes import Meshes
 from rodfem.newton import correct
 from rodfem.unfolding import Unfolded, unfold
@@ -100,7 +99,6 @@ def sharpen(follower: Follower, special: Special, found: Unfolded) -> None:
         energy=follower.energy(found.x),
         stretch=follower.shape.stretch(found.x),
     )
-    special.located_to = ROUND_OFF * max(1.0, abs(found.load))
 
 
 def arms(follower: Follower, gap: Gap) -> list[Point]:
