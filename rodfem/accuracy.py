@@ -158,10 +158,12 @@ class Richer:
             y.axpy(s, tangent)
             return y, tangent
 
+        # few nodes tell where an eigenvalue crosses zero better than where the load has its extremum
+        zero_of = "mu" if special.kind == FOLD else special.zero_of
         try:
-            found = refine(follower, curve, 0.0, NARROW * WINDOW, mode, special.zero_of, beside=point.load)
+            found = refine(follower, curve, 0.0, NARROW * WINDOW, mode, zero_of, beside=point.load)
         except ConvergenceError:  # it lies farther away
-            found = refine(follower, curve, 0.0, WINDOW, mode, special.zero_of, beside=point.load)
+            found = refine(follower, curve, 0.0, WINDOW, mode, zero_of, beside=point.load)
         ordinate = follower.shape.ordinate(found.x)
         slope = ordinate_along(follower, found.x, found.tangent)
         left = abs(slope) * found.along + ROUND_OFF * max(1.0, abs(ordinate))

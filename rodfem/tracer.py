@@ -121,7 +121,7 @@ class Tracer:
         """Follow a branch to its end; where its mesh is too coarse, from there on with another."""
         special = {id(s.point) for s in branch.special}
         history, begun = [p for p in branch.points if id(p) not in special], False
-        self._open, self._before, self._short = [history[-1]], None, (-inf, inf, 0)
+        self._short = (-inf, inf, 0)
         self._level = history[-1].zero
         while True:
             try:
@@ -148,7 +148,6 @@ class Tracer:
             branch.points = [moved.get(id(p), p) for p in branch.points]
             history = [new for _, new in pairs]
             self.follower = follower
-            self._open, self._before = [history[-1]], None
             self.report.mesh(follower.system, trouble.point.load, str(trouble))
         last = history[-1].arclength
         branch.points = [p for p in branch.points if p.arclength <= last]
@@ -157,6 +156,7 @@ class Tracer:
 
     def _advance(self, branch: Branch, history: list[Point]) -> None:
         """Append points until the branch ends, which :attr:`Branch.ended` then says."""
+        self._open, self._before = [history[-1]], None
         for item in follow(self.follower, history, self.plan.steps, (self.low, self.high), self._reach):
             if isinstance(item, str):
                 branch.ended = item
@@ -175,7 +175,6 @@ class Tracer:
             try:
                 reason = self._between(branch, previous, item)
             except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
-                self._open, self._before = [previous], None
                 self._advance(branch, history)
                 return
             if reason:

@@ -65,18 +65,26 @@ class Verification:
 
         ``equations`` are those at ``x``, zero at an equilibrium (None).  The state must be the one last brought.
         """
+        failed = self._failing(matrix, equations)
+        if failed and equations is None:  # the state may be no equilibrium: one that was carried over from another mesh
+            equations = self.system.new_vector()
+            self.system.residual(x, equations)
+            failed = self._failing(matrix, equations)
+        for i in failed:
+            self.drop(i, x)
+        return not failed
+
+    def _failing(self, matrix: PETSc.Mat, equations: PETSc.Vec | None) -> list[int]:
+        """Symmetries, by number, whose generators are no null vectors of ``S`` at the state last brought."""
         candidates = [i for i in range(len(self.system.symmetries)) if i not in self.dropped]
         if not candidates:
-            return True
+            return []
         self._norm = self._norm or matrix.norm(PETSc.NormType.INFINITY)
         exact = [i for i in candidates if not self.system.symmetries[i].along]
         suspects = [i for i in candidates if i not in exact]
         if exact and not self._holds(matrix, self._mixture(tuple(exact)), equations):
             suspects += exact
-        failed = [i for i in suspects if not self._holds(matrix, self._mixture((i,)), equations)]
-        for i in failed:
-            self.drop(i, x)
-        return not failed
+        return [i for i in suspects if not self._holds(matrix, self._mixture((i,)), equations)]
 
     def drop(self, i: int, x: PETSc.Vec) -> None:
         """Drop a symmetry, in words."""

@@ -24,7 +24,7 @@ from rodfem.stability.blocks import Blocks
 from rodfem.stability.inertia import Inertia as Count
 from rodfem.stability.judge import METHODS, Judge, judge
 from rodfem.stability.matrices import gathered, petsc_matrix
-from rodfem.stability.pencil import assemble_pencil, symmetry_modes, weighed_modes, with_factors
+from rodfem.stability.pencil import Inverse, assemble_pencil, symmetry_modes, weighed_modes, with_factors
 from rodfem.stability.projection import INVERSES
 from rodfem.stability.rank import rank_of, smallest_singular
 from rodfem.stability.reduction import Reduction
@@ -184,7 +184,7 @@ def test_deflation_alone(formulation: str) -> None:
     factors(shifted)
     assert to_judge.inertia is not None
     for deflated, zeros in (((), 1), ([mode], 0)):
-        solver = with_factors(matrix, mass, 6, shift, factors, to_judge.inertia.seed(1), deflated)
+        solver = with_factors(matrix, mass, 6, shift, Inverse(factors), to_judge.inertia.seed(1), deflated)
         solver.solve()
         values = np.sort([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
         vanish = abs(values) < 1e-9 * abs(expected).max()
