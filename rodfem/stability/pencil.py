@@ -19,6 +19,8 @@ from rodfem.system import System, combine
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
+ROOM = {"mat_mumps_icntl_14": 100}
+"""Percentage of room beyond MUMPS's estimate: delayed pivots of a saddle point take more than its own 20."""
 LARGE = 5000
 """Rows of a pencil from which MUMPS factors it: a dense row may fill in KLU's factors."""
 LEAST = 6
@@ -114,7 +116,7 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     ksp.getPC().setType("lu")
     package = lu_package(matrix.comm.tompi4py(), "rodfem_st_") if matrix.size[0] < LARGE else "mumps"
     ksp.getPC().setFactorSolverType(package)
-    prefer_options("rodfem_st_", ordering(matrix))
+    prefer_options("rodfem_st_", ordering(matrix) | ROOM)
     for prefix in ("", "rodfem_st_"):
         prefer_options(prefix, PIVOTS)
     solver.setFromOptions()
