@@ -25,6 +25,8 @@ COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
 ROUND_OFF = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
+FIRST, NEAREST = 0.05, 1e-3
+"""Distance of the first point of a branch from the branch point that it leaves: usually, and at least."""
 APART = 1e-7
 """Arclength above which there is a state to count at between two special points."""
 SHIFT = 1e-6
@@ -236,9 +238,16 @@ def leave(follower: Follower, special: Special, direction: PETSc.Vec, first: flo
 def start_branch(
     special: Special, direction: PETSc.Vec, name: str, parent: tuple[str, int], depth: int, follower: Follower
 ) -> Branch | None:
-    """Branch that leaves ``special`` along ``direction``: its first two points, the special point itself first."""
-    first = leave(follower, special, direction, 0.05)
+    """Branch that leaves ``special`` along ``direction``: its first two points, the special point itself first.
+
+    The second is nearer where the load has turned back before it, by the law of a pitchfork: the fold is on the branch.
+    """
+    first, amplitude = leave(follower, special, direction, FIRST), FIRST
     if first is None:
         return None
+    law = special.law if special.zero_of == "mu" and special.law and "pitchfork" in special.law.kind else None
+    while law and min((first.load - special.point.load) * law.side, first.slope * law.side) < 0 and amplitude > NEAREST:
+        amplitude /= 4
+        first = leave(follower, special, direction, amplitude) or first
     origin = replace(special.point, tangent=direction, arclength=0.0, slope=follower.system.scalar(direction))
     return Branch(name, parent, depth, [origin, first])

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import io
+from argparse import Namespace
 from math import cos, pi, sin
 from typing import Any
 
 import numpy as np
 import pytest
+import rods
+import scenes
 from classics import ON_AXIS, RIGID, ROUND, WIDE, circle, column, explore, push
+from mpi4py import MPI
 from rows import verify
 
 from forms.energy import bending
 from rodfem import Discretization, Ordinate, Parameter, Plan, Ring, Scene, Steps, clamped, free, judge, pinned, sliding
 from rodfem.branch import BRANCH_POINT
-from rodfem.chain import Row, breaks, chained
+from rodfem.chain import Row, breaks, chained, explain
 from rodfem.continuation import Follower
+from rodfem.diagram import _branch_data
 from rodfem.explore import Explorer
+from rodfem.loci.locus import locus
 from rodfem.report import Report
 from rodfem.system import System
 
@@ -108,6 +115,30 @@ def test_a_family_at_the_first_load() -> None:
     assert [s.point.load for s in branch.special if s.kind == BRANCH_POINT] == pytest.approx([4.0], abs=1e-8)
 
 
+def test_a_fold_beside_the_branch_point_that_it_comes_from() -> None:
+    """At A = -2.31 the second branch of the hemitropic rod turns back 0.04 from where it begins.
+
+    The locus of the fold at A = -2, followed to that A, has the same load.
+    """
+    branches = rods.explored(constants=(-2.31, 1.0, 1.0, 3.0))
+    (fold,) = rods.specials(branches[2], "fold")
+    assert fold.point.arclength < 0.05
+    assert (fold.negative_before, fold.negative_after) == (3, 2)
+    (other,) = rods.specials(rods.explored(constants=(-2.0, 1.0, 1.0, 3.0))[2], "fold")
+    solver = rods.follower(constants=(-2.0, 1.0, 1.0, 3.0))
+    found = locus(solver, other, "A", ((0.3, 0.4), (-2.31, -1.9)), error_bars=0)
+    row = int(np.argmin(found.values[:, 1]))
+    assert found.values[row] == pytest.approx([fold.point.load, -2.31], abs=1e-9)
+
+
+def test_every_row_of_the_ring_demo() -> None:
+    scene = scenes.module("ring").scene(Namespace(twisting=1.5, span=(0.0, 1.6)))
+    solver = Follower(System(scene, Discretization("auto", 8, 6)))
+    branches = Explorer(solver, Plan(error_bars=False), Report(quiet=True), lambda: None).run()
+    verify(solver, branches)
+    assert [b.name for b in branches] == ["circle", "branch 1", "branch 1.1", "branch 1.2"]
+
+
 def test_what_is_not_explained_is_kept() -> None:
     """With the special point taken out of a branch its rows contradict each other."""
     found = explore(column("euler", (pinned(), pinned(ON_AXIS, push)), (0.0, 30.0), constants={"B2": 1.3}))
@@ -119,6 +150,15 @@ def test_what_is_not_explained_is_kept() -> None:
     assert (broken.before, broken.after) == (0, 1)
     assert broken.a.load < singular[0].point.load < broken.b.load
     assert "index changes from 0 to 1" in str(broken)
+    branch.points, branch.special = rows, singular[1:]
+    branch.renumber()
+    explain(branch)
+    columns, (entry,) = _branch_data(branch)["columns"], _branch_data(branch)["unexplained"]
+    assert (entry["before"], entry["after"]) == (0, 1)
+    assert columns["load"][entry["row"]] == broken.a.load
+    terminal = io.StringIO()
+    Report(stream=terminal).table([branch], found.solver.system)
+    assert f"! {branch.name}: {broken}" in terminal.getvalue() or MPI.COMM_WORLD.rank > 0
     a, b = Row(branch.points[0], 0, 0), Row(branch.points[-1], 2, 2)
     assert chained(a.low, a.high, singular, b.low, b.high)
     assert not chained(a.low, a.high, singular[:1], b.low, b.high)

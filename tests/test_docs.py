@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rows import verify
 
 from rodfem.branch import Branch
 from rodfem.ends import Attachment, clamped, free
@@ -52,7 +53,9 @@ def traced(name: str) -> tuple[list[Branch], str]:
     terminal = io.StringIO()
     found = solver(scenes()[name], Discretization("auto", 8, 6))
     plan = Plan(error_bars=False)
-    return Explorer(found, plan, Report(stream=terminal), lambda: None).run(), terminal.getvalue()
+    branches = Explorer(found, plan, Report(stream=terminal), lambda: None).run()
+    verify(found, branches)
+    return branches, terminal.getvalue()
 
 
 @pytest.mark.alone
