@@ -117,7 +117,7 @@ class System:
         """
         scene, d = self.scene, self.fields.discretization
         fields, equations = self.fields, self.equations
-        if fields.unknowns > FEW or not scene.conservative:
+        if fields.unknowns > FEW or (self.comm.size > 1 and not scene.conservative):  # each rank asks all equations
             fields, equations = self._elsewhere(replace(d, elements=max(6, 2 * len(scene.joints) + 2), vertices=None))
         found = find_symmetries(fields, equations)
         if not may_slide(scene):

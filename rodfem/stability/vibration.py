@@ -212,14 +212,20 @@ class Vibration:
 
         Its vectors are any in its invariant subspace: bending about d1 in one state and about d2 in the next.
         """
-        kinds = [""] * len(found)
-        for group in groups(np.array([p.value for p in found]), ALIKE):
+        together, columns = groups(np.array([p.value for p in found]), ALIKE), []
+        for group in together:
             if len(group) == 1:
-                name = character.name(character.shares(self.system, self.turned, found[group[0]].parts))
+                columns.append(np.stack(found[group[0]].parts, axis=1))
             else:
-                name = self.motion(self.orthonormal(np.stack([found[j].vector for j in group], axis=1)))
+                basis = self.orthonormal(np.stack([found[j].vector for j in group], axis=1))
+                columns.append(np.concatenate([basis.real, basis.imag], axis=1))
+        squares = character.squares(self.system, self.turned, np.concatenate(columns, axis=1))
+        kinds, begin = [""] * len(found), 0
+        for group, part in zip(together, columns, strict=True):
+            square = squares[begin : begin + part.shape[1]].sum(axis=0)
+            begin += part.shape[1]
             for j in group:
-                kinds[j] = name
+                kinds[j] = character.name(square / max(square.sum(), 1e-300))
         return kinds
 
     def motion(self, basis: np.ndarray) -> str:
