@@ -42,6 +42,7 @@ def localised(turns: int = 27) -> Scene:
     )  # fmt: skip
 
 
+@pytest.mark.alone
 def test_a_rod_under_high_tension() -> None:
     """Its eigenvalues are a thousand times as sensitive to its state as those of a rod without load.
 
@@ -79,6 +80,7 @@ def test_a_range_about_the_buckling_load(half: float) -> None:
     assert (special.negative_before, special.negative_after) == (0, 1)
 
 
+@pytest.mark.alone
 def test_a_double_point_that_the_mesh_splits() -> None:
     """Michell's ring of C = 1.5 at its fourth mode, C t0 = sqrt(15): one point, where two eigenvalues vanish."""
     scene = column(
@@ -115,6 +117,7 @@ def test_a_family_at_the_first_load() -> None:
     assert [s.point.load for s in branch.special if s.kind == BRANCH_POINT] == pytest.approx([4.0], abs=1e-8)
 
 
+@pytest.mark.alone
 def test_a_fold_beside_the_branch_point_that_it_comes_from() -> None:
     """At A = -2.31 the second branch of the hemitropic rod turns back 0.04 from where it begins.
 
@@ -131,6 +134,7 @@ def test_a_fold_beside_the_branch_point_that_it_comes_from() -> None:
     assert found.values[row] == pytest.approx([fold.point.load, -2.31], abs=1e-9)
 
 
+@pytest.mark.alone
 def test_every_row_of_the_ring_demo() -> None:
     scene = scenes.module("ring").scene(Namespace(twisting=1.5, span=(0.0, 1.6)))
     solver = Follower(System(scene, Discretization("auto", 8, 6)))

@@ -56,6 +56,7 @@ def test_contact_force_is_constant_and_the_same_in_both_formulations() -> None:
     np.testing.assert_allclose(n, np.broadcast_to(n[0], n.shape), rtol=0, atol=1e-9)
 
 
+@pytest.mark.alone
 def test_decreasing_load() -> None:
     """The same special points as with increasing load, met the other way round."""
     straight, *buckled = explored("reduced", 12, 6, span=(0.5, 0.05), at=(0.2,))
@@ -72,6 +73,7 @@ def test_decreasing_load() -> None:
     assert user_points(first, 0.2)[0].ordinate == pytest.approx(shooting.FIRST[0.2][0], abs=1e-9)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("start", [0.0, 0.01, 0.07 / 3, 0.05, 0.1])
 def test_loads_are_located_as_precisely_as_they_claim(start: float) -> None:
     """Where the points of a branch lie must not matter, and 1/12 of the rod at degree 6 is exact for this purpose."""
@@ -80,6 +82,7 @@ def test_loads_are_located_as_precisely_as_they_claim(start: float) -> None:
         assert abs(s.point.load - exact) <= 3 * s.located_to
 
 
+@pytest.mark.alone
 def test_special_points_do_not_depend_on_the_steps() -> None:
     plan = Plan((0.0, 0.6), steps=Steps(first=0.05, largest=0.25, aim=2e-2), error_bars=False)
     coarse = Explorer(follower("reduced", 12, 6), plan, Report(quiet=True), lambda: None).run()
@@ -107,6 +110,7 @@ def test_newton_converges_quadratically() -> None:
     assert np.log(sizes[3] / sizes[2]) / np.log(sizes[2] / sizes[1]) == pytest.approx(2, abs=0.2)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_restart_on_another_discretisation(formulation: str, folder: Path) -> None:
     """A saved state starts Newton's method on other elements of another degree, and it lands on the exact state."""

@@ -51,6 +51,7 @@ def force(follower: Follower, x: object) -> float:
     return float(out.norm())
 
 
+@pytest.mark.alone
 def test_cord() -> None:
     """From the straight state alone: all that exploring finds, and whatever else is found is an equilibrium."""
     found = cord()
@@ -110,6 +111,7 @@ def test_ring_in_its_plane() -> None:
     assert (circle.zero, pressed.zero) == (3, 4)  # two translations, a rotation; and the shift, which a circle turns by
 
 
+@pytest.mark.alone
 def test_ruler() -> None:
     """Both ways of falling to the side count as one; it is the start of the branch that leaves the plane."""
     found = ruler()

@@ -65,7 +65,7 @@ def fold_of(lateral: float) -> float:
     return float(found.fun)
 
 
-@pytest.mark.parametrize("lateral", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("lateral", [*(pytest.param(e, marks=pytest.mark.alone) for e in (1e-3, 1e-9, 1e-12)), 1e-6])
 def test_both_pieces_of_a_broken_pitchfork(lateral: float) -> None:
     """The first branch is stable all along; the detached one has a fold, and no branch point is left.
 
@@ -107,6 +107,7 @@ def test_unfolding_is_the_work_of_the_imperfection() -> None:
     assert values[1].size > values[1].noise
 
 
+@pytest.mark.alone
 def test_perfect_points_stay_what_they_are() -> None:
     found = diagram(cantilever(0.0))
     (special,) = found.special()
@@ -117,6 +118,7 @@ def test_perfect_points_stay_what_they_are() -> None:
     assert special.law.kind == "supercritical pitchfork"
 
 
+@pytest.mark.alone
 def test_a_mesh_without_the_symmetry_of_the_rod() -> None:
     """Unequal elements take a pitchfork apart that the reversal of the rod makes: a richer mesh tells."""
     ends = (pinned(), pinned(ON_AXIS, push))
@@ -129,6 +131,7 @@ def test_a_mesh_without_the_symmetry_of_the_rod() -> None:
     assert IMPERFECT not in kinds
 
 
+@pytest.mark.alone
 def test_what_steps_do_not_resolve_is_called_imperfect() -> None:
     """The bend of 1e-13 is sharper than the least step: the point is recorded with the size of its unfolding."""
     found = diagram(cantilever(1e-13), depth=0)
@@ -155,6 +158,7 @@ def test_a_load_beside_a_branch_point(beside: float) -> None:
     assert abs(row.ordinate) == pytest.approx(expected, rel=4e-15 / beside + 1e-8)
 
 
+@pytest.mark.alone
 def test_a_search_finds_the_detached_branch_once() -> None:
     """Its mirror image is nearly an equilibrium at 1e-9: deflating that would hide it."""
     found = diagram(cantilever(1e-9), 0, at=(3.0,), tries=2)

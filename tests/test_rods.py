@@ -47,6 +47,7 @@ def linearized(stiffness: Any, k: Any, m: Any, n: Any) -> np.ndarray:
 # --- many eigenvalues nearer to zero than the one that crosses ------------------------------------------------------
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("EI", [1e-3, 1e-6])
 def test_whirling_string(EI: float) -> None:
     """Pulled by T, spinning at sqrt(P): ``P = EI (n pi)^4 + T (n pi)^2``, twice each; torsion is softer by far."""

@@ -41,6 +41,7 @@ def test_loads_of_both_formulations(formulation: str) -> None:
     assert all(s.located_to < 1e-10 for s in found)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("constants", REFERENCE)
 def test_loads_and_indices(constants: Constants) -> None:
     """Eigenvalues cross zero in pairs, and return where the thrust's destabilising part 10 lam (1 - lam) declines."""
@@ -65,6 +66,7 @@ def test_straight_states() -> None:
         assert abs(p.ordinate) < 1e-12
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     ("formulation", "degree", "meshes"),
     [

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs the tests serially, on two ranks, and those marked `short` on three; stops at the first run that fails.
+# Runs the tests serially (in two processes, a file in one of them), on two ranks, and those marked `short` on three; stops at the first run that fails.
 #
 #     tools/test.sh PYTHON MPIRUN SECONDS [options for pytest]        (as `make test` does)
 #
@@ -33,7 +33,7 @@ run() {
     exit $status
 }
 
-run "serially" "$python" -m pytest "$@"
+run "serially, in two processes" "$python" -m pytest -n 2 --dist loadfile "$@"
 run "on two ranks ($marks)" $mpirun -n 2 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m "$marks" "$@"
 run "on three ranks (the short ones)" $mpirun -n 3 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m short "$@"
 echo "== Passed: the tests serially, on two ranks and on three"
