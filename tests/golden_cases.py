@@ -1,0 +1,82 @@
+"""Every demo, classical problem and scene of the documentation, as they are recorded in ``tests/golden``."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Callable
+from itertools import groupby
+from typing import Any
+
+import classics
+import rods
+import scenes as demos
+import test_classics
+import test_docs
+
+from rodfem.branch import FLUTTER, Branch, Special
+from rodfem.continuation import Equilibria, Follower
+from rodfem.explore import Explorer
+from rodfem.fields import Discretization
+from rodfem.plan import Plan
+from rodfem.report import Report
+from rodfem.scene import Scene
+from rodfem.sweep import Sweep
+from rodfem.system import System
+
+DEMOS: dict[str, Callable[[], Scene]] = {
+    "hemitropic": rods.scene,
+    "cord": lambda: demos.scene("cord", span=(60.0, 8.0)),
+    "ruler": lambda: demos.scene("ruler"),
+    "follower": lambda: demos.scene("follower"),
+    "ring": lambda: demos.module("ring").scene(Namespace(twisting=1.5, span=(0.0, 1.6))),
+}
+OTHERS: dict[str, Callable[[], Scene]] = {
+    "bow": classics.bow,
+    "helical spring": lambda: classics.spring(3.0, 2.0),
+    "loop": classics.loop,
+    "lateral in the plane": lambda: classics.lateral("e2"),
+    "planar column": classics.planar_column,
+    "Bathe and Bolourchi": classics.bathe,
+    "Beck": classics.beck,
+}
+
+
+def cases() -> dict[str, Callable[[], Scene]]:
+    """Scenes by name, of which the first word says where they are from."""
+    found = {f"demo {name}": scene for name, scene in DEMOS.items()}
+    found |= {f"classic {name}": entry[0] for name, entry in test_classics.CRITICAL.items()}
+    found |= {f"classic {name}": scene for name, scene in OTHERS.items()}
+    return found | {f"docs {name}": (lambda s=scene: s) for name, scene in test_docs.scenes().items()}
+
+
+def trace(scene: Scene) -> list[Branch]:
+    """Branches of a scene to the depth 1, by the default discretisation, with error bars."""
+    system = System(scene, Discretization("auto", 8, 6))
+    quiet = Report(quiet=True)
+    if scene.conservative:
+        return list(Explorer(Follower(system), Plan(scene.span, depth=1), quiet, lambda: None).run())
+    return list(Sweep(Equilibria(system), Plan(scene.span), quiet, lambda: None).run())
+
+
+def record(scene: Scene) -> list[dict[str, Any]]:
+    """What is recorded of a scene: its branches, with their special points and the sequence of their indices."""
+    return [
+        {
+            "name": branch.name,
+            "ended": branch.ended.split(" at ")[0],
+            "indices": [index for index, _ in groupby(p.negative for p in branch.points)],
+            "special": [_point(s) for s in branch.special],
+        }
+        for branch in trace(scene)
+    ]
+
+
+def _point(s: Special) -> dict[str, Any]:
+    out = {
+        "kind": s.kind,
+        "load": s.point.load,
+        "bar": max(s.error_estimate, s.located_to),
+        "index": [s.negative_before, s.negative_after],
+        "zero": s.point.zero,
+    }
+    return out | ({"omega2": s.omega2} if s.kind == FLUTTER else {})
