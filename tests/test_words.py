@@ -170,7 +170,7 @@ def test_modules_are_attributes() -> None:
     named |= {"rodfem." + name.replace("/", ".") for row in table for name in re.findall(r"`([a-z_/]+)`", row)}
     assert {"rodfem.modes", "rodfem.stability.judge", "rodfem.topology.link", "forms.loads"} <= named
     lines = ["import pydoc, rodfem, forms"] + [f"pydoc.render_doc({name})" for name in sorted(named)]
-    environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(HOME)}
+    environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(HOME), "HOME": str(Path.home())}
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
 

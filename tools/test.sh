@@ -1,13 +1,15 @@
 #!/bin/sh
-# Runs the tests serially (in two processes, a file in one of them), on two ranks, and those marked `short` on three; stops at the first run that fails.
+# Runs the tests serially (in two processes, each file in one of them), on two ranks, and those marked `short` on three;
+# stops at the first run that fails.
 #
 #     tools/test.sh PYTHON MPIRUN SECONDS [options for pytest]        (as `make test` does)
 #
-# Two ranks do without the tests marked `alone` that are not `short`; with marks=short in the environment they run the
-# short ones only.
+# Two ranks do without the tests marked `alone` that are not `short`.  With quick=yes in the environment the serial run
+# does so, too, two ranks run the short ones only, and three ranks none.
 set -eu
 cd "$(dirname "$0")/.."
-marks=${marks-not alone or short}
+marks="not alone or short" serial=
+[ "${quick-}" != yes ] || serial=$marks marks=short
 python=$1 mpirun=$2 limit=$3
 shift 3
 
@@ -33,7 +35,7 @@ run() {
     exit $status
 }
 
-run "serially, in two processes" "$python" -m pytest -n 2 --dist loadfile "$@"
+run "serially, in two processes" "$python" -m pytest -n 2 --dist loadfile -m "$serial" "$@"
 run "on two ranks ($marks)" $mpirun -n 2 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m "$marks" "$@"
-run "on three ranks (the short ones)" $mpirun -n 3 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m short "$@"
-echo "== Passed: the tests serially, on two ranks and on three"
+[ "${quick-}" = yes ] || run "on three ranks (the short ones)" $mpirun -n 3 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m short "$@"
+echo "== Passed"
