@@ -183,9 +183,9 @@ def _footer(diagram: Mapping[str, Any]) -> str:
     errors = [point.get("error_estimate") for point in special if point["kind"] in COUNTED]
     known = [abs(error) for error in errors if error is not None and math.isfinite(error)]
     if known:
-        share = f" for {len(known)} of {len(errors)}" if len(known) < len(errors) else ""
+        share = f" (of {len(known)} out of {len(errors)})" if len(known) < len(errors) else ""
         worst = f"{max(known):.1e}".replace("e-0", "e-")
-        parts.append(f"loads of special points accurate to {worst} (estimated{share})")
+        parts.append(f"error of the loads of special points at most {worst}{share}")
     return "; ".join(parts)
 
 

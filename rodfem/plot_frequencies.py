@@ -140,11 +140,11 @@ def _top(columns: Mapping[str, Any], most: int) -> float:
 
 
 def _footer(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> str:
-    """Discretisation, and the greatest estimated error of the special loads."""
+    """Discretisation, and the greatest bound of the errors of the special loads."""
     d = diagram["discretization"]
     text = f"{d['formulation']} formulation, {d['elements']} elements of degree {d['degree']}, {d['unknowns']} unknowns"
     found = [s for b in branches for s in b["special"] if s["kind"] in SPECIAL and s["error_estimate"] is not None]
     if found:
         kinds = " and ".join(kind for kind in SPECIAL if any(s["kind"] == kind for s in found))
-        text += f"; {kinds} loads accurate to {max(s['error_estimate'] for s in found):.1e} (estimated)"
+        text += f"; error of {kinds} loads at most {max(s['error_estimate'] for s in found):.1e}"
     return text
