@@ -173,6 +173,12 @@ def _tex(text: str, always: bool = False) -> str:
     return text
 
 
+def at_most(error: float) -> str:
+    """Return a bound with two digits, never smaller than it is."""
+    step = 10.0 ** (math.floor(math.log10(error)) - 1) if error > 0 else 1.0
+    return f"{math.ceil(error / step * (1 - 1e-12)) * step:.1e}".replace("e-0", "e-")
+
+
 def _footer(diagram: Mapping[str, Any]) -> str:
     """Return the line that names the discretisation and the accuracy of the special points."""
     phrase = "{formulation} formulation, {elements} elements of degree {degree}, {unknowns} unknowns"
@@ -184,8 +190,7 @@ def _footer(diagram: Mapping[str, Any]) -> str:
     known = [abs(error) for error in errors if error is not None and math.isfinite(error)]
     if known:
         share = f" (of {len(known)} out of {len(errors)})" if len(known) < len(errors) else ""
-        worst = f"{max(known):.1e}".replace("e-0", "e-")
-        parts.append(f"error of the loads of special points at most {worst}{share}")
+        parts.append(f"error of the loads of special points at most {at_most(max(known))}{share}")
     return "; ".join(parts)
 
 

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rodfem.plot import DPI, HALO, MARKERS, PALETTE, SIZE, STYLE
+from rodfem.plot import DPI, HALO, MARKERS, PALETTE, SIZE, STYLE, at_most
 
 COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5}
 """Places in the palette."""
@@ -146,5 +146,5 @@ def _footer(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> st
     found = [s for b in branches for s in b["special"] if s["kind"] in SPECIAL and s["error_estimate"] is not None]
     if found:
         kinds = " and ".join(kind for kind in SPECIAL if any(s["kind"] == kind for s in found))
-        text += f"; error of {kinds} loads at most {max(s['error_estimate'] for s in found):.1e}"
+        text += f"; error of {kinds} loads at most {at_most(max(s['error_estimate'] for s in found))}"
     return text
