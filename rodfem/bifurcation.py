@@ -98,12 +98,15 @@ def find_special(follower: Follower, a: Point, b: Point, orders: Sequence[int], 
     return found
 
 
-def renew(follower: Follower, point: Point) -> None:
-    """Compute the index and the tangent of a point, which may be those of a prediction near by, at its own state."""
+def renew(follower: Follower, point: Point, *, turning: bool) -> None:
+    """Compute the index of a point anew, at its own state; also the tangent, where the load is ``turning`` beside it.
+
+    The recorded ones may have been told from a prediction near by.
+    """
     follower.system.set_phase(point.x)
     index = decide(follower.inertia, point.x).index
     point.negative, point.zero = index.negative, index.zero
-    if point.tangent is not None:
+    if turning and point.tangent is not None:
         point.tangent = follower.tangent(follower.row(point.tangent), at=point.x)
         point.slope = follower.system.scalar(point.tangent)
 

@@ -41,11 +41,12 @@ def frequency_mesh(
     """
     loads = np.linspace(span[0], span[1], 3)
     mesh = replace(start_mesh(scene, formulation, accuracy, comm), vertices=None)
-    values = _frequencies(scene, mesh, loads, number, comm)
+    first = System(scene, mesh, comm)
+    values = _frequencies(first, loads, number)
     best, least = mesh, np.inf
     for _ in range(MOST):
         finer = replace(mesh, elements=ceil(REFINED * mesh.elements))
-        richer = _frequencies(scene, finer, loads, number, comm)
+        richer = _frequencies(System(scene, finer, comm, symmetries=first.symmetries), loads, number)
         change = max(_change(v[:number], w) for v, w in zip(values, richer, strict=True))
         if change >= least:
             break
@@ -56,11 +57,9 @@ def frequency_mesh(
     return best, least
 
 
-def _frequencies(
-    scene: Scene, mesh: Discretization, loads: np.ndarray, number: int, comm: MPI.Comm
-) -> list[np.ndarray]:
+def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndarray]:
     """Eigenvalues mu nearest the origin at each of the loads, two more than ``number``."""
-    solver = Equilibria(System(scene, mesh, comm))
+    solver = Equilibria(system)
     vibration = Vibration(solver.system)
     x, _ = solver.first(float(loads[0]))
     found = []

@@ -226,7 +226,7 @@ class Tracer:
         if len(rows) > 1 or a.negative != b.negative or a.slope * b.slope < 0:
             was = rows[0].negative, rows[0].slope > 0
             for point in (*rows, b):
-                renew(self.follower, point)
+                renew(self.follower, point, turning=len(rows) > 1 or a.slope * b.slope < 0)
             if was != (rows[0].negative, rows[0].slope > 0) and self._before is not None:
                 rows.insert(0, self.here(self._before))  # what changes does so before that row
         self._before, self._open = rows[-1], [b]

@@ -32,8 +32,7 @@ from rodfem.loci.singular import Singular, null_vectors
 from rodfem.report import number
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.inertia import Inertia
-from rodfem.system import System
-from rodfem.transfer import Transfer
+from rodfem.transfer import Transfer, richer_system
 
 STEPS = Steps(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
@@ -270,11 +269,7 @@ def _estimate(
         found = Richer(solver)
         richer, transfer = found.follower, found.transfer
     else:
-        d = solver.system.fields.discretization
-        finer = type(d)(d.formulation, d.elements, d.degree + 1)
-        richer = Equilibria(
-            System(plane.system.scene, finer, solver.system.comm, solver.system.clock, solver.system.fields.mesh)
-        )
+        richer = Equilibria(richer_system(solver.system))
         transfer = Transfer(solver.system, richer.system)
     other = Plane(richer.system, plane.names[1], (tuple(plane.bounds[0]), tuple(plane.bounds[1])))
     criterion: Criterion | None = None
