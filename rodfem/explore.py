@@ -191,7 +191,8 @@ class Explorer(Tracer):
                 way = direction.copy()
                 way.scale(sign)
                 name = self._name(parent)
-                branch = start_branch(special, way, name, (parent.name, i), parent.depth + 1, self.follower)
+                origin = parent.name, i
+                branch = start_branch(special, way, name, origin, parent.depth + 1, self.follower, len(ways))
                 if branch is None:
                     self.report.warn(
                         f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}."
