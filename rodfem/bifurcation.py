@@ -24,6 +24,8 @@ from rodfem.stability.band import decide
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
+UNCOUPLED = 1e-9
+"""Below this it is round-off.  Between the two the index tells, and then the unfolding parameters."""
 ROUND_OFF = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
 FIRST, NEAREST = 0.05, 1e-3
@@ -160,6 +162,8 @@ def _special(
         )
     special = special_at(follower, located, located.s, still)
     special.zero_of = zero_of
+    if zero_of == "slope" and abs(located.after - located.before) == 1 and special.coupling > UNCOUPLED:
+        special.kind = FOLD  # an eigenvalue crosses zero with the slope; where a side branch ends it only touches zero
     return special
 
 

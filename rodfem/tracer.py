@@ -10,8 +10,8 @@ from math import inf, isnan
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.bifurcation import find_special, midpoint, renew
-from rodfem.branch import BRANCH_POINT, END, IMPERFECT, NOT_TRACED, USER, Branch, Point, Special
+from rodfem.bifurcation import COUPLED, find_special, midpoint, renew
+from rodfem.branch import BRANCH_POINT, END, FOLD, IMPERFECT, NOT_TRACED, USER, Branch, Point, Special
 from rodfem.chain import Row, chained, explain, merge_doubles
 from rodfem.continuation import VERTICAL, Follower, distance, follow, hermite
 from rodfem.errors import ConvergenceError
@@ -280,13 +280,20 @@ class Tracer:
         return Row(point, *resolve(self.follower.inertia, point.x))
 
     def _examined(self, specials: list[Special]) -> list[Special]:
-        """Branch points with the size of their unfolding parameters; raises :class:`Gap` where they are not one."""
+        """Branch points with the size of their unfolding parameters; raises :class:`Gap` where they are not one.
+
+        Steps that jump a gap may meet a change of slope there: a fold whose null vector is nearly orthogonal to the
+        load derivative is asked, too, and is one if the equations of a branch point have no solution.
+        """
         for special in specials:
-            if special.kind == BRANCH_POINT or special.negative_before == special.negative_after:
+            weak = special.kind == FOLD and special.coupling <= COUPLED
+            if weak or special.kind == BRANCH_POINT or special.negative_before == special.negative_after:
                 gap = self.gaps.examine(self.follower, special)
                 if gap is not None and self.gaps.open(gap, self.follower):
                     raise gap
-                if gap is not None:
+                if weak and gap is None and special.unfolding >= 0:  # nan: no such point near by
+                    special.kind = BRANCH_POINT
+                if not weak and gap is not None:
                     special.kind, special.note = IMPERFECT, str(gap)
         return specials
 
