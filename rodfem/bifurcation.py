@@ -248,17 +248,18 @@ def start_branch(
     depth: int,
     follower: Follower,
     ways: int,
+    bounds: tuple[float, float],
 ) -> Branch | None:
     """Branch that leaves ``special`` along ``direction``, one of ``ways``: its first two points, the special one first.
 
     The second is nearer where the load has turned back before it, or its index is not that with which the branch
-    begins: the fold, or the branch point, that says why is on the branch.
+    begins: the fold, or the branch point, that says why is on the branch.  So it is where its load is out of bounds.
     """
     first, amplitude = leave(follower, special, direction, FIRST), FIRST
     if first is None:
         return None
     side = _side(follower, special, direction)
-    while amplitude > NEAREST and _changed(special, side, ways, first):
+    while amplitude > NEAREST and (not bounds[0] <= first.load <= bounds[1] or _changed(special, side, ways, first)):
         amplitude /= 4
         first = leave(follower, special, direction, amplitude) or first
     origin = replace(special.point, tangent=direction, arclength=0.0, slope=follower.system.scalar(direction))

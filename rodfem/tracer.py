@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from rodfem.bifurcation import COUPLED, find_special, midpoint, renew
 from rodfem.branch import BRANCH_POINT, END, FOLD, IMPERFECT, NOT_TRACED, USER, Branch, Point, Special
-from rodfem.chain import Row, chained, explain, merge_doubles
+from rodfem.chain import Row, chained, explain, merge_doubles, persistent_zeros
 from rodfem.continuation import VERTICAL, Follower, distance, follow, hermite
 from rodfem.errors import ConvergenceError
 from rodfem.gaps import Gap, Gaps
@@ -431,6 +431,16 @@ class Tracer:
         branch.points.append(special.point)
         branch.special.append(special)
 
+    def _singular_start(self, branch: Branch) -> None:
+        """Say that a range begins at a singular state: a branch point there is not located, and not followed."""
+        first = branch.points[0]
+        extra = first.zero - persistent_zeros(branch.points)
+        if branch.parent is None and extra > 0 and not any(s.point is first for s in branch.special):
+            self.report.warn(
+                f"The first state, at {self.scene.load} = {first.load:.8g}, is singular: {extra} eigenvalue(s) vanish "
+                "there that do not all along the branch. What else leaves it is not followed: begin before it."
+            )
+
     def _singular_end(self, branch: Branch, last: Point) -> None:
         """Report a branch point on the very end of the range, located on a piece of the branch that goes past it."""
         parameter, load = self.scene.parameters[self.scene.load], last.load
@@ -511,6 +521,7 @@ class Tracer:
     def _finish(self, branch: Branch) -> None:
         branch.renumber()
         explain(branch)
+        self._singular_start(branch)
         last = branch.points[-1]
         if branch.ended == "end of range" and last.zero > self.follower.system.active_drifts():
             self._singular_end(branch, last)
