@@ -254,8 +254,10 @@ def start_branch(
 
     The second is nearer where the load has turned back before it, or its index is not that with which the branch
     begins: the fold, or the branch point, that says why is on the branch.  So it is where its load is out of bounds.
+    Nor is it farther away than the branch that it leaves began: beside a nearly double point branches are short.
     """
-    first, amplitude = leave(follower, special, direction, FIRST), FIRST
+    amplitude = FIRST if depth < 2 else max(min(FIRST, special.point.arclength), NEAREST)
+    first = leave(follower, special, direction, amplitude)
     if first is None:
         return None
     side = _side(follower, special, direction)

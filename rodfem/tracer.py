@@ -10,7 +10,7 @@ from math import inf, isnan
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.bifurcation import COUPLED, find_special, midpoint, renew
+from rodfem.bifurcation import COUPLED, FIRST, find_special, midpoint, renew
 from rodfem.branch import BRANCH_POINT, END, FOLD, IMPERFECT, NOT_TRACED, USER, Branch, Point, Special
 from rodfem.chain import Row, chained, explain, merge_doubles, persistent_zeros
 from rodfem.continuation import VERTICAL, Follower, distance, follow, hermite
@@ -32,6 +32,8 @@ HALVINGS = 4
 """How many times a piece of a branch is halved until its special points explain the indices of its ends."""
 SHORTER = 2
 """How many times steps are made eight times shorter where the indices are not explained."""
+NEAR_START = 8
+"""Steps of a branch that begins near another special point are as short as its first for so many times their length."""
 PATIENCE = 4
 """Rows with an eigenvalue near zero after which it is asked whether it stays zero."""
 
@@ -122,6 +124,8 @@ class Tracer:
         special = {id(s.point) for s in branch.special}
         history, begun = [p for p in branch.points if id(p) not in special], False
         self._short = (-inf, inf, 0)
+        if branch.parent and 0 < history[-1].arclength < FIRST / 2:  # it begins near something: see start_branch
+            self._short = (NEAR_START * history[-1].arclength, history[-1].arclength, 0)
         self._level = history[-1].zero
         while True:
             try:

@@ -227,13 +227,14 @@ def test_a_branch_point_right_after_the_beginning_of_a_branch(apart: float) -> N
 
     With the deflection a_1 sin(pi s) + a_2 sin(2 pi s) the potential of fourth order of the inextensible rod is
     pi^6 (-11/64 a_1^4 - 5/4 a_1^2 a_2^2 + 1/4 a_2^4) there.  Mode 2 buckles at P_2 = (5 + d) pi^2 and turns unstable at
-    P_2 + 3 pi^2 d / 11; mode 1 at P_1 = (5 + 4 d) pi^2, of index 2 down to P_1 - 33 pi^2 d.
+    P_2 + 3 pi^2 d / 11; mode 1 at P_1 = (5 + 4 d) pi^2, of index 2 down to P_1 - 33 pi^2 d.  One branch (and its mirror
+    image) leads from one of these points to the other.
     """
     scene = column(
         "nearly double", SUPPORTS["pinned-pinned"], (48.0, 51.0), planar="e2",
         constants={"k": 4 * pi**4 * (1 + apart), "B2": 1.0}, potential=lambda x, c: loads.spring(x.r, (c.k, 0.0, 0.0)),
     )  # fmt: skip
-    straight, second, first = explore(scene, depth=1).branches
+    straight, second, first, *between = explore(scene, depth=2).branches
     assert [s.point.load for s in straight.special[:2]] == pytest.approx(
         [(5 + apart) * pi**2, (5 + 4 * apart) * pi**2], abs=1e-9
     )
@@ -243,3 +244,7 @@ def test_a_branch_point_right_after_the_beginning_of_a_branch(apart: float) -> N
         away = special.point.load - branch.points[0].load
         assert away == pytest.approx(change * pi**2 * apart, rel=0.2 * (apart / 1e-3) ** 0.5)
         assert not branch.unexplained
+    assert between
+    assert {(b.parent, b.ended) for b in between} == {
+        ((second.name, 0), f"meets {first.name} at P = {first.special[0].point.load:.8g}")
+    }
