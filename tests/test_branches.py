@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 import shooting
-from classics import SUPPORTS, column, explore
+from classics import SUPPORTS, column
 from rods import DEFAULT, Constants, explored, specials, user_points
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
@@ -234,7 +234,9 @@ def test_a_branch_point_right_after_the_beginning_of_a_branch(apart: float) -> N
         "nearly double", SUPPORTS["pinned-pinned"], (48.0, 51.0), planar="e2",
         constants={"k": 4 * pi**4 * (1 + apart), "B2": 1.0}, potential=lambda x, c: loads.spring(x.r, (c.k, 0.0, 0.0)),
     )  # fmt: skip
-    straight, second, first, *between = explore(scene, depth=2).branches
+    solver = Follower(System(scene, Discretization("auto", 8, 6)))
+    explorer = Explorer(solver, Plan(scene.span, error_bars=False), Report(quiet=True), lambda: None)
+    straight, second, first, *between = explorer.run()
     assert [s.point.load for s in straight.special[:2]] == pytest.approx(
         [(5 + apart) * pi**2, (5 + 4 * apart) * pi**2], abs=1e-9
     )
