@@ -265,7 +265,9 @@ def start_branch(
         amplitude /= 4
         first = leave(follower, special, direction, amplitude) or first
     origin = replace(special.point, tangent=direction, arclength=0.0, slope=follower.system.scalar(direction))
-    begins = index_beside(special, first.load, ways)
+    span = follower.system.scene.span
+    vertical = abs(first.slope) < VERTICAL * abs(span[1] - span[0])  # the load changes by round-off
+    begins = None if vertical else index_beside(special, first.load, ways)
     return Branch(name, parent, depth, [origin, first], begins=begins)
 
 
@@ -296,6 +298,8 @@ def _side(follower: Follower, special: Special, direction: PETSc.Vec) -> float:
 def _changed(special: Special, side: float, ways: int, first: Point) -> bool:
     """Whether the load has turned back before the point ``first`` of a branch, or its index is another one there."""
     begins = index_beside(special, first.load, ways)
+    if special.law is not None and special.law.kind == "vertical branch":
+        return False
     if begins is not None and not first.negative <= begins <= first.negative + first.zero:
         return True
     return min((first.load - special.point.load) * side, first.slope * side) < 0
