@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 from petsc4py import PETSc
 
 from rodfem.branch import BRANCH_POINT, FOLD, Branch, Point, Special
@@ -23,6 +24,8 @@ from rodfem.stability.band import decide
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
+UNCOUPLED = 1e-9
+"""Below this it is round-off.  Between the two the index tells, and then the unfolding parameters."""
 ROUND_OFF = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
 FIRST, NEAREST = 0.05, 1e-3
@@ -162,6 +165,8 @@ def _special(
         )
     special = special_at(follower, located, located.s, still)
     special.zero_of = zero_of
+    if zero_of == "slope" and abs(located.after - located.before) == 1 and special.coupling > UNCOUPLED:
+        special.kind = FOLD  # an eigenvalue crosses zero with the slope; where a side branch ends it only touches zero
     return special
 
 
@@ -239,18 +244,65 @@ def leave(follower: Follower, special: Special, direction: PETSc.Vec, first: flo
 
 
 def start_branch(
-    special: Special, direction: PETSc.Vec, name: str, parent: tuple[str, int], depth: int, follower: Follower
+    special: Special,
+    direction: PETSc.Vec,
+    name: str,
+    parent: tuple[str, int],
+    depth: int,
+    follower: Follower,
+    ways: int,
+    bounds: tuple[float, float],
 ) -> Branch | None:
-    """Branch that leaves ``special`` along ``direction``: its first two points, the special point itself first.
+    """Branch that leaves ``special`` along ``direction``, one of ``ways``: its first two points, the special one first.
 
-    The second is nearer where the load has turned back before it, by the law of a pitchfork: the fold is on the branch.
+    The second is nearer where the load has turned back before it, or its index is not that with which the branch
+    begins: the fold, or the branch point, that says why is on the branch.  So it is where its load is out of bounds.
+    Nor is it farther away than the branch that it leaves began: beside a nearly double point branches are short.
     """
-    first, amplitude = leave(follower, special, direction, FIRST), FIRST
+    amplitude = FIRST if depth < 2 else max(min(FIRST, special.point.arclength), NEAREST)
+    first = leave(follower, special, direction, amplitude)
     if first is None:
         return None
-    law = special.law if special.zero_of == "mu" and special.law and "pitchfork" in special.law.kind else None
-    while law and min((first.load - special.point.load) * law.side, first.slope * law.side) < 0 and amplitude > NEAREST:
+    side = _side(follower, special, direction)
+    while amplitude > NEAREST and (not bounds[0] <= first.load <= bounds[1] or _changed(special, side, ways, first)):
         amplitude /= 4
         first = leave(follower, special, direction, amplitude) or first
     origin = replace(special.point, tangent=direction, arclength=0.0, slope=follower.system.scalar(direction))
-    return Branch(name, parent, depth, [origin, first])
+    span = follower.system.scene.span
+    vertical = abs(first.slope) < VERTICAL * abs(span[1] - span[0])  # the load changes by round-off
+    begins = None if vertical else index_beside(special, first.load, ways)
+    return Branch(name, parent, depth, [origin, first], begins=begins)
+
+
+def index_beside(special: Special, load: float, ways: int) -> int | None:
+    """Index with which a branch begins that leaves towards ``load``; None where the index of the trunk does not tell.
+
+    By exchange of stability the eigenvalue that crosses zero has the sign opposite to that on the trunk at the same
+    load.  Of one way to leave the eigenvalues of the other null vectors belong to a symmetry, and stay zero.
+    """
+    low, high = sorted((special.negative_before, special.negative_after))
+    if special.zero_of != "mu" or ways != 1 or high - low != special.multiplicity or not special.point.slope:
+        return None
+    ahead = (load - special.point.load) * special.point.slope > 0
+    there = special.negative_after if ahead else special.negative_before
+    return low if there == high else low + 1
+
+
+def _side(follower: Follower, special: Special, direction: PETSc.Vec) -> float:
+    """Sign of the load's change along a branch right after it leaves; zero where that is not asked for."""
+    if special.zero_of != "mu":
+        return 0.0
+    if special.law is not None:
+        return special.law.side if "pitchfork" in special.law.kind else 0.0
+    near = leave(follower, special, direction, FIRST / 4)
+    return 0.0 if near is None else float(np.sign(near.load - special.point.load))
+
+
+def _changed(special: Special, side: float, ways: int, first: Point) -> bool:
+    """Whether the load has turned back before the point ``first`` of a branch, or its index is another one there."""
+    begins = index_beside(special, first.load, ways)
+    if special.law is not None and special.law.kind == "vertical branch":
+        return False
+    if begins is not None and not first.negative <= begins <= first.negative + first.zero:
+        return True
+    return min((first.load - special.point.load) * side, first.slope * side) < 0

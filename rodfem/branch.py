@@ -132,7 +132,10 @@ class Unexplained:
 
 @dataclass
 class Branch:
-    """A connected piece of equilibria: its points in order, its special points, where it came from and why it ended."""
+    """A connected piece of equilibria: its points in order, its special points, where it came from and why it ended.
+
+    ``begins`` is the index right after the branch point that it leaves, where the indices of the trunk tell it.
+    """
 
     name: str
     parent: tuple[str, int] | None
@@ -141,6 +144,7 @@ class Branch:
     special: list[Special] = field(default_factory=list)
     ended: str = NOT_TRACED
     unexplained: list[Unexplained] = field(default_factory=list)
+    begins: int | None = None
 
     def insert(self, special: Special) -> None:
         """Put a special point among the points by its arclength, and renumber the rows of all special points."""

@@ -45,13 +45,18 @@ def chained(low: int, high: int, specials: Sequence[Special], last_low: int, las
     return all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(intervals[::2], intervals[1::2], strict=True))
 
 
-def breaks(points: Sequence[Point], specials: Sequence[Special]) -> list[Unexplained]:
-    """Neighbours among rows in order of arclength, some of them special points, whose indices do not agree."""
+def breaks(points: Sequence[Point], specials: Sequence[Special], begins: int | None = None) -> list[Unexplained]:
+    """Neighbours among rows in order of arclength, some of them special points, whose indices do not agree.
+
+    ``begins`` is the index right after the first row, where it is known although it is none of these special points.
+    """
     at = {id(s.point): s for s in specials if s.kind in (FOLD, BRANCH_POINT)}
     persistent = persistent_zeros(points)
     found = []
     for a, b in pairwise(points):
         left, right = _beside(a, at, persistent, after=True), _beside(b, at, persistent, after=False)
+        if a is points[0] and begins is not None:
+            left = begins, begins
         if left[1] < right[0] or right[1] < left[0]:
             found.append(Unexplained(a, b, left[0], right[0]))
     return found
@@ -73,7 +78,7 @@ def _beside(point: Point, at: dict[int, Special], persistent: int, after: bool) 
 
 def explain(branch: Branch) -> None:
     """Check the whole branch, which must be in order, and keep what is not explained."""
-    branch.unexplained = breaks(branch.points, branch.special)
+    branch.unexplained = breaks(branch.points, branch.special, branch.begins)
 
 
 def merge_doubles(branch: Branch) -> None:

@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from rodfem.bifurcation import COUPLED, coupling_of, directions, start_branch
 from rodfem.branch import BRANCH_POINT, Branch, Point, Special
+from rodfem.continuation import ON_BOUND
 from rodfem.ends import Ring
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.gaps import Gap, arms
@@ -191,11 +192,17 @@ class Explorer(Tracer):
                 way = direction.copy()
                 way.scale(sign)
                 name = self._name(parent)
-                branch = start_branch(special, way, name, (parent.name, i), parent.depth + 1, self.follower)
+                origin = parent.name, i
+                branch = start_branch(
+                    special, way, name, origin, parent.depth + 1, self.follower, len(ways), self._bounds()
+                )
                 if branch is None:
                     self.report.warn(
                         f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}."
                     )
+                    continue
+                if not self._bounds()[0] <= branch.points[1].load <= self._bounds()[1]:
+                    self.report.say(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
                     continue
                 if first is not None and equivalent(first, branch.points[1]):
                     continue  # the mirror image of the branch just traced
@@ -206,6 +213,11 @@ class Explorer(Tracer):
                     continue
                 self.trace(branch)
         self._judge_from_the_side(special, self.branches[before:])
+
+    def _bounds(self) -> tuple[float, float]:
+        """Least and greatest load, with room for round-off."""
+        margin = ON_BOUND * (self.high - self.low)
+        return self.low - margin, self.high + margin
 
     def _law(self, special: Special, direction: PETSc.Vec) -> None:
         """Find the local law at a branch point: of what leaves, or of this branch where it ends on another."""

@@ -10,9 +10,9 @@ from math import inf, isnan
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.bifurcation import find_special, midpoint, renew
-from rodfem.branch import BRANCH_POINT, END, IMPERFECT, NOT_TRACED, USER, Branch, Point, Special
-from rodfem.chain import Row, chained, explain, merge_doubles
+from rodfem.bifurcation import COUPLED, FIRST, find_special, midpoint, renew
+from rodfem.branch import BRANCH_POINT, END, FOLD, IMPERFECT, NOT_TRACED, USER, Branch, Point, Special
+from rodfem.chain import Row, chained, explain, merge_doubles, persistent_zeros
 from rodfem.continuation import VERTICAL, Follower, distance, follow, hermite
 from rodfem.errors import ConvergenceError
 from rodfem.gaps import Gap, Gaps
@@ -32,6 +32,8 @@ HALVINGS = 4
 """How many times a piece of a branch is halved until its special points explain the indices of its ends."""
 SHORTER = 2
 """How many times steps are made eight times shorter where the indices are not explained."""
+NEAR_START = 8
+"""Steps of a branch that begins near another special point are as short as its first for so many times their length."""
 PATIENCE = 4
 """Rows with an eigenvalue near zero after which it is asked whether it stays zero."""
 
@@ -122,6 +124,8 @@ class Tracer:
         special = {id(s.point) for s in branch.special}
         history, begun = [p for p in branch.points if id(p) not in special], False
         self._short = (-inf, inf, 0)
+        if branch.parent and 0 < history[-1].arclength < FIRST / 2:  # it begins near something: see start_branch
+            self._short = (NEAR_START * history[-1].arclength, history[-1].arclength, 0)
         self._level = history[-1].zero
         while True:
             try:
@@ -280,13 +284,20 @@ class Tracer:
         return Row(point, *resolve(self.follower.inertia, point.x))
 
     def _examined(self, specials: list[Special]) -> list[Special]:
-        """Branch points with the size of their unfolding parameters; raises :class:`Gap` where they are not one."""
+        """Branch points with the size of their unfolding parameters; raises :class:`Gap` where they are not one.
+
+        Steps that jump a gap may meet a change of slope there: a fold whose null vector is nearly orthogonal to the
+        load derivative is asked, too, and is one if the equations of a branch point have no solution.
+        """
         for special in specials:
-            if special.kind == BRANCH_POINT or special.negative_before == special.negative_after:
+            weak = special.kind == FOLD and special.coupling <= COUPLED
+            if weak or special.kind == BRANCH_POINT or special.negative_before == special.negative_after:
                 gap = self.gaps.examine(self.follower, special)
                 if gap is not None and self.gaps.open(gap, self.follower):
                     raise gap
-                if gap is not None:
+                if weak and gap is None and special.unfolding >= 0:  # nan: no such point near by
+                    special.kind = BRANCH_POINT
+                if not weak and gap is not None:
                     special.kind, special.note = IMPERFECT, str(gap)
         return specials
 
@@ -424,6 +435,16 @@ class Tracer:
         branch.points.append(special.point)
         branch.special.append(special)
 
+    def _singular_start(self, branch: Branch) -> None:
+        """Say that a range begins at a singular state: a branch point there is not located, and not followed."""
+        first = branch.points[0]
+        extra = first.zero - persistent_zeros(branch.points)
+        if branch.parent is None and extra > 0 and not any(s.point is first for s in branch.special):
+            self.report.warn(
+                f"The first state, at {self.scene.load} = {first.load:.8g}, is singular: {extra} eigenvalue(s) vanish "
+                "there that do not all along the branch. What else leaves it is not followed: begin before it."
+            )
+
     def _singular_end(self, branch: Branch, last: Point) -> None:
         """Report a branch point on the very end of the range, located on a piece of the branch that goes past it."""
         parameter, load = self.scene.parameters[self.scene.load], last.load
@@ -504,6 +525,7 @@ class Tracer:
     def _finish(self, branch: Branch) -> None:
         branch.renumber()
         explain(branch)
+        self._singular_start(branch)
         last = branch.points[-1]
         if branch.ended == "end of range" and last.zero > self.follower.system.active_drifts():
             self._singular_end(branch, last)

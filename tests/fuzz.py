@@ -264,7 +264,8 @@ def chain(branch: Branch, finding: Finding) -> None:
     """Whether from row to row the index changes by what the special points in between say."""
     special = sorted((s for s in branch.special if s.kind in ("fold", "branch point")), key=lambda s: s.point.arclength)
     at_special = {id(s.point) for s in special}
-    rows = [p for p in branch.points if id(p) not in at_special]
+    least = min(p.zero for p in branch.points)  # a row with an eigenvalue near zero may have either index
+    rows = [p for p in branch.points if id(p) not in at_special and p.zero == least]
     for a, b in pairwise(rows[1:] if branch.parent else rows):
         index = a.negative
         for s in (s for s in special if a.arclength < s.point.arclength < b.arclength):

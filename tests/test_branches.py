@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from math import pi
+
 import numpy as np
 import pytest
 import shooting
+from classics import SUPPORTS, column
 from rods import DEFAULT, Constants, explored, specials, user_points
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
+from forms import loads
 from forms.energy import bending
-from rodfem.branch import Branch
+from rodfem.branch import BRANCH_POINT, Branch
 from rodfem.continuation import Follower
 from rodfem.ends import pinned
 from rodfem.explore import Explorer
@@ -222,3 +226,34 @@ def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
             assert np.hypot(np.hypot(*n), p.load) == pytest.approx(P0, rel=1e-9)
             assert p.energy == pytest.approx(loop.point.energy, rel=1e-9)
             assert (p.negative, p.zero) == (1, 2)
+
+
+@pytest.mark.parametrize("apart", [1e-3, 1e-5])
+def test_a_branch_point_right_after_the_beginning_of_a_branch(apart: float) -> None:
+    """Pinned column on a foundation k = 4 pi^4 (1 + d), where modes 1 and 2 nearly meet at P = 5 pi^2.
+
+    With the deflection a_1 sin(pi s) + a_2 sin(2 pi s) the potential of fourth order of the inextensible rod is
+    pi^6 (-11/64 a_1^4 - 5/4 a_1^2 a_2^2 + 1/4 a_2^4) there.  Mode 2 buckles at P_2 = (5 + d) pi^2 and turns unstable at
+    P_2 + 3 pi^2 d / 11; mode 1 at P_1 = (5 + 4 d) pi^2, of index 2 down to P_1 - 33 pi^2 d.  One branch (and its mirror
+    image) leads from one of these points to the other.
+    """
+    scene = column(
+        "nearly double", SUPPORTS["pinned-pinned"], (48.0, 51.0), planar="e2",
+        constants={"k": 4 * pi**4 * (1 + apart), "B2": 1.0}, potential=lambda x, c: loads.spring(x.r, (c.k, 0.0, 0.0)),
+    )  # fmt: skip
+    solver = Follower(System(scene, Discretization("auto", 8, 6)))
+    explorer = Explorer(solver, Plan(scene.span, error_bars=False), Report(quiet=True), lambda: None)
+    straight, second, first, *between = explorer.run()
+    assert [s.point.load for s in straight.special[:2]] == pytest.approx(
+        [(5 + apart) * pi**2, (5 + 4 * apart) * pi**2], abs=1e-9
+    )
+    for branch, before, after, change in ((second, 0, 1, 3 / 11), (first, 2, 1, -33.0)):
+        special = next(s for s in branch.special if s.kind == BRANCH_POINT)
+        assert (special.negative_before, special.negative_after) == (before, after)
+        away = special.point.load - branch.points[0].load
+        assert away == pytest.approx(change * pi**2 * apart, rel=0.2 * (apart / 1e-3) ** 0.5)
+        assert not branch.unexplained
+    assert between
+    assert {(b.parent, b.ended) for b in between} == {
+        ((second.name, 0), f"meets {first.name} at P = {first.special[0].point.load:.8g}")
+    }

@@ -189,3 +189,26 @@ def test_steps_that_do_not_explain_are_repeated() -> None:
     assert {p.negative for p in branch.points} == {0}
     assert not branch.unexplained
     assert abs(branch.points[-1].ordinate - 2.0) > 0.3
+
+
+@pytest.mark.parametrize("short", [0.0, 1e-9, 1e-4])
+def test_branches_that_leave_at_the_end_of_the_range(short: float) -> None:
+    """All rows are within the range; a branch of which it has nothing is none."""
+    scene = column("range", (clamped(), free(push)), (0.0, EULER + short))
+    found = explore(scene, depth=1)
+    (special,) = found.special()
+    assert special.point.load == pytest.approx(EULER, abs=1e-11)
+    assert len(found.branches) == (2 if short == 1e-4 else 1)
+    for branch in found.branches:
+        assert branch.ended == "end of range"
+        assert max(p.load for p in branch.points) <= scene.span[1] * (1 + 1e-7)
+
+
+def test_a_range_that_begins_at_a_branch_point() -> None:
+    """What is not looked at is said: the branch point is a row that no search has before it."""
+    terminal = io.StringIO()
+    scene = column("range", (clamped(), free(push)), (EULER, 4.0))
+    solver = Follower(System(scene, Discretization("reduced", 8, 6)))
+    (branch,) = Explorer(solver, Plan(scene.span, error_bars=False), Report(stream=terminal), lambda: None).run()
+    assert [p.negative for p in branch.points[1:]] == [1] * (len(branch.points) - 1)
+    assert "is singular: 1 eigenvalue(s) vanish there" in terminal.getvalue() or MPI.COMM_WORLD.rank > 0

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from classics import ON_AXIS, SUPPORTS, Found, column, push
+from classics import ON_AXIS, SUPPORTS, Found, column, push, turned
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc
 
-from rodfem import Discretization, Ordinate, Plan, Scene, clamped, free, pinned
-from rodfem.branch import BRANCH_POINT, FOLD, IMPERFECT
+from rodfem import Discretization, Ordinate, Plan, Scene, clamped, free, pinned, sliding
+from rodfem.branch import BRANCH_POINT, FOLD, IMPERFECT, Special
 from rodfem.continuation import Follower
 from rodfem.explore import Explorer
 from rodfem.report import Report
@@ -164,3 +164,30 @@ def test_a_search_finds_the_detached_branch_once() -> None:
     found = diagram(cantilever(1e-9), 0, at=(3.0,), tries=2)
     assert [b.name for b in found.branches] == ["straight", "found 1 at 3"]
     assert [s.kind for s in found.branches[1].special if s.kind != "user"] == ["end", "fold", "end"]
+
+
+def test_folds_that_are_nearly_uncoupled_from_the_load() -> None:
+    """Past a turn of 2 pi the null vector of a clamped rod is nearly orthogonal to the load derivative, also at a fold.
+
+    The rod bends almost alike in all planes: a load ``e`` across takes a subcritical pitchfork apart, and the fold of
+    the first branch lies below it by the e^(2/3) of Koiter (1945).
+    """
+
+    def special(e: float) -> Special:
+        scene = column(
+            "turned", (clamped(), sliding(ON_AXIS, turned)), (12.5, 13.2), load="phi",
+            constants={"phi": 12.5, "B2": 1.02, "C": 0.7, "e": e}, distributed=lambda c: (c.e, 0.3 * c.e, 0.0),
+            start=lambda s: np.stack([np.cos(6.25 * s), 0 * s, 0 * s, np.sin(6.25 * s)], axis=1),
+        )  # fmt: skip
+        first = diagram(scene, 0, Discretization("pointwise", 6, 5)).branches[0]
+        return first.special[0]
+
+    perfect = special(0.0)
+    assert perfect.kind == BRANCH_POINT
+    below = []
+    for e in (8e-6, 1e-6, 1e-7):
+        fold = special(e)
+        assert (fold.kind, fold.negative_before, fold.negative_after) == (FOLD, 0, 1)
+        below.append(perfect.point.load - fold.point.load)
+    assert below[0] / below[1] == pytest.approx(4.0, rel=1e-3)
+    assert below[1] / below[2] == pytest.approx(10 ** (2 / 3), rel=1e-3)
