@@ -133,7 +133,11 @@ def _count_between(follower: Follower, a: Point, b: Point, found: list[Special])
 
 def midpoint(follower: Follower, a: Point, b: Point) -> Point | None:
     """Point half-way between two points of a branch; None where it is not between them."""
-    s = (a.arclength + b.arclength) / 2
+    return point_between(follower, a, b, (a.arclength + b.arclength) / 2)
+
+
+def point_between(follower: Follower, a: Point, b: Point, s: float) -> Point | None:
+    """Point of a branch at arclength ``s`` between two of its points; None where it is not between them."""
     try:
         x = solve_at(follower, lambda t: hermite(a, b, t), s)
     except ConvergenceError:

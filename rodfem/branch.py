@@ -27,7 +27,8 @@ class Point:
     load the one with less of it need not be the one with less total energy.  ``slope`` is the load's component of the
     tangent, ``drift`` the largest drift scalar (zero but for round-off), ``error`` the last Newton correction, ``mesh``
     the number of the discretisation that ``x`` belongs to, and ``estimate`` the error of the discretisation in load and
-    ordinate, where an accuracy was asked for.  Of
+    ordinate, where an accuracy was asked for.  ``determinant`` is the logarithm of the size of the saddle matrix's
+    determinant, at the state whose factors told the index.  Of
     frequencies ``omega2`` are the eigenvalues (real and imaginary part), ``motion`` what the rod does in each, and
     ``curve`` the numbers of their curves against the load.
     """
@@ -51,6 +52,7 @@ class Point:
     negative_in_space: int | None = None
     mesh: int = 0
     estimate: float = float("nan")
+    determinant: float = float("nan")
 
 
 @dataclass

@@ -88,11 +88,16 @@ class Condensed(Spread):
             springs, compliance = self._factor_piece(np.diag(corner)[piece.touched])
         except ConvergenceError as error:
             trouble = str(error)
-        negative = self.factors.inertia()[0] if self.symmetric and piece.size and not trouble else 0
-        parts = piece.comm.allgather((trouble, negative, springs, compliance))
+        negative, determinant = 0, 0.0
+        if self.symmetric and piece.size and not trouble:
+            negative, determinant = self.factors.inertia()[0], self.factors.determinant()
+        elif not trouble:
+            determinant = float(np.log(abs(springs)).sum())
+        parts = piece.comm.allgather((trouble, negative, springs, compliance, determinant))
         if any(part[0] for part in parts):
             raise ConvergenceError(next(part[0] for part in parts if part[0]))
         self._negative, self._zero = sum(part[1] - len(part[2]) for part in parts), 1
+        self._determinant = sum(part[4] for part in parts)
         self.regular = all(np.isfinite(part).all() for part in (corner, *(part[3] for part in parts)))
         if self.regular:
             self._join(corner, [part[2] for part in parts], [part[3] for part in parts])
@@ -143,6 +148,8 @@ class Condensed(Spread):
         if self.symmetric:
             values = np.linalg.eigvalsh(joint)
             self._negative += int((values < 0).sum())
+            with np.errstate(divide="ignore"):
+                self._determinant += float(np.log(abs(values)).sum() - 2 * np.log(self._scale).sum())
             self._zero = int((values == 0).sum())
             self.regular = self._zero == 0
 
@@ -166,6 +173,10 @@ class Condensed(Spread):
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
         return self._negative, self._zero
+
+    def determinant(self) -> float:
+        """Logarithm of the size of the determinant of the symmetric matrix last factored: it multiplies, too."""
+        return self._determinant
 
 
 def equilibrate(matrix: np.ndarray, most: int = 30) -> np.ndarray:

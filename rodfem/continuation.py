@@ -213,6 +213,7 @@ class Follower(Equilibria):
         system = self.system
         if index is None:
             index = decide(self.inertia, x).index
+        determinant = self.inertia.factors.determinant()
         return Point(
             x=x,
             tangent=tangent,
@@ -229,6 +230,7 @@ class Follower(Equilibria):
             spectrum=self._leftmost(x, index),
             negative_in_space=None if self.space is None else self.space.count(x).negative,
             mesh=self.mesh,
+            determinant=determinant,
         )
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:
@@ -379,8 +381,8 @@ def follow(
                 outcome, tangent, index = follower.correct(x, row, 0.5 * step, last.slope)
                 if outcome.converged:
                     load = system.scalar(x)
-        if not low <= load <= high:
-            point = _to_load(follower, points, load, bounds[0] if load < low else bounds[1], step)
+        if not low <= load <= high or _on_bound(load, last, bounds, span):
+            point = _to_load(follower, points, load, min(bounds, key=lambda bound: abs(bound - load)), step)
             if point is not None:
                 yield point
                 yield "end of range"
@@ -406,6 +408,12 @@ def distance(system: System, a: PETSc.Vec, b: PETSc.Vec) -> float:
     change = a.copy()
     change.aypx(-1.0, b)
     return system.norm(change)
+
+
+def _on_bound(load: float, last: Point, bounds: tuple[float, float], span: float) -> bool:
+    """Whether a step from ``last`` that changes the load ends on a bound of the range, but for round-off."""
+    near = min(abs(bound - load) for bound in bounds)
+    return near < ON_BOUND * span and abs(last.load - load) > 2 * ON_BOUND * span
 
 
 def _to_load(follower: Follower, points: list[Point], beyond: float, load: float, step: float) -> Point | None:

@@ -6,6 +6,8 @@ parallel factorisation exchanges some for every front, each longer under way tha
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
@@ -71,7 +73,7 @@ class Copied(Spread):
         self.factors, self.symmetric = factors, factors.kind == "cholesky"
         self.regular = False
         self._matrix: PETSc.Mat | None = None
-        self._inertia = 0, 0
+        self._inertia, self._determinant = (0, 0), -inf
 
     def __call__(self, matrix: PETSc.Mat) -> None:
         """Factor ``matrix``; raises :class:`ConvergenceError` on all ranks where one gives up."""
@@ -80,19 +82,19 @@ class Copied(Spread):
             self._block = Block(self.factors, matrix.size[0])
         else:
             self.copy.update(matrix)
-        trouble, inertia = "", (0, 1)
+        trouble, inertia, determinant = "", (0, 1), -inf
         try:
             self.factors(self.copy.matrix)
             if self.symmetric and self.factors.regular:
-                inertia = self.factors.inertia()
+                inertia, determinant = self.factors.inertia(), self.factors.determinant()
         except ConvergenceError as error:
             trouble = str(error)
-        troubles, regular, inertias = zip(
-            *self.copy.comm.allgather((trouble, self.factors.regular, inertia)), strict=True
+        troubles, regular, inertias, determinants = zip(
+            *self.copy.comm.allgather((trouble, self.factors.regular, inertia, determinant)), strict=True
         )
         if any(troubles):
             raise ConvergenceError(next(filter(None, troubles)))
-        self.regular, self._inertia = all(regular), inertias[0]
+        self.regular, self._inertia, self._determinant = all(regular), inertias[0], determinants[0]
 
     def spread(self, right: np.ndarray) -> np.ndarray:
         """Solve for the columns of the rows of this rank."""
@@ -101,3 +103,7 @@ class Copied(Spread):
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
         return self._inertia
+
+    def determinant(self) -> float:
+        """Logarithm of the size of the determinant of the symmetric matrix last factored."""
+        return self._determinant

@@ -8,6 +8,7 @@ solves in a tenth (reduced formulation) to a quarter (pointwise) of MUMPS's time
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from math import inf, log
 from typing import Any, Protocol
 
 import numpy as np
@@ -78,6 +79,9 @@ class Factors(Protocol):
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
+
+    def determinant(self) -> float:
+        """Logarithm of the size of the determinant of the symmetric matrix last factored."""
 
 
 def factors_of(
@@ -233,6 +237,10 @@ class Klu:
         """LU factors count none."""
         raise TypeError("LU factors have no inertia: LDL^t factors have")
 
+    def determinant(self) -> float:
+        """None is kept of LU factors."""
+        raise TypeError("LU factors keep no determinant: LDL^t factors do")
+
 
 class Mumps:
     """Factors by MUMPS.
@@ -304,6 +312,12 @@ class Mumps:
         negative, zero, _ = self.ksp.getPC().getFactorMatrix().getInertia()
         return int(negative), int(zero)
 
+    def determinant(self) -> float:
+        """Logarithm of the size of the determinant of the symmetric matrix last factored; -inf where it is zero."""
+        factor = self.ksp.getPC().getFactorMatrix()
+        mantissa = abs(factor.getMumpsRinfog(12))
+        return log(mantissa) + factor.getMumpsInfog(34) * log(2.0) if mantissa else -inf
+
     def _prepare(self, matrix: PETSc.Mat) -> None:
         self.ksp.reset()
         self.ksp.setType("preonly")
@@ -318,6 +332,8 @@ class Mumps:
         prefer_options(self.prefix, DENSE_ROWS)
         self.factor.setOptionsPrefix(self.prefix)  # made before PETSc's own set-up, it has none
         self.factor.setMumpsIcntl(14, self.room)
+        if self.kind == "cholesky":
+            self.factor.setMumpsIcntl(33, 1)  # the determinant
         for control, value in self.controls.items():
             self.factor.setMumpsIcntl(control, value)
         for control, threshold in self.thresholds.items():

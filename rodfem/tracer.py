@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import inf, isnan
+from math import isnan
 
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.bifurcation import COUPLED, FIRST, find_special, midpoint, renew
-from rodfem.branch import BRANCH_POINT, END, FOLD, IMPERFECT, NOT_TRACED, USER, Branch, Point, Special
-from rodfem.chain import Row, chained, explain, merge_doubles, persistent_zeros
+from rodfem.bifurcation import FIRST
+from rodfem.branch import BRANCH_POINT, END, NOT_TRACED, USER, Branch, Point, Special
+from rodfem.chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation import VERTICAL, Follower, distance, follow, hermite
 from rodfem.errors import ConvergenceError
 from rodfem.gaps import Gap, Gaps
@@ -20,26 +20,15 @@ from rodfem.locate import solve_at
 from rodfem.meshes import Meshes, TooCoarse
 from rodfem.plan import Plan
 from rodfem.report import Report
-from rodfem.stability.band import resolve
+from rodfem.special_search import SpecialSearch, Unresolved
 from rodfem.watch import Watch
 from rodfem.zero_stretch import zero_stretch
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
 
-
-HALVINGS = 4
-"""How many times a piece of a branch is halved until its special points explain the indices of its ends."""
-SHORTER = 2
-"""How many times steps are made eight times shorter where the indices are not explained."""
 NEAR_START = 8
 """Steps of a branch that begins near another special point are as short as its first for so many times their length."""
-PATIENCE = 4
-"""Rows with an eigenvalue near zero after which it is asked whether it stays zero."""
-
-
-class Unresolved(Exception):
-    """The special points found in a step do not explain the indices at its ends."""
 
 
 class Tracer:
@@ -59,10 +48,7 @@ class Tracer:
         self.meshes = Meshes(follower, plan.accuracy)
         self.gaps = Gaps(self.meshes)
         self.warned = False
-        self._open: list[Point] = []
-        self._before: Point | None = None
-        self._short = (-inf, inf, 0)
-        self._level = 0
+        self.specials = SpecialSearch(self.meshes, self.gaps, report)
 
     @property
     def solvers(self) -> Sequence[Follower]:
@@ -123,10 +109,11 @@ class Tracer:
         """Follow a branch to its end; where its mesh is too coarse, from there on with another."""
         special = {id(s.point) for s in branch.special}
         history, begun = [p for p in branch.points if id(p) not in special], False
-        self._short = (-inf, inf, 0)
-        if branch.parent and 0 < history[-1].arclength < FIRST / 2:  # it begins near something: see start_branch
-            self._short = (NEAR_START * history[-1].arclength, history[-1].arclength, 0)
-        self._level = history[-1].zero
+        first = history[-1].arclength
+        if branch.parent and 0 < first < FIRST / 2:  # it begins near something: see start_branch
+            self.specials.begin(history[-1], short=first, until=NEAR_START * first)
+        else:
+            self.specials.begin(history[-1])
         while True:
             try:
                 self.watch.row(history[-1], self.follower)
@@ -160,11 +147,14 @@ class Tracer:
 
     def _advance(self, branch: Branch, history: list[Point]) -> None:
         """Append points until the branch ends, which :attr:`Branch.ended` then says."""
-        self._open, self._before = [history[-1]], None
-        for item in follow(self.follower, history, self.plan.steps, (self.low, self.high), self._reach):
+        self.specials.resume(history[-1])
+        for item in follow(self.follower, history, self.plan.steps, (self.low, self.high), self.specials.reach):
             if isinstance(item, str):
                 branch.ended = item
-                self._close(branch)
+                with self.follower.system.clock.purpose("location"):
+                    for special in self.specials.rest():
+                        branch.insert(special)
+                        self.report.special(branch, special)
                 return
             previous = history[-1]
             self._check_symmetry(item)
@@ -197,7 +187,7 @@ class Tracer:
             return self._between_points(branch, a, b)
 
     def _between_points(self, branch: Branch, a: Point, b: Point) -> str:
-        specials = [] if a is branch.points[0] and branch.parent else self._specials(a, b)
+        specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b)
         pieces = [a, *(s.point for s in specials if s.point.arclength > a.arclength), b]
         users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
         for special in specials + users:
@@ -214,115 +204,6 @@ class Tracer:
                 branch.insert(special)
                 self.report.special(branch, special)
         return ""
-
-    def _specials(self, a: Point, b: Point) -> list[Special]:
-        """Special points that the row ``b`` after ``a`` tells of; raises :class:`Gap` for one that is taken apart.
-
-        An eigenvalue within the tolerance of zero has no sign yet: rows with one wait, as ``_open``, until it has.  One
-        that stays zero to working accuracy belongs to a family of equilibria at one load, and is not waited for.
-        """
-        rows = [self.here(p) for p in self._open]
-        self._level = min(rows[0].zero, b.zero)
-        if b.zero > self._level:
-            self._open.append(b)
-            if len(self._open) <= PATIENCE or self._row(b).decided:
-                return []
-        if len(rows) > 1 or a.negative != b.negative or a.slope * b.slope < 0:
-            was = rows[0].negative, rows[0].slope > 0
-            for point in (*rows, b):
-                renew(self.follower, point, turning=len(rows) > 1 or a.slope * b.slope < 0)
-            if was != (rows[0].negative, rows[0].slope > 0) and self._before is not None:
-                rows.insert(0, self.here(self._before))  # what changes does so before that row
-        self._before, self._open = rows[-1], [b]
-        return self._examined(self._among([*rows, b]))
-
-    def _among(self, points: Sequence[Point]) -> list[Special]:
-        """Special points among rows, all but the first and the last of which have an eigenvalue near zero.
-
-        Raises :class:`Unresolved` where they do not explain the indices, and shorter steps have not been tried.
-        """
-        rows, found = [self._row(p) for p in points], []
-        why: list[str] = []
-        sure = [rows[0], *(row for row in rows[1:-1] if row.decided), rows[-1]]
-        for p, q in pairwise(sure):
-            specials = self._special_between(p, q, why)
-            found += specials
-            if not chained(p.low, p.high, specials, q.low, q.high):
-                self._shorten(p.point, q.point)
-        for trouble in why:
-            self.report.warn(trouble)
-        return found
-
-    def _shorten(self, a: Point, b: Point) -> None:
-        """Shorten steps from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are short already."""
-        until, _, tries = self._short
-        tries = tries + 1 if a.arclength < until else 1
-        if tries <= SHORTER:
-            length = b.arclength - a.arclength
-            self._short = b.arclength + length, length / 8, tries
-            raise Unresolved
-
-    def _reach(self, point: Point) -> float:
-        """Largest step from a point: near gaps, and where the indices are not explained, short ones."""
-        until, largest, _ = self._short
-        near = self.gaps.reach(self.follower, point)
-        return min(near, largest) if point.arclength < until else near
-
-    def _close(self, branch: Branch) -> None:
-        """Insert special points among rows at the end of a branch that have an eigenvalue near zero."""
-        if len(self._open) > 1:
-            with self.follower.system.clock.purpose("location"):
-                for special in self._examined(self._among([self.here(p) for p in self._open])):
-                    branch.insert(special)
-                    self.report.special(branch, special)
-
-    def _row(self, point: Point) -> Row:
-        """Index of a point, small eigenvalues by their Rayleigh quotients."""
-        if point.zero <= self._level:
-            return Row(point, point.negative, point.negative)
-        self.follower.system.set_phase(point.x)
-        return Row(point, *resolve(self.follower.inertia, point.x))
-
-    def _examined(self, specials: list[Special]) -> list[Special]:
-        """Branch points with the size of their unfolding parameters; raises :class:`Gap` where they are not one.
-
-        Steps that jump a gap may meet a change of slope there: a fold whose null vector is nearly orthogonal to the
-        load derivative is asked, too, and is one if the equations of a branch point have no solution.
-        """
-        for special in specials:
-            weak = special.kind == FOLD and special.coupling <= COUPLED
-            if weak or special.kind == BRANCH_POINT or special.negative_before == special.negative_after:
-                gap = self.gaps.examine(self.follower, special)
-                if gap is not None and self.gaps.open(gap, self.follower):
-                    raise gap
-                if weak and gap is None and special.unfolding >= 0:  # nan: no such point near by
-                    special.kind = BRANCH_POINT
-                if not weak and gap is not None:
-                    special.kind, special.note = IMPERFECT, str(gap)
-        return specials
-
-    def _special_between(self, p: Row, q: Row, troubles: list[str], halvings: int = HALVINGS) -> list[Special]:
-        """Folds and branch points between two rows, on halves of the piece where a whole one is not resolved.
-
-        It is where they explain the indices of both rows.  ``troubles`` gets sentences on pieces that are not.
-        """
-        found, why = [], ""
-        persistent = max(self._level - self.follower.system.active_drifts(), 0)
-        try:
-            found = find_special(self.follower, p.point, q.point, p.crossing(q), persistent)
-        except ConvergenceError as trouble:
-            why = str(trouble)
-        if not why and chained(p.low, p.high, found, q.low, q.high):
-            return found
-        middle = midpoint(self.follower, p.point, q.point) if halvings else None
-        if middle is None:
-            if why:
-                loads = f"{p.point.load:.8g} and {q.point.load:.8g}"
-                troubles.append(f"A special point between loads {loads} is missing: {why}")
-            return found
-        row = self._row(middle)
-        first = self._special_between(p, row, troubles, halvings - 1)
-        return first + self._special_between(row, q, troubles, halvings - 1)
 
     def _users(self, branch: Branch, p: Point, q: Point, a: Point, b: Point) -> list[Special]:
         """User points between two neighbours among which the load is monotone."""
@@ -457,11 +338,7 @@ class Tracer:
                 guess = hermite(previous, last, last.arclength)[0]
                 point = self.user(guess, beyond, 2 * last.arclength - previous.arclength, beyond > load)
                 point.arclength = last.arclength + distance(self.follower.system, last.x, point.x)
-                self._level = min(previous.zero, point.zero)
-                orders = self._row(previous).crossing(self._row(point))
-                persistent = max(self._level - self.follower.system.active_drifts(), 0)
-                found = find_special(self.follower, previous, point, orders, persistent)
-                found = [s for s in found if s.kind == BRANCH_POINT]
+                found = [s for s in self.specials.beyond(previous, point) if s.kind == BRANCH_POINT]
         except ConvergenceError as trouble:
             self.report.warn(
                 f"The last state, at {self.scene.load} = {load:g}, is singular, and was not resolved: {trouble}"
@@ -510,7 +387,7 @@ class Tracer:
         recent = [p for p in history[-4:] if p.arclength > 0.0]  # a branch point has zeros of its own
         stay = extra > 0 and bool(recent) and all(p.zero == point.zero for p in recent)
         self.follower.damp(extra if stay else 0)
-        if stay and len(recent) == 4 and point.zero <= self._level and not self.warned:
+        if stay and len(recent) == 4 and point.zero <= self.specials.level and not self.warned:
             self.warned = True
             self.report.say(
                 f"  {extra} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
