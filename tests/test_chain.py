@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from argparse import Namespace
+from dataclasses import replace
 from math import cos, pi, sin
 from typing import Any
 
@@ -11,13 +12,15 @@ import numpy as np
 import pytest
 import rods
 import scenes
-from classics import ON_AXIS, RIGID, ROUND, WIDE, circle, column, explore, push
+from classics import ON_AXIS, RIGID, ROUND, WIDE, circle, column, explore, push, winkler
+from closed_form import buckling
 from mpi4py import MPI
 from rows import verify
+from scipy.optimize import brentq
 
 from forms.energy import bending
 from rodfem import Discretization, Ordinate, Parameter, Plan, Ring, Scene, Steps, clamped, free, judge, pinned, sliding
-from rodfem.branch import BRANCH_POINT
+from rodfem.branch import BRANCH_POINT, FOLD
 from rodfem.chain import Row, breaks, chained, explain
 from rodfem.continuation import Follower
 from rodfem.diagram import _branch_data
@@ -132,6 +135,44 @@ def test_a_fold_beside_the_branch_point_that_it_comes_from() -> None:
     found = locus(solver, other, "A", ((0.3, 0.4), (-2.31, -1.9)), error_bars=0)
     row = int(np.argmin(found.values[:, 1]))
     assert found.values[row] == pytest.approx([fold.point.load, -2.31], abs=1e-9)
+
+
+@pytest.mark.parametrize("largest", [0.05, 0.15])
+def test_a_fold_and_a_branch_point_of_opposite_sign_in_one_step(largest: float) -> None:
+    """On a foundation of k = 240 the second branch turns back 0.017 after its index has gone from 3 to 4.
+
+    At the ends of the step it is 3.  Steps of 0.3 happen to end between the two.
+    """
+    scene = winkler()
+    scene = replace(scene, parameters={**scene.parameters, "k": Parameter(240.0)})
+    solver = Follower(System(scene, Discretization("auto", 8, 6)))
+    plan = Plan(scene.span, depth=1, steps=Steps(largest=largest), error_bars=False)
+    branch = Explorer(solver, plan, Report(quiet=True), lambda: None).run()[2]
+    found = [(s.kind, s.negative_before, s.negative_after) for s in branch.special[1:3]]
+    assert found == [(BRANCH_POINT, 3, 4), (FOLD, 4, 3)]
+    assert [s.point.load for s in branch.special[1:3]] == pytest.approx([31.28043, 31.27381], abs=1e-5)
+
+
+@pytest.mark.parametrize(("longer", "apart"), [(1e-3, 0.0265), (1e-4, 8.39e-3), (1e-6, 8.39e-4)])
+def test_an_eigenvalue_that_passes_zero_twice_in_one_step(longer: float, apart: float) -> None:
+    """Two double branch points of the straight rod, ``apart`` by the closed form: the index is 2 on either side.
+
+    For A = 0 they depend on lam (1 - lam) l^2 alone, and meet at lam = 1/2 and a half length of 2.84188.
+    """
+    meet = brentq(lambda half: buckling(0.5, 0.0, 1.0, 1.0, half), 2.8, 2.9, xtol=1e-15)
+    constants = (0.0, 1.0, 1.0, meet + longer)
+    first = brentq(lambda lam: buckling(lam, *constants), 0.4, 0.5, xtol=1e-15)
+    assert 1 - 2 * first == pytest.approx(apart, rel=5e-3)
+    solver = Follower(System(rods.scene(constants), Discretization("reduced", 16, 6)))
+    plan = Plan((0.0, 0.95), depth=0, steps=Steps(largest=0.1), error_bars=False)
+    (straight,) = Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+    pair = straight.special[1:3]
+    assert [(s.negative_before, s.negative_after) for s in pair] == [(2, 4), (4, 2)]
+    assert [s.point.load for s in pair] == pytest.approx([first, 1 - first], abs=1e-9)
+    # in a shorter rod the eigenvalue comes near zero, and turns back
+    shorter = Follower(System(rods.scene((0.0, 1.0, 1.0, meet - longer)), Discretization("reduced", 16, 6)))
+    (straight,) = Explorer(shorter, plan, Report(quiet=True), lambda: None).run()
+    assert [(s.negative_before, s.negative_after) for s in straight.special] == [(0, 2), (2, 0), (0, 0)]
 
 
 @pytest.mark.alone
