@@ -54,6 +54,8 @@ def special_at(follower: Follower, located: Located, arclength: float, still: Se
         )
     _, vectors = inertia.nearest(null_count, accuracy=1e-8)
     vectors = across(system, vectors, still)
+    if not vectors:
+        raise ConvergenceError(f"The null vector near load {located.load:.8g} is none beside those that stay zero.")
     coupling = max(coupling_of(follower, x, v) for v in vectors)
     turning = abs(system.scalar(tangent)) < 1e-3 * abs(system.scene.span[1] - system.scene.span[0])
     kind = FOLD if turning and coupling > COUPLED else BRANCH_POINT

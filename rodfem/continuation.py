@@ -9,7 +9,7 @@ where it does not.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -372,7 +372,10 @@ def follow(
         last = points[-1]
         most = min(reach(last), steps.largest)
         step = min(step, most)
-        x, direction = predict(points, last.arclength + step)
+        known = points
+        if system.damping and last.tangent is not None:  # across a family, along which the path is not determined
+            known = [replace(last, tangent=follower.tangent(follower.row(last.tangent), at=last.x))]
+        x, direction = predict(known, last.arclength + step)
         load, outcome, tangent, index = system.scalar(x), None, None, None
         if low <= load <= high:
             row = follower.row(direction)
@@ -389,7 +392,7 @@ def follow(
                 return
         elif outcome is not None and tangent is not None and row.dot(tangent) > 0.9:
             yield follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome, index)
-            order = min(len(points) - 1, 3) + 1
+            order = 2 if system.damping else min(len(points) - 1, 3) + 1
             factor = (steps.aim / max(outcome.moved, 1e-12)) ** (1 / order)
             step = min(step * min(max(factor, 0.4), 1.6), steps.largest)
             continue

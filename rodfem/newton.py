@@ -65,8 +65,12 @@ def iterate(
     next: near a solution the old factors cost one solve where new ones cost five.  Done when a correction, or what the
     observed rate of convergence leaves after it, is small enough.  Fails, leaving ``x`` where it got to, after ``most``
     iterations, where there is nothing to subtract (None), or when ``x`` moves further than ``reach`` in the metric.
+
+    With damping ``d`` a correction of size c along a family of equilibria is that by a force ``d c``, which no mesh
+    makes exactly zero: one that no longer shrinks is accepted where that force is within the tolerance.
     """
     equations, origin = system.new_vector(), x.copy()
+    still = max(ROUND_OFF, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else ROUND_OFF
     previous, size, refactor = float("inf"), float("inf"), True
     iteration = 0
     for iteration in range(1, most + 1):
@@ -83,7 +87,7 @@ def iterate(
         if not isfinite(size) or distance > reach:
             break
         left = size if fresh else min(2.0 * size / previous, 1.0) * size
-        if size < TOLERANCE or left < tolerance or (fresh and ROUND_OFF > size > 0.5 * previous):
+        if size < TOLERANCE or left < tolerance or (fresh and still > size > 0.5 * previous):
             origin.aypx(-1.0, x)
             return Outcome(True, iteration, left, system.norm(origin))
         refactor = size > 0.02 or size > 0.1 * previous

@@ -90,11 +90,14 @@ class SpecialSearch:
         return self._examined(self._among([*rows, *between, b]))
 
     def rest(self) -> list[Special]:
-        """Special points among the last rows of a branch, where they have an eigenvalue near zero."""
+        """Special points among the last rows of a branch, where they have an eigenvalue near zero.
+
+        The branch has ended: nothing is tried with shorter steps.
+        """
         if len(self._open) < 2:
             return []
         self._on(self._open[-1])
-        return self._examined(self._among([self._here(p) for p in self._open]))
+        return self._examined(self._among([self._here(p) for p in self._open], ended=True), ended=True)
 
     def beyond(self, a: Point, b: Point) -> list[Special]:
         """Special points between a row and a point past the end of its branch, as they are found on one piece."""
@@ -125,10 +128,11 @@ class SpecialSearch:
         """Number of eigenvalues that stay zero without a symmetry."""
         return max(self.level - self.follower.system.active_drifts(), 0)
 
-    def _among(self, points: Sequence[Point]) -> list[Special]:
+    def _among(self, points: Sequence[Point], ended: bool = False) -> list[Special]:
         """Special points among rows, all but the first and the last of which have an eigenvalue near zero.
 
-        Raises :class:`Unresolved` where they do not explain the indices, and shorter steps have not been tried.
+        Raises :class:`Unresolved` where they do not explain the indices, and shorter steps have not been tried, unless
+        the branch has ``ended``.
         """
         rows, found = [self.row(p) for p in points], []
         why: list[str] = []
@@ -136,7 +140,7 @@ class SpecialSearch:
         for p, q in pairwise(sure):
             specials = self._between(p, q, why)
             found += specials
-            if not chained(p.low, p.high, specials, q.low, q.high):
+            if not ended and not chained(p.low, p.high, specials, q.low, q.high):
                 self._shorten(p.point, q.point)
         for trouble in why:
             self.report.warn(trouble)
@@ -151,8 +155,10 @@ class SpecialSearch:
             self._short = b.arclength + length, length / 8, tries
             raise Unresolved
 
-    def _examined(self, specials: list[Special]) -> list[Special]:
+    def _examined(self, specials: list[Special], ended: bool = False) -> list[Special]:
         """Branch points with the size of their unfolding parameters; raises :class:`Gap` where they are not one.
+
+        One on a branch that has ``ended`` is marked as imperfect instead.
 
         Steps that jump a gap may meet a change of slope there: a fold whose null vector is nearly orthogonal to the
         load derivative is asked, too, and is one if the equations of a branch point have no solution.
@@ -161,11 +167,11 @@ class SpecialSearch:
             weak = special.kind == FOLD and special.coupling <= COUPLED
             if weak or special.kind == BRANCH_POINT or special.negative_before == special.negative_after:
                 gap = self.gaps.examine(self.follower, special)
-                if gap is not None and self.gaps.open(gap, self.follower):
+                if gap is not None and not ended and self.gaps.open(gap, self.follower):
                     raise gap
                 if weak and gap is None and special.unfolding >= 0:  # nan: no such point near by
                     special.kind = BRANCH_POINT
-                if not weak and gap is not None:
+                if (ended or not weak) and gap is not None:
                     special.kind, special.note = IMPERFECT, str(gap)
         return specials
 

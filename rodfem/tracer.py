@@ -362,8 +362,12 @@ class Tracer:
         if (a.load - first.load) * (b.load - first.load) > 0 or not near(first, a, 4) or a.slope * first.slope <= 0:
             return False
         s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
-        point = self.user(hermite(a, b, s)[0], first.load, s, increasing=b.load > a.load)
-        return self.alike(point, first, 1e-7)
+        guess = hermite(a, b, s)[0]
+        self.follower.system.set_phase(guess)
+        x, outcome = self.follower.at_load(guess, first.load, reach=1.0)
+        if not outcome.converged:  # beside a fold, say: not there
+            return False
+        return self.alike(self.follower.point(x, s, None, outcome), first, 1e-7)
 
     def alike(self, a: Point, b: Point, tolerance: float) -> bool:
         """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
