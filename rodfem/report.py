@@ -230,8 +230,8 @@ class Report:
 
         if coarse := sum(s.resolved is False for b in branches for s in b.special):
             self.warn(
-                f"The mesh does not resolve {coarse} special point{'s'[: coarse > 1]}: what stands in brackets there is "
-                "no bound, and the rod need not have such a point; use more elements or a higher degree."
+                f"The mesh does not resolve {coarse} special point{'s'[: coarse > 1]}: what stands in brackets is "
+                "no bound there, and the rod need not have such a point; use more elements or a higher degree."
             )
         missed = not_followed(branches)
         if missed:
