@@ -152,17 +152,13 @@ class Richer:
         changed = self._gauges[1].changed(first, x, state=True)
         return Again(x, *last, float(left[0]), float(left[1]), self.rho([point.x], [x]), changed)
 
-    def law(self, special: Special, direction: PETSc.Vec, law: Law, near: Sequence[PETSc.Vec]) -> None:
-        """Set the uncertainty of a law of the first discretisation: that of the rod's law, infinite without another.
-
-        ``near`` are the states of the first discretisation that it was had from.
-        """
+    def law(self, special: Special, direction: PETSc.Vec, law: Law) -> None:
+        """Set the uncertainty of a law of the first discretisation: that of the rod's law, infinite without another."""
         self.system.damping = self.coarse.system.damping
         way, again, rho = self.transfer(direction, state=False), None, 0.0
         for known, origin, left in self._origins:
             if known is special:
-                guesses = [self.transfer(x, state=True) for x in near]
-                (again, _), rho = law_of(self.follower, origin, way, guesses), left
+                again, rho = law_of(self.follower, origin, way), left
         if again is None or (again.kind, again.power) != (law.kind, law.power):
             law.uncertainty = float("inf")
         else:

@@ -226,10 +226,10 @@ class Explorer(Tracer):
         from_the_side = special.zero_of == "slope"
         with self.follower.system.clock.purpose("location"):
             way = special.null_vectors[0] if from_the_side else direction
-            special.law, near = law_of(self.follower, origin_of(self.follower, special), way)
+            special.law = law_of(self.follower, origin_of(self.follower, special), way)
         if special.law is not None and isfinite(special.error_estimate):
             with self.follower.system.clock.purpose("error bars"):
-                self.meshes.richer(special.point.mesh).law(special, way, special.law, near)
+                self.meshes.richer(special.point.mesh).law(special, way, special.law)
         if special.law is not None and not from_the_side:
             indices = special.negative_before, special.negative_after
             special.law.judge(*(indices if special.point.slope > 0 else reversed(indices)))

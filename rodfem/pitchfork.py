@@ -8,7 +8,7 @@ that it leaves is higher, else subcritical.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,13 +53,8 @@ def ordinate_along(follower: Follower, x: PETSc.Vec, direction: PETSc.Vec) -> fl
     return (follower.shape.ordinate(beside) - follower.shape.ordinate(x)) / BESIDE
 
 
-def law_of(
-    follower: Follower, origin: Origin, direction: PETSc.Vec, guesses: Sequence[PETSc.Vec] = ()
-) -> tuple[Law | None, list[PETSc.Vec]]:
-    """Law of the branch that leaves ``origin`` along ``direction``, and the states it is had from, by amplitude.
-
-    None, and no states, where it cannot be had from nearby points.  ``guesses`` at these states, from another mesh,
-    save iterations.
+def law_of(follower: Follower, origin: Origin, direction: PETSc.Vec) -> Law | None:
+    """Law of the branch that leaves ``origin`` along ``direction``; None where it cannot be had from nearby points.
 
     At a pitchfork the load is an even function of the amplitude, and the ordinate an even or an odd one;
     polynomials through four amplitudes give their leading coefficients.  Uncertain is what those through three miss,
@@ -67,21 +62,10 @@ def law_of(
     measured from it, divided by the square of an amplitude.
     """
     row = follower.row(direction)
-    amplitudes = [float(a) for a in (*AMPLITUDES, -AMPLITUDES[-1])]
-    states = [
-        _near(follower, origin, direction, row, a, guess)
-        for a, guess in zip(amplitudes, guesses or [None] * len(amplitudes), strict=True)
-    ]
-    near = [x for x in states if x is not None]
-    if len(near) < len(states):
-        return None, []
-    return _fitted(follower, origin, near), near
-
-
-def _fitted(follower: Follower, origin: Origin, near: Sequence[PETSc.Vec]) -> Law | None:
-    """Law that states at the :data:`AMPLITUDES`, and at the least one below zero, tell; None where they do not."""
-    loads = np.array([follower.system.scalar(x) for x in near]) - origin.load
-    ordinates = np.array([follower.shape.ordinate(x) for x in near]) - origin.ordinate
+    near = [_near(follower, origin, direction, row, float(a)) for a in (*AMPLITUDES, -AMPLITUDES[-1])]
+    if None in near:
+        return None
+    loads, ordinates = np.array(near, dtype=float).T
     plus, minus = loads[-2], loads[-1]
     span = follower.system.scene.span
     if max(map(abs, loads)) < VERTICAL * abs(span[1] - span[0]):
@@ -105,22 +89,16 @@ def _fitted(follower: Follower, origin: Origin, near: Sequence[PETSc.Vec]) -> La
 
 
 def _near(
-    follower: Follower,
-    origin: Origin,
-    direction: PETSc.Vec,
-    row: PETSc.Vec,
-    amplitude: float,
-    guess: PETSc.Vec | None,
-) -> PETSc.Vec | None:
-    """State at an amplitude of the bifurcating branch; None where Newton's method fails."""
-    system, x = follower.system, origin.x.copy()
+    follower: Follower, origin: Origin, direction: PETSc.Vec, row: PETSc.Vec, amplitude: float
+) -> tuple[float, float] | None:
+    """Changes of load and ordinate at an amplitude of the bifurcating branch; None where Newton's method fails."""
+    system = follower.system
+    x = origin.x.copy()
     x.axpy(amplitude, direction)
-    if guess is not None:  # moved along the direction to that amplitude
-        amount = (row.dot(x) - row.dot(guess)) / row.dot(direction)
-        x = guess.copy()
-        x.axpy(amount, direction)
     system.set_phase(x)
-    return x if correct(system, x, row, reach=2.0 * abs(amplitude)).converged else None
+    if not correct(system, x, row, reach=2.0 * abs(amplitude)).converged:
+        return None
+    return system.scalar(x) - origin.load, follower.shape.ordinate(x) - origin.ordinate
 
 
 def _left(
