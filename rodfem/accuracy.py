@@ -36,9 +36,9 @@ from rodfem.transfer import Transfer, richer_system
 AMPLE, MOST = 2.0, 0.75
 """Times the ratio of the last coefficients that an error is taken to fall by, for one that is small by accident; and
 what is left at most: beyond, neither mesh resolves the state."""
-RESOLVED_TO = 0.2
-"""Relative change of the strains on the richer mesh, up to which a mesh resolves a state: a fifth.  Its square, of the
-order of which errors of loads are, is 4 %."""
+RESOLVED_TO = 0.1
+"""Relative change of the strains on the richer mesh, up to which a mesh resolves a state: a tenth.  Its square, of the
+order of which errors of loads are, is one per cent."""
 RESOLVED = 1e-9
 """Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
 NARROW = 1 / 128
