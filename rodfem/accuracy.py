@@ -7,6 +7,12 @@ positions at vertices.  How smooth it is the states themselves tell: by the last
 the two meshes, whose ratio bounds that of loads and positions amply.  To that comes what location and arithmetic leave
 open of the richer result.
 
+All of this is asymptotic.  Errors of loads and positions are of second order in those of strains only while these are
+small, and a single value may agree on two meshes by accident, where what it has of either sign cancels; norms do not
+cancel.  Where the strains of the state, or of its null vector, differ between the two meshes by more than
+:data:`RESOLVED_TO` of themselves, the first mesh does not resolve the state, and ``d`` is no bound but what its error
+may well exceed.
+
 The state, its tangent and the null vector are interpolated, so that this costs a few solves.
 """
 
@@ -30,6 +36,9 @@ from rodfem.transfer import Transfer, richer_system
 AMPLE, MOST = 2.0, 0.75
 """Times the ratio of the last coefficients that an error is taken to fall by, for one that is small by accident; and
 what is left at most: beyond, neither mesh resolves the state."""
+RESOLVED_TO = 0.1
+"""Relative change of the strains on the richer mesh, up to which a mesh resolves a state: a tenth.  Its square, of the
+order of which errors of loads are, is one per cent."""
 RESOLVED = 1e-9
 """Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
 NARROW = 1 / 128
@@ -52,7 +61,8 @@ def bound(value: complex, richer: complex, left: float, rho: float) -> float:
 class Again:
     """A point computed again: state, load and ordinate, what location and arithmetic leave open of these two.
 
-    ``rho`` is the part of the errors of the first discretisation that is left.
+    ``rho`` is the part of the errors of the first discretisation that is left; the strains of the state or of its null
+    vector, the one that did so more, have ``changed`` by that part of themselves.
     """
 
     x: PETSc.Vec
@@ -61,6 +71,12 @@ class Again:
     load_left: float
     ordinate_left: float
     rho: float
+    changed: float
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the first discretisation resolves the state: otherwise the errors may exceed their bounds."""
+        return self.changed <= RESOLVED_TO
 
     def errors(self, point: Point) -> tuple[float, float]:
         """Bounds of the errors in load and ordinate of the point as first computed."""
@@ -91,7 +107,8 @@ class Richer:
     def estimate(self, special: Special) -> None:
         """Set ``error_estimate`` and ``ordinate_error`` of a special point, bounds of what it may be in error by.
 
-        They are infinite where the richer discretisation does not find the point.
+        They are infinite where the richer discretisation does not find the point, and no bounds where the point is not
+        ``resolved``, which is set, too.
         """
         if special.zero_of == "stretch":
             return  # it has its own estimate: see :mod:`rodfem.zero_stretch`
@@ -101,9 +118,11 @@ class Richer:
             again = self.again(point, fixed_load=True) if at_a_load else self._located(special)
         except ConvergenceError as trouble:
             special.error_estimate = special.ordinate_error = float("inf")
+            special.resolved = False
             special.note = f"no error estimate: {trouble}"
             return
         load_error, special.ordinate_error = again.errors(point)
+        special.resolved = again.resolved
         special.error_estimate = special.ordinate_error if at_a_load else max(load_error, special.located_to)
 
     def again(self, point: Point, *, fixed_load: bool) -> Again:
@@ -113,6 +132,7 @@ class Richer:
         there is no such point.
         """
         system, x = self.system, self.transfer(point.x, state=True)
+        first = x.copy()
         row = self.follower.axis
         if not fixed_load and point.tangent is not None:
             row = self.follower.row(self.transfer(point.tangent, state=False))
@@ -129,7 +149,8 @@ class Richer:
         last = system.scalar(x), self.follower.shape.ordinate(x)
         moved = np.abs(np.subtract(last, (load, ordinate)))
         left = STEADY * moved + ROUND_OFF * np.maximum(1.0, np.abs(last))
-        return Again(x, *last, float(left[0]), float(left[1]), self.rho([point.x], [x]))
+        changed = self._gauges[1].changed(first, x, state=True)
+        return Again(x, *last, float(left[0]), float(left[1]), self.rho([point.x], [x]), changed)
 
     def law(self, special: Special, direction: PETSc.Vec, law: Law) -> None:
         """Set the uncertainty of a law of the first discretisation: that of the rod's law, infinite without another."""
@@ -167,6 +188,8 @@ class Richer:
         ordinate = follower.shape.ordinate(found.x)
         slope = ordinate_along(follower, found.x, found.tangent)
         left = abs(slope) * found.along + ROUND_OFF * max(1.0, abs(ordinate))
-        rho = self.rho([point.x, special.null_vectors[0]], [found.x, follower.inertia.sharpened(mode)])
+        sharp, gauge = follower.inertia.sharpened(mode), self._gauges[1]
+        rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
+        changed = max(gauge.changed(x, found.x, state=True), gauge.changed(mode, sharp, state=False))
         self._origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
-        return Again(found.x, found.load, ordinate, found.uncertainty, left, rho)
+        return Again(found.x, found.load, ordinate, found.uncertainty, left, rho, changed)

@@ -81,9 +81,10 @@ class Special:
 
     ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` bounds its error, that of the
     discretisation included: of the load for folds and branch points, of the ordinate at user points and ends;
-    ``ordinate_error`` bounds that of the ordinate at all (see :mod:`rodfem.accuracy`). ``coupling``
-    is the cosine between the null vector and the derivative of the equations in the load: zero at a branch point,
-    not at a fold.  ``unfolding`` is the size of the unfolding parameters that make it a branch point, relative to the
+    ``ordinate_error`` bounds that of the ordinate at all (see :mod:`rodfem.accuracy`).  Where the mesh has not
+    ``resolved`` the state they are what the errors may well exceed; None: not examined.  ``coupling`` is the cosine
+    between the null vector and the derivative of the equations in the load: zero at a branch point, not at a fold.
+    ``unfolding`` is the size of the unfolding parameters that make it a branch point, relative to the
     metric as eigenvalues are (:mod:`rodfem.unfolding`): round-off, unless an imperfection has taken it apart.
     ``omega2`` is the double eigenvalue of flutter, ``cluster`` the :class:`~rodfem.stability.cluster.Cluster` of the
     eigenvalues that collide.
@@ -98,6 +99,7 @@ class Special:
     coupling: float = 0.0
     error_estimate: float = float("nan")
     ordinate_error: float = float("nan")
+    resolved: bool | None = None
     meets: tuple[str, int] | None = None
     switched: bool = False
     row: int = -1

@@ -148,6 +148,7 @@ def _special_data(s: Special) -> dict[str, Any]:
         "multiplicity": s.multiplicity,
         "error_estimate": _plain(s.error_estimate),
         "ordinate_error_estimate": _plain(s.ordinate_error),
+        "resolved": s.resolved,
         "located_to": s.located_to,
         "coupling": s.coupling,
         "meets": list(s.meets) if s.meets else None,

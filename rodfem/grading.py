@@ -102,11 +102,23 @@ class Gauge:
         parts = system.comm.allreduce(self.solver.shape.size @ self._squares(x, directions))
         return float(np.sqrt(parts[-2:].sum() / max(parts.sum(), system.scene.length)))
 
-    def _squares(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec]) -> np.ndarray:
+    def changed(self, before: PETSc.Vec, after: PETSc.Vec, *, state: bool) -> float:
+        """Norm of the change of the strains over that of those after, or one radian along the rod.
+
+        Of two states, or (``state=False``) of two null vectors of metric norm 1, of either sign.
+        """
+        system, apart = self.solver.system, before.copy()
+        same = state or (system.metric * before).dot(after) >= 0
+        apart.axpy(-1.0 if same else 1.0, after)
+        squares = self._squares(None, [apart]), self._squares(after, []) if state else self._squares(None, [after])
+        change, size = (float(system.comm.allreduce(np.sum(self.solver.shape.size @ parts))) for parts in squares)
+        return float(np.sqrt(change / max(size, system.scene.length)))
+
+    def _squares(self, x: PETSc.Vec | None, directions: Sequence[PETSc.Vec]) -> np.ndarray:
         """Squared coefficients of the strains on the elements of this rank, (elements, degree)."""
         fields, shape = self.solver.system.fields, self.solver.shape
         squares = np.zeros((fields.owned_cells, fields.discretization.degree))
-        for vector in (x, *directions):
+        for vector in directions if x is None else (x, *directions):
             self.solver.system.bring(vector)
             values = fields.u.x.array
             if vector is not x:

@@ -47,24 +47,26 @@ def rounded_up(error: float) -> float:
     return float(f"{ceil(error / 10.0**power * (1 - 1e-12))}e{power}")
 
 
-def number(value: float, error: float) -> str:
+def number(value: float, error: float, resolved: bool | None = True) -> str:
     """Write a number with the digits that its error supports, and its bar: ``0.3216501 (3e-07)``.
 
-    The bar is rounded up; to the error it adds what the digits left out amount to.
+    The bar is rounded up; to the error it adds what the digits left out amount to.  ``(at least 3e-02)`` where the mesh
+    has not ``resolved`` what the number is of.
     """
     if not isfinite(error):
         return f"{value:.8g} (no estimate)"
     digits = min(max(-floor(log10(rounded_up(error)) + 1e-9), 0), 13) if error > 0 else 13
     shown = round(value, digits) + 0.0
-    return f"{shown:.{digits}f} ({rounded_up(error + abs(value - shown)):.0e})"
+    least = "at least " if resolved is False else ""
+    return f"{shown:.{digits}f} ({least}{rounded_up(error + abs(value - shown)):.0e})"
 
 
-def _law(law: Law) -> str:
-    """Local law of a branch point in words."""
+def _law(law: Law, resolved: bool | None) -> str:
+    """Local law of a branch point, whose state the mesh has ``resolved`` or not, in words."""
     if law.side == 0:
         return f"{law.kind}: a family of equilibria at one and the same load"
     sign, x = "-" if law.coefficient < 0 else "+", "x" if law.power == 1 else f"x^{law.power}"
-    return f"{law.kind}, load = load_b {sign} {number(abs(law.coefficient), law.uncertainty)} {x} + ..."
+    return f"{law.kind}, load = load_b {sign} {number(abs(law.coefficient), law.uncertainty, resolved)} {x} + ..."
 
 
 def _index(special: Special) -> str:
@@ -198,7 +200,8 @@ class Report:
     def law(self, special: Special) -> None:
         """Print the local law of a branch point, if it has one."""
         if special.law is not None:
-            self.say(f"\nAt load {special.point.load:.8g}: {_law(special.law)}; x is the change of the ordinate")
+            law = _law(special.law, special.resolved)
+            self.say(f"\nAt load {special.point.load:.8g}: {law}; x is the change of the ordinate")
 
     def finished(self, branch: Branch) -> None:
         """Close a branch: its last point and why it ended."""
@@ -214,9 +217,9 @@ class Report:
         for branch in branches:
             for s in branch.special:
                 exact = s.kind in (USER, END) and s.zero_of != "stretch"
-                load = f"{s.point.load:.10g}" if exact else number(s.point.load, s.error_estimate)
+                load = f"{s.point.load:.10g}" if exact else number(s.point.load, s.error_estimate, s.resolved)
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
-                ordinate = number(s.point.ordinate, s.ordinate_error)
+                ordinate = number(s.point.ordinate, s.ordinate_error, s.resolved)
                 self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {_index(s)}{zero}")
                 if s.kind == FLUTTER:
                     self.say(f"    double eigenvalue omega^2 = {number(s.omega2, s.omega2_error)}")
@@ -225,6 +228,11 @@ class Report:
             for unexplained in branch.unexplained:
                 self.warn(f"{branch.name}: {unexplained}")
 
+        if coarse := sum(s.resolved is False for b in branches for s in b.special):
+            self.warn(
+                f"The mesh does not resolve {coarse} special point{'s'[: coarse > 1]}: what stands in brackets is "
+                "no bound there, and the rod need not have such a point; use more elements or a higher degree."
+            )
         missed = not_followed(branches)
         if missed:
             deepest = max(

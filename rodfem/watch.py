@@ -86,10 +86,15 @@ class Watch:
 
     def judge(self, special: Special) -> None:
         """Raise :class:`TooCoarse` for a special point with too large an error, where another mesh may help."""
-        error = self.meshes.error_of(special)
+        error = self._error_of(special)
         located = special.located_to / max(1.0, abs(special.point.load))
         if error > self.accuracy > located and special.point.arclength > self.excused:
             raise TooCoarse(special.point, error, special.null_vectors, 2.0 if special.zero_of == "stretch" else 1.0)
+
+    def _error_of(self, special: Special) -> float:
+        """Estimated error of a special point; never within the accuracy where the mesh does not resolve its state."""
+        error = self.meshes.error_of(special)
+        return max(error, GROWN * self.accuracy) if special.resolved is False else error
 
     def drifting(self, point: Point) -> None:
         """Raise :class:`TooCoarse` for a point at which the mesh breaks a symmetry, where another mesh may help."""
@@ -100,7 +105,7 @@ class Watch:
         """Say at a special point whether the accuracy was not reached, and why."""
         if self.meshes.accuracy is None:
             return
-        special.point.estimate = error = self.meshes.error_of(special)
+        special.point.estimate = error = self._error_of(special)
         if error > self.accuracy and not special.note:
             located = special.located_to / max(1.0, abs(special.point.load)) > self.accuracy
             why = f"located to {special.located_to:.0e} only" if located else "finer meshes did not lower the error"
@@ -167,7 +172,8 @@ class Watch:
                 why=f"index {point.negative}, {negative} on a richer mesh",
             )
         values = point.load, point.ordinate
-        return max(e / max(1.0, abs(v)) for e, v in zip(again.errors(point), values, strict=True))
+        error = max(e / max(1.0, abs(v)) for e, v in zip(again.errors(point), values, strict=True))
+        return error if again.resolved else max(error, GROWN * self.accuracy)
 
     @staticmethod
     def _index(point: Point, richer: Richer, again: Again) -> int:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from io import StringIO
 from math import hypot, pi, sqrt
 
 import classics
 import numpy as np
 import pytest
+import rods
+import shooting
 from classics import SUPPORTS, column
 from mpi4py import MPI
 from scipy.optimize import brentq
@@ -102,6 +105,45 @@ def test_highest_degree() -> None:
     (branch,) = explored(classics.elastica(3.0), (4, 12))
     (s,) = [s for s in branch.special if s.kind == BRANCH_POINT]
     assert abs(s.point.load - pi**2 / 4) <= s.error_estimate < 1e-10
+
+
+# --- meshes that do not resolve the rod -----------------------------------------------------------------------------
+
+
+def coarse(accuracy: float | None) -> tuple[Follower, list[Branch]]:
+    """The hemitropic rod on two elements of degree 2 to begin with."""
+    solver = Follower(System(rods.scene(), Discretization("auto", 2, 2)))
+    plan = Plan((0.0, 0.55), (0.5,), 1, accuracy=accuracy)
+    return solver, list(Explorer(solver, plan, Report(quiet=True), lambda: None).run())
+
+
+def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
+    """At 0.5 two meshes agree by accident in the ordinate, not in the strains: its bar is a tenth of its error."""
+    branches = coarse(None)[1]
+    (buckled,) = [b for b in branches if b.name == "branch 1"]
+    (s,) = [s for s in buckled.special if s.kind == "user"]
+    assert abs(s.point.ordinate - shooting.FIRST[0.5][0]) > 5 * s.ordinate_error
+    assert s.resolved is False
+    stream = StringIO()
+    Report(stream=stream).table(branches, System(rods.scene(), Discretization("auto", 2, 2)))
+    assert "(at least 2e-03)" in stream.getvalue()
+    assert "does not resolve" in stream.getvalue()
+
+
+def test_an_accuracy_is_not_reached_by_accident() -> None:
+    """Points that agree on two meshes to the accuracy asked for, and are not resolved, are computed on a finer one."""
+    (buckled,) = [b for b in coarse(1e-2)[1] if b.name == "branch 1"]
+    (s,) = [s for s in buckled.special if s.kind == "user"]
+    assert s.resolved
+    assert abs(s.point.ordinate - shooting.FIRST[0.5][0]) <= s.ordinate_error <= 1e-2 * s.point.ordinate
+
+
+def test_straight_rod_is_resolved_by_any_mesh() -> None:
+    """It has no strains but constant ones; its null vector, a quarter of a cosine, has."""
+    for mesh, buckling in (((1, 1), False), ((4, 1), True)):
+        (straight,) = explored(classics.elastica(6.0), mesh, (2.0,))
+        found = {s.kind: s.resolved for s in straight.special}
+        assert found == {"user": True, BRANCH_POINT: buckling, "end": True}
 
 
 # --- local laws -----------------------------------------------------------------------------------------------------

@@ -46,6 +46,7 @@ SPECIAL = {
     "negative_before": int,
     "negative_after": int,
     "error_estimate": float,
+    "resolved": bool,
     "located_to": float,
 }
 TIMING = ("assembly_s", "solve_s", "stability_s", "total_s")
