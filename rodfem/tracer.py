@@ -406,9 +406,9 @@ class Tracer:
             )
         if extra > still:
             self.report.say(
-                f"  {extra - still} eigenvalue(s) stay within {inertia.tolerance / inertia.scale:.0e} of zero, relative "
-                f"to the lowest bending eigenvalue, without being zero: a critical load is close to {self.scene.load} = "
-                f"{before.load:.8g}"
+                f"  {extra - still} eigenvalue(s) are within {inertia.tolerance / inertia.scale:.0e} of zero, relative "
+                "to the lowest bending eigenvalue, without being zero: a critical load is close to "
+                f"{self.scene.load} = {before.load:.8g}"
             )
 
     def _extra(self, point: Point) -> int:
