@@ -139,6 +139,8 @@ class Branch:
     """A connected piece of equilibria: its points in order, its special points, where it came from and why it ended.
 
     ``begins`` is the index right after the branch point that it leaves, where the indices of the trunk tell it.
+    ``singular_start`` is the number of eigenvalues that vanish at the first state of a range and not all along the
+    branch: a branch point there, if it is one, is not located.
     """
 
     name: str
@@ -149,6 +151,16 @@ class Branch:
     ended: str = NOT_TRACED
     unexplained: list[Unexplained] = field(default_factory=list)
     begins: int | None = None
+    singular_start: int = 0
+
+    def start_in_words(self, load: str) -> str:
+        """Sentence on a first state that is singular, for a load of that name; empty where it is not."""
+        if not self.singular_start:
+            return ""
+        return (
+            f"The first state, at {load} = {self.points[0].load:.8g}, is singular: {self.singular_start} eigenvalue(s) "
+            "vanish there that do not all along the branch. What else leaves it is not followed: begin before it."
+        )
 
     def insert(self, special: Special) -> None:
         """Put a special point among the points by its arclength, and renumber the rows of all special points."""

@@ -41,6 +41,8 @@ STRAYED = 0.3
 """Distance from the start beyond which an equilibrium is not the one that the start stands for."""
 HELD = 1e-8
 """Drift, over the lowest bending eigenvalue, above which phase conditions hold a state off the equilibrium."""
+ALIGNED = 0.9
+"""Least cosine between the direction of a prediction and the tangent of the point that it leads to."""
 ON_BOUND = 1e-8
 """A load beyond a bound by less than this, of the span, is on it: branches of equal loads may lie there."""
 
@@ -385,12 +387,13 @@ def follow(
                 if outcome.converged:
                     load = system.scalar(x)
         if not low <= load <= high or _on_bound(load, last, bounds, span):
-            point = _to_load(follower, points, load, min(bounds, key=lambda bound: abs(bound - load)), step)
+            bound = min(bounds, key=lambda bound: abs(bound - load))
+            point = _to_load(follower, points, load, bound, step, steps.smallest)
             if point is not None:
                 yield point
                 yield "end of range"
                 return
-        elif outcome is not None and tangent is not None and row.dot(tangent) > 0.9:
+        elif outcome is not None and tangent is not None and row.dot(tangent) > ALIGNED:
             yield follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome, index)
             order = 2 if system.damping else min(len(points) - 1, 3) + 1
             factor = (steps.aim / max(outcome.moved, 1e-12)) ** (1 / order)
@@ -419,17 +422,24 @@ def _on_bound(load: float, last: Point, bounds: tuple[float, float], span: float
     return near < ON_BOUND * span and abs(last.load - load) > 2 * ON_BOUND * span
 
 
-def _to_load(follower: Follower, points: list[Point], beyond: float, load: float, step: float) -> Point | None:
-    """Last point of a branch, exactly at ``load``; None where Newton's method does not get there within the step.
+def _to_load(
+    follower: Follower, points: list[Point], beyond: float, load: float, step: float, least: float
+) -> Point | None:
+    """Last point of a branch, exactly at ``load``; None where it is not accepted as any other point of the branch is.
 
-    ``beyond`` is the load that a whole step leads to.
+    ``beyond`` is the load that a whole step leads to.  The step to ``load`` is a part of it, of length ``least`` or
+    more, and Newton's method may go half as far from the prediction.
     """
     last, system = points[-1], follower.system
     fraction = (load - last.load) / (beyond - last.load)
-    x, _ = predict(points, last.arclength + fraction * step)
+    length = max(fraction * step, least)
+    x, direction = predict(points, last.arclength + fraction * step)
+    row = follower.row(direction)
     system.set_phase(x)
-    x, outcome = follower.at_load(x, load, reach=0.5 * step)
+    x, outcome = follower.at_load(x, load, reach=0.5 * length)
     if not outcome.converged:
         return None
-    tangent = follower.load_tangent(x, load > last.load)
+    tangent = follower.load_tangent(x, beyond > last.load)
+    if not row.dot(tangent) > ALIGNED:
+        return None
     return follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome)

@@ -204,7 +204,7 @@ class Explorer(Tracer):
                 if not self._bounds()[0] <= branch.points[1].load <= self._bounds()[1]:
                     self.report.say(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
                     continue
-                if first is not None and equivalent(first, branch.points[1]):
+                if first is not None and self._mirrored(special, first, branch.points[1]):
                     continue  # the mirror image of the branch just traced
                 first = branch.points[1]
                 if special.meets is None and self._traced_already(branch, special):
@@ -245,6 +245,21 @@ class Explorer(Tracer):
     def _name(self, parent: Branch) -> str:
         siblings = sum(b.parent is not None and b.parent[0] == parent.name for b in self.branches)
         return f"{parent.name + '.' if parent.depth else 'branch '}{siblings + 1}"
+
+    def _mirrored(self, special: Special, a: Point, b: Point) -> bool:
+        """Whether first points of the two branches that leave in opposite ways are of mirror images, at one load.
+
+        The metric need not share the symmetry: points at one distance in it need not be mirror images themselves.
+        """
+        if equivalent(a, b):
+            return True
+        inner, outer = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
+        piece = Branch("", None, 0, [self.here(replace(special.point, arclength=0.0)), self.here(outer)])
+        try:
+            there = states_at(self.follower, [piece], inner.load)
+        except ConvergenceError:  # nothing of the one branch is at the other's load
+            return False
+        return any(self.alike(self.here(inner), p, 1e-7) for p in there)
 
     def _came_from(self, parent: Branch, special: Special, point: Point) -> bool:
         """Whether what leaves the end of a side branch is that branch again, or its mirror image."""

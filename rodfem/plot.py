@@ -34,6 +34,7 @@ PALETTE = (  # after Okabe and Ito: hues safe for the colour-blind, then the sam
     *("#003F62", "#753400", "#00573F", "#70435C", "#2F6380", "#7E5700"),
 )
 UNEXPLAINED = "index change unexplained"
+SINGULAR = "singular first state, not located"
 MARKERS: dict[str, dict[str, Any]] = {
     "branch point": {"marker": "o", "ms": 7.5, "mfc": "white", "mec": "black", "mew": 1.5},
     "fold": {"marker": "D", "ms": 6.0, "mfc": "black", "mec": "black"},
@@ -41,6 +42,7 @@ MARKERS: dict[str, dict[str, Any]] = {
     "flutter": {"marker": "*", "ms": 13.0, "mfc": "#F0E442", "mec": "black", "mew": 1.1},
     "user": {"marker": "x", "ms": 6.5, "mec": "black", "mew": 1.6, "label": "requested load"},
     UNEXPLAINED: {"marker": "^", "ms": 10.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
+    SINGULAR: {"marker": "s", "ms": 8.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
 }
 HALO = [withStroke(linewidth=3.2, foreground="white")]
 
@@ -51,7 +53,7 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     Stable parts are solid, unstable ones dotted, each with the number of negative eigenvalues beside it; those of a
     planar rod that are stable in its plane but not in space are dashed.  Where a stable and another part lie on each
     other, the other one is drawn inside the stable one.  A segment in which the index changes without a special point
-    that says so has a mark of warning.
+    that says so has a mark of warning, and so has a first state that is singular.
 
     Parameters
     ----------
@@ -115,6 +117,8 @@ def _draw_branches(
         for point in branch.get("special", []):
             found.setdefault(point["kind"], []).append((point["load"], point["ordinate"]))
         found.setdefault(UNEXPLAINED, []).extend(_unexplained(branch))
+        if branch.get("singular_start"):
+            found.setdefault(SINGULAR, []).append(tuple(branch["columns"][key][0] for key in ("load", "ordinate")))
     for piece in sorted(pieces, key=lambda piece: -piece.negative):  # the stable ones on top: see _uncover
         axes.plot(*piece.curve.T, color=piece.colour, **STYLES[piece.kind])
     kinds = {piece.kind for piece in pieces} | {STABLE, UNSTABLE}

@@ -225,8 +225,8 @@ class Report:
                     self.say(f"    double eigenvalue omega^2 = {number(s.omega2, s.omega2_error)}")
                 if s.note:
                     self.say(f"    {s.note}")
-            for unexplained in branch.unexplained:
-                self.warn(f"{branch.name}: {unexplained}")
+            for sentence in filter(None, (branch.start_in_words(scene.load), *map(str, branch.unexplained))):
+                self.warn(f"{branch.name}: {sentence}")
 
         if coarse := sum(s.resolved is False for b in branches for s in b.special):
             self.warn(

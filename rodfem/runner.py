@@ -135,7 +135,7 @@ def _loci(
 
     Each on the mesh on which it was found.
     """
-    from rodfem.loci.locus import locus
+    from rodfem.loci.locus import Locus, locus
     from rodfem.plot_locus import draw_locus
 
     if plan.locus is None:
@@ -145,8 +145,12 @@ def _loci(
     load = (min(span), max(span))
     saved: list[dict] = []
     for branch in branches:
+        known: list[Locus] = []
         for special in branch.special:
             if special.kind in (USER, END) or special.meets is not None:
+                continue
+            if any(found.passes(special) for found in known):
+                report.say(f"\nThe {special.kind} of {branch.name} at {special.point.load:.8g} is on a locus above")
                 continue
             if plan.accuracy is not None:
                 report.say("\nA locus stays on the mesh of its special point: its own estimate says how accurate it is")
@@ -158,6 +162,7 @@ def _loci(
                 continue
             report.say(found.text())
             saved.append(found.data())
+            known.append(found)
             if solvers[0].system.comm.rank == 0:
                 found.save(output / f"locus-{len(saved)}.json")
     if saved and figures and solvers[0].system.comm.rank == 0:

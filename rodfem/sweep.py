@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 from scipy.optimize import brentq, newton
 
@@ -23,11 +24,12 @@ from rodfem.continuation import Equilibria
 from rodfem.curves import Curves
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.flutter import AtLoad, locate_flutter, unmatched
+from rodfem.locate import real_root, zero_uncertainty
 from rodfem.pitchfork import ROUND_OFF
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
-from rodfem.stability.vibration import MULTIPLE, REAL, Frequencies, Vibration
+from rodfem.stability.vibration import EPS, MULTIPLE, NEAR_ZERO, REAL, Frequencies, Vibration
 from rodfem.transfer import Transfer, richer_system
 
 LOADS = 101
@@ -42,6 +44,15 @@ DRIVEN = 1e-7
 """Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
 MEAN = 10.0
 """Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
+SHIFT = -1e-3
+"""Eigenvalues are sought next to this one: beside zero, where the tangent matrix is singular."""
+MANY = 100.0
+"""Round-off of the inverse eigenvalues, in units of the largest and of eps.
+
+Measured up to 50 for Greenhill's rod, but 1e6 and more for some eigenvalues: those are not covered.
+"""
+AROUND = 1e-4
+"""Half width, relative to a divergence load, over which its eigenvalues are sampled."""
 TOGETHER = 1e-6
 """Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
 NONE = Frequencies(np.zeros(0, dtype=complex), np.zeros(0))
@@ -155,9 +166,9 @@ class Sweep:
         A complex shift looks for a pair that may be farther from the origin than all that the real shift found.
         """
         self.vibration.assemble(x)
-        near = self.vibration.near(max(self.number, FREQUENCIES) + 6, -1e-3)
+        near = self.vibration.near(max(self.number, FREQUENCIES) + 6, SHIFT)
         reach = SEEN * abs(near.values).max()
-        found = list(zip(near.values, near.errors, near.kinds, near.vectors.T, strict=True))
+        found = list(zip(_without_round_off(near.values), near.errors, near.kinds, near.vectors.T, strict=True))
         for pair in (v for v in self.last.values if v.imag > 0 and abs(v) > reach):
             beside = self.vibration.near(2, pair * (1 + 1e-4))
             for value, error, kind, vector in zip(
@@ -298,10 +309,9 @@ class Sweep:
         vibration.assemble(self._state(guess, loads[0]))
         found = vibration.near(number + 2, -1e-3)
         cluster = cluster_of(vibration, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
-        load = loads[0]
-        if number > 1:
-            load = _zero(self._measured(self.solver, vibration, guess), cluster, load)
-        return _Event(DIVERGENCE, load, sign * number, 1e-11 * max(1.0, abs(load)), 0.0, cluster)
+        load, uncertainty = _zero_between(self._measured(self.solver, vibration, guess), cluster, loads[0])
+        uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), 1e-11 * max(1.0, abs(load)))
+        return _Event(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
         """Real eigenvalues at a load near the origin, in ascending order."""
@@ -368,6 +378,31 @@ def at_load(solver: Equilibria, guess: PETSc.Vec, load: float) -> PETSc.Vec:
             "balance the loads."
         )
     return x
+
+
+def _without_round_off(values: np.ndarray) -> np.ndarray:
+    """Eigenvalues next to :data:`SHIFT`, imaginary parts that are round-off of real ones dropped: (k,).
+
+    The solver has ``1 / (mu - shift)`` to round-off of the largest of them: ``mu`` to ``eps |mu - shift|^2 / min |mu -
+    shift|``, and one near zero to that of the matrix.
+    """
+    apart, least = abs(values - SHIFT), NEAR_ZERO * abs(values).max()
+    doubt = np.maximum(REAL * np.maximum(abs(values), least), MANY * EPS * apart**2 / apart.min())
+    return np.where(abs(values.imag) < doubt, values.real, values)
+
+
+def _zero_between(measured: AtLoad, cluster: Cluster, load: float) -> tuple[float, float]:
+    """Load near ``load`` at which the mean of a cluster vanishes, and what round-off of the mean leaves open.
+
+    The mean is sampled over :data:`AROUND`, and interpolated: its scatter shows in the last coefficients.
+    """
+    half = AROUND * max(1.0, abs(load))
+    nodes = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
+    series = chebyshev.chebfit(nodes, [measured(load + half * t, cluster).cluster.mean for t in nodes.tolist()], 5)
+    root = real_root(series, 0.0)
+    if root is None:
+        raise ConvergenceError(f"The divergence load near {load:.6g} could not be located: use a smaller range.")
+    return load + half * root, half * zero_uncertainty(series, root)
 
 
 def _zero(measured: AtLoad, cluster: Cluster, load: float) -> float:

@@ -21,6 +21,7 @@ from rodfem.meshes import Meshes, TooCoarse
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.special_search import SpecialSearch, Unresolved
+from rodfem.stability.band import resolve
 from rodfem.watch import Watch
 from rodfem.zero_stretch import zero_stretch
 
@@ -317,14 +318,13 @@ class Tracer:
         branch.special.append(special)
 
     def _singular_start(self, branch: Branch) -> None:
-        """Say that a range begins at a singular state: a branch point there is not located, and not followed."""
+        """Record that a range begins at a singular state: a branch point there is not located, and not followed."""
         first = branch.points[0]
         extra = first.zero - persistent_zeros(branch.points)
-        if branch.parent is None and extra > 0 and not any(s.point is first for s in branch.special):
-            self.report.warn(
-                f"The first state, at {self.scene.load} = {first.load:.8g}, is singular: {extra} eigenvalue(s) vanish "
-                "there that do not all along the branch. What else leaves it is not followed: begin before it."
-            )
+        located = any(s.point is first and s.kind == BRANCH_POINT for s in branch.special)
+        if branch.parent is None and extra > 0 and not located:
+            branch.singular_start = extra
+            self.report.warn(branch.start_in_words(self.scene.load))
 
     def _singular_end(self, branch: Branch, last: Point) -> None:
         """Report a branch point on the very end of the range, located on a piece of the branch that goes past it."""
@@ -393,9 +393,26 @@ class Tracer:
         self.follower.damp(extra if stay else 0)
         if stay and len(recent) == 4 and point.zero <= self.specials.level and not self.warned:
             self.warned = True
+            self._say_zeros(recent[0], point, extra)
+
+    def _say_zeros(self, before: Point, point: Point, extra: int) -> None:
+        """Say of eigenvalues that count as zero at two rows whether round-off tells them from zero, or they are it."""
+        system, inertia, still = self.follower.system, self.follower.inertia, 0
+        own = point.zero - system.active_drifts() - extra
+        for p in (before, point):
+            system.set_phase(p.x)
+            low, high = resolve(inertia, p.x)
+            still = min(max(still, high - low - own), extra)
+        if still:
             self.report.say(
-                f"  {extra} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
+                f"  {still} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
                 "move freely at one and the same load"
+            )
+        if extra > still:
+            self.report.say(
+                f"  {extra - still} eigenvalue(s) are within {inertia.tolerance / inertia.scale:.0e} of zero, relative "
+                "to the lowest bending eigenvalue, without being zero: a critical load is close to "
+                f"{self.scene.load} = {before.load:.8g}"
             )
 
     def _extra(self, point: Point) -> int:

@@ -20,14 +20,16 @@ from scipy.optimize import brentq
 
 from forms.energy import bending
 from rodfem import Discretization, Ordinate, Parameter, Plan, Ring, Scene, Steps, clamped, free, judge, pinned, sliding
+from rodfem.bifurcation import directions, leave
 from rodfem.branch import BRANCH_POINT, FOLD
 from rodfem.chain import Row, breaks, chained, explain
-from rodfem.continuation import Follower
+from rodfem.continuation import Follower, _to_load
 from rodfem.diagram import _branch_data
 from rodfem.explore import Explorer
 from rodfem.loci.locus import locus
 from rodfem.report import Report
 from rodfem.system import System
+from rodfem.tracer import equivalent
 
 EULER = pi**2 / 4
 """Buckling load of the clamped-free column."""
@@ -253,3 +255,46 @@ def test_a_range_that_begins_at_a_branch_point() -> None:
     (branch,) = Explorer(solver, Plan(scene.span, error_bars=False), Report(stream=terminal), lambda: None).run()
     assert [p.negative for p in branch.points[1:]] == [1] * (len(branch.points) - 1)
     assert "is singular: 1 eigenvalue(s) vanish there" in terminal.getvalue() or MPI.COMM_WORLD.rank > 0
+    assert _branch_data(branch)["singular_start"] == 1
+
+
+def test_eigenvalues_beside_a_critical_load_are_no_family_of_equilibria() -> None:
+    """Within the tolerance of a count, yet far above the round-off of their Rayleigh quotients: nothing moves."""
+    terminal = io.StringIO()
+    scene = column("range", (clamped(), free(push)), (EULER, EULER + 1e-6))
+    solver = Follower(System(scene, Discretization("reduced", 8, 6)))
+    Explorer(solver, Plan(scene.span, error_bars=False), Report(stream=terminal), lambda: None).run()
+    assert "move freely" not in terminal.getvalue()
+    assert "without being zero: a critical load is close to P = 2.4674011" in terminal.getvalue() or MPI.COMM_WORLD.rank
+
+
+def test_mirror_images_are_compared_at_one_load() -> None:
+    """First points at distances that differ by 1e-4, relative, are of a branch and its image all the same."""
+    scene = column("mirror", (clamped(), free(push)), (0.0, 6.0))
+    solver = Follower(System(scene, Discretization("reduced", 8, 6)))
+    explorer = Explorer(solver, Plan(scene.span, depth=0, error_bars=False), Report(quiet=True), lambda: None)
+    (special,) = [s for s in explorer.run()[0].special if s.kind == "branch point" and s.point.load < 4]
+    (way,) = directions(solver, special)
+    first = leave(solver, special, way, 0.05)
+    way.scale(-1.0)
+    image = leave(solver, special, way, 0.05 * (1 + 1e-4))
+    assert not equivalent(first, image)
+    assert explorer._mirrored(special, first, image) and explorer._mirrored(special, image, first)
+    assert not explorer._mirrored(special, replace(first, energy=1.001 * first.energy), image)
+
+
+def test_the_last_step_to_a_bound_goes_the_way_of_the_prediction() -> None:
+    """From a straight state and a direction into the buckled ones the straight state at the bound is no next point."""
+    scene = column("bound", (clamped(), free(push)), (0.0, 6.0))
+    solver = Follower(System(scene, Discretization("reduced", 8, 6)))
+    explorer = Explorer(solver, Plan((0.0, 2.6), depth=0, error_bars=False), Report(quiet=True), lambda: None)
+    (straight,) = explorer.run()
+    (special,) = [s for s in straight.special if s.kind == "branch point"]
+    last = straight.points[-1]
+    aside = last.tangent.copy()
+    aside.axpy(1.0, special.null_vectors[0])
+    aside.scale(1.0 / solver.system.norm(aside))
+    solver.system.set_phase(last.x)
+    assert _to_load(solver, [last], last.load + 0.02, last.load + 0.01, 0.02, 1e-5) is not None
+    wrong = replace(last, tangent=aside)
+    assert _to_load(solver, [wrong], last.load + 0.02, last.load + 0.01, 0.02, 1e-5) is None

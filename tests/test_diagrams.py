@@ -18,7 +18,7 @@ from rodfem.errors import SceneError
 from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.plan import Plan
-from rodfem.plot import PALETTE, UNEXPLAINED, _draw_branches, draw_diagram
+from rodfem.plot import PALETTE, SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram
 from rodfem.plot_pieces import PLANAR, STABLE, UNSTABLE, hidden, pieces_of
 from rodfem.report import Report
 from rodfem.scene import Ordinate
@@ -98,6 +98,13 @@ def test_what_is_unexplained_is_marked(folder: Path) -> None:
     y, x = (places.mean() for places in np.nonzero(seen[300:700, 400:1100]))  # the mark, without the legend
     dots = pixels(folder / "plain.png", PALETTE[0])[300:700, 400:1100]
     assert abs(y - 200) < 60 and abs(x - 350) < 120 and dots.any()  # in the middle of the segment
+
+
+@pytest.mark.short
+def test_a_singular_first_state_is_marked() -> None:
+    plain = branch("a", [0.0, 1.0, 2.0], [0, 1, 1])
+    assert SINGULAR not in legend(plain | {"singular_start": 0})
+    assert SINGULAR in legend(plain | {"singular_start": 1})
 
 
 @pytest.mark.alone

@@ -10,8 +10,9 @@ import classics
 import numpy as np
 import pytest
 
-from rodfem import Discretization, End, Scene, SceneError, judge
+from rodfem import Discretization, End, Plan, Scene, SceneError, judge, sweep
 from rodfem.continuation import Equilibria
+from rodfem.report import Report
 from rodfem.system import System
 
 
@@ -74,3 +75,17 @@ def test_a_motion_that_a_load_drives(kind: str) -> None:
     """A moment at one end that nothing balances turns the rod for ever."""
     with pytest.raises(SceneError, match="nothing holds the rod against the rotation about e3"):
         classics.sweep(scene(kind, balanced=False))
+
+
+@KINDS
+def test_a_double_divergence_is_one(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside zero round-off makes a complex pair of a double eigenvalue: it is not two simple ones, nor flutter."""
+    monkeypatch.setattr(sweep, "LOADS", 15)
+    coarse, loads = Equilibria(System(scene(kind), Discretization("auto", 2, 4))), []
+    for span in ((6.0, 6.5), (6.2, 6.3)):
+        (branch,) = sweep.Sweep(coarse, Plan(span, error_bars=False), Report(quiet=True), lambda: None).run()
+        found, _ = branch.special
+        assert (found.kind, found.negative_before, found.negative_after) == ("divergence", 0, 2)
+        loads.append(found.point.load)
+    assert loads[0] == pytest.approx(loads[1], abs=found.located_to)
+    assert loads[0] == pytest.approx(2 * pi, abs=1e-4)

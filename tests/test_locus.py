@@ -148,7 +148,7 @@ def test_fold_ends_where_the_pitchfork_changes_its_side() -> None:
 def test_cusp() -> None:
     """A thrust above Euler's and a force across that sweeps from one side to the other: folds that meet at a cusp."""
     solver, (branch,) = cantilever("e", (0.3, -0.3))
-    fold = specials(branch, "fold")[0]
+    fold, other = specials(branch, "fold")
     found = locus(solver, fold, "lam", ((-0.5, 0.5), (2.0, 3.0)), steps=WIDE, error_bars=0)
     (cusp,) = found.marks
     assert cusp.kind == "cusp"
@@ -156,6 +156,8 @@ def test_cusp() -> None:
     assert found.ended == ("lam = 3, its bound", "lam = 3, its bound")
     assert found.values[0, 0] == pytest.approx(-found.values[-1, 0], abs=1e-9)
     assert {tuple(pair) for pair in found.index.tolist()} == {(0, 1)}
+    assert found.passes(fold) and found.passes(other)  # so that no second run writes the same curve
+    assert not found.passes(replace(other, point=replace(other.point, load=0.9 * other.point.load)))
 
 
 def test_a_parameter_that_destroys_the_branch_point() -> None:

@@ -169,6 +169,10 @@ class Tracer:
         node.s = s
         return [(node, kind)]
 
+    def crossed(self, a: Node, b: Node, which: int, value: float) -> list[Node]:
+        """Node between two neighbours at which a parameter has a value; none where it cannot be located."""
+        return [node for node, _ in self._located(a, b, lambda n: float(n.p[which]) - value, "")]
+
     def _last(self, half: Half, a: Node, b: Node, f: Callable[[Node], float], sentence: str) -> str:
         """End at a node where ``f`` vanishes."""
         found = self._located(a, b, f, sentence)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,8 @@ from rodfem.transfer import Transfer, richer_system
 
 STEPS = Steps(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
+SAME = 1e-6
+"""Loads of special points that differ by less than this, relative, may be one and the same point of a curve."""
 
 
 @dataclass
@@ -79,6 +82,9 @@ class Locus:
         Why it ends, at its first and at its last row.
     states
         State vector of each row, of the system on which the locus was computed; not saved.
+    crossings
+        Load and ordinate at the start, and wherever else the curve passes the second parameter's value there; not
+        saved.
     """
 
     scene: str
@@ -100,6 +106,13 @@ class Locus:
     constants: dict[str, float]
     discretization: dict[str, Any]
     states: list[PETSc.Vec] = field(default_factory=list)
+    crossings: list[tuple[float, float]] = field(default_factory=list)
+
+    def passes(self, special: Special) -> bool:
+        """Whether the curve passes the line of its start again at another special point of that scene."""
+        here = np.array([special.point.load, special.point.ordinate])
+        near = SAME * np.maximum(1.0, abs(here))
+        return self.kind == special.kind and any((abs(here - there) <= near).all() for there in self.crossings)
 
     def data(self) -> dict[str, Any]:
         """Plain lists, numbers and strings for a file; what was not computed is None."""
@@ -198,6 +211,10 @@ def locus(
         marks = {start - i: kind for i, kind in backwards.marks.items()} | {
             start + i: kind for i, kind in onwards.marks.items()
         }
+        crossings = [(float(first.p[0]), first.ordinate)]
+        for a, b in (pair for half in (backwards, onwards) for pair in pairwise(half.nodes[1:])):
+            if (a.p[1] - p[1]) * (b.p[1] - p[1]) < 0:
+                crossings += [(float(n.p[0]), n.ordinate) for n in tracer.crossed(a, b, 1, float(p[1]))]
         error = np.full((len(nodes), 2), np.nan)
         if error_bars:
             rows = np.linspace(0, len(nodes) - 1, error_bars).round().astype(int).tolist()
@@ -229,6 +246,7 @@ def locus(
             "unknowns": system.fields.unknowns,
         },
         states=[n.x for n in nodes],
+        crossings=crossings,
     )
 
 
