@@ -77,7 +77,7 @@ def glyphs_of(
         if np.linalg.norm(F) > LEAST * force:
             out.append(_force(at, F / force, clear, outward, radius))
         if np.linalg.norm(M) > LEAST * moment:
-            out.append(round_arrow(at + (clear + radius) * outward, M, 4.2 * radius, 0.42 * radius, LOAD, view[2]))
+            out.append(round_arrow(at + (clear + radius) * outward, M, 5.0 * radius, 0.45 * radius, LOAD, view[2]))
     for tie in setting.ties:
         out += _tie(tie, s, centres, home, radius, view)
     out += _foundation(setting, s, centres, home, radius, up)
@@ -247,7 +247,7 @@ def _distributed(
         way = force / np.linalg.norm(force)
         tip = centres[node] - 1.6 * radius * way
         if along:
-            tip = centres[node] + size / 2 * way + 4.0 * radius * _across(way, back)
+            tip = centres[node] + size / 2 * way + 5.5 * radius * _across(way, back)
         out.append(straight_arrow(tip - size * way, tip, 0.3 * radius, LOAD))
     return out
 

@@ -28,7 +28,7 @@ __all__ = ["draw_shape", "draw_shape_safely", "main"]
 Floats = NDArray[np.float64]
 SIZE, ROOM = (1600, 1000), 0.84  # pixels, share of the height above the caption
 ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
-TRIAD, SUBSCRIPTS = np.array([0.07, 0.87]), "₁₂₃"  # place of the triad, as a share of width and height
+TRIAD, SUBSCRIPTS = np.array([0.085, 0.86]), "₁₂₃"  # place of the triad, as a share of width and height
 FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 MPI_VARIABLES = ("OMPI_", "PMI", "MPI_LOCAL")  # the beginnings of their names, PMI_ and PMIX_ alike
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
@@ -234,7 +234,7 @@ def triad(view: Floats, corner: Floats, size: float) -> tuple[list[Solid], list[
     last = int(np.argmin(length))
     if length[last] < 0.5:
         opposite = -np.delete(seen, last, axis=0).sum(axis=0)
-        places[last] = 0.4 * opposite / np.linalg.norm(opposite)
+        places[last] = 0.6 * opposite / np.linalg.norm(opposite)
     names: list[tuple[str, Floats]] = []
     for i, at in enumerate(places):
         alike = [j for j, (_, other) in enumerate(names) if np.linalg.norm(at - other) < 0.4]

@@ -254,25 +254,24 @@ def foundation_of(scene: Scene, sample: Sample) -> tuple[Floats, Floats] | None:
     return (s, np.array(found)) if np.any(found) else None
 
 
-def ties_of(scene: Scene, sample: Sample) -> list[Tie]:
-    """What the constraints of a scene keep, in a state given by :meth:`~rodfem.shape.Shape.sample`."""
-    return [_tie(scene, constraint, sample) for constraint in scene.constraints]
+def ties_of(scene: Scene, samples: Sequence[Sample]) -> list[list[Tie]]:
+    """What each constraint of a scene keeps, in states given by :meth:`~rodfem.shape.Shape.sample`."""
+    load = float(samples[0]["load"])
+    whole = [_of_the_ends(scene, x, load) if x.kind == "integral" else None for x in scene.constraints]
+    return [[_tie(scene, x, a, sample) for sample in samples] for x, a in zip(scene.constraints, whole, strict=True)]
 
 
-def _tie(scene: Scene, constraint: Constraint, sample: Sample) -> Tie:
+def _tie(scene: Scene, constraint: Constraint, a: Floats | None, sample: Sample) -> Tie:
     none = np.full((2, 3), np.nan)
     if constraint.s is not None:
         line, normal = _surface(scene, constraint.of, constraint.s, sample)
         note = "" if np.isfinite([line[0], normal]).any() else f"constraint of the directors at s = {constraint.s:g}"
         return Tie(constraint.s, line, normal, note)
-    if constraint.kind == "integral":
-        a = _of_the_ends(scene, constraint, float(sample["load"]))
-        if a is not None:
-            start, end = np.asarray(sample["r"][0]), np.asarray(sample["r"][-1])
-            line = np.array([start, start + a * (a @ (end - start)) / (a @ a)])
-            return Tie(np.nan, line, none[0], "")
-        return Tie(np.nan, none, none[0], "integral constraint")
-    return Tie(np.nan, none, none[0], "constraint all along the rod")
+    if a is not None:
+        start, end = np.asarray(sample["r"][0]), np.asarray(sample["r"][-1])
+        return Tie(np.nan, np.array([start, start + a * (a @ (end - start)) / (a @ a)]), none[0], "")
+    words = "integral constraint" if constraint.kind == "integral" else "constraint all along the rod"
+    return Tie(np.nan, none, none[0], words)
 
 
 def _surface(scene: Scene, of: OfPlace, s: float, sample: Sample) -> tuple[Floats, Floats]:
@@ -352,13 +351,11 @@ def write(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:
         along.attrs["note"] = "" if foundation else "load by a potential along the rod"
         if foundation:
             along["s"], along["stiffness"] = foundation
-    ties = [ties_of(scene, sample) for sample in samples]
-    for number in range(len(scene.constraints)):
+    for number, ties in enumerate(ties_of(scene, samples)):
         here = group.create_group(f"{TIES}/constraint {number + 1}")
-        here.attrs.update(s=ties[0][number].s, note=ties[0][number].note)
-        here["line"], here["normal"] = (
-            np.array([getattr(row[number], key) for row in ties]) for key in ("line", "normal")
-        )
+        here.attrs.update(s=ties[0].s, note=ties[0].note)
+        for key in ("line", "normal"):
+            here[key] = np.array([getattr(tie, key) for tie in ties])
 
 
 def write_section(file: Any, scene: Scene) -> None:
