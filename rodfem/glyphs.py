@@ -3,17 +3,23 @@
 The directors decide the body at the place (block where they are held, axle where they turn about an axis, ball on a
 point where they turn freely), free components of the position the rails on which it slides, stiffnesses the springs.
 So a slide is a block on rails, a pin that slides a ball on a wedge on rails; a free end is nothing.
+
+A constraint that keeps the distance of two points is a string between them, one that keeps a point on a surface a ball
+in a frame tangent to it; an elastic foundation is a row of coils.
+
+In a motion the rod has left a place: rails, what springs and strings are fixed to, and frames stay there.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rodfem.setting import AXIS, HELD, Setting, Support
+from rodfem.setting import AXIS, HELD, Setting, Support, Tie
 from rodfem.solids import Solid, ball, box, coil, profile_of, round_arrow, straight_arrow, sweep
 
 Floats = NDArray[np.float64]
@@ -25,7 +31,15 @@ LEAST = 1e-9
 """Load relative to the greatest one, or stiffness, below which none is drawn."""
 
 
-def glyphs_of(setting: Setting, s: Floats, centres: Floats, frames: Floats, radius: float, view: Floats) -> list[Solid]:
+def glyphs_of(
+    setting: Setting,
+    s: Floats,
+    centres: Floats,
+    frames: Floats,
+    radius: float,
+    view: Floats,
+    home: Floats | None = None,
+) -> list[Solid]:
     """Solids for all that holds and loads a rod.
 
     Parameters
@@ -38,20 +52,24 @@ def glyphs_of(setting: Setting, s: Floats, centres: Floats, frames: Floats, radi
         Mean radius of the rod in the picture.
     view
         Axes of the picture as rows (3, 3): to the right, upwards, to the viewer.
+    home
+        Centreline (n, 3) of the equilibrium from which a motion has taken the rod; None: it is there.
     """
+    home = centres if home is None else home
     out, up = list[Solid](), view[1]
     widest = float(abs(profile_of(s[[0, -1]], setting.section, np.linspace(0, 2 * np.pi, 25))).max())
     size = max(BLOCK, 1.25 * widest) * radius
-    chord = centres[-1] - centres[0]
+    chord = home[-1] - home[0]
     found = []
     for support in setting.supports:
         node = int(np.argmin(abs(s - support.s)))
         side = {0: -1.0, len(s) - 1: 1.0}.get(node, 0.0)
-        found.append((support, centres[node], frames[node], side * frames[node, :, 2], side * chord))
-    force, moment = (max([np.linalg.norm(x[0].loads(x[2])[i]) for x in found], default=0.0) for i in (0, 1))
-    for support, at, R, outward, away in found:
-        held = _body(support, at, R, away, size, up)
-        out += held + _springs(support, at, outward - 0.3 * up - 0.2 * view[2], radius, up)
+        found.append((support, centres[node], home[node], frames[node], side * frames[node, :, 2], side * chord))
+    force, moment = (max([np.linalg.norm(x[0].loads(x[3])[i]) for x in found], default=0.0) for i in (0, 1))
+    for support, at, place, R, outward, away in found:
+        held = _body(support, at, place, R, away, size, up)
+        towards = outward - 0.3 * up - 0.2 * view[2]
+        out += held + _springs(support, at, place, towards, radius, up)
         if support.mass:
             out.append(ball(at, 2.2 * radius, DARK))
         clear = 2.2 * size if held else 0.5 * BLOCK * radius
@@ -59,14 +77,18 @@ def glyphs_of(setting: Setting, s: Floats, centres: Floats, frames: Floats, radi
         if np.linalg.norm(F) > LEAST * force:
             out.append(_force(at, F / force, clear, outward, radius))
         if np.linalg.norm(M) > LEAST * moment:
-            out.append(round_arrow(at + clear * outward, M, 3.6 * radius, 0.42 * radius, LOAD))
+            out.append(round_arrow(at + (clear + radius) * outward, M, 5.0 * radius, 0.45 * radius, LOAD, view[2]))
+    for tie in setting.ties:
+        out += _tie(tie, s, centres, home, radius, view)
+    out += _foundation(setting, s, centres, home, radius, up)
     return out + _distributed(setting, s, centres, frames, radius, view[2])
 
 
-def _body(support: Support, at: Floats, R: Floats, away: Floats, size: float, up: Floats) -> list[Solid]:
+def _body(support: Support, at: Floats, home: Floats, R: Floats, away: Floats, size: float, up: Floats) -> list[Solid]:
     """Body by what the directors may do, and rails by what the position may.
 
-    ``away`` is the direction from the other end of the rod, zero inside of it; ``size`` half the size of a block.
+    The rails are where ``home`` (3,) has them.  ``away`` is the direction from the other end of the rod, zero inside of
+    it; ``size`` half the size of a block.
     """
     if support.turning != HELD and not support.held.any():
         return []
@@ -75,7 +97,7 @@ def _body(support: Support, at: Floats, R: Floats, away: Floats, size: float, up
     if support.turning == HELD:
         middle = at + 0.5 * size * frame[:, 2] * _sign(frame[:, 2] @ away)
         block = box(middle, frame, (size, size, 0.5 * size), GREY)
-        return [block, *_rails(free, middle, frame[:, 0], 1.2 * size, size)]
+        return [block, *_rails(free, middle + home - at, frame[:, 0], 1.2 * size, size)]
     if support.turning == AXIS:
         axis = R @ support.axis / np.linalg.norm(support.axis)
         body = sweep([at - 1.25 * size * axis, at + 1.25 * size * axis], 0.5 * size, DARK)
@@ -90,7 +112,7 @@ def _body(support: Support, at: Floats, R: Floats, away: Floats, size: float, up
         at + 1.05 * size * below, stand * np.array([1.0, -1.0, -1.0]), (size, size, 0.95 * size), GREY, top=0.22
     )
     plate = box(at + 2.2 * size * below, stand, (1.4 * size, 1.4 * size, 0.2 * size), DARK)
-    return [body, wedge, plate, *_rails(free, at + 2.6 * size * below, below, 0.8 * size, size)]
+    return [body, wedge, plate, *_rails(free, home + 2.6 * size * below, below, 0.8 * size, size)]
 
 
 def _rails(free: list[Floats], middle: Floats, normal: Floats, apart: float, size: float) -> list[Solid]:
@@ -127,15 +149,11 @@ def _other(direction: Floats, wanted: Floats) -> Floats:
     return np.asarray(out / np.linalg.norm(out))
 
 
-def _springs(support: Support, at: Floats, towards: Floats, radius: float, up: Floats) -> list[Solid]:
+def _springs(support: Support, at: Floats, home: Floats, towards: Floats, radius: float, up: Floats) -> list[Solid]:
     """A coil along each principal direction of the stiffness of translation, a turn about each of that of rotation."""
     out: list[Solid] = []
     for direction in _stiff(support.translation_stiffness):
-        way = direction * _sign(direction @ towards)
-        start, end = at + 0.8 * radius * way, at + 11.0 * radius * way
-        out.append(coil(start, end, 1.5 * radius, WIRE * radius, 6, STEEL))
-        stand = np.column_stack([_other(way, up), np.cross(way, _other(way, up)), way])
-        out.append(box(end, stand, (1.2 * BLOCK * radius, 1.2 * BLOCK * radius, 0.4 * radius), GREY))
+        out += _spring(at, home, direction * _sign(direction @ towards), 11.0, radius, up)
     for direction in _stiff(support.rotation_stiffness):
         a = _other(direction, up)
         b = np.cross(direction, a)
@@ -145,6 +163,50 @@ def _springs(support: Support, at: Floats, towards: Floats, radius: float, up: F
             sweep(at + (size * np.cos(angle))[:, None] * a + (size * np.sin(angle))[:, None] * b, WIRE * radius, STEEL)
         )
     return out
+
+
+def _spring(at: Floats, home: Floats, way: Floats, length: float, radius: float, up: Floats) -> list[Solid]:
+    """Coil from a point of the rod to a plate, which is ``length`` radii away where the rod is at ``home``."""
+    end = home + length * radius * way
+    along = (end - at) / np.linalg.norm(end - at)
+    turns, wide = (6, 1.5) if length > 8.0 else (4, 0.9)
+    stand = np.column_stack([_other(way, up), np.cross(way, _other(way, up)), way])
+    half = 0.8 * wide * BLOCK * radius
+    return [
+        coil(at + 0.8 * radius * along, end, wide * radius, WIRE * radius, turns, STEEL),
+        box(end, stand, (half, half, 0.4 * radius), GREY),
+    ]
+
+
+def _foundation(setting: Setting, s: Floats, centres: Floats, home: Floats, radius: float, up: Floats) -> list[Solid]:
+    """A coil at each place where there is a foundation, along the stiff direction nearest to the picture's vertical."""
+    out: list[Solid] = []
+    for at, stiffness in zip(*(setting.foundation or ((), ())), strict=True):
+        stiff = np.array(_stiff(stiffness))
+        if len(stiff):
+            node, way = int(np.argmin(abs(s - at))), -(stiff @ up) @ stiff
+            way = way / np.linalg.norm(way) if np.linalg.norm(way) > 0.3 else stiff[-1]
+            out += _spring(centres[node], home[node], way, 7.0, radius, up)
+    return out
+
+
+def _tie(tie: Tie, s: Floats, centres: Floats, home: Floats, radius: float, view: Floats) -> list[Solid]:
+    """String between two points, or ball in a frame tangent to a surface; nothing for what has no place."""
+    whole = not np.isfinite(tie.s)
+    nodes = np.array([0, -1]) if whole else np.full(2, np.argmin(abs(s - tie.s)))
+    if np.isfinite(tie.line).all():
+        ends = tie.line + (centres - home)[nodes] * np.array([[whole], [True]])
+        if np.linalg.norm(ends[1] - ends[0]) < radius:
+            return []
+        return [sweep(ends, 0.3 * radius, DARK), *(ball(end, 1.4 * radius, DARK) for end in ends)]
+    if not np.isfinite(tie.normal).all():
+        return []
+    at = home[nodes[0]]
+    side = _other(tie.normal, view[0])
+    other = np.cross(tie.normal, side)
+    corners = [at + 7.0 * radius * (a * side + b * other) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))]
+    bars = [sweep([a, b], 0.3 * radius, STEEL) for a, b in pairwise(corners)]
+    return [ball(centres[nodes[0]], 1.7 * radius, DARK), *bars]
 
 
 def _stiff(stiffness: Floats) -> list[Floats]:
@@ -185,7 +247,7 @@ def _distributed(
         way = force / np.linalg.norm(force)
         tip = centres[node] - 1.6 * radius * way
         if along:
-            tip = centres[node] + size / 2 * way + 4.0 * radius * _across(way, back)
+            tip = centres[node] + size / 2 * way + 5.5 * radius * _across(way, back)
         out.append(straight_arrow(tip - size * way, tip, 0.3 * radius, LOAD))
     return out
 

@@ -118,7 +118,7 @@ def save_modes(
 
             if first:
                 write_section(file, scene)
-            write(group, scene, [{name: getattr(modes, name) for name in ("load", "s", "r")}])
+            write(group, scene, [{name: getattr(modes, name) for name in ("load", "s", "r", "q")}])
 
 
 def load_modes(path: Path, branch: str, row: int) -> Modes:

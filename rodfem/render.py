@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from rodfem.glyphs import LOAD, glyphs_of
+from rodfem.glyphs import DARK, LOAD, glyphs_of
 from rodfem.setting import Setting
 from rodfem.setting import read as read_setting
-from rodfem.solids import Solid, profile_of, rod
+from rodfem.solids import Solid, profile_of, rod, straight_arrow
 from rodfem.view import view_of
 
 __all__ = ["draw_shape", "draw_shape_safely", "main"]
@@ -28,6 +28,7 @@ __all__ = ["draw_shape", "draw_shape_safely", "main"]
 Floats = NDArray[np.float64]
 SIZE, ROOM = (1600, 1000), 0.84  # pixels, share of the height above the caption
 ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
+TRIAD, SUBSCRIPTS = np.array([0.085, 0.86]), "₁₂₃"  # place of the triad, as a share of width and height
 FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 MPI_VARIABLES = ("OMPI_", "PMI", "MPI_LOCAL")  # the beginnings of their names, PMI_ and PMIX_ alike
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
@@ -88,10 +89,15 @@ def draw_shape(
     for solid in solids:
         _add(pyvista, plotter, solid)
     _add_directors(pyvista, plotter, state.centres, state.directors, thickness)
-    _look(plotter, np.concatenate([solid.points for solid in solids]), view, 5.0 * thickness)
-    plotter.add_axes(xlabel="e1", ylabel="e2", zlabel="e3", line_width=4, viewport=(0.0, 0.76, 0.15, 1.0))
+    corner, scale = _look(plotter, np.concatenate([solid.points for solid in solids]), view, 5.0 * thickness)
+    arrows, names = triad(view, corner, 0.14 * scale)
+    for solid in arrows:
+        _add(pyvista, plotter, solid)
     labels = [(text, 0.5, 0.03, "black"), ("d₁", 0.935, 0.93, FIRST), ("d₂", 0.97, 0.93, SECOND)]
     labels += [("load", 0.885, 0.93, LOAD)] if any(solid.color == LOAD for solid in solids) else []
+    share = 0.07 / np.array([SIZE[0] / SIZE[1], 1.0])
+    labels += [(name, *(TRIAD - (0.0, 0.015) + share * at), DARK) for name, at in names]
+    labels += [("not drawn: " + ", ".join(notes), 0.5, 0.095, DARK)] if (notes := state.setting.notes) else []
     for label, x, y, colour in filter(lambda item: item[0], labels):
         style = {"font_size": min(20, 1400 // len(label)), "color": colour, "font_file": font}
         actor = plotter.add_text(label, position=(x, y), viewport=True, **style)
@@ -215,8 +221,35 @@ def _add_directors(pyvista: Any, plotter: Any, centres: Floats, directors: Float
         plotter.add_mesh(arrows, color=colour, **STYLE)
 
 
-def _look(plotter: Any, points: Floats, view: Floats, margin: float) -> None:
-    """Set a camera without perspective that sees all points (n, 3), above the caption."""
+def triad(view: Floats, corner: Floats, size: float) -> tuple[list[Solid], list[tuple[str, Floats]]]:
+    """Arrows along e1, e2, e3 from a point, and their names with places (2,) in units of ``size`` from there.
+
+    The name of a direction nearly along the line of sight goes opposite to the two others, those of two directions that
+    look alike are put together.
+    """
+    arrows = [straight_arrow(corner, corner + size * e, 0.03 * size, DARK) for e in np.eye(3)]
+    seen = view[:2].T
+    length = np.linalg.norm(seen, axis=1)
+    places = seen * (1.0 + 0.35 / np.maximum(length, 1e-9))[:, None]
+    last = int(np.argmin(length))
+    if length[last] < 0.5:
+        opposite = -np.delete(seen, last, axis=0).sum(axis=0)
+        places[last] = 0.6 * opposite / np.linalg.norm(opposite)
+    names: list[tuple[str, Floats]] = []
+    for i, at in enumerate(places):
+        alike = [j for j, (_, other) in enumerate(names) if np.linalg.norm(at - other) < 0.4]
+        if alike:
+            names[alike[0]] = f"{names[alike[0]][0]}, e{SUBSCRIPTS[i]}", names[alike[0]][1]
+        else:
+            names.append((f"e{SUBSCRIPTS[i]}", at))
+    return arrows, names
+
+
+def _look(plotter: Any, points: Floats, view: Floats, margin: float) -> tuple[Floats, float]:
+    """Set a camera without perspective that sees all points (n, 3), above the caption.
+
+    Returns the place of the triad in space, and half the height of the picture there.
+    """
     seen = points @ view.T
     low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
     middle, half = (low + high) / 2, (high - low) / 2
@@ -227,6 +260,8 @@ def _look(plotter: Any, points: Floats, view: Floats, margin: float) -> None:
     plotter.camera.enable_parallel_projection()
     plotter.camera.parallel_scale = scale
     plotter.renderer.ResetCameraClippingRange()
+    shift = (2 * TRIAD - 1) * scale * np.array([SIZE[0] / SIZE[1], 1.0])
+    return focus + shift @ view[:2], scale
 
 
 def draw_shape_safely(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-SUPPORTS, DISTRIBUTED, SECTION = "supports", "distributed", "section"
+SUPPORTS, DISTRIBUTED, SECTION, FOUNDATION, TIES = "supports", "distributed", "section", "foundation", "constraints"
 """Groups below that of a branch or a state, and of the file."""
 HELD, AXIS, TURNS = "held", "axis", "free"
 """What directors may do: nothing, turn about one axis, turn freely."""
@@ -47,7 +47,7 @@ class Support:
     mass
         Attached there.
     force, moment
-        In the frame of space, felt in the free directions, (3,).
+        In the frame of space, felt in the free directions, (3,); those of potentials that are no springs among them.
     follower, follower_moment
         Along the directors, (3,).
     """
@@ -81,16 +81,43 @@ def kind_of(held: int, turning: str, sprung: bool) -> str:
 
 
 @dataclass(frozen=True)
+class Tie:
+    """What a constraint keeps, in one state.
+
+    Attributes
+    ----------
+    s
+        Arclength of the point that it keeps; nan for the two ends, or for the whole rod.
+    line
+        The two points (2, 3) whose distance it keeps: a fixed one and that of the rod, or the two ends; nan without.
+    normal
+        Unit normal (3,) of the surface on which it keeps the point; nan without.
+    note
+        The constraint in words where it has no place in a picture, else empty.
+    """
+
+    s: float
+    line: Floats
+    normal: Floats
+    note: str
+
+
+@dataclass(frozen=True)
 class Setting:
     """All that a file says of what holds and loads a rod in one state; empty for a file that says nothing.
 
     ``section`` has arclengths (n,) and second moments of area (n, 2, 2) up to a factor; ``distributed`` arclengths (n,)
-    and forces per length (n, 3) in the frame of space and along the directors.
+    and forces per length (n, 3) in the frame of space and along the directors; ``foundation`` arclengths (n,) and
+    stiffnesses per length (n, 3, 3) along e1, e2, e3.  ``notes`` names in words what acts and has no place in a
+    picture.
     """
 
     supports: tuple[Support, ...] = ()
     section: tuple[Floats, Floats] | None = None
     distributed: tuple[Floats, Floats, Floats] | None = None
+    foundation: tuple[Floats, Floats] | None = None
+    ties: tuple[Tie, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def axis(self) -> Floats | None:
@@ -122,13 +149,23 @@ def read(group: Any, row: int | None = None) -> Setting:
 
     ``row`` is that of the state; None where the group has one state only.
     """
-    row, supports, section, distributed = row or 0, [], None, None
-    for here in group[SUPPORTS].values() if SUPPORTS in group else ():
-        supports.append(Support(**{name: value[row] for name, value in here.items()}, **here.attrs))
+    row, section, distributed, foundation = row or 0, None, None, None
+    supports, ties = (
+        [{name: value[row] for name, value in here.items()} | dict(here.attrs) for here in group[kind].values()]
+        if kind in group
+        else []
+        for kind in (SUPPORTS, TIES)
+    )
     if SECTION in group.file:
         s, B = (group.file[SECTION][name][:] for name in ("s", "stiffness"))
         section = s, B[:, ::-1, ::-1] * np.array([[1.0, -1.0], [-1.0, 1.0]])
     if DISTRIBUTED in group:
         along = group[DISTRIBUTED]
         distributed = along["s"][:], along["force"][row], along["follower"][row]
-    return Setting(tuple(supports), section, distributed)
+    notes = [tie["note"] for tie in ties if tie["note"]]
+    if FOUNDATION in group:
+        along = group[FOUNDATION]
+        foundation = (along["s"][:], along["stiffness"][:]) if "stiffness" in along else None
+        notes += [along.attrs["note"]] if foundation is None else []
+    held = tuple(Support(**support) for support in supports)
+    return Setting(held, section, distributed, foundation, tuple(Tie(**tie) for tie in ties), tuple(notes))

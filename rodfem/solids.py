@@ -110,14 +110,19 @@ def straight_arrow(start: Floats, end: Floats, radius: float, color: str) -> Sol
     return arrow([start, neck, end], radius, color)
 
 
-def round_arrow(centre: Floats, axis: Floats, size: float, radius: float, color: str) -> Solid:
-    """Arrow three quarters of the way about an axis (3,), in the sense of a moment along it."""
+def round_arrow(centre: Floats, axis: Floats, size: float, radius: float, color: str, front: Floats) -> Solid:
+    """Arrow three quarters of the way about an axis (3,), in the sense of a moment along it.
+
+    It winds along the axis a little, and its head is in the direction ``front``, so that it is seen from all sides.
+    """
     axis = axis / np.linalg.norm(axis)
-    a = across(axis)
+    a = front - (front @ axis) * axis
+    a = across(axis) if np.linalg.norm(a) < 0.1 else a / np.linalg.norm(a)
     b = np.cross(axis, a)
     head = min(6.5 * radius / size, 1.2)
-    angle = np.append(np.linspace(0, 1.6 * np.pi - head, 40), 1.6 * np.pi)
-    return arrow(centre + size * (np.outer(np.cos(angle), a) + np.outer(np.sin(angle), b)), radius, color)
+    angle = np.append(np.linspace(-1.6 * np.pi, -head, 40), 0.0) + head / 2
+    along = np.outer(size * (0.5 + 0.6 * angle / np.pi), axis)
+    return arrow(centre + size * (np.outer(np.cos(angle), a) + np.outer(np.sin(angle), b)) + along, radius, color)
 
 
 def rod(centres: Floats, frames: Floats, profile: Floats, color: str) -> Solid:

@@ -11,6 +11,10 @@ Floats = NDArray[np.float64]
 
 TILT, STEEP = np.radians([20.0, 55.0])
 """By which a picture is seen from above; that of a closed rod, to show what is across its plane."""
+ASIDE, ABOVE = np.radians([40.0, 35.0])
+"""By which a rod that bends and moves in different planes is seen from aside, and from above."""
+BESIDE = 0.87
+"""Cosine of a load and the motion below which their plane is not that of the picture."""
 NEAR = 0.9
 """Cosine from which on a direction is taken for that of the nearest axis of space."""
 STRAIGHT = 1e-3
@@ -37,7 +41,7 @@ def view_of(
     down
         Direction of a load along the rod (gravity), which is downwards in the picture.
     load
-        Direction of a force across the rod, which is not along the line of sight.
+        Direction of a force across the rod, or of its deflection, which is not along the line of sight.
     side
         Direction that is upwards where a straight rod has not moved.
 
@@ -45,8 +49,9 @@ def view_of(
     -------
     axes
         Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and upwards is the
-        principal direction of the displacement across it.  With gravity it is the other way round.  A closed rod is
-        shown in the plane nearest to it.
+        principal direction of the displacement across it.  A load that is not nearly along that direction is upwards
+        instead, and the rod is seen from aside.  With gravity that is downwards.  A closed rod is shown in the plane
+        nearest to it.
     """
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
     chord = reference[-1] - reference[0] if axis is None else axis
@@ -64,9 +69,11 @@ def view_of(
         up = up * _sign(up @ moved[np.argmax(np.linalg.norm(moved - np.outer(moved @ right, right), axis=1))])
         if load is not None:
             aside = load - (load @ right) * right
-            if abs(up @ aside) < 0.5 * np.linalg.norm(aside):  # nearly along the line of sight: half way to it
-                up, tilt = up + _sign(up @ aside) * aside / np.linalg.norm(aside), 0.0
+            if abs(up @ aside) < BESIDE * np.linalg.norm(aside):
+                up, tilt = _snapped(aside / np.linalg.norm(aside)), ABOVE
+                up = up - (up @ right) * right
                 up /= np.linalg.norm(up)
+                right = np.cos(ASIDE) * right + np.sin(ASIDE) * np.cross(right, up)  # the rod goes away, so upwards
             elif (up @ aside) * (np.cross(right, up) @ aside) > 1e-9 * (aside @ aside):  # towards the load
                 tilt = -tilt
     back = np.cross(right, up)

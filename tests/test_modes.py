@@ -23,7 +23,7 @@ from rodfem.fields import Discretization
 from rodfem.mode_finder import ModeFinder
 from rodfem.modes import SYMMETRY, Modes, load_modes, save_modes
 from rodfem.motion import Motions
-from rodfem.plot_modes import draw_modes, main
+from rodfem.plot_modes import FRAMES, GROWS, amplitude, draw_modes, main
 from rodfem.scene import Scene
 from rodfem.system import System
 
@@ -245,10 +245,22 @@ def test_file_and_pictures(folder: Path, capfd: pytest.CaptureFixture) -> None:
         draw_modes(path, "branch 1", 7, folder / "modes.png", [3])
     arguments = [str(path), "--branch", "branch 1", "--row", "7", "--mode", "1", "--output"]
     assert main([*arguments, str(folder / "a" / "modes.gif")]) == main([*arguments, str(folder / "modes.png")]) == 0
-    assert (folder / "a" / "modes.gif").read_bytes().count(b"\x21\xf9\x04") == 40  # pictures
+    assert (folder / "a" / "modes.gif").read_bytes().count(b"\x21\xf9\x04") == 60  # pictures
     assert (folder / "modes.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     assert main([*arguments[:-2], "9"]) == 2
     assert "choose 1 to 2" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(("root", "grows"), [(2j, False), (3.0, True), (0.5 + 10j, True), (3.0 + 0.1j, True)])
+def test_animation_is_a_loop_without_a_jump(root: complex, grows: bool) -> None:
+    """From picture to picture, and from the last to the first, it does not go far."""
+    path = np.array([amplitude(complex(root), grows, frame / FRAMES) for frame in range(FRAMES + 1)])
+    assert path[-1] == pytest.approx(path[0], abs=1e-12)
+    assert abs(path).max() == pytest.approx(1.0)
+    assert abs(np.diff(path)).max() < 0.3
+    if grows:
+        start = path[: int(GROWS * FRAMES) + 1]
+        np.testing.assert_allclose(start[1:] / start[:-1], start[1] / start[0])  # exponential
 
 
 def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from math import cos, pi, sin, sqrt
 from pathlib import Path
 from typing import Any
@@ -15,14 +16,14 @@ from matplotlib.image import imread
 
 from forms import loads
 from forms.energy import bending
-from rodfem.ends import Attachment, End, clamped, elastic, free, hinged, pinned, sliding
+from rodfem.ends import Attachment, End, at, clamped, elastic, everywhere, free, hinged, integral, pinned, sliding
 from rodfem.errors import SceneError
-from rodfem.glyphs import DARK, GREY, LOAD, STEEL
-from rodfem.render import _read, draw_shape_safely
+from rodfem.glyphs import DARK, GREY, LOAD, STEEL, glyphs_of
+from rodfem.render import _read, draw_shape_safely, triad
 from rodfem.scene import Inertia, Ordinate, Parameter, Scene
 from rodfem.setting import read
-from rodfem.solids import FLATTEST, profile_of
-from rodfem.supports import supports_of, write, write_section
+from rodfem.solids import FLATTEST, SIDES, profile_of, round_arrow
+from rodfem.supports import foundation_of, supports_of, ties_of, write, write_section
 from rodfem.typical import typical_state
 from rodfem.view import view_of
 
@@ -119,6 +120,82 @@ def test_what_is_no_spring_and_what_is_attached() -> None:
     assert supports_of(classics.ring(), STRAIGHT | {"load": 0.0}) == {}
 
 
+def test_potentials_that_are_no_springs_are_loads() -> None:
+    """Minus their derivative: of crossed dead forces M/2 (d1 x e2 - d2 x e1), where the arms have turned."""
+    a, b, c, d = q = np.array([0.8, 0.2, -0.4, 0.4])
+    d1, d2 = (a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c)), (
+        2 * (b * c - a * d), a * a - b * b + c * c - d * d, 2 * (c * d + a * b),
+    )  # fmt: skip
+    state = STRAIGHT | {"load": 4.0, "q": np.tile(q, (31, 1))}
+    torque = End(energy=lambda x, c: loads.semi_tangential(x.d1, x.d2, c.P) + loads.dead(x.r, (1.0, 2.0, -c.P)))
+    right = supports_of(column(clamped(), torque), state)["right end"]
+    np.testing.assert_allclose(right.moment, 2.0 * (np.cross(d1, E2) - np.cross(d2, E1)), atol=1e-12)
+    np.testing.assert_allclose(right.force, [1.0, 2.0, -4.0], atol=1e-12)
+    both = End(energy=lambda x, c: loads.spring(x.r, (10.0, 20.0, 0.0)) + loads.dead(x.r, push(c)))
+    right = supports_of(column(clamped(), both), state)["right end"]
+    assert right.kind == "spring"
+    np.testing.assert_allclose(right.force, [0.0, 0.0, -4.0], atol=1e-12)  # what no spring holds
+
+
+def test_curved_arrow_has_the_sense_of_the_moment() -> None:
+    axis = np.array([0.0, 0.6, 0.8])
+    path = round_arrow(E1, axis, 1.0, 0.01, LOAD, E2).points[:-2].reshape(-1, SIDES, 3).mean(axis=1) - E1
+    turning = np.cross(path[:-1], np.diff(path, axis=0)) @ axis
+    assert turning.min() > -1e-12 and 1.5 * pi < turning.sum() < 2 * pi
+
+
+CONSTRAINTS = {
+    "sphere": at(1.0, lambda x, c: ufl.dot(x.r, x.r) - c.P**2),
+    "string": at(1.0, lambda x, c: ufl.sqrt(x.r[0] ** 2 + (x.r[1] - 1.0) ** 2 + x.r[2] ** 2) - c.P),
+    "plane": at(1.0, lambda x, c: 3 * x.r[1] - 4 * x.r[2] + c.P),
+    "cylinder": at(1.0, lambda x, c: (x.r[1] - 1) ** 2 + x.r[2] ** 2 - c.P**2),
+    "director": at(1.0, lambda x, c: x.d1[1]),
+    "distance": integral(lambda x, c: x.v[2] * x.d3[2], lambda c: c.P),
+    "twist": integral(lambda x, c: x.k[2], lambda c: c.P),
+    "all": everywhere(lambda x, c: x.k[2], strain=True),
+}
+
+
+def test_constraints_keep_distances_and_surfaces(folder: Path) -> None:
+    found = [tie for (tie,) in ties_of(column(constraints=tuple(CONSTRAINTS.values())), [STRAIGHT | {"load": 4.0}])]
+    ties = dict(zip(CONSTRAINTS, found, strict=True))
+    for name, line in {"sphere": [0 * E1, E3], "string": [E2, E3], "distance": [0 * E1, E3]}.items():
+        np.testing.assert_allclose(ties[name].line, line, atol=1e-6)
+    for name, normal in {"plane": [0, 0.6, -0.8], "cylinder": [0, -sqrt(0.5), sqrt(0.5)]}.items():
+        np.testing.assert_allclose(ties[name].normal, normal, atol=1e-12)
+    assert [name for name, tie in ties.items() if tie.note] == ["director", "twist", "all"]
+    assert not any(np.isfinite([*tie.line.ravel(), *tie.normal]).any() for tie in found if tie.note)
+    bow = column(constraints=(CONSTRAINTS["sphere"], CONSTRAINTS["all"]))
+    state = _read(saved(folder / "states.h5", bow), "straight", 0)
+    assert state.setting.notes == ("constraint all along the rod",)
+    string = next(x for x in state.solids(0.01, state.view())[2:] if np.ptp(x.points[:, 2]) > 0.9)
+    np.testing.assert_allclose(string.points[-2:], [0 * E1, E3], atol=1e-6)
+
+
+def test_foundation_is_a_row_of_springs(folder: Path) -> None:
+    bed = column(potential=lambda x, c: loads.spring(x.r, (300.0, 300.0, 0.0)))
+    found = foundation_of(bed, STRAIGHT | {"load": 4.0})
+    assert found is not None
+    np.testing.assert_allclose(found[1], np.tile(np.diag([300.0, 300.0, 0.0]), (9, 1, 1)), atol=1e-3)
+    state = _read(saved(folder / "states.h5", bed), "straight", 0)
+    assert [x.color for x in state.solids(0.01, state.view())].count(STEEL) == 9
+    blown = column(potential=lambda x, c: loads.pressure(x.r, x.dr, c.P))
+    state = _read(saved(folder / "states.h5", blown), "straight", 0)
+    assert state.setting.notes == ("load by a potential along the rod",)
+
+
+def test_what_slides_goes_along_with_a_motion_and_its_rails_stay(folder: Path) -> None:
+    state = _read(saved(folder / "states.h5", column(clamped(), ENDS["slide"])), "straight", 0)
+    moved = state.centres + 0.1 * np.outer(state.s, E3)
+    here, there = (
+        glyphs_of(state.setting, state.s, r, state.directors, 0.01, np.eye(3), state.centres)
+        for r in (state.centres, moved)
+    )
+    shift = [(b.color, (b.points - a.points).mean(axis=0)[2]) for a, b in zip(here, there, strict=True)]
+    assert [color for color, _ in shift] == [GREY, GREY, STEEL, STEEL, LOAD]
+    np.testing.assert_allclose([z for _, z in shift], [0.0, 0.1, 0.0, 0.0, 0.1], atol=1e-12)
+
+
 def test_record_of_every_row_can_be_read_back(folder: Path) -> None:
     scene = column(clamped(), ENDS["clamp"], distributed=lambda c: (0.0, c.P * c.s, 0.0))
     with h5py.File(folder / "states.h5", "w") as file:
@@ -199,8 +276,22 @@ def test_view_shows_the_plane_of_the_motion_and_tilts_nothing() -> None:
     right, up, _ = view_of(STRAIGHT["r"], 0.3 * bump * E1, down=-E3)
     np.testing.assert_allclose([abs(right @ E1), right @ E3, up @ E1], [1.0, 0.0, 0.0], atol=1e-12)
     assert up @ E3 > 0.9  # gravity is downwards
-    _, up, _ = view_of(STRAIGHT["r"], 0.3 * bump * E2, load=E1)
-    assert min(abs(up @ E1), abs(up @ E2)) > 0.6  # neither of both is along the line of sight
+    view = view_of(STRAIGHT["r"], 0.3 * bump * E2, load=E1)
+    np.testing.assert_allclose(view @ view.T, np.eye(3), atol=1e-12)
+    seen = [view[:2] @ e for e in (E1, E2, E3)]
+    assert min(map(np.linalg.norm, seen)) > 0.7  # none is along the line of sight, and all look different
+    for a, b in combinations(seen, 2):
+        assert abs(np.linalg.det([a, b])) > 0.4
+    assert seen[0][0] == 0.0 < seen[0][1]  # the load is upwards
+
+
+@pytest.mark.parametrize("way", [E1, E2, -E2, np.array([0.6, 0.8, 0.0])])
+def test_names_of_the_axes_do_not_overlap(way: np.ndarray) -> None:
+    view = view_of(STRAIGHT["r"], np.sin(pi * S)[:, None] * way)
+    arrows, names = triad(view, E1, 2.0)
+    assert [x.points[-1].tolist() for x in arrows] == [(E1 + 2.0 * e).tolist() for e in np.eye(3)]
+    assert "".join(sorted("".join(name for name, _ in names))).strip(", ") == "eee₁₂₃"
+    assert min(np.linalg.norm(a - b) for (_, a), (_, b) in combinations(names, 2)) > 0.35
 
 
 def branch(name: str, negative: list[int], special: list[dict] = [], **more: Any) -> dict[str, Any]:  # noqa: B006
