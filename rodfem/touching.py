@@ -7,9 +7,8 @@ it.  A simple eigenvalue gives it a parabola near such a pair, a double one the 
     det^(1/m)(s) ~ c ((s - s_m)^2 - r^2),    crossings at s_m -+ r,    m = 1, 2,
 
 which three rows determine.  Where its vertex lies inside a step, well below the values at both ends, the branch is
-solved at the vertex, and the eigenvalues nearest zero are computed there.  Successive parabolic interpolation of the
-smallest (Brent 1973, chapter 5) ends at a state with another index, or at a lowest value that is not zero.
-Determinants come with the factors that count the index: they cost nothing.
+solved there.  Successive parabolic interpolation (Brent 1973, chapter 5) ends at a state with another index, or at a
+lowest value that is not zero.  Determinants come with the factors that count the index: they cost nothing.
 """
 
 from __future__ import annotations
@@ -26,11 +25,10 @@ LOWER = 0.5
 MULTIPLICITIES = (1, 2)
 TRIES = 10
 """Interpolations until a lowest value is given up."""
+CLOSER = 4
+"""Interpolations after which the vertex is believed."""
 MARGIN = 1e-3
 """Part of a step, at its ends, in which no state is solved."""
-NEAREST = 4
-"""Number of eigenvalues nearest zero that are computed at a state."""
-
 Sample = tuple[float, float]
 """Arclength, and a value whose lowest is sought."""
 
@@ -72,48 +70,39 @@ def inside(follower: Follower, rows: Sequence[Point], p: Point, q: Point) -> lis
     for multiplicity in MULTIPLICITIES:
         samples = [(row.arclength, relative(row, p, multiplicity)) for row in rows]
         if all(isfinite(value) for _, value in samples):
-            s, least = vertex(samples)
-            if p.arclength < s < q.arclength and least < LOWER * min(1.0, relative(q, p, multiplicity)):
-                found = lowest(follower, p, q, s)
-                if found is not None:
-                    return [found]
+            found = lowest(follower, samples, p, q, multiplicity)
+            if found is not None:
+                return [found]
     return []
 
 
 def relative(row: Point, other: Point, multiplicity: int) -> float:
     """Root of the determinant at a row over that at another, with the sign that the indices say; nan if not known."""
     exponent = (row.determinant - other.determinant) / multiplicity
-    return (-1) ** (row.negative - other.negative) * exp(min(exponent, 600.0))
+    return float((-1) ** (row.negative - other.negative) * exp(min(exponent, 600.0)))
 
 
-def lowest(follower: Follower, p: Point, q: Point, s: float) -> Point | None:
-    """State between two rows, towards the lowest size of an eigenvalue, at which the index differs from theirs.
-
-    The first is solved at ``s``.
-    """
+def lowest(follower: Follower, samples: list[Sample], p: Point, q: Point, multiplicity: int) -> Point | None:
+    """State between two rows, towards the lowest value that the samples lead to, if its index differs from theirs."""
+    known = [sample for sample in samples if sample[0] in (p.arclength, q.arclength)]
+    least = min(value for _, value in known)
     margin = MARGIN * (q.arclength - p.arclength)
-    ends = {side: (_size(follower, p, side), _size(follower, q, side)) for side in (1.0, -1.0)}
-    state = point_between(follower, p, q, min(max(s, p.arclength + margin), q.arclength - margin))
-    if state is None or differs(state, p):
-        return state
-    first = state.arclength
-    for side, (left, right) in ends.items():
-        least = _size(follower, state, side)
-        if not least < min(left, right) < inf:
-            continue
-        samples = [(p.arclength, left), (first, least), (q.arclength, right)]
-        for _ in range(TRIES):
-            s, value = vertex(samples)
-            if not p.arclength + margin < s < q.arclength - margin or value > LOWER * least:
-                break
-            trial = point_between(follower, p, q, s)
-            if trial is None or differs(trial, p):
-                return trial
-            size = _size(follower, trial, side)
-            if not size < least:
-                break
-            least = size
-            samples = sorted(sorted([*samples, (s, size)], key=lambda sample: sample[1])[:3])
+    for tried in range(TRIES):
+        s, value = vertex(samples)
+        close = 0 < tried < CLOSER  # the first parabolas reach too far to tell how low it is
+        if not p.arclength < s < q.arclength or (value > LOWER * least and not close):
+            break
+        s = min(max(s, p.arclength + margin), q.arclength - margin)
+        state = point_between(follower, p, q, s)
+        if state is None or differs(state, p):
+            return state
+        size = relative(state, p, multiplicity)
+        if not size < least or any(s == other for other, _ in samples):
+            break
+        least = size
+        known = sorted([*known, (s, size)])
+        middle = known.index((s, size))
+        samples = known[middle - 1 : middle + 2]
     return None
 
 
@@ -131,15 +120,3 @@ def vertex(samples: Sequence[Sample]) -> Sample:
         return inf, 0.0
     s = (a + b) / 2 - first / (2 * curvature)
     return s, g + (s - b) * (first + curvature * (s - a))
-
-
-def _size(follower: Follower, row: Point, side: float) -> float:
-    """Size of the eigenvalue nearest zero among the positive (``side`` 1) or the negative ones (-1) of a row.
-
-    Infinite where none of those nearest to zero is on that side.
-    """
-    follower.system.set_phase(row.x)
-    follower.inertia.count(row.x)
-    return min(
-        (side * v for v in follower.inertia.nearest(NEAREST)[0] if side * v > follower.inertia.tolerance), default=inf
-    )
