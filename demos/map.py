@@ -14,16 +14,13 @@ from mpi4py import MPI
 
 import rodfem.cli as cli
 from forms.energy import hemitropic
-from rodfem.branch import BRANCH_POINT, USER
-from rodfem.continuation import Follower
 from rodfem.ends import clamped
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Ordinate, Parameter, Scene
 from rodfem.sharing import many
-from rodfem.system import System
+from rodfem.tracing import trace
 
 
 def scene(A: float, highest: float) -> Scene:
@@ -43,14 +40,13 @@ def scene(A: float, highest: float) -> Scene:
 
 def read(rod: Scene, loads: np.ndarray) -> dict:
     """Where the straight rod's index changes, and least displacement of a stable state (None: no such) at each load."""
-    follower = Follower(System(rod, Discretization("reduced", 8, 6), MPI.COMM_SELF))
     plan = Plan(rod.span, at=tuple(loads), depth=1, error_bars=False)
-    branches = Explorer(follower, plan, Report(MPI.COMM_SELF, quiet=True), lambda: None).run()
+    diagram = trace(rod, Discretization("reduced", 8, 6), plan, comm=MPI.COMM_SELF)
     stable = np.full(len(loads), np.nan)
-    for s in (s for branch in branches for s in branch.special if s.kind == USER and s.point.negative == 0):
-        i = int(np.argmin(abs(loads - s.point.load)))
-        stable[i] = np.fmin(stable[i], s.point.ordinate)
-    changes = [s for s in branches[0].special if s.kind == BRANCH_POINT]
+    for point in (s.point for s in diagram.special("user") if s.point.stable):
+        i = int(np.argmin(abs(loads - point.load)))
+        stable[i] = np.fmin(stable[i], point.ordinate)
+    changes = diagram.special("branch point", "straight")
     return {
         "changes": [[s.negative_before, s.negative_after, s.point.load] for s in changes],
         "stable": [None if np.isnan(x) else x for x in stable],

@@ -18,7 +18,8 @@ finds and classifies the points where it is lost, follows what branches off, and
         ordinate=Ordinate("tip displacement", s=1.0, of=lambda r, q: hypot(r[0], r[1])),
         span=(0.0, 10.0),
     )
-    run(column)
+    run(column)                          # with files and pictures
+    diagram = rodfem.trace(column)       # without
 
 * **Rod**: ``flexible``, ``unshearable``, ``inextensible`` or both; any stored energy ``W(v, k, c)`` that returns a UFL
   expression of the strains, the constants and the arclength ``c.s`` (:mod:`forms.energy` has a few).
@@ -32,12 +33,15 @@ finds and classifies the points where it is lost, follows what branches off, and
 * **Parameters**: any of them can be the load, :meth:`Scene.varying`; :func:`locus` follows a special point in the plane
   of two of them.
 * **Plane**: ``planar="e2"`` keeps the rod in the plane across e2, and records its index in space besides.
-* **One state**: :func:`solver` sets up a scene on a mesh, which the functions below take; :func:`equilibrium` computes
-  a state with it, :func:`load_state` restores a saved one.
-* **Is it stable?**: :func:`judge` answers for one state by any of six methods, and says how far to trust it;
-  :class:`ModeFinder` finds how the rod moves in its left-most modes, and what a controller needs to know of them.
+* **Diagram**: :func:`trace` computes without files and returns a :class:`Diagram`: ``diagram["branch 1"]``,
+  ``.special("fold")``, ``.at(40.0)``, ``.assess(point)``, ``.modes(point)``, ``.locus(special, "A", (-3, 0))``,
+  ``.search(40.0)``, ``.show(point)``, ``.plot()``, ``.save(folder)``; :func:`load` reads a saved one.  :func:`run` is
+  the same with a terminal, files and pictures.
+* **One state**: a :class:`Solver` is a scene on a mesh: equilibria at given loads, one by one.
+* **Is it stable?**: each point has its index; :meth:`Diagram.assess` decides by any of six methods, and says how far to
+  trust it; :meth:`Diagram.modes` finds how the rod moves in its left-most modes, and what a controller needs to know.
 * **Many rods**: :func:`many` shares a list of scenes among the ranks, into files, restartable.
-* **What is not connected**: :func:`further` looks for other equilibria at a load by deflation.
+* **What is not connected**: :meth:`Diagram.search` looks for other equilibria at a load by deflation.
 
 Continuous symmetries (a rod free to turn about its axis, a ring that may go anywhere) are found, not stated: each state
 that breaks one has a zero eigenvalue for it, which is counted as zero.
@@ -59,7 +63,6 @@ from typing import Any
 from rodfem.lazy import submodule
 
 _HOMES = {
-    "locus": "loci.locus",
     "Locus": "loci.locus",
     **dict.fromkeys(
         ("End", "clamped", "pinned", "sliding", "hinged", "free", "elastic", "Ring", "Attachment", "Constraint"), "ends"
@@ -73,19 +76,20 @@ _HOMES = {
     "Plan": "plan",
     "Steps": "continuation",
     "run": "runner",
-    "solver": "solvers",
-    "equilibrium": "solvers",
+    "trace": "tracing",
+    "load": "saved",
+    "Diagram": "diagram",
+    "Solver": "solvers",
+    "Observer": "observer",
+    "Branch": "branch",
+    "Point": "branch",
+    "Special": "branch",
     "many": "sharing",
-    "judge": "stability.judge",
-    "ModeFinder": "mode_finder",
     "Modes": "modes",
     "load_modes": "modes",
-    "further": "search.deflation",
-    "states_at": "search.deflation",
     "SceneError": "errors",
     "ConvergenceError": "errors",
-    "load_json": "diagram",
-    "load_state": "diagram",
+    "load_json": "files",
 }
 
 __all__ = sorted(_HOMES)

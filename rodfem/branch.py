@@ -19,7 +19,7 @@ FLUTTER, DIVERGENCE = "flutter", "divergence"
 """Under loads without a potential: a pair of frequencies becomes complex; one becomes imaginary."""
 
 
-@dataclass
+@dataclass(repr=False)
 class Point:
     """One equilibrium: state ``x``, unit ``tangent``, ``arclength`` from the start of the branch, and records.
 
@@ -54,6 +54,21 @@ class Point:
     estimate: float = float("nan")
     determinant: float = float("nan")
 
+    @property
+    def index(self) -> int:
+        """Number of negative eigenvalues; without a potential of those that are negative or complex."""
+        return self.negative
+
+    @property
+    def stable(self) -> bool:
+        """Whether no eigenvalue is negative: zero ones, which :attr:`zero` counts, leave it undecided beyond that."""
+        return self.negative == 0
+
+    def __repr__(self) -> str:
+        """Load, ordinate and stability."""
+        word = "stable" if self.stable else f"unstable, index {self.negative}"
+        return f"<Point at load {self.load:.10g}: ordinate {self.ordinate:.6g}, {word}>"
+
 
 @dataclass
 class Law:
@@ -75,7 +90,7 @@ class Law:
             self.kind = "supercritical pitchfork" if there > here else "subcritical pitchfork"
 
 
-@dataclass
+@dataclass(repr=False)
 class Special:
     """A special point: what it is, how precisely it was located, its null vectors, and the index on either side.
 
@@ -111,6 +126,11 @@ class Special:
     unfolding: float = float("nan")
     cluster: Cluster | None = None
 
+    def __repr__(self) -> str:
+        """Kind, load and change of the index."""
+        change = f"{self.negative_before}->{self.negative_after}"
+        return f"<Special point: {self.kind} at load {self.point.load:.10g}, index {change}>"
+
     @property
     def multiplicity(self) -> int:
         """Number of eigenvalues that cross or touch zero here."""
@@ -134,7 +154,7 @@ class Unexplained:
         )
 
 
-@dataclass
+@dataclass(repr=False)
 class Branch:
     """A connected piece of equilibria: its points in order, its special points, where it came from and why it ended.
 
@@ -152,6 +172,10 @@ class Branch:
     unexplained: list[Unexplained] = field(default_factory=list)
     begins: int | None = None
     singular_start: int = 0
+
+    def __repr__(self) -> str:
+        """Name, size and end."""
+        return f"<Branch {self.name!r}: {len(self.points)} points, {len(self.special)} special, ended: {self.ended}>"
 
     def start_in_words(self, load: str) -> str:
         """Sentence on a first state that is singular, for a load of that name; empty where it is not."""

@@ -1,275 +1,254 @@
-"""A bifurcation diagram as plain columnar data: made from branches, saved to ``diagram.json`` and ``states.h5``.
-
-``diagram.json`` holds for each branch its columns (one entry a row, a row being an equilibrium; ``meaning`` has each in
-words) and its special points, each of which is a row too.  ``states.h5`` holds the same rows as shapes and fields in
-natural order along the rod, whatever the number of ranks: to draw them, or to start again from one with
-:func:`load_state`.
-"""
+"""The whole picture: branches of equilibria with the solvers of their meshes, and all that can be asked of them."""
 
 from __future__ import annotations
 
-import json
-import os
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from petsc4py import PETSc
-
-from rodfem.branch import Branch, Special, not_followed
+from rodfem.branch import END, USER, Branch, Point, Special
 from rodfem.clock import Clock
-from rodfem.continuation import Equilibria
+from rodfem.continuation import Equilibria, Follower, Steps
 from rodfem.errors import SceneError
-from rodfem.fields import Fields
-from rodfem.motion import Motions
-from rodfem.supports import write as write_supports
-from rodfem.supports import write_section
-from rodfem.system import System
+from rodfem.fields import Discretization
+from rodfem.files import as_data, save_json, save_states
+from rodfem.modes import Modes
+from rodfem.plan import Plan
+from rodfem.scene import Scene
+from rodfem.search.deflation import states_at
+from rodfem.solvers import Solver
+from rodfem.stability.judge import Verdict
 
-COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error", "mesh")
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-MEANING = {
-    "load": "value of the parameter",
-    "ordinate": "the scene's ordinate",
-    "energy": "stored energy int W ds of the rod, without the potential of the loads, springs and foundations",
-    "negative": "number of negative eigenvalues of the constrained second variation (the index): 0 is stable",
-    "zero": "number of eigenvalues that vanish, those of symmetries included",
-    "stretch": "least stretch v3 along the rod",
-    "slope": "the load's component of the unit tangent",
-    "drift": "largest drift scalar: the error with which the mesh has the symmetries",
-    "arclength": "length along the branch, in the metric of rotations and load",
-    "error": "size of the last Newton correction",
-    "mesh": "number of the discretisation in meshes",
-}
-"""Columns in words, as they stand in the file."""
-UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
-"""What ``negative`` counts where loads have no potential."""
+    from rodfem.loci.locus import Locus
+    from rodfem.snapshot import Snapshot
 
 
-def as_data(
-    branches: Sequence[Branch],
-    systems: Sequence[System],
-    clock: Clock,
-    span: tuple[float, float],
-    accuracy: float | None = None,
-) -> dict[str, Any]:
-    """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene).
+class Diagram:
+    """A bifurcation diagram: what :func:`rodfem.trace` returns, and :func:`rodfem.load` reads.
 
-    ``systems`` are those of the meshes that the points name by their number; ``discretization`` is the one with most
-    unknowns, and ``meshes`` has all.
+    It is a sequence of branches, in the order in which they were found, which are also found by name.  All methods that
+    compute are collective over the ranks that share the rod.
+
+    Attributes
+    ----------
+    scene, plan
+        What was traced.
+    branches
+        All branches.
+    solvers
+        What computes on each mesh, by the number that a point has in ``mesh``.
+    warnings, notes
+        Sentences on what went wrong without stopping the computation, and on what is worth knowing.
+    clock
+        Where the time went.
     """
-    system = max(systems, key=lambda s: s.fields.unknowns)
-    scene, d = system.scene, system.fields.discretization
-    s = clock.seconds
-    points = sum(len(b.points) for b in branches)
-    work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
-    return {
-        "scene": scene.name,
-        "title": scene.title or scene.name,
-        "parameter": scene.load,
-        "parameter_label": scene.parameters[scene.load].label or scene.load,
-        "ordinate": scene.ordinate.name,
-        "ordinate_label": scene.ordinate.label or scene.ordinate.name,
-        "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
-        "range": list(span),
-        "discretization": {
-            "formulation": d.formulation,
-            "elements": d.elements,
-            "degree": d.degree,
-            "unknowns": system.fields.unknowns,
-        },
-        "accuracy": accuracy,
-        "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
-        "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE}),
-        "branch_points_not_followed": not_followed(branches),
-        "meshes": [_mesh_data(s.fields) for s in systems],
-        "branches": [_branch_data(b) for b in branches],
-        "timing": {
-            "assembly_s": s.get("assembly", 0.0),
-            "solve_s": s.get("solve", 0.0),
-            "stability_s": s.get("stability", 0.0),
-            "location_s": s.get("location", 0.0),
-            "error_bars_s": s.get("error bars", 0.0),
-            "setup_s": s.get("setup", 0.0),
-            "total_s": clock.total(),
-            "points": points,
-            "ms_per_point": 1e3 * work / max(points, 1),
-            "ranks": system.comm.size,
-        },
-    }
 
+    def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[Equilibria]) -> None:
+        """Keep what was traced; ``solvers`` may grow."""
+        self.scene, self.plan, self.branches, self.solvers = scene, plan, branches, solvers
+        self.warnings: list[str] = []
+        self.notes: list[str] = []
+        self._asked: dict[int, Solver] = {}
 
-def _mesh_data(fields: Fields) -> dict[str, Any]:
-    d = fields.discretization
-    return {
-        "elements": d.elements,
-        "degree": d.degree,
-        "unknowns": fields.unknowns,
-        "vertices": None if d.vertices is None else list(d.vertices),
-    }
+    # --- what there is ---------------------------------------------------------------------------------------------
 
+    @property
+    def clock(self) -> Clock:
+        """Seconds by purpose, of the computation and of what was asked since."""
+        return self.solvers[0].system.clock
 
-def _branch_data(branch: Branch) -> dict[str, Any]:
-    rows = {id(p): i for i, p in enumerate(branch.points)}
-    columns: dict[str, list[Any]] = {name: [_plain(getattr(p, name)) for p in branch.points] for name in COLUMNS}
-    if any(np.isfinite(p.estimate) for p in branch.points):
-        columns["estimate"] = [_plain(p.estimate) for p in branch.points]
-    if any(p.spectrum for p in branch.points):
-        columns["spectrum"] = [p.spectrum for p in branch.points]
-    if any(p.negative_in_space is not None for p in branch.points):
-        columns["negative_in_space"] = [p.negative_in_space for p in branch.points]
-    if any(p.omega2 for p in branch.points):
-        columns["omega2"] = [p.omega2 for p in branch.points]
-        columns["motion"] = [p.motion for p in branch.points]
-        columns["curve"] = [p.curve for p in branch.points]
-        columns["unstable"] = [p.negative for p in branch.points]
-    return {
-        "name": branch.name,
-        "parent": list(branch.parent) if branch.parent else None,
-        "ended": branch.ended,
-        "columns": columns,
-        "special": [_special_data(s) for s in branch.special],
-        "singular_start": branch.singular_start,
-        "unexplained": [{"row": rows[id(u.a)], "before": u.before, "after": u.after} for u in branch.unexplained],
-    }
+    @property
+    def span(self) -> tuple[float, float]:
+        """Range of the load, its start first."""
+        return self.plan.over(self.scene)
 
+    def __len__(self) -> int:
+        """Number of branches."""
+        return len(self.branches)
 
-def _special_data(s: Special) -> dict[str, Any]:
-    return {
-        "kind": s.kind,
-        "load": s.point.load,
-        "ordinate": s.point.ordinate,
-        "energy": s.point.energy,
-        "row": s.row,
-        "negative_before": s.negative_before,
-        "negative_after": s.negative_after,
-        "zero": s.point.zero,
-        "multiplicity": s.multiplicity,
-        "error_estimate": _plain(s.error_estimate),
-        "ordinate_error_estimate": _plain(s.ordinate_error),
-        "resolved": s.resolved,
-        "located_to": s.located_to,
-        "coupling": s.coupling,
-        "meets": list(s.meets) if s.meets else None,
-        "followed": s.switched,
-        "omega2": _plain(s.omega2),
-        "law": None if s.law is None else asdict(s.law) | {"uncertainty": _plain(s.law.uncertainty)},
-        "unfolding": _plain(s.unfolding),
-        "note": s.note,
-    }
+    def __iter__(self) -> Iterator[Branch]:
+        """Branches in the order in which they were found."""
+        return iter(self.branches)
 
+    def __getitem__(self, key: str | int) -> Branch:
+        """Branch by name or number; raises :class:`KeyError` or :class:`IndexError`."""
+        if isinstance(key, int):
+            return self.branches[key]
+        for branch in self.branches:
+            if branch.name == key:
+                return branch
+        raise KeyError(f"no branch {key!r}: there are {', '.join(repr(b.name) for b in self.branches)}")
 
-def _plain(value: float) -> float | int | None:
-    """Number that JSON can hold; what is not finite becomes null."""
-    if isinstance(value, int):
-        return value
-    return float(value) if np.isfinite(value) else None
+    def special(self, kind: str | None = None, branch: str | None = None) -> list[Special]:
+        """Special points, of one kind ("fold", "branch point", "flutter", "divergence", ...) or one branch if named.
 
+        Without a kind those at which something happens: loads asked for and ends are left out.
+        """
+        chosen = self.branches if branch is None else [self[branch]]
+        every = [s for b in chosen for s in b.special]
+        return [s for s in every if (s.kind == kind if kind is not None else s.kind not in (USER, END))]
 
-def save_json(data: dict[str, Any], path: Path) -> None:
-    """Write a diagram whole or not at all, so that an interrupted run leaves the last good file."""
-    draft = path.with_suffix(".json.part")
-    draft.write_text(json.dumps(data, indent=1) + "\n")
-    os.replace(draft, path)
+    def at(self, load: float) -> list[Point]:
+        """All equilibria of the diagram at exactly ``load``, computed there, each with its own index.
 
+        In the order of their branches.  Raises :class:`~rodfem.errors.SceneError` for a load outside the range.
+        """
+        low, high = sorted(self.span)
+        if not low <= load <= high:
+            raise SceneError(
+                f"The load {load:g} is outside the range {low:g} to {high:g} of this diagram: trace a wider one, as in "
+                "diagram.again(span=...)."
+            )
+        finest = self._finest()
+        solver = self.solvers[finest]
+        if not isinstance(solver, Follower):
+            guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
+            return [self.solver(guess).equilibrium(load, guess)]
+        return states_at(solver, [replace(b, points=[self._on(p, finest) for p in b.points]) for b in self], load)
 
-def load_json(path: Path) -> dict[str, Any]:
-    """Read a diagram; raises :class:`SceneError` where there is none."""
-    try:
-        data: dict[str, Any] = json.loads(Path(path).read_text())
-    except (OSError, json.JSONDecodeError) as trouble:
-        raise SceneError(f"{path} is not a diagram ({trouble}): give the diagram.json of a run.") from trouble
-    return data
+    def solver(self, point: Point | Special) -> Solver:
+        """Return the solver of the mesh that a point belongs to."""
+        mesh = point.point.mesh if isinstance(point, Special) else point.mesh
+        if mesh not in self._asked:
+            self._asked[mesh] = Solver.of(self.solvers[mesh])
+        return self._asked[mesh]
 
+    # --- what it can be asked ------------------------------------------------------------------------------------
 
-def save_states(branch: Branch, solvers: Sequence[Equilibria], path: Path, first: bool) -> None:
-    """Append the states of a branch to an HDF5 file; collective, written on rank 0.
+    def assess(self, point: Point | Special, method: str = "auto", number: int = 4) -> Verdict:
+        """Decide the stability of a point with a given method: see :meth:`rodfem.Solver.assess`."""
+        return self.solver(point).assess(point, method, number)
 
-    Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
-    every further field and scalar with P rows, and under ``special/<i>`` the null vectors of its special points:
-    displacement ``r``, ``rotation`` in the space frame, and the change of ``q``.  Below it are the groups of
-    :func:`rodfem.supports.write`, for pictures; the file has the name of the ``first`` branch and the bending
-    stiffness under ``section``.  ``solvers`` are those of the meshes that points name; the rows of a mesh with fewer
-    nodes end in nan.
-    """
-    import h5py
+    def modes(self, point: Point | Special, number: int = 3, method: str = "auto") -> Modes:
+        """Left-most modes of a point: see :meth:`rodfem.Solver.modes`."""
+        return self.solver(point).modes(point, number, method)
 
-    samples = [solvers[p.mesh].shape.sample(p.x) for p in branch.points]
-    used = {s.point.mesh for s in branch.special}
-    motions = {i: Motions(solvers[i].system) for i in sorted(used)}
-    modes = [[motions[s.point.mesh].at(s.point.x, v) for v in s.null_vectors] for s in branch.special]
-    system = solvers[0].system
-    if system.comm.rank:
-        return
-    with h5py.File(path, "w" if first else "a") as file:
-        file.attrs.update(
-            scene=system.scene.name,
-            parameter=system.scene.load,
-            formulation=system.fields.discretization.formulation,
+    def locus(
+        self,
+        special: Special,
+        parameter: str,
+        interval: tuple[float, float],
+        load: tuple[float, float] | None = None,
+        steps: Steps | None = None,
+    ) -> Locus:
+        """Follow a special point in the plane of the load and a second parameter.
+
+        Parameters
+        ----------
+        special
+            A fold, a branch point, a flutter load or a divergence load of this diagram.
+        parameter
+            Name of the second parameter of the scene.
+        interval
+            Least and greatest value of that parameter.
+        load
+            Least and greatest load, by default those of the diagram.
+        steps
+            Control of the step, by default :data:`rodfem.loci.locus.STEPS`.
+
+        Raises :class:`~rodfem.errors.SceneError` for a parameter, bounds or a kind of special point that make no sense,
+        and :class:`~rodfem.errors.ConvergenceError` where the special point is not found again.
+        """
+        from rodfem.loci.locus import STEPS, locus
+
+        low, high = sorted(load or self.span)
+        return locus(self.solvers[special.point.mesh], special, parameter, ((low, high), interval), steps or STEPS)
+
+    def search(self, load: float, tries: int = 24, seed: int = 0) -> list[Point]:
+        """Equilibria at ``load`` that are on no branch, by ``tries`` deflated Newton iterations; none twice."""
+        return Solver.of(self.solvers[self._finest()]).search(load, self.at(load), tries, seed)
+
+    def again(self, discretization: Discretization | None = None, **changes: Any) -> Diagram:
+        """Trace once more with another discretisation or plan: ``again(span=(60, 4))``, ``again(accuracy=1e-8)``.
+
+        ``changes`` are fields of :class:`~rodfem.Plan`.  The mesh stays unless one is given.
+        """
+        from rodfem.tracing import trace
+
+        system = self.solvers[0].system
+        mesh = discretization or system.fields.discretization
+        return trace(self.scene, mesh, replace(self.plan, **changes), comm=system.comm)
+
+    def _finest(self) -> int:
+        """Number of the mesh with most unknowns."""
+        return max(range(len(self.solvers)), key=lambda i: self.solvers[i].system.fields.unknowns)
+
+    def _on(self, point: Point, mesh: int) -> Point:
+        """Point interpolated on another mesh, to start from; itself if it is on that."""
+        if point.mesh == mesh:
+            return point
+        x = self.solvers[mesh].shape.restore(self.solvers[point.mesh].shape.sample(point.x))
+        return replace(point, x=x, tangent=None, mesh=mesh)
+
+    # --- how it is kept and shown ------------------------------------------------------------------------------------
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Contents of ``diagram.json``: see docs/files.md."""
+        systems = [solver.system for solver in self.solvers]
+        return as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy)
+
+    def save(self, folder: Path | str) -> Path:
+        """Write ``diagram.json`` and ``states.h5`` into a folder, which is made; returns it."""
+        folder, comm = Path(folder), self.solvers[0].system.comm
+        if comm.rank == 0:
+            folder.mkdir(parents=True, exist_ok=True)
+            save_json(self.data, folder / "diagram.json")
+        for i, branch in enumerate(self.branches):
+            save_states(branch, self.solvers, folder / "states.h5", first=i == 0)
+        comm.barrier()
+        return folder
+
+    def plot(self, path: Path | str | None = None) -> Figure:
+        """Draw the diagram with stability and special points; also into a file, if a ``path`` is given."""
+        if self.scene.conservative:
+            from rodfem.plot import figure_of
+        else:
+            from rodfem.plot_frequencies import figure_of
+        figure = figure_of(self.data)
+        if path is not None and self.solvers[0].system.comm.rank == 0:
+            figure.savefig(Path(path))
+        return figure
+
+    def show(self, point: Point | Special, path: Path | str | None = None, caption: str | None = None) -> Snapshot:
+        """Draw the rod at a point, with its supports and loads; also into a file, if a ``path`` is given.
+
+        A notebook shows what is returned.  Raises :class:`ImportError` where PyVista is missing.
+        """
+        from rodfem.snapshot import snapshot
+
+        return snapshot(self, point.point if isinstance(point, Special) else point, path, caption)
+
+    def __repr__(self) -> str:
+        """Scene, size and range."""
+        low, high = self.span
+        points = sum(len(b.points) for b in self.branches)
+        return (
+            f"<Diagram of {self.scene.name!r}: {len(self)} branches, {points} points, {len(self.special())} special "
+            f"points, {self.scene.load} from {low:g} to {high:g}>"
         )
-        if first:
-            file.attrs["first"] = branch.name
-            write_section(file, system.scene)
-        group = file.create_group(f"branches/{branch.name}")
-        for name in samples[0]:
-            group[name] = _stacked([np.asarray(s[name]) for s in samples])
-        write_supports(group, system.scene, samples)
-        for i, vectors in enumerate(modes):
-            for j, mode in enumerate(vectors):
-                target = group.create_group(f"special/{i}/null_vector_{j}")
-                target["r"], target["q"], target["rotation"] = mode.r, mode.q, mode.w
 
+    def _repr_html_(self) -> str:
+        """Table of special points for notebooks."""
+        from rodfem.report import index_in_words, number
 
-def _stacked(rows: list[np.ndarray]) -> np.ndarray:
-    """Arrays of equal or different shapes as the rows of one, filled up with nan."""
-    shape = tuple(np.max([row.shape for row in rows], axis=0).astype(int))
-    if all(row.shape == shape for row in rows):
-        return np.array(rows)
-    out = np.full((len(rows), *shape), np.nan)
-    for place, row in zip(out, rows, strict=True):
-        place[tuple(map(slice, row.shape))] = row
-    return out
-
-
-def _trimmed(row: Any) -> Any:
-    """Array without the slices at the ends of its axes that hold nothing but nan."""
-    for axis in range(np.ndim(row)):
-        others = tuple(i for i in range(np.ndim(row)) if i != axis)
-        row = np.compress(~np.isnan(row).all(axis=others), row, axis=axis)
-    return row
-
-
-def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc.Vec:
-    """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
-
-    Raises :class:`SceneError` where the file has no such row, has it in the other formulation, or lacks an unknown of
-    the follower's scene.
-    """
-    import h5py
-
-    wanted = follower.system.fields.discretization.formulation
-    try:
-        with h5py.File(path, "r") as file:
-            if file.attrs["formulation"] != wanted:
-                raise SceneError(
-                    f"{path} holds states of the {file.attrs['formulation']} formulation: choose that, not {wanted}."
+        rows = []
+        for branch in self.branches:
+            for s in branch.special:
+                cells = (
+                    branch.name,
+                    s.kind,
+                    number(s.point.load, s.error_estimate, s.resolved),
+                    number(s.point.ordinate, s.ordinate_error, s.resolved),
+                    index_in_words(s),
                 )
-            group = file[f"branches/{branch}"]
-            sample = {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
-    except (OSError, KeyError, IndexError, ValueError) as trouble:
-        if isinstance(trouble, SceneError):
-            raise
-        raise SceneError(
-            f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it."
-        ) from trouble
-    system = follower.system
-    wanted_names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]
-    missing = [name for name in wanted_names if name not in sample]
-    if missing:
-        raise SceneError(
-            f"{path} has no {', '.join(missing)}, unknowns of the scene {system.scene.name!r}: it was written for "
-            "another scene, or by another version of rodfem; run the scene again."
-        )
-    return follower.shape.restore(sample)
+                rows.append("".join(f"<td>{escape(cell)}</td>" for cell in cells))
+        head = ("branch", "kind", self.scene.load, self.scene.ordinate.name, "index")
+        title = "".join(f"<th>{escape(name)}</th>" for name in head)
+        body = "".join(f"<tr>{row}</tr>" for row in rows)
+        return f"<p>{escape(repr(self)[1:-1])}</p><table><thead><tr>{title}</tr></thead><tbody>{body}</tbody></table>"

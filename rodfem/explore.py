@@ -40,7 +40,7 @@ class Explorer(Tracer):
     def run(self) -> list[Branch]:
         """Trace the start state's branch, then what leaves each branch point, breadth first."""
         if self.meshes.accuracy != self.plan.accuracy:
-            self.report.say(
+            self.observer.note(
                 f"  computed to {self.meshes.accuracy:g}: a coarser mesh would break the ring's symmetry along itself"
             )
         self.trace(self._primary())
@@ -51,12 +51,12 @@ class Explorer(Tracer):
 
     def _search(self, load: float) -> None:
         """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
-        self.report.say()
+        self.observer.note("")
         with self.follower.system.clock.purpose("search"):
             self.use(max(self.meshes.followers, key=lambda f: f.system.fields.unknowns).mesh)
             here = [replace(b, points=[self.here(p) for p in b.points]) for b in self.branches]
             known = states_at(self.follower, here, load)
-            found = further(self.follower, load, known, self.plan.tries, report=self.report)
+            found = further(self.follower, load, known, self.plan.tries, observer=self.observer)
         before = len(self.branches)
         for i, point in enumerate(found):
             if not self._on_branch(point, before):
@@ -106,9 +106,9 @@ class Explorer(Tracer):
             )
         if isinstance(self.scene.ends, Ring):
             number, Tw, Wr = link(self.follower.shape.sample(point.x))
-            self.report.say(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
+            self.observer.note(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
         if point.negative:
-            self.report.say(
+            self.observer.note(
                 f"  the first state is unstable already (index {point.negative}): stability was lost outside the range"
             )
         return Branch(self.scene.states, None, 0, [point])
@@ -180,7 +180,7 @@ class Explorer(Tracer):
         try:
             ways = directions(self.follower, special)
         except ConvergenceError as trouble:
-            self.report.warn(f"No branch could be followed from {parent.name} at {special.point.load:.8g}: {trouble}")
+            self.observer.warn(f"No branch could be followed from {parent.name} at {special.point.load:.8g}: {trouble}")
             return
         before = len(self.branches)
         for direction in ways:
@@ -197,12 +197,12 @@ class Explorer(Tracer):
                     special, way, name, origin, parent.depth + 1, self.follower, len(ways), self._bounds()
                 )
                 if branch is None:
-                    self.report.warn(
+                    self.observer.warn(
                         f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}."
                     )
                     continue
                 if not self._bounds()[0] <= branch.points[1].load <= self._bounds()[1]:
-                    self.report.say(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
+                    self.observer.note(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
                     continue
                 if first is not None and self._mirrored(special, first, branch.points[1]):
                     continue  # the mirror image of the branch just traced
@@ -233,14 +233,14 @@ class Explorer(Tracer):
         if special.law is not None and not from_the_side:
             indices = special.negative_before, special.negative_after
             special.law.judge(*(indices if special.point.slope > 0 else reversed(indices)))
-            self.report.law(special)
+            self.observer.law(special)
 
     def _judge_from_the_side(self, special: Special, trunk: Sequence[Branch]) -> None:
         """Name a pitchfork that was reached along its side branch, from the branch that it ends on, now traced."""
         index = {branch.points[1].load > special.point.load: branch.points[1].negative for branch in trunk}
         if special.law is not None and special.zero_of == "slope" and len(index) == 2:
             special.law.judge(index[False], index[True])
-            self.report.law(special)
+            self.observer.law(special)
 
     def _name(self, parent: Branch) -> str:
         siblings = sum(b.parent is not None and b.parent[0] == parent.name for b in self.branches)

@@ -16,11 +16,12 @@ from rodfem.plan import Plan
 from rodfem.plot_modes import draw_modes
 from rodfem.report import Report
 from rodfem.stability.judge import Judge
+from rodfem.system import System
 
 
-def check_method(solver: Equilibria, plan: Plan) -> None:
+def check_method(system: System, plan: Plan) -> None:
     """Raise :class:`SceneError` for a method that does not apply, before anything is computed."""
-    Judge(solver).choose(plan.method or "auto", plan.modes)
+    Judge(system).choose(plan.method or "auto", plan.modes)
 
 
 def judge_users(

@@ -41,7 +41,7 @@ FIELDS = ("value", "residual", "error", "displacement", "rotation", "rotation_bo
 LEFT = ("left_displacement", "left_rotation", "weight_displacement", "weight_rotation")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Modes:
     """Modes of one state, K of them, at the m nodes of the mesh; nondimensional, or in the units of the scene.
 
@@ -76,6 +76,11 @@ class Modes:
     left_rotation: np.ndarray
     weight_displacement: np.ndarray
     weight_rotation: np.ndarray
+
+    def __repr__(self) -> str:
+        """Load, and each eigenvalue with its motion."""
+        each = ", ".join(f"{v:.6g} ({m})" for v, m in zip(self.value, self.motion, strict=True))
+        return f"<Modes at load {self.load:.10g}: mu = {each}>"
 
     @property
     def rotation_body(self) -> np.ndarray:

@@ -74,7 +74,15 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     KeyError
         If an entry of ``diagram.json`` is missing.
     """
-    path = Path(path)
+    path, figure = Path(path), figure_of(diagram)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(path, dpi=DPI, format=path.suffix[1:] or "png")
+    return path
+
+
+def figure_of(diagram: Mapping[str, Any]) -> Figure:
+    """Figure of a diagram, as :func:`draw_diagram` writes it; raises as that does."""
     branches = diagram.get("branches") if isinstance(diagram, Mapping) else None
     if not branches:
         raise ValueError("the diagram has no branches: expected those of a diagram.json; try that of a scene")
@@ -96,9 +104,7 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
         legend, obstacles = _place_legend(axes, handles, pieces, points, len(branches) <= 8)
         _uncover(axes, pieces)
         _place_labels(axes, pieces, legend, obstacles)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=DPI, format=path.suffix[1:] or "png")
-    return path
+    return figure
 
 
 def _draw_branches(

@@ -67,6 +67,14 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
     diverged is a plus; flutter loads are stars, divergence loads triangles.  The axis shows the ``most`` left-most
     eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any ``omega2``.
     """
+    figure = figure_of(diagram, most)
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(path)
+    return path
+
+
+def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
+    """Figure of the frequencies of a diagram, as :func:`draw_frequencies` writes it; raises as that does."""
     branches = [b for b in diagram["branches"] if b["columns"].get("omega2")]
     if not branches:
         raise ValueError(f"The diagram of {diagram['scene']} has no eigenvalues: run a scene with a follower load.")
@@ -96,8 +104,7 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
         handles += [Line2D([], [], ls="none", label=kind, **SPECIAL[kind]) for kind in SPECIAL if kind in shown]
         axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9)
         figure.supxlabel(_footer(diagram, branches), fontsize=8.5, color="0.4", x=0.01, ha="left")
-        figure.savefig(path)
-    return path
+    return figure
 
 
 PARTS = {

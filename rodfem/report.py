@@ -28,6 +28,7 @@ from rodfem.branch import (
 from rodfem.clock import Clock
 from rodfem.fields import Discretization
 from rodfem.modes import Modes
+from rodfem.observer import Observer
 from rodfem.scene import Scene
 from rodfem.stability.judge import Verdict
 from rodfem.system import System
@@ -69,7 +70,7 @@ def _law(law: Law, resolved: bool | None) -> str:
     return f"{law.kind}, load = load_b {sign} {number(abs(law.coefficient), law.uncertainty, resolved)} {x} + ..."
 
 
-def _index(special: Special) -> str:
+def index_in_words(special: Special) -> str:
     """Index at a special point in words: before and after if it changes."""
     before, after = special.negative_before, special.negative_after
     index = f"{before}->{after}" if before != after else f"{special.point.negative}"
@@ -99,7 +100,7 @@ def _roots(point: Point) -> dict[str, str]:
     return {kind: "  ".join(texts[:4]) + (" ..." if len(texts) > 4 else "") for kind, texts in words.items()}
 
 
-class Report:
+class Report(Observer):
     """Prints on rank 0; with ``quiet`` it prints nothing."""
 
     def __init__(self, comm: MPI.Comm = MPI.COMM_WORLD, quiet: bool = False, stream: TextIO | None = None) -> None:
@@ -116,6 +117,10 @@ class Report:
                 self.stream.write("\r\033[K")
             self.stream.write(line + end)
             self.stream.flush()
+
+    def note(self, sentence: str) -> None:
+        """Print it."""
+        self.say(sentence)
 
     def compiling(self) -> None:
         """Say why the first run takes longer."""
@@ -194,7 +199,7 @@ class Report:
         return (
             f"{LABELS[special.kind]}   {round(p.load, 10) + 0.0:<14.10f} {round(p.ordinate, 9) + 0.0:<14.9f} "
             f"{p.energy:<10.6f} "
-            f"{_index(special):>{max(6, len(self.count))}} {p.zero:>5}  {special.located_to:.0e}{meets}"
+            f"{index_in_words(special):>{max(6, len(self.count))}} {p.zero:>5}  {special.located_to:.0e}{meets}"
         )
 
     def law(self, special: Special) -> None:
@@ -220,7 +225,7 @@ class Report:
                 load = f"{s.point.load:.10g}" if exact else number(s.point.load, s.error_estimate, s.resolved)
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
                 ordinate = number(s.point.ordinate, s.ordinate_error, s.resolved)
-                self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {_index(s)}{zero}")
+                self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {index_in_words(s)}{zero}")
                 if s.kind == FLUTTER:
                     self.say(f"    double eigenvalue omega^2 = {number(s.omega2, s.omega2_error)}")
                 if s.note:

@@ -10,19 +10,16 @@ from mpi4py import MPI
 
 from rodfem import compat
 from rodfem.branch import END, USER, Branch
-from rodfem.clock import Clock
-from rodfem.continuation import Equilibria, Follower
-from rodfem.diagram import as_data, save_json, save_states
+from rodfem.continuation import Equilibria
+from rodfem.diagram import Diagram
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization
-from rodfem.frequency_mesh import frequency_mesh
-from rodfem.meshes import start_mesh
+from rodfem.files import save_json, save_states
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Scene
-from rodfem.solvers import solver
-from rodfem.sweep import FREQUENCIES, Sweep
+from rodfem.system import System
+from rodfem.tracing import trace
 from rodfem.typical import typical_state
 
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
@@ -54,78 +51,65 @@ def run(
     figures: bool = True,
     comm: MPI.Comm = MPI.COMM_WORLD,
     quiet: bool = False,
-) -> list[Branch]:
-    """Explore a scene and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
+) -> Diagram:
+    """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
     By default 8 elements of degree 6 (few elements to start with where the plan has an accuracy), the scene's own span,
     and the folder ``results/<name>``.  Files are brought up to date after every branch, so that an interrupted run
-    loses no finished one.  Raises :class:`~rodfem.errors.SceneError` for bad input, before any computation, and
-    :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
+    keeps all completed ones.  Returns the diagram.  Raises :class:`~rodfem.errors.SceneError` for bad input, before any
+    computation, and :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
     """
     plan = plan or Plan()
     output = output or Path("results") / scene.name
     if scene.conservative:
         compat.require_real_petsc()
     plan.check(scene)
-    discretization = discretization or Discretization()
     writable(output, comm)
-    report, clock = Report(comm, quiet), Clock()
-    with compat.announce_compilation(report.compiling):
-        with clock("setup"):
-            if plan.accuracy is not None and discretization.vertices is None:
-                discretization = _chosen(scene, discretization.formulation, plan, report, comm)
-            follower = solver(scene, discretization, comm, spectrum=plan.spectrum, clock=clock)
-            system = follower.system
-        report.system(system, plan.accuracy)
-        if plan.method or plan.modes:
-            from rodfem.judging import check_method
-
-            check_method(follower, plan)
-        explorer: Explorer | Sweep
-        if isinstance(follower, Follower):
-            explorer = Explorer(follower, plan, report, lambda: _save(explorer, clock, output))
-        else:
-            explorer = Sweep(follower, plan, report, lambda: _save(explorer, clock, output))
-        branches = explorer.run()
-    _save_diagram(explorer, clock, output)
-    report.table(branches, system)
-    report.spectra(branches, scene)
-    report.frequencies(branches, scene.load)
-    report.timing(clock, sum(len(b.points) for b in branches))
-    report.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
+    terminal = Terminal(plan, output, comm, quiet)
+    diagram = trace(scene, discretization, plan, terminal, comm=comm)
+    branches, clock = diagram.branches, diagram.clock
+    if comm.rank == 0:
+        save_json(diagram.data, output / "diagram.json")
+    terminal.table(branches, diagram.solvers[0].system)
+    terminal.spectra(branches, scene)
+    terminal.frequencies(branches, scene.load)
+    terminal.timing(clock, sum(len(b.points) for b in branches))
+    terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
     if plan.method or plan.modes:
         from rodfem.judging import judge_users
 
-        judge_users(branches, explorer.solvers, plan, output, report, figures)
+        judge_users(branches, diagram.solvers, plan, output, terminal, figures)
     if plan.locus is not None:
-        _loci(branches, explorer.solvers, plan, output, report, figures)
+        _loci(branches, diagram.solvers, plan, output, terminal, figures)
     if figures and comm.rank == 0:
-        _draw(output, report)
+        _draw(output, terminal)
     comm.barrier()
-    return branches
+    return diagram
 
 
-def _chosen(scene: Scene, formulation: str, plan: Plan, report: Report, comm: MPI.Comm) -> Discretization:
-    """Discretisation for the accuracy of the plan: to start with, or of a whole sweep."""
-    assert plan.accuracy is not None
-    if scene.conservative:
-        return start_mesh(scene, formulation, plan.accuracy, comm)
-    number = plan.spectrum or FREQUENCIES
-    mesh, change = frequency_mesh(scene, formulation, plan.accuracy, plan.over(scene), number, comm)
-    report.frequency_mesh(mesh, number, change, plan.accuracy)
-    return mesh
+class Terminal(Report):
+    """Shows a run on the terminal, and keeps its files up to date."""
 
+    def __init__(self, plan: Plan, output: Path, comm: MPI.Comm, quiet: bool) -> None:
+        """Write into the folder ``output``, which there is."""
+        super().__init__(comm, quiet)
+        self.plan, self.output = plan, output
 
-def _save(explorer: Explorer | Sweep, clock: Clock, output: Path) -> None:
-    with clock("files"):
-        _save_diagram(explorer, clock, output)
-        save_states(explorer.branches[-1], explorer.solvers, output / "states.h5", first=len(explorer.branches) == 1)
+    def system(self, system: System, accuracy: float | None = None) -> None:
+        """Say what is solved, and refuse a method that does not apply before anything is computed."""
+        super().system(system, accuracy)
+        if self.plan.method or self.plan.modes:
+            from rodfem.judging import check_method
 
+            check_method(system, self.plan)
 
-def _save_diagram(explorer: Explorer | Sweep, clock: Clock, output: Path) -> None:
-    systems, plan = [solver.system for solver in explorer.solvers], explorer.plan
-    if systems[0].comm.rank == 0:
-        save_json(as_data(explorer.branches, systems, clock, explorer.span, plan.accuracy), output / "diagram.json")
+    def complete(self, diagram: Diagram) -> None:
+        """Save all that there is: an interrupted run keeps all completed branches."""
+        with diagram.clock("files"):
+            if diagram.solvers[0].system.comm.rank == 0:
+                save_json(diagram.data, self.output / "diagram.json")
+            first = len(diagram) == 1
+            save_states(diagram.branches[-1], diagram.solvers, self.output / "states.h5", first=first)
 
 
 def _loci(
@@ -172,7 +156,7 @@ def _loci(
 
 def _draw(output: Path, report: Report) -> None:
     """Draw the diagram, and the shape of a stable state if there is one."""
-    from rodfem.diagram import load_json
+    from rodfem.files import load_json
     from rodfem.plot import draw_diagram
     from rodfem.plot_frequencies import draw_frequencies
     from rodfem.render import draw_shape_safely

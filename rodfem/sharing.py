@@ -13,8 +13,8 @@ from typing import Any
 
 from mpi4py import MPI
 
-from rodfem.diagram import save_json
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.files import save_json
 from rodfem.runner import writable
 from rodfem.scene import Scene
 

@@ -12,7 +12,7 @@ from rodfem.chain import Row, chained
 from rodfem.errors import ConvergenceError
 from rodfem.gaps import Gaps
 from rodfem.meshes import Meshes
-from rodfem.report import Report
+from rodfem.observer import Observer
 from rodfem.stability.band import resolve
 from rodfem.touching import Touching
 
@@ -37,9 +37,9 @@ class SpecialSearch:
         Number of eigenvalues that are zero at both ends of the piece looked at: those stay zero along the branch.
     """
 
-    def __init__(self, meshes: Meshes, gaps: Gaps, report: Report) -> None:
+    def __init__(self, meshes: Meshes, gaps: Gaps, observer: Observer) -> None:
         """Nothing is known about a branch before :meth:`begin`."""
-        self.meshes, self.gaps, self.report = meshes, gaps, report
+        self.meshes, self.gaps, self.observer = meshes, gaps, observer
         self.follower = meshes.followers[0]
         self.level = 0
         self._open: list[Point] = []
@@ -143,7 +143,7 @@ class SpecialSearch:
             if not ended and not chained(p.low, p.high, specials, q.low, q.high):
                 self._shorten(p.point, q.point)
         for trouble in why:
-            self.report.warn(trouble)
+            self.observer.warn(trouble)
         return found
 
     def _shorten(self, a: Point, b: Point) -> None:

@@ -25,9 +25,9 @@ from rodfem.curves import Curves
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.flutter import AtLoad, locate_flutter, unmatched
 from rodfem.locate import real_root, zero_uncertainty
+from rodfem.observer import Observer
 from rodfem.pitchfork import ROUND_OFF
 from rodfem.plan import Plan
-from rodfem.report import Report
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
 from rodfem.stability.vibration import EPS, MULTIPLE, NEAR_ZERO, REAL, Frequencies, Vibration
 from rodfem.transfer import Transfer, richer_system
@@ -74,9 +74,9 @@ class _Event:
 class Sweep:
     """Sweeps the load of a scene over a range from its start state; used like the explorer of conservative scenes."""
 
-    def __init__(self, solver: Equilibria, plan: Plan, report: Report, finished: Callable[[], None]) -> None:
+    def __init__(self, solver: Equilibria, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
         """Allocate the pencil; the plan must have passed its check."""
-        self.solver, self.plan, self.report, self.finished = solver, plan, report, finished
+        self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.span = plan.over(solver.system.scene)
         self.vibration = Vibration(solver.system)
         self.number = plan.spectrum or FREQUENCIES
@@ -94,41 +94,46 @@ class Sweep:
         scene = self.solver.system.scene
         branch = Branch(scene.states, None, 0)
         self.branches.append(branch)
-        self.report.branch(branch)
+        self.observer.branch(branch)
         a, b = self.span
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
         x, _ = self.solver.first(a)
         grid: list[Point] = []
         for motion in self.solver.system.free_motions():
-            self.report.say(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
+            self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         for load in loads if a < b else loads[::-1]:
             x = self._state(x, float(load))
             before = self.last
             point = self._point(x)
             for notice in self.solver.system.verification.read():
-                self.report.warn(notice)
+                self.observer.warn(notice)
             if grid:
                 self._between(branch, grid[-1], point, before, self.last)
             branch.points.append(point)
             grid.append(point)
             if load in self.plan.at:
                 self._special(branch, Special(USER, point, point.negative, point.negative, 1e-12 * max(1.0, abs(load))))
-            self.report.progress(branch, point)
+            self.observer.progress(branch, point)
         branch.ended = "end of range"
         last = branch.points[-1]
         branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
         branch.renumber()
         if self.plan.error_bars:
             self._error_bars(branch)
-        self.report.finished(branch)
+        self.observer.finished(branch)
         rank, size = self.vibration.asymmetry()
-        self.report.say(
+        self.observer.note(
             f"  the load makes the tangent matrix non-symmetric by a matrix of rank {rank} "
             f"(largest entry {size:.1e} of |S|):\n"
             f"  factors of the symmetric part and {rank} more solves would do for it (Sherman-Morrison-Woodbury)"
         )
         self.finished()
         return self.branches
+
+    def at(self, x: PETSc.Vec) -> Point:
+        """Evaluate the records of an equilibrium that is not on the way of the sweep."""
+        self.solver.system.set_phase(x)
+        return self._point(x, on_the_way=False)
 
     def _state(self, guess: PETSc.Vec, load: float) -> PETSc.Vec:
         return at_load(self.solver, guess, load)
@@ -226,7 +231,7 @@ class Sweep:
                     event = self._collision(here, there, found, chosen)
                 except ConvergenceError as trouble:
                     value = found.values[chosen[0]]
-                    self.report.warn(
+                    self.observer.warn(
                         f"The eigenvalue {value:.6g} at {self._load} = {here.load:.6g} was not "
                         f"followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
                     )
@@ -291,7 +296,7 @@ class Sweep:
             try:
                 found.append(float(brentq(mu, *loads, xtol=1e-12 * max(map(abs, loads)))))
             except (ConvergenceError, IndexError, ValueError):
-                self.report.warn(
+                self.observer.warn(
                     f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
                 )
                 return []
@@ -319,7 +324,7 @@ class Sweep:
 
     def _special(self, branch: Branch, special: Special) -> None:
         branch.special.append(special)
-        self.report.special(branch, special)
+        self.observer.special(branch, special)
 
     def _error_bars(self, branch: Branch) -> None:
         with self.solver.system.clock.purpose("error bars"):

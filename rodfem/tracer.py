@@ -18,8 +18,8 @@ from rodfem.errors import ConvergenceError
 from rodfem.gaps import Gap, Gaps
 from rodfem.locate import solve_at
 from rodfem.meshes import Meshes, TooCoarse
+from rodfem.observer import Observer
 from rodfem.plan import Plan
-from rodfem.report import Report
 from rodfem.special_search import SpecialSearch, Unresolved
 from rodfem.stability.band import resolve
 from rodfem.watch import Watch
@@ -39,9 +39,9 @@ class Tracer:
     is lost.
     """
 
-    def __init__(self, follower: Follower, plan: Plan, report: Report, finished: Callable[[], None]) -> None:
+    def __init__(self, follower: Follower, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
         """Start with no branch; the plan must have passed its :meth:`Plan.check`."""
-        self.follower, self.plan, self.report, self.finished = follower, plan, report, finished
+        self.follower, self.plan, self.observer, self.finished = follower, plan, observer, finished
         self.scene = follower.system.scene
         self.span = plan.over(self.scene)
         self.low, self.high = sorted(self.span)
@@ -49,7 +49,7 @@ class Tracer:
         self.meshes = Meshes(follower, plan.accuracy)
         self.gaps = Gaps(self.meshes)
         self.warned = False
-        self.specials = SpecialSearch(self.meshes, self.gaps, report)
+        self.specials = SpecialSearch(self.meshes, self.gaps, observer)
 
     @property
     def solvers(self) -> Sequence[Follower]:
@@ -68,7 +68,7 @@ class Tracer:
         """Follow a branch to its end, insert its special points, estimate errors, hand it on as finished."""
         self.branches.append(branch)
         if branch.ended == NOT_TRACED:
-            self.report.branch(branch)
+            self.observer.branch(branch)
         self.use(branch.points[-1].mesh)
         self.watch = Watch(self.meshes, (self.low, self.high))
         self.follower.system.set_phase(branch.points[-1].x)
@@ -77,7 +77,7 @@ class Tracer:
             self._follow(branch)
         except ConvergenceError as trouble:
             branch.ended = f"no convergence: {trouble}"
-            self.report.warn(str(trouble))
+            self.observer.warn(str(trouble))
         self._finish(branch)
 
     def trace_whole(self, point: Point, name: str, depth: int) -> None:
@@ -86,14 +86,14 @@ class Tracer:
             raise ValueError("A point without a tangent is no start of a branch.")
         back = Branch(name, None, depth, [reversed_point(point, 0.0)])
         self.use(point.mesh)
-        self.report.branch(back)
+        self.observer.branch(back)
         self.watch = Watch(self.meshes, (self.low, self.high))
         self.follower.damp(0)
         try:
             self._follow(back)
         except ConvergenceError as trouble:
             back.ended = f"no convergence: {trouble}"
-            self.report.warn(str(trouble))
+            self.observer.warn(str(trouble))
         branch = reversed_branch(back)
         branch.ended = back.ended
         if back.ended == "closed loop":
@@ -131,7 +131,7 @@ class Tracer:
 
         Rows before the trouble stay what they are on the mesh that was made for them.
         """
-        follower = self.watch.another(trouble, self.report)
+        follower = self.watch.another(trouble, self.observer)
         if follower is not None:
             follower.damp(self.follower.system.damping > 0)
             with self.follower.system.clock.purpose("location"):
@@ -140,7 +140,7 @@ class Tracer:
             branch.points = [moved.get(id(p), p) for p in branch.points]
             history = [new for _, new in pairs]
             self.follower = follower
-            self.report.mesh(follower.system, trouble.point.load, str(trouble))
+            self.observer.mesh(follower.system, trouble.point.load, str(trouble))
         last = history[-1].arclength
         branch.points = [p for p in branch.points if p.arclength <= last]
         branch.special = [s for s in branch.special if s.point.arclength <= last]
@@ -155,7 +155,7 @@ class Tracer:
                 with self.follower.system.clock.purpose("location"):
                     for special in self.specials.rest():
                         branch.insert(special)
-                        self.report.special(branch, special)
+                        self.observer.special(branch, special)
                 return
             previous = history[-1]
             self._check_symmetry(item)
@@ -177,7 +177,7 @@ class Tracer:
                 return
             history.append(item)
             branch.points.append(item)
-            self.report.progress(branch, item)
+            self.observer.progress(branch, item)
             if self._closes(branch, previous, item):
                 branch.ended = "closed loop"
                 return
@@ -197,13 +197,13 @@ class Tracer:
             if special.kind == BRANCH_POINT:
                 reason = self._meeting(branch, special)
                 branch.insert(special)
-                self.report.special(branch, special)
+                self.observer.special(branch, special)
                 if reason:  # it ends before a row that was taken for one of it
                     branch.points = [p for p in branch.points if p.arclength <= special.point.arclength]
                     return reason
             else:
                 branch.insert(special)
-                self.report.special(branch, special)
+                self.observer.special(branch, special)
         return ""
 
     def _users(self, branch: Branch, p: Point, q: Point, a: Point, b: Point) -> list[Special]:
@@ -234,7 +234,7 @@ class Tracer:
         for special in self._users(branch, a, b, a, b):
             self.watch.special(special)
             branch.insert(special)
-            self.report.special(branch, special)
+            self.observer.special(branch, special)
 
     def _user_between(self, a: Point, b: Point, load: float, rows: tuple[Point, Point], s: float) -> Point:
         """Point at exactly ``load`` between two ``rows`` of the piece from ``a`` to ``b``, expected at arclength ``s``.
@@ -324,7 +324,7 @@ class Tracer:
         located = any(s.point is first and s.kind == BRANCH_POINT for s in branch.special)
         if branch.parent is None and extra > 0 and not located:
             branch.singular_start = extra
-            self.report.warn(branch.start_in_words(self.scene.load))
+            self.observer.warn(branch.start_in_words(self.scene.load))
 
     def _singular_end(self, branch: Branch, last: Point) -> None:
         """Report a branch point on the very end of the range, located on a piece of the branch that goes past it."""
@@ -340,7 +340,7 @@ class Tracer:
                 point.arclength = last.arclength + distance(self.follower.system, last.x, point.x)
                 found = [s for s in self.specials.beyond(previous, point) if s.kind == BRANCH_POINT]
         except ConvergenceError as trouble:
-            self.report.warn(
+            self.observer.warn(
                 f"The last state, at {self.scene.load} = {load:g}, is singular, and was not resolved: {trouble}"
             )
             return
@@ -349,7 +349,7 @@ class Tracer:
                 branch.points[-1] = special.point
                 branch.special.append(special)
                 branch.renumber()
-                self.report.special(branch, special)
+                self.observer.special(branch, special)
                 return
 
     def _closes(self, branch: Branch, a: Point, b: Point) -> bool:
@@ -376,7 +376,7 @@ class Tracer:
 
     def _check_symmetry(self, point: Point) -> None:
         for notice in self.follower.system.verification.read():
-            self.report.warn(notice)
+            self.observer.warn(notice)
         if point.drift > 1e-6 * self.follower.inertia.scale:
             self.watch.drifting(point)
             raise ConvergenceError(
@@ -404,12 +404,12 @@ class Tracer:
             low, high = resolve(inertia, p.x)
             still = min(max(still, high - low - own), extra)
         if still:
-            self.report.say(
+            self.observer.note(
                 f"  {still} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
                 "move freely at one and the same load"
             )
         if extra > still:
-            self.report.say(
+            self.observer.note(
                 f"  {extra - still} eigenvalue(s) are within {inertia.tolerance / inertia.scale:.0e} of zero, relative "
                 "to the lowest bending eigenvalue, without being zero: a critical load is close to "
                 f"{self.scene.load} = {before.load:.8g}"
@@ -435,9 +435,9 @@ class Tracer:
             self._error_bars(branch)
             merge_doubles(branch)
         for unexplained in branch.unexplained:
-            self.report.warn(str(unexplained))
-        self.report.finished(branch)
-        self.watch.summary(branch, self.report)
+            self.observer.warn(str(unexplained))
+        self.observer.finished(branch)
+        self.watch.summary(branch, self.observer)
         self.finished()
 
     def _error_bars(self, branch: Branch) -> None:

@@ -19,7 +19,7 @@ from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError
 from rodfem.meshes import Meshes, TooCoarse
 from rodfem.newton import correct
-from rodfem.report import Report
+from rodfem.observer import Observer
 
 SHARP = 1e-9
 """For a better accuracy than this points get one more step of Newton's method, to round-off."""
@@ -111,15 +111,15 @@ class Watch:
             why = f"located to {special.located_to:.0e} only" if located else "finer meshes did not lower the error"
             special.note = f"accuracy {self.accuracy:g} not reached: {why}"
 
-    def summary(self, branch: Branch, report: Report) -> None:
+    def summary(self, branch: Branch, observer: Observer) -> None:
         """Say on which meshes a branch was traced, and the largest error of its points."""
         if self.meshes.accuracy is None:
             return
         used = [self.meshes.followers[number].system for number in sorted({p.mesh for p in branch.points})]
         worst = max(p.estimate for p in branch.points if not isnan(p.estimate))
-        report.accuracy(used, worst, self.meshes.accuracy)
+        observer.accuracy(used, worst, self.meshes.accuracy)
 
-    def another(self, trouble: TooCoarse, report: Report) -> Follower | None:
+    def another(self, trouble: TooCoarse, observer: Observer) -> Follower | None:
         """Follower on a mesh for the state that was too coarse; None, which is reported, where no mesh helps there."""
         if abs(trouble.point.arclength - self.place) < NEAR:
             self.tries += 1
@@ -133,7 +133,7 @@ class Watch:
             why = "finer meshes do not lower the error" if not helps else f"{self.tries + 1} finer meshes did not do"
             if len(self.meshes.followers) >= MOST:
                 why = f"{MOST} meshes are the most"
-            report.warn(f"The accuracy is not reached near load {trouble.point.load:.6g} ({trouble}): {why}.")
+            observer.warn(f"The accuracy is not reached near load {trouble.point.load:.6g} ({trouble}): {why}.")
             return None
         return self.meshes.raised(trouble, self.tries)
 

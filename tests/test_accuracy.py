@@ -22,10 +22,10 @@ from scipy.special import ellipk
 
 from rodfem.branch import BRANCH_POINT, FLUTTER, FOLD, USER, Branch
 from rodfem.continuation import Follower
-from rodfem.diagram import load_state
 from rodfem.errors import SceneError
 from rodfem.explore import Explorer
 from rodfem.fields import Discretization, Fields
+from rodfem.files import load_state
 from rodfem.meshes import start_mesh
 from rodfem.plan import Plan
 from rodfem.report import Report

@@ -19,15 +19,16 @@ from rows import verify
 from scipy.optimize import brentq
 
 from forms.energy import bending
-from rodfem import Discretization, Ordinate, Parameter, Plan, Ring, Scene, Steps, clamped, free, judge, pinned, sliding
+from rodfem import Discretization, Ordinate, Parameter, Plan, Ring, Scene, Steps, clamped, free, pinned, sliding
 from rodfem.bifurcation import directions, leave
 from rodfem.branch import BRANCH_POINT, FOLD
 from rodfem.chain import Row, breaks, chained, explain
 from rodfem.continuation import Follower, _to_load
-from rodfem.diagram import _branch_data
 from rodfem.explore import Explorer
+from rodfem.files import _branch_data
 from rodfem.loci.locus import locus
 from rodfem.report import Report
+from rodfem.stability.judge import judge
 from rodfem.system import System
 from rodfem.tracer import equivalent
 

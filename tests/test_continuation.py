@@ -12,9 +12,9 @@ from numpy.polynomial.legendre import leggauss
 from rods import DEFAULT, explored, follower, specials, user_points
 
 from rodfem.continuation import Steps
-from rodfem.diagram import load_state, save_states
 from rodfem.errors import SceneError
 from rodfem.explore import Explorer
+from rodfem.files import load_state, save_states
 from rodfem.plan import Plan
 from rodfem.report import Report
 

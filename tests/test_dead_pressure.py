@@ -15,11 +15,12 @@ import ufl
 
 import rodfem.system
 from forms.energy import bending
-from rodfem import Discretization, Plan, Ring, Scene, Steps, judge
+from rodfem import Discretization, Plan, Ring, Scene, Steps
 from rodfem.continuation import Equilibria, Follower
 from rodfem.explore import Explorer
 from rodfem.newton import relax
 from rodfem.report import Report
+from rodfem.stability.judge import judge
 from rodfem.symmetries import Symmetry, elementary_generators
 from rodfem.system import System
 

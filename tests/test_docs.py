@@ -15,13 +15,12 @@ from rows import verify
 from rodfem.branch import Branch
 from rodfem.ends import Attachment, clamped, free
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.places import needs_centreline
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.scene import Inertia, Scene
-from rodfem.solvers import solver
+from rodfem.tracing import trace
 
 PAGE = Path(__file__).parents[1] / "docs" / "rods.md"
 
@@ -51,11 +50,9 @@ def test_every_scene_of_the_page() -> None:
 def traced(name: str) -> tuple[list[Branch], str]:
     """Branches of a scene of the page, and what the terminal says meanwhile."""
     terminal = io.StringIO()
-    found = solver(scenes()[name], Discretization("auto", 8, 6))
-    plan = Plan(error_bars=False)
-    branches = Explorer(found, plan, Report(stream=terminal), lambda: None).run()
-    verify(found, branches)
-    return branches, terminal.getvalue()
+    diagram = trace(scenes()[name], Discretization("auto", 8, 6), Plan(error_bars=False), Report(stream=terminal))
+    verify(diagram.solvers[0], diagram.branches)
+    return diagram.branches, terminal.getvalue()
 
 
 @pytest.mark.alone

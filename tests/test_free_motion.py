@@ -10,9 +10,10 @@ import classics
 import numpy as np
 import pytest
 
-from rodfem import Discretization, End, Plan, Scene, SceneError, judge, sweep
+from rodfem import Discretization, End, Plan, Scene, SceneError, sweep
 from rodfem.continuation import Equilibria
 from rodfem.report import Report
+from rodfem.stability.judge import judge
 from rodfem.system import System
 
 

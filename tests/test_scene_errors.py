@@ -16,7 +16,6 @@ from rods import run_demo
 
 from rodfem import ends, scene
 from rodfem.continuation import Follower, Steps
-from rodfem.diagram import load_json
 from rodfem.ends import (
     Attachment,
     End,
@@ -33,6 +32,7 @@ from rodfem.ends import (
 from rodfem.errors import SceneError
 from rodfem.explore import Explorer
 from rodfem.fields import Discretization, Fields
+from rodfem.files import load_json
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.runner import run

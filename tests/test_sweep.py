@@ -18,8 +18,8 @@ from rods import specials
 from rodfem.branch import Branch
 from rodfem.clock import Clock
 from rodfem.continuation import Equilibria
-from rodfem.diagram import as_data
 from rodfem.fields import Discretization
+from rodfem.files import as_data
 from rodfem.plan import Plan
 from rodfem.plot_frequencies import curves, draw_frequencies
 from rodfem.report import Report

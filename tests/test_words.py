@@ -190,28 +190,26 @@ def test_python_of_the_readme(folder: Path, monkeypatch: pytest.MonkeyPatch, cap
     names: dict[str, Any] = {}
     for block in re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), flags=re.DOTALL):
         exec(block, names)
-    judge, mesh = rodfem.judge, names["on_mesh"]
-    assert judge(mesh, names["straight"]).negative == 2
-    assert (judge(names["finer"], names["buckled"]).negative, judge(names["finer"], names["buckled"]).zero) == (0, 1)
-    assert names["finer"].system.scalar(names["buckled"]) == 0.52
-    np.testing.assert_allclose(names["modes"].value[0], judge(mesh, names["straight"], "dense").values[0], rtol=1e-8)
-    assert capfd.readouterr().out.count("Locus of the branch point in lam and A") == 1
+    solver, straight, buckled = names["solver"], names["straight"], names["buckled"]
+    assert (straight.index, buckled.index, buckled.zero, buckled.load) == (2, 0, 1, 0.52)
+    np.testing.assert_allclose(names["modes"].value[0], solver.assess(straight, "dense").values[0], rtol=1e-8)
+    assert capfd.readouterr().out.count("Locus of the branch point in lam and k0") == 1
 
 
 def test_an_equilibrium_that_there_is_not() -> None:
-    hemitropic = rodfem.solver(rods.scene(), MESH)
+    hemitropic = rodfem.Solver(rods.scene(), MESH)
     with pytest.raises(rodfem.SceneError, match=r"lam = 1.5 is outside its admissible range"):
-        rodfem.equilibrium(hemitropic, 1.5)
+        hemitropic.equilibrium(1.5)
     with pytest.raises(rodfem.ConvergenceError, match=r"No equilibrium was found at lam = 0.5: go there in steps"):
-        rodfem.equilibrium(hemitropic, 0.5, guess=hemitropic.system.new_vector())
+        hemitropic.equilibrium(0.5, guess=hemitropic.equilibria.system.new_vector())
 
 
 def test_a_saved_state_of_another_scene(folder: Path) -> None:
     """An unshearable rod has a stretch, the one whose state was saved none."""
     run(compressed("unshearable and inextensible"), MESH, Plan(error_bars=False), folder, figures=False, quiet=True)
-    stretched = rodfem.solver(compressed("unshearable"), MESH)
+    stretched = rodfem.Solver(compressed("unshearable"), MESH)
     with pytest.raises(rodfem.SceneError, match="has no v, unknowns of the scene 'column': it was written for"):
-        rodfem.load_state(folder / "states.h5", "straight", 0, stretched)
+        stretched.restore(folder / "states.h5", "straight", 0)
 
 
 def test_mu_is_an_eigenvalue_and_nothing_else(folder: Path, printed: Any) -> None:

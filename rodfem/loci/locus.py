@@ -24,8 +24,8 @@ from petsc4py import PETSc
 from rodfem.accuracy import Richer
 from rodfem.branch import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, Special
 from rodfem.continuation import Equilibria, Follower, Steps
-from rodfem.diagram import save_json
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.files import save_json
 from rodfem.loci.collision import Collision
 from rodfem.loci.curve import Criterion, Half, Tracer
 from rodfem.loci.plane import Interval, Node, Plane

@@ -24,7 +24,7 @@ from rodfem.branch import Branch, Point
 from rodfem.continuation import Follower, hermite
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.newton import correct
-from rodfem.report import Report
+from rodfem.observer import Observer
 from rodfem.search.deflated import FLOW, MOST, DeflatedNewton
 from rodfem.search.guesses import turned_state
 from rodfem.search.mirror import Mirror, mirrors
@@ -103,7 +103,7 @@ class Deflation(DeflatedNewton):
             if abs(point.load - load) > 1e-9 * abs(scene.span[1] - scene.span[0]):
                 raise SceneError(
                     f"A known equilibrium is at {scene.load} = {point.load:.8g}, not {load:.8g}: "
-                    "give equilibria at the load of the search (rodfem.states_at finds them on branches)."
+                    "give equilibria at the load of the search (diagram.at(load) computes them)."
                 )
         fields.u.x.array[fields.number >= 0] = 0.0  # multipliers of the state that was there before are no guess
         self.start = follower.start(load)
@@ -200,18 +200,18 @@ def further(
     known: Sequence[Point] = (),
     tries: int = 24,
     seed: int = 0,
-    report: Report | None = None,
+    observer: Observer | None = None,
 ) -> list[Point]:
     """Equilibria at ``load`` beside the ``known`` ones, from ``tries`` deflated Newton iterations.
 
     Each stands for all that the scene's symmetries make of it, and carries its index, energy, ordinate and a tangent in
-    the direction of increasing load.  How the tries ended goes to ``report``; :class:`Deflation` has the numbers.
+    the direction of increasing load.  How the tries ended goes to the ``observer``; :class:`Deflation` has the numbers.
     Raises :class:`SceneError` for a load that is not admissible, or known equilibria at another one.
     """
     search = Deflation(follower, load, known, seed)
     found = search.run(tries)
-    if report is not None:
-        report.say(str(search.tally))
+    if observer is not None:
+        observer.note(str(search.tally))
     return found
 
 
