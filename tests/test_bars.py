@@ -126,8 +126,9 @@ def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
     assert s.resolved is False
     stream = StringIO()
     Report(stream=stream).table(branches, System(rods.scene(), Discretization("auto", 2, 2)))
-    assert "(at least 2e-03)" in stream.getvalue()
-    assert "does not resolve" in stream.getvalue()
+    if MPI.COMM_WORLD.rank == 0:
+        assert "(at least 2e-03)" in stream.getvalue()
+        assert "does not resolve" in stream.getvalue()
 
 
 def test_an_accuracy_is_not_reached_by_accident() -> None:
@@ -138,6 +139,7 @@ def test_an_accuracy_is_not_reached_by_accident() -> None:
     assert abs(s.point.ordinate - shooting.FIRST[0.5][0]) <= s.ordinate_error <= 1e-2 * s.point.ordinate
 
 
+@pytest.mark.alone
 def test_straight_rod_is_resolved_by_any_mesh() -> None:
     """It has no strains but constant ones; its null vector, a quarter of a cosine, has."""
     for mesh, buckling in (((1, 1), False), ((4, 1), True)):
