@@ -235,7 +235,7 @@ class Diagram:
 
     def _repr_html_(self) -> str:
         """Table of special points for notebooks."""
-        from rodfem.report import index_in_words, number
+        from rodfem.digits import index_in_words, number
 
         rows = []
         for branch in self.branches:

@@ -20,9 +20,10 @@ from scipy.special import ellipk
 from rodfem import Discretization, Ordinate, Plan, Scene
 from rodfem.branch import BRANCH_POINT, FOLD, Branch
 from rodfem.continuation import Follower
+from rodfem.digits import number
 from rodfem.explore import Explorer
 from rodfem.meshes import start_mesh
-from rodfem.report import Report, number
+from rodfem.report import Report
 from rodfem.system import System
 
 LARGE = 3.0

@@ -24,13 +24,13 @@ from petsc4py import PETSc
 from rodfem.accuracy import Richer
 from rodfem.branch import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, Special
 from rodfem.continuation import Equilibria, Follower, Steps
+from rodfem.digits import number
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.files import save_json
 from rodfem.loci.collision import Collision
 from rodfem.loci.curve import Criterion, Half, Tracer
 from rodfem.loci.plane import Interval, Node, Plane
 from rodfem.loci.singular import Singular, null_vectors
-from rodfem.report import number
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.inertia import Inertia
 from rodfem.transfer import Transfer, richer_system
