@@ -53,6 +53,7 @@ Data flows, and imports go, one way: ``ends``, ``scene`` -> ``fields`` -> ``equa
 mathematics is in ``forms``.
 
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
+Type checkers read ``__init__.pyi``.
 """
 
 from __future__ import annotations
@@ -92,7 +93,12 @@ _HOMES = {
     "load_json": "files",
 }
 
-__all__ = sorted(_HOMES)
+# Not __all__: with it help(rodfem) prints every class in full, 1400 lines.
+_NAMES = sorted(_HOMES)
+
+__doc__ = f"{__doc__ or ''}\nPublic names, by module (``help(rodfem.Scene)`` describes one of them):\n\n" + "\n".join(
+    f"* ``{home}``: {', '.join(name for name in _NAMES if _HOMES[name] == home)}" for home in sorted({*_HOMES.values()})
+)
 
 
 def __getattr__(name: str) -> Any:
@@ -101,10 +107,10 @@ def __getattr__(name: str) -> Any:
         return getattr(import_module(f"rodfem.{_HOMES[name]}"), name)
     module = submodule("rodfem", name)
     if module is None:
-        raise AttributeError(f"module 'rodfem' has no attribute {name!r}; it has {', '.join(__all__)}")
+        raise AttributeError(f"module 'rodfem' has no attribute {name!r}; it has {', '.join(_NAMES)}")
     return module
 
 
 def __dir__() -> list[str]:
-    """All public names, so that ``help(rodfem)`` and completion show them."""
-    return __all__
+    """All public names, for completion."""
+    return _NAMES

@@ -147,7 +147,7 @@ class Scene:
     interval: tuple[float, float]
     rod: str
     energy: Callable[[Any, Any, Constants], Any] = field(metadata={"role": Role("stored energy", "W(v, k, c)")})
-    parameters: Mapping[str, Parameter]
+    parameters: Mapping[str, Any]  # Parameter or float as given, Parameter as kept: dataclasses have one type for both
     load: str
     ends: tuple[End, End] | Ring = field(metadata={"places": ("left", "right")})
     ordinate: Ordinate
