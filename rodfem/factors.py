@@ -84,41 +84,10 @@ class Factors(Protocol):
         """Logarithm of the size of the determinant of the symmetric matrix last factored."""
 
 
-def factors_of(
-    kind: str,
-    comm: MPI.Comm,
-    unknowns: int,
-    scalars: int,
-    controls: dict[int, int],
-    thresholds: dict[int, float] | None = None,
-    prefix: str = "",
-) -> Factors:
-    """Factors for matrices of ``unknowns`` rows on a communicator, the last ``scalars`` of which may be dense.
-
-    ``controls`` are MUMPS's ICNTL, ``thresholds`` its CNTL; PETSc's options begin with ``rodfem_lu_`` or
-    ``rodfem_cholesky_``, or with another ``prefix``.
-    """
-    prefix = prefix or f"rodfem_{kind}_"
-    lu = kind == "lu" and lu_package(MPI.COMM_SELF, prefix) != "mumps"
-    factors = Klu(prefix, scalars) if lu else Mumps(kind, controls, thresholds, prefix)
-    if comm.size == 1:
-        return factors
-    from rodfem.condensed import Condensed  # they are made of the former
-    from rodfem.copied import Copied
-
-    return Condensed(scalars, factors) if is_cut(comm, unknowns) else Copied(factors)
-
-
 def lu_package(comm: MPI.Comm, prefix: str) -> str:
     """PETSc's name of the package for LU factors of matrices on a communicator; the option overrules what is best."""
     best = "klu" if comm.size == 1 and compat.factors_by("klu") else "mumps"
     return str(PETSc.Options(prefix).getString("pc_factor_mat_solver_type", best))
-
-
-def solving(counting: Factors, comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
-    """What solves with a symmetric matrix best, where ``counting`` are its LDL^t factors: those, or LU factors."""
-    same = lu_package(MPI.COMM_SELF, "rodfem_lu_") == "mumps"
-    return counting if same else factors_of("lu", comm, unknowns, scalars, {})
 
 
 class Block:

@@ -24,7 +24,7 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.clock import Clock
 from rodfem.equations import Equations
-from rodfem.factors import factors_of
+from rodfem.factoring import factors_of
 from rodfem.fields import LOAD, Discretization, Fields
 from rodfem.invariance import find_motion_along, find_symmetries
 from rodfem.pattern import bordered_pattern, metric_pattern, new_matrix

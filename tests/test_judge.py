@@ -16,7 +16,7 @@ from states import buckled, plain, scene
 
 from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.factors import factors_of
+from rodfem.factoring import factors_of
 from rodfem.fields import Discretization
 from rodfem.scene import Inertia
 from rodfem.stability.band import decide

@@ -6,7 +6,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.factors import factors_of
+from rodfem.factoring import factors_of
 from rodfem.stability.inertia import inertia_factors
 from rodfem.system import System
 

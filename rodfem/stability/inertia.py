@@ -19,7 +19,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.factors import Factors, factors_of
+from rodfem.factoring import factors_of
+from rodfem.factors import Factors
 from rodfem.system import System, combine
 
 EPS = float(np.finfo(float).eps)

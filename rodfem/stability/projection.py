@@ -28,7 +28,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.factors import factors_of
+from rodfem.factoring import factors_of
 from rodfem.stability.blocks import Pencil
 from rodfem.stability.inertia import inertia_factors
 from rodfem.stability.kernel import kernel

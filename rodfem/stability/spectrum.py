@@ -22,7 +22,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.factors import Factors, solving
+from rodfem.factoring import solving
+from rodfem.factors import Factors
 from rodfem.stability.inertia import Inertia, inertia_factors
 from rodfem.stability.pencil import Inverse, assemble_pencil, exclude_modes, symmetry_modes, with_factors
 from rodfem.system import dense_columns

@@ -31,7 +31,8 @@ from rodfem import compat
 from rodfem.condensed import Condensed
 from rodfem.copied import Copy
 from rodfem.errors import ConvergenceError
-from rodfem.factors import PETSC_ERR_LIB, Factors, Mumps, factors_of, is_cut
+from rodfem.factoring import factors_of
+from rodfem.factors import PETSC_ERR_LIB, Factors, Mumps, is_cut
 from rodfem.stability import character
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.pencil import (
