@@ -59,8 +59,10 @@ $python -c 'import dolfinx' ||
 # Debian's dolfinx, petsc4py and scipy are compiled against Debian's numpy: no other may come into .venv.
 $system -c 'import numpy; print("numpy==" + numpy.__version__)' >.venv/constraints.txt
 
+# As a path, not by setuptools' import hook: type checkers do not see through that.
 echo "Installing rodfem[$extras] in .venv"
-$python -m pip install --quiet --disable-pip-version-check --constraint .venv/constraints.txt --editable ".[$extras]" ||
+$python -m pip install --quiet --disable-pip-version-check --constraint .venv/constraints.txt \
+    --config-settings editable_mode=compat --editable ".[$extras]" ||
     fail "pip could not install rodfem[$extras] in .venv (see above)."
 echo "$made_for" >"$stamp"
 echo "rodfem[$extras] is ready: $python"
