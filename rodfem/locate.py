@@ -1,4 +1,4 @@
-r"""Locating where an eigenvalue or the slope of the load vanishes on a branch.
+r"""Location of zeros of an eigenvalue or of the slope of the load on a branch.
 
 The bordered system is (nearly) singular near such a point, where equilibria are therefore not computed.  The branch is
 solved at Chebyshev nodes on a short interval around the point; the eigenvalue, the load and the state are smooth
@@ -55,7 +55,8 @@ def solve_at(follower: Follower, curve: Curve, s: float) -> PETSc.Vec:
     outcome = correct(follower.system, x, follower.row(direction))
     if not outcome.converged:
         raise ConvergenceError(
-            f"No equilibrium near load {follower.system.scalar(x):.8g} while locating a special point."
+            f"No equilibrium near load {follower.system.scalar(x):.8g} while locating a special point: "
+            "use smaller steps (--step)."
         )
     return x
 

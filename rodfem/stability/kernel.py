@@ -83,7 +83,7 @@ def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
     C = sp.csr_matrix(C, copy=True)
     m, p = C.shape
     if p > m:
-        raise SceneError(f"{p} constraints on {m} unknowns leave nothing to move: use fewer constraints.")
+        raise SceneError(f"{p} constraints on {m} unknowns leave no free unknown: use fewer constraints.")
     scale = float(abs(C.data).max()) if C.nnz else 1.0
     C.data[abs(C.data) < ROUND_OFF * scale] = 0.0
     C.eliminate_zeros()
@@ -97,7 +97,7 @@ def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
         columns = found.project(C[:, dense].toarray())
         count = columns.shape[1]
         if count > len(found.free):
-            raise SceneError(f"{p} constraints on {m} unknowns leave nothing to move: use fewer constraints.")
+            raise SceneError(f"{p} constraints on {m} unknowns leave no free unknown: use fewer constraints.")
         reflections, R = factor(found.free[None, :], columns[None])
         require_independent(R, scale, int((~dense).sum()) + np.arange(count)[None])
         found.steps.append(reflections)
