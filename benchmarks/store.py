@@ -13,7 +13,7 @@ from benchmarks.common import load
 
 
 class Store:
-    """Pieces of a benchmark by key; an interrupted run loses none that is finished."""
+    """Pieces of a benchmark by key; an interrupted run keeps all completed pieces."""
 
     def __init__(self, path: Path, resume: bool) -> None:
         """Take up what the file has (``resume``), or start with nothing and overwrite it."""

@@ -1,6 +1,6 @@
 r"""Perversion of a telephone cord.
 
-A telephone cord is a rod that would like to be coiled: its intrinsic curvature is k0 = 2 pi N about d2, N turns
+A telephone cord is a rod whose natural state is coiled: its intrinsic curvature is k0 = 2 pi N about d2, N turns
 over its length. Pulled straight, and let go, it does not coil back: clamped at both ends it can only form coils
 of both hands, with a perversion between them.  The rod is unshearable and inextensible, with
 

@@ -1,7 +1,7 @@
 r"""Michell's ring.
 
 A thin rod is bent to a circle, and its ends are joined.  It has round cross-sections, W = 1/2 [k1^2 + k2^2 + C (k3 -
-t0)^2], and would like to be twisted by t0 all along: but its link was fixed when it was closed, so that the circle has
+t0)^2], and its natural twist is t0.  Its link was fixed when it was closed, so that the circle has
 no twist, and is under a torque C t0.  With radius 1 it buckles out of its plane where
 
     C t0 = sqrt(n^2 - 1),    n = 2, 3, ...

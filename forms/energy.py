@@ -3,7 +3,7 @@
 A stored energy is a function ``W(v, k, c)`` of the strains ``v`` and ``k`` (UFL vectors of shape (3,),
 body frame) and the scene's named constants ``c`` (``c.s`` is the arclength), that returns a UFL scalar.
 Contact force and moment follow by differentiation: ``n_i = dW/dv_i``, ``m_i = dW/dk_i``.
-What is below is a small stock of them; any other function of this form serves as well.
+The functions below are examples; any other function of this form serves as well.
 """
 
 from __future__ import annotations
@@ -13,7 +13,12 @@ from ufl.core.expr import Expr
 
 
 def bending(k: Expr, stiffness: tuple[Expr, Expr, Expr]) -> Expr:
-    """Quadratic energy of bending and twist, ``1/2 sum_i stiffness_i k_i^2``."""
+    """Quadratic energy of bending and twist, ``1/2 (B1 k1^2 + B2 k2^2 + C k3^2)``.
+
+    ``k`` has shape (3,): bending about ``d1`` and ``d2``, then twist.  ``stiffness = (B1, B2, C)`` are the two bending
+    stiffnesses and the torsional one, force times length squared.  A natural curvature or twist is subtracted first:
+    ``bending((k[0], k[1], k[2] - c.t0), stiffness)``.
+    """
     return sum(0.5 * b * k[i] ** 2 for i, b in enumerate(stiffness))
 
 

@@ -34,21 +34,21 @@ from rodfem.pitchfork import ROUND_OFF, Origin, law_of, ordinate_along
 from rodfem.transfer import Transfer, richer_system
 
 AMPLE, MOST = 2.0, 0.75
-"""Times the ratio of the last coefficients that an error is taken to fall by, for one that is small by accident; and
-what is left at most: beyond, neither mesh resolves the state."""
+"""Safety factor on the ratio of the last coefficients, which may be small by coincidence; and the largest ratio of
+errors: beyond it neither mesh resolves the state."""
 RESOLVED_TO = 0.1
 """Relative change of the strains on the richer mesh, up to which a mesh resolves a state: a tenth.  Its square, of the
 order of which errors of loads are, is one per cent."""
 RESOLVED = 1e-9
 """Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
 NARROW = 1 / 128
-"""Part of the usual window that is enough to find a special point again, beside itself."""
+"""Part of the usual window on which a special point is located again."""
 STEADY = 3.0
-"""Times the change in one more step of Newton's method, that a result is uncertain by."""
+"""Uncertainty of a result, in units of its change by one more step of Newton's method."""
 
 
 def halved(degree: int) -> float:
-    """Part of the error of a smooth state, on elements of a degree, that ones half as long leave at most."""
+    """Largest part of the error of a smooth state on elements of ``degree`` that remains on halved elements."""
     return float(0.5 ** (degree + 1))
 
 
@@ -97,7 +97,7 @@ class Richer:
         self._gauges = Gauge(follower, weights), Gauge(self.follower, weights)
 
     def rho(self, before: Sequence[PETSc.Vec], after: Sequence[PETSc.Vec]) -> float:
-        """Part of the errors of a state (and its null vector) that is left on the richer discretisation."""
+        """Ratio of the errors of a state (and its null vector) on the richer discretisation and on the first."""
         degree = self.coarse.system.fields.discretization.degree
         first, last = (g.unresolved(x, more) for g, (x, *more) in zip(self._gauges, (before, after), strict=True))
         if degree < 3 or last < RESOLVED:  # the last coefficients are the strains themselves, or round-off
@@ -105,7 +105,7 @@ class Richer:
         return max(halved(degree), min(AMPLE * last / max(first, RESOLVED), MOST))
 
     def estimate(self, special: Special) -> None:
-        """Set ``error_estimate`` and ``ordinate_error`` of a special point, bounds of what it may be in error by.
+        """Set ``error_estimate`` and ``ordinate_error`` of a special point, bounds of its errors in load and ordinate.
 
         They are infinite where the richer discretisation does not find the point, and no bounds where the point is not
         ``resolved``, which is set, too.

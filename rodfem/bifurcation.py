@@ -1,4 +1,4 @@
-r"""Special points: finding folds and branch points, telling them apart, and switching branches.
+r"""Special points: detection and classification of folds and branch points, and branch switching.
 
 Between two points of a branch with different indices an eigenvalue of the second variation crosses zero; where the
 load turns back, its slope does.  With ``phi`` the null vector (left and right, as the saddle matrix ``S`` is symmetric)
@@ -55,7 +55,10 @@ def special_at(follower: Follower, located: Located, arclength: float, still: Se
     _, vectors = inertia.nearest(null_count, accuracy=1e-8)
     vectors = across(system, vectors, still)
     if not vectors:
-        raise ConvergenceError(f"The null vector near load {located.load:.8g} is none beside those that stay zero.")
+        raise ConvergenceError(
+            f"The null vector near load {located.load:.8g} is in the span of those that persist along the branch: "
+            "use smaller steps (--step)."
+        )
     coupling = max(coupling_of(follower, x, v) for v in vectors)
     turning = abs(system.scalar(tangent)) < 1e-3 * abs(system.scene.span[1] - system.scene.span[0])
     kind = FOLD if turning and coupling > COUPLED else BRANCH_POINT

@@ -1,4 +1,4 @@
-"""What a continuation produces: points, special points and branches of equilibria."""
+"""Results of a continuation: points, special points and branches of equilibria."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Indices along a branch: its rows and its special points tell one story.
+"""Consistency of the indices along a branch: rows and special points.
 
-From row to row the index changes by exactly what the special points in between say, each with its own index before and
-after.  A row allows an interval: eigenvalues that are zero within the tolerance of the count may be of either sign.
-Where the intervals of two neighbours have nothing in common the chain is broken: an eigenvalue has crossed zero unseen,
-or a number is wrong.  A branch keeps the breaks that no smaller step explains in :attr:`Branch.unexplained`.
+From row to row the index changes by the sum of the changes at the special points in between, each with its own index
+before and after.  A row allows an interval: eigenvalues that are zero within the tolerance of the count may be of
+either sign.  If the intervals of two neighbours are disjoint, the chain is broken: an eigenvalue has crossed zero
+unseen, or a number is wrong.  A branch keeps the breaks that no smaller step explains in :attr:`Branch.unexplained`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Interval = tuple[int, int]
 
 @dataclass(frozen=True)
 class Row:
-    """A point of a branch with the least and the greatest index that its smallest eigenvalues leave open."""
+    """A point of a branch with the least and the greatest index compatible with its smallest eigenvalues."""
 
     point: Point
     low: int

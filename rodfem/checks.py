@@ -1,4 +1,4 @@
-"""What can be wrong with a scene, found before any computation: each check raises one sentence."""
+"""Validation of a scene before any computation: each check raises one sentence."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def check_start(scene: Scene) -> None:
     if q.shape != (5, 4):
         raise SceneError(f"The start has the shape {q.shape} at 5 arclengths: return a quaternion for each, (5, 4).")
     if not (np.linalg.norm(q, axis=1) > 0).all():
-        raise SceneError("The start is no rotation everywhere: return quaternions of size one.")
+        raise SceneError("The start is no rotation everywhere: return quaternions of unit norm.")
     if scene.normal is not None and abs(np.delete(q[:, 1:], scene.normal, axis=1)).max() > 1e-12:
         raise SceneError(f"The start leaves the plane across {scene.planar}: turn about that axis only.")
     if isinstance(scene.ends, Ring) and scene.ends.sign * (q[0] @ q[-1]) <= 0:
@@ -211,7 +211,7 @@ def check_supports(scene: Scene) -> None:
                         "turn about that axis only."
                     )
                 if not sum(float(x) ** 2 for x in rotation) > 0:
-                    raise SceneError(f"The rotation of the {side} end is the zero quaternion: give one of size one.")
+                    raise SceneError(f"The rotation of the {side} end is the zero quaternion: give one of unit norm.")
         if end.hinge is not None and end.rotation is None:
             raise SceneError(f"The {side} end has a hinge but no rotation: say which directors the hinge holds.")
         if end.hinge is not None:

@@ -1,4 +1,4 @@
-"""Where the time goes: seconds spent in assembly, solves and stability."""
+"""Timing: seconds spent in assembly, solves and stability."""
 
 from __future__ import annotations
 

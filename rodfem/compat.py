@@ -1,4 +1,4 @@
-"""All differences between dolfinx releases, bridged by what a release can do, not by its number.
+"""All differences between dolfinx releases, bridged by capability, not by version number.
 
 Supported: 0.5.2 (Debian 12) and 0.9.0 (Debian 13).  Nothing else in rodfem asks for a version.
 """

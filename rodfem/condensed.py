@@ -1,20 +1,21 @@
-r"""Factors of a bordered matrix on several ranks: a rod is a chain, cut where one rank's part of it meets the next.
+r"""Factors of a bordered matrix on several ranks: static condensation onto the cuts of the chain.
 
-Let ``u`` be the unknowns that ranks share, those at the cuts and all scalars, and ``x_r`` the others of rank r, which
-do not couple to those of another rank:
+A rod is a chain, cut where the subdomain of one rank meets that of the next.  Let ``u`` be the interface unknowns
+(those at the cuts and all scalars) and ``x_r`` the inner unknowns of rank r, which do not couple to those of another
+rank:
 
     A_r x_r + B_r u = b_r,        sum_r C_r x_r + G u = c.
 
-Eliminating ``x_r`` would ask for ``A_r`` to be regular, which it need not be where the whole is: a piece between two
-clamps buckles at loads of its own.  So each piece is braced at its ends instead, by springs ``T_r``, any diagonal
-matrix that makes it regular, and forces ``l_r`` act on it there:
+The Schur complement of ``A_r`` requires ``A_r`` to be regular, and it need not be where the whole matrix is: a piece
+between two clamps buckles at loads of its own.  Instead each piece is braced at its ends by artificial springs ``T_r``,
+any diagonal matrix that makes it regular, and interface forces ``l_r`` act on it there:
 
     P_r (x_r; u_r) = (b_r; l_r),        P_r = (A_r B_r; C_r T_r).
 
-With ``y_r = P_r^-1 (b_r; 0)``, the columns ``Z_r = P_r^-1 (0; 1)``, and their part ``X_r`` at the shared unknowns, the
-conditions that all pieces agree there, ``u_r = u``, and that forces balance are the small dense system
+With ``y_r = P_r^-1 (b_r; 0)``, the columns ``Z_r = P_r^-1 (0; 1)``, and their part ``X_r`` at the interface unknowns,
+compatibility ``u_r = u`` and the balance of the interface forces are the small dense system
 
-    D (l; u) = (y at the shared unknowns; c),        D = (-X 1; 1 G - sum_r T_r),
+    D (l; u) = (y at the interface unknowns; c),        D = (-X 1; 1 G - sum_r T_r),
 
 the same on all ranks, and ``x_r`` is the rest of ``y_r + Z_r l_r``.
 
@@ -25,12 +26,13 @@ negative eigenvalues away; elimination of the pieces leaves D, up to the sign of
 
     negative(A) = sum_r [negative(P_r) - m_r] + negative(D).
 
-The springs are arbitrary, and exact: what they add to the pieces is taken away in D.  They are the diagonal of the
-whole matrix, which at a cut nearly clamps the piece; for multipliers, scalars, and a centreline without weight, where
-there is none, minus the sum of magnitudes of the column: what is singular with small springs loses digits.
-A piece so braced is singular by accident only, and that shows: ``|T|^1/2 X |T|^1/2`` is large, or a pivot zero.  Then
-it is braced by other springs.  One that is singular with any has a null vector that does not move the shared unknowns,
-and the matrix has the same.
+The artificial springs cancel exactly: their contribution to each subdomain is subtracted in the interface matrix D.
+Their stiffness is a multiple of the diagonal of the whole matrix, which at a cut nearly clamps the piece.
+Multipliers, scalars, and a centreline without weight have no diagonal: there it is minus the sum of magnitudes of the
+column, because a piece that is nearly singular with weak springs loses digits.  A piece so braced is singular by
+coincidence only, which is detected: ``|T|^1/2 X |T|^1/2`` is large, or a pivot zero.  Then the piece is braced by other
+springs.  A piece that is singular with all of them has a null vector that vanishes at the interface, and so has the
+whole matrix.
 """
 
 from __future__ import annotations
@@ -45,21 +47,21 @@ from rodfem.factors import Block, Klu, Mumps, Spread
 from rodfem.piece import Piece
 
 GROWTH = 100.0
-"""Times its springs' own compliance, how compliant a braced piece may be: what exceeds one is lost in digits."""
+"""Largest compliance of a braced piece, relative to that of its springs; the excess over one is lost in digits."""
 SOFT = 1e-3
-"""A diagonal less than this, relative to the sum of its column, is no spring: it may be a shift of zero."""
+"""Relative to the sum of its column, a diagonal entry below this is no spring: it may be a shifted zero."""
 NOTHING = 1e-12
 """A column whose sum is less than this, relative to the diagonals of others, is round-off."""
 SPRINGS = (3.0, 1.0, -2.0, 0.3, 10.0, -0.5)
-"""Multiples of the springs, tried one after the other.
+"""Multiples of the diagonal used as springs, in the order of the attempts.
 
-More than the diagonal first: of a positive matrix what the piece takes from a spring is at most that, and is just that
-where an unknown couples to this piece alone.
+The first exceeds one: the Schur complement of a piece of a positive matrix is at most the diagonal, and equals it where
+an unknown couples to this piece alone.
 """
 
 
 class Condensed(Spread):
-    """Factors on several ranks: each its own piece by KLU or MUMPS, and all together what the pieces share.
+    """Factors on several ranks: of each rank's piece by KLU or MUMPS, and of the interface matrix on all ranks.
 
     :class:`~rodfem.factors.Factors` of matrices whose pattern is symmetric and stays.
     """

@@ -31,20 +31,21 @@ from rodfem.stability.spectrum import Spectrum
 from rodfem.system import System, combine
 
 LEVEL = 0.05
-"""Where the load changes by less than this (of its span a unit of arclength), its slope is computed afresh, unless the
-correction was so small that it cannot have changed its sign."""
+"""Slope of the load (in spans per unit of arclength) below which it is computed anew at the corrected state, unless the
+correction was too small to change its sign."""
 VERTICAL = 1e-8
-"""A branch along which the load changes by less than this (of its span a unit of arclength) is one of equal loads."""
+"""Slope of the load (in spans per unit of arclength) below which it counts as constant along a branch."""
 STILL = 1e-6
-"""Damping of Newton's method at a start that may move freely at its load, over the lowest bending eigenvalue."""
+"""Damping of Newton's method at a singular first state, over the lowest bending eigenvalue."""
 STRAYED = 0.3
-"""Distance from the start beyond which an equilibrium is not the one that the start stands for."""
+"""If Newton's method moves the initial guess farther than this (metric norm), the result is not accepted as the first
+state."""
 HELD = 1e-8
-"""Drift, over the lowest bending eigenvalue, above which phase conditions hold a state off the equilibrium."""
+"""Drift scalar, over the lowest bending eigenvalue, above which phase conditions hold a state off the equilibrium."""
 ALIGNED = 0.9
-"""Least cosine between the direction of a prediction and the tangent of the point that it leads to."""
+"""Least cosine between the direction of a prediction and the tangent at the corrected point."""
 ON_BOUND = 1e-8
-"""A load beyond a bound by less than this, of the span, is on it: branches of equal loads may lie there."""
+"""Distance from a bound, in spans, below which a load counts as on it: branches of constant load may lie there."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class Steps:
         for name in ("first", "largest", "smallest", "aim"):
             real(name, getattr(self, name), getattr(Steps, name))
         if whole("most", self.most, Steps.most) < 1:
-            raise SceneError(f"A branch of {self.most} points is none: give most=1 or more.")
+            raise SceneError(f"most is {self.most}: a branch has at least one point; give most=1 or more.")
         if not self.smallest < self.largest <= 1:
             raise SceneError(
                 f"A step of {self.largest:g} is out of bounds: choose more than {self.smallest:g}, at most 1."

@@ -10,8 +10,8 @@ in the load and ``row`` the arclength equation Newton's matrix is ``J = (S F_lam
 ``S`` is singular at a fold, and a count says nothing about eigenvalues within its tolerance: both show in the same
 solves.  A block of vectors ``v`` is carried along the branch and iterated inversely, once a point; the least
 ``|v| / |S^-1 M v|`` is an upper bound of the distance of the nearest eigenvalue from zero, and an estimate as good as
-the block is rich in its vector: 1e-3 of a vector that has a bit of everything is mixed in every time, and a vector
-whose eigenvalue is within the tolerance, 1e-7 of the usual, grows by 1e7.  Where that is not safely away from zero a
+the block is rich in its vector: 1e-3 of a generic vector is added every time, and a vector
+whose eigenvalue is within the tolerance, 1e-7 of the usual, grows by 1e7.  If that is too near zero, the
 state is computed by LU factors of ``J``, and counted by two shifts.
 
 The factors belong to the prediction, the index to the equilibrium.  From one to the other ``S`` changes by ``dS``.  Its
@@ -38,15 +38,15 @@ from rodfem.system import dense_columns
 BLOCK = 2
 """Number of vectors that are iterated along a branch."""
 FRESH = 1e-3
-"""How much of a vector with a bit of everything is added to each before it is iterated."""
+"""Weight of a generic vector that is added to each vector of the block before it is iterated."""
 NEAR = 1e-3
-"""An eigenvalue nearer zero than this, in units of the lowest bending eigenvalue, is left to the two shifts."""
+"""Distance of an eigenvalue from zero, over the lowest bending eigenvalue, below which the two shifts count."""
 SENSITIVE = 100.0
-"""Least change of an eigenvalue that is reckoned with when the state moves by one radian, in the same units."""
+"""Least change of an eigenvalue assumed when the state moves by one radian, in the same units."""
 DIFFERENCE = 0.05
 """Step of the differences, relative to how far the equilibrium is from the prediction."""
 SAFE = 10.0
-"""Times the measured change of the carried eigenvalues by which all eigenvalues must be away from zero."""
+"""Least distance of all eigenvalues from zero, over the measured change of those carried along."""
 
 
 class Corrector:
@@ -123,7 +123,7 @@ class Corrector:
         return np.array([self._image.dot(v) for v in self._block]) / step
 
     def _solve(self, right: PETSc.Vec | None) -> None:
-        """Solve for all right-hand sides at once: it is the call that costs, not the column."""
+        """Solve for all right-hand sides at once: the cost is that of the call, hardly of a column."""
         system, inertia = self.system, self.inertia
         with system.clock("solve"):
             columns = self._right.getDenseArray()

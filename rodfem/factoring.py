@@ -32,6 +32,6 @@ def factors_of(
 
 
 def solving(counting: Factors, comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
-    """What solves with a symmetric matrix best, where ``counting`` are its LDL^t factors: those, or LU factors."""
+    """The fastest factors for solutions with a symmetric matrix: its LDL^t factors ``counting``, or LU factors."""
     same = lu_package(MPI.COMM_SELF, "rodfem_lu_") == "mumps"
     return counting if same else factors_of("lu", comm, unknowns, scalars, {})

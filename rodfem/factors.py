@@ -1,7 +1,7 @@
-"""Factors of a matrix whose pattern stays: LDL^t by MUMPS, LU by KLU; on several ranks whole or piece by piece.
+"""Factors of matrices with a fixed pattern: LDL^t by MUMPS, LU by KLU; on several ranks replicated or substructured.
 
-Only LDL^t factors count the inertia, which MUMPS alone does.  Where solutions are all that is wanted KLU is better for
-a chain of linear elements: it has no dense fronts to manage, each of which would be one element.  For 1e4 of them it
+Only LDL^t factors count the inertia, and only MUMPS reports it.  For solutions alone KLU is faster on a chain of linear
+elements: it has no dense fronts to manage, each of the size of one element.  For 1e4 of them it
 solves in a tenth (reduced formulation) to a quarter (pointwise) of MUMPS's time.
 """
 
@@ -34,12 +34,12 @@ PIVOTS = {"mat_klu_pivot_tol": 1.0}
 PETSc 3.18 and 3.22 want the option without a prefix.
 """
 SMALL = 2.0**-14
-"""Factor of dense rows and columns, with which none of them is the pivot of a sparse one: it would fill in all others.
+"""Scaling of dense rows and columns, so that none is chosen as the pivot of a sparse row and fills in all others.
 
-With them as they are, 3000 pointwise elements of the hemitropic rod take 40 s to factor instead of 40 ms.
+Without it 3000 pointwise elements of the hemitropic rod take 40 s to factor instead of 40 ms.
 """
 BALANCED = {"mat_mumps_icntl_7": 4}
-"""One that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
+"""MUMPS's ordering that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
 
 
 def is_cut(comm: MPI.Comm, unknowns: int) -> bool:
@@ -75,7 +75,7 @@ class Factors(Protocol):
         """Solve with the last factors."""
 
     def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Solve for all columns of a dense matrix at once: it is the call that costs, not the column."""
+        """Solve for all columns of a dense matrix at once: the cost is that of the call, hardly of a column."""
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
@@ -263,7 +263,7 @@ class Mumps:
         self.ksp.solve(right, out)
 
     def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Solve for all columns of a dense matrix at once: it is the call that costs, not the column."""
+        """Solve for all columns of a dense matrix at once: the cost is that of the call, hardly of a column."""
         self.ksp.getPC().getFactorMatrix().matSolve(right, out)
 
     def columns(self, rows: np.ndarray, right: PETSc.Mat, out: PETSc.Mat) -> None:

@@ -270,7 +270,7 @@ class Fields:
         return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
 
     def out_of_plane(self) -> dict[str, np.ndarray]:
-        """Degrees of freedom of each field that a planar rod does without; empty for a rod in space."""
+        """Degrees of freedom of each field that vanish for a planar rod; empty for a rod in space."""
         normal = self.scene.normal
         if normal is None:
             return {}
@@ -377,7 +377,7 @@ class Fields:
         return ", ".join(words)
 
     def left_out(self) -> list[str]:
-        """Unknowns that this scene does without, and why."""
+        """Fields and strains that are not unknowns of this scene, each with the reason."""
         scene, c = self.scene, self.scene.constants()
         fixed = [i for i in range(3) if i not in scene.free_strains]
         lines = []

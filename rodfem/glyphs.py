@@ -1,4 +1,4 @@
-"""What holds and loads a rod as solids of a picture, each made of its properties.
+"""Supports and loads of a rod as solids of a picture.
 
 The directors decide the body at the place (block where they are held, axle where they turn about an axis, ball on a
 point where they turn freely), free components of the position the rails on which it slides, stiffnesses the springs.

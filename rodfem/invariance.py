@@ -1,7 +1,7 @@
-r"""Which motions of its state are symmetries of a scene: asked of its equations at generic states.
+r"""Detection of the continuous symmetries of a scene: invariance of its equations at generic states.
 
 With a potential a combination ``g = sum_j a_j g_j`` of the generators of :mod:`rodfem.symmetries` is a symmetry where
-it leaves the functional ``L`` as it is, at every state and load; without one where the equations ``F`` of equilibrium
+it leaves the functional ``L`` invariant, at every state and load; without one where the equations ``F`` of equilibrium
 are equivariant, so that it carries equilibria into equilibria, for ``g(x) = A x + c`` ::
 
     sum_j a_j dL(x)[g_j(x)] = 0,      or      dF(x)[g(x)] + A^t F(x) = 0,
@@ -27,7 +27,7 @@ from rodfem.fields import LOAD, Block, Fields
 from rodfem.symmetries import Symmetry, derivative, elementary_generators
 
 EXACT = 1e-10
-"""Of the sum of magnitudes of what adds up to the change of the functional, the part that is round-off."""
+"""Round-off of the change of the functional, relative to the sum of magnitudes of its terms."""
 SLIDING = 1e-8
 """The same for the motion of a closed rod along itself: the error of a fine mesh."""
 STATES = 3
@@ -35,7 +35,7 @@ STATES = 3
 SLIDES = 8
 """Number of states at which that is asked."""
 WILD = 1e4
-"""A state whose forces are greater by this factor than the least is not asked: round-off of its hides all others."""
+"""States whose forces exceed the least by this factor are left out: their round-off hides that of all others."""
 DECAY = 0.6
 """Ratio of one Fourier coefficient of a generic state to the next."""
 SMOOTH = 0.35

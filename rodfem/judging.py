@@ -1,4 +1,4 @@
-"""Verdicts on the states at the loads of a plan, and their modes: what ``--method`` and ``--modes`` ask for."""
+"""Verdicts on the states at the loads of a plan, and their modes: the options ``--method`` and ``--modes``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers that a person gives: of the right kind, or a sentence that says which was expected."""
+"""Validation of numbers given by the user: the kind, or one sentence with the kind expected."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-r"""Locating where an eigenvalue or the slope of the load vanishes on a branch.
+r"""Location of zeros of an eigenvalue or of the slope of the load on a branch.
 
-Near such a point the bordered system is (nearly) singular, so no equilibrium is computed closer to it than need be:
-the branch is solved at Chebyshev nodes of a short piece around it, and the eigenvalue, the load and the state, all
-smooth functions of arclength, are interpolated at spectral accuracy.
+The bordered system is (nearly) singular near such a point, where equilibria are therefore not computed.  The branch is
+solved at Chebyshev nodes on a short interval around the point; the eigenvalue, the load and the state are smooth
+functions of arclength, and are interpolated with spectral accuracy.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from rodfem.system import System, combine
 NODES, FEWER = 6, 4
 """Number of nodes of an interpolant, and of one over a very short piece."""
 WINDOW = 0.02
-"""Half length of the piece of a branch, in the metric, on which a special point is interpolated."""
+"""Half length, in the metric, of the interval of a branch on which a special point is interpolated."""
 ROUND_OFF = 1e-12
-"""What Newton's tolerance and the conditioning near a singular point leave open in a load, relative to it or to one."""
+"""Uncertainty of a load, relative to it or to one, by Newton's tolerance and the conditioning near a singular point."""
 SHARP = 1e-11
-"""Uncertainty of a load, for the given mesh, at which a special point needs no sharper interpolation."""
+"""Uncertainty of a load on the given mesh below which the interpolation is not refined further."""
 PART = 0.02
-"""Part of a distance between two loads to which it is wanted."""
+"""Relative uncertainty at which the difference of two loads is accepted."""
 
 NARROWER = 6
-"""How many times a bracket is narrowed until the eigenvalue that crosses is found among those nearest to zero."""
+"""Largest number of times a bracket is narrowed until the crossing eigenvalue is among those nearest zero."""
 
 Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
 
@@ -55,13 +55,14 @@ def solve_at(follower: Follower, curve: Curve, s: float) -> PETSc.Vec:
     outcome = correct(follower.system, x, follower.row(direction))
     if not outcome.converged:
         raise ConvergenceError(
-            f"No equilibrium near load {follower.system.scalar(x):.8g} while locating a special point."
+            f"No equilibrium near load {follower.system.scalar(x):.8g} while locating a special point: "
+            "use smaller steps (--step)."
         )
     return x
 
 
 def solve_beside(follower: Follower, curve: Curve, s: float, aside: float) -> tuple[PETSc.Vec, float]:
-    """Solve at ``s``, or ``aside`` of it where ``s`` is the very point at which the bordered matrix is singular."""
+    """Solve at ``s``, or at ``s + aside`` if the bordered matrix is singular there; returns state and parameter."""
     try:
         return solve_at(follower, curve, s), s
     except ConvergenceError:
@@ -69,7 +70,7 @@ def solve_beside(follower: Follower, curve: Curve, s: float, aside: float) -> tu
 
 
 def across(system: System, vectors: Sequence[PETSc.Vec], still: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
-    """Orthonormal vectors (in the metric) of what a space of ``vectors`` has beside the one that ``still`` spans."""
+    """Metric-orthonormal basis of span(``vectors``) modulo span(``still``), the persistent null vectors."""
     known, out = list(still), []
     for vector in vectors:
         rest = vector.copy()

@@ -25,7 +25,7 @@ from rodfem.symmetries import may_slide
 from rodfem.system import System
 
 FINEST, COARSEST = 1e-10, 1e-1
-"""Accuracies that can be asked for; round-off is near the first."""
+"""Least and greatest accuracy that can be asked for; the former is near round-off."""
 OF_A_RING = 1e-8
 """Accuracy with which a uniform ring is computed at least."""
 MARGIN = 100.0
@@ -35,10 +35,11 @@ FURTHER = 10.0
 
 
 def check_accuracy(accuracy: float) -> None:
-    """Raise :class:`SceneError` for an accuracy that is none, or cannot be had in double precision."""
+    """Raise :class:`SceneError` for an accuracy outside :data:`FINEST` to :data:`COARSEST`."""
     if not FINEST <= accuracy <= COARSEST:
         raise SceneError(
-            f"An accuracy of {accuracy:g} cannot be had: ask for one between {FINEST:g} (round-off) and {COARSEST:g}."
+            f"An accuracy of {accuracy:g} is not attainable: ask for one between {FINEST:g} (round-off) and "
+            f"{COARSEST:g}."
         )
 
 

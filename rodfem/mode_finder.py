@@ -23,9 +23,9 @@ from rodfem.transfer import Transfer, richer_system
 EQUAL = 1e-6
 """Eigenvalues closer than this, relative to the greatest, are one: their modes are any basis of a plane."""
 SEEN = 1e-3
-"""A functional to which a mode responds less than this, relative to the greatest response, does not see it."""
+"""Response of a mode to a functional, relative to the greatest one, below which the functional does not observe it."""
 FLOOR = 1e-12
-"""What arithmetic leaves open of an eigenvalue at least, relative to the greatest."""
+"""Least uncertainty of an eigenvalue by round-off, relative to the greatest one."""
 
 
 class ModeFinder:

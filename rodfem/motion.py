@@ -1,4 +1,4 @@
-r"""What the rod does in a perturbation of a state: displacement and infinitesimal rotation in natural order along it.
+r"""Motion of the rod in a perturbation of a state: displacement and infinitesimal rotation, in order along the rod.
 
 The rotation is the spin ``w`` with ``dd_i = w x d_i``, in the space frame; of the quaternion it is ``w = 2 vec(dq
 conj(q)) / |q|^2``.  Without a centreline the displacement is the integral of the linearised kinematics ::

@@ -1,4 +1,4 @@
-"""The part of a bordered matrix that one rank factors: its own unknowns, and beside them what it shares with others."""
+"""Subdomains of a distributed bordered matrix: the inner unknowns of one rank, and the interface unknowns."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from rodfem.stability.matrices import first_of
 
 
 class Piece:
-    """Rows and columns of this rank's inner unknowns, and of the shared ones they couple to, of a distributed matrix.
+    """Rows and columns of this rank's inner unknowns, and of the interface unknowns that couple to them.
 
-    Shared are the last ``scalars`` unknowns, and where unknowns of two ranks couple those of one of the two, of the one
-    that has fewer.  The pattern is symmetric.
+    Interface (shared) unknowns are the last ``scalars`` ones and, for each pair of coupled ranks, the boundary
+    unknowns of the rank that has fewer of them.  The pattern of the matrix is symmetric.
 
     Attributes
     ----------
     shared
-        Global numbers of all shared unknowns, the same on all ranks, ascending.
+        Global numbers of all interface unknowns in ascending order, the same on all ranks.
     own, inner
-        Rows of this rank that are shared and that are not, counted from its first.
+        Interface rows and inner rows of this rank, counted from its first row.
     held
         Places in ``shared`` of the rows of ``own``.
     touched
-        Places in ``shared`` of those that this rank's inner unknowns couple to; they are the last of the piece.
+        Places in ``shared`` of the unknowns coupled to this rank's inner ones; they are the last of the piece.
     matrix
-        The piece (PETSc, on this rank alone), its block of shared unknowns diagonal.  Of a symmetric one the upper
-        triangle.
+        The piece (PETSc, on this rank alone); its block of interface unknowns is diagonal.  A symmetric piece stores
+        the upper triangle.
     """
 
     def __init__(self, matrix: PETSc.Mat, scalars: int, *, symmetric: bool) -> None:
-        """Find the cuts in the pattern of ``matrix``, on all ranks together."""
+        """Find the interface in the pattern of ``matrix``; collective."""
         self.symmetric = symmetric
         self.comm = comm = matrix.comm.tompi4py()
         rank, ranges = comm.rank, np.array(matrix.getOwnershipRanges())
@@ -84,7 +84,7 @@ class Piece:
         self.matrix = PETSc.Mat().createAIJWithArrays((size, size), (*index, self.values), comm=PETSc.COMM_SELF)
 
     def _cut(self, rows: np.ndarray, columns: np.ndarray, ranges: np.ndarray, first: int) -> np.ndarray:
-        """Numbers of this rank's unknowns that are shared because another rank's couple to them."""
+        """Global numbers of this rank's unknowns on the interface with other ranks, scalars not included."""
         rank, size = self.comm.rank, self.comm.size
         between = ((columns < ranges[rank]) | (columns >= ranges[rank + 1])) & (columns < first) & (rows < first)
         row, owner = rows[between], np.searchsorted(ranges, columns[between], side="right") - 1
@@ -110,7 +110,7 @@ class Piece:
         return entries, row, column
 
     def update(self, matrix: PETSc.Mat) -> np.ndarray:
-        """Take the values of ``matrix``, all but the springs; returns its block of shared unknowns, on all ranks."""
+        """Copy the values of ``matrix``, without the springs; returns its block of interface unknowns, on all ranks."""
         values = matrix.getValuesCSR()[2]
         if not self.symmetric:
             received = np.empty(sum(self._counts[1]), dtype=values.dtype)

@@ -21,14 +21,14 @@ from rodfem.newton import correct
 AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 """Amplitudes, in the metric, at which the branch is solved: the positive half of eight Chebyshev nodes."""
 ROUND_OFF = 1e-12
-"""What arithmetic leaves open of an ordinate at least, relative to it or to one."""
+"""Least uncertainty of an ordinate by round-off, relative to it or to one."""
 BESIDE = 1e-3
 """Distance along a branch, in the metric, over which the slope of the ordinate is taken."""
 
 
 @dataclass(frozen=True)
 class Origin:
-    """A branch point: state, load and ordinate, and what its location leaves open of these two."""
+    """A branch point: state, load and ordinate, and the uncertainties of the latter two by its location."""
 
     x: PETSc.Vec
     load: float
@@ -54,7 +54,7 @@ def ordinate_along(follower: Follower, x: PETSc.Vec, direction: PETSc.Vec) -> fl
 
 
 def law_of(follower: Follower, origin: Origin, direction: PETSc.Vec) -> Law | None:
-    """Law of the branch that leaves ``origin`` along ``direction``; None where it cannot be had from nearby points.
+    """Law of the branch that leaves ``origin`` along ``direction``; None if it cannot be computed from nearby points.
 
     At a pitchfork the load is an even function of the amplitude, and the ordinate an even or an odd one;
     polynomials through four amplitudes give their leading coefficients.  Uncertain is what those through three miss,

@@ -48,7 +48,7 @@ class Piece(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The index, in brackets that in space."""
+        """The index, followed by the index in space in parentheses."""
         return str(self.negative) if self.in_space is None else f"{self.negative} ({self.in_space})"
 
 

@@ -55,9 +55,9 @@ def run(
     """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
     By default 8 elements of degree 6 (few elements to start with where the plan has an accuracy), the scene's own span,
-    and the folder ``results/<name>``.  Files are brought up to date after every branch, so that an interrupted run
-    keeps all completed ones.  Returns the diagram.  Raises :class:`~rodfem.errors.SceneError` for bad input, before any
-    computation, and :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
+    and the folder ``results/<name>``.  Files are updated after every branch: an interrupted run keeps all completed
+    branches.  Returns the diagram.  Raises :class:`~rodfem.errors.SceneError` for bad input, before any computation,
+    and :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
     """
     plan = plan or Plan()
     output = output or Path("results") / scene.name

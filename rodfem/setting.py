@@ -1,4 +1,4 @@
-"""What holds a rod and what loads it in one state, as a file says it: plain arrays, for pictures.
+"""Supports and loads of a rod in one state, as a file records them: plain arrays, for pictures.
 
 :mod:`rodfem.supports` makes and writes it from a scene.
 

@@ -1,4 +1,4 @@
-r"""What holds a rod and what loads it: derived from a scene, and written to a file.
+r"""Supports and loads of a rod: derived from a scene, and written to a file.
 
 An end is described by its properties, and named after them by one rule (:func:`~rodfem.setting.kind_of`): how many
 components of its position are held, what its directors are free to do, and whether springs hold it.  A potential of an

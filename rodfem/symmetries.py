@@ -205,7 +205,7 @@ def add_change(fields: Fields, target: str, matrix: np.ndarray, constant: np.nda
 
 
 def _known(fields: Fields, group: str, load: float, size: int) -> np.ndarray:
-    """Values of the components of a group that are no unknowns: known forces, held positions; else zero."""
+    """Values of the components of a group that are not unknowns (known forces, held positions), else zero."""
     scene, values = fields.scene, np.zeros(size)
     c = scene.constants(load)
     if group == "n":

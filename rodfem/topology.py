@@ -60,5 +60,5 @@ def link(sample: dict[str, Any], points: int = 400) -> tuple[int, float, float]:
     Tw, Wr = twist(s, np.asarray(sample["q"])), writhe(CubicSpline(s, closed, bc_type="periodic")(fine))
     Lk = round(Tw + Wr)
     if abs(Tw + Wr - Lk) > 0.05:
-        raise SceneError(f"Twist {Tw:.4f} and writhe {Wr:.4f} do not make a linking number: is the rod closed?")
+        raise SceneError(f"Twist {Tw:.4f} plus writhe {Wr:.4f} is no integer: close the rod, without contact.")
     return Lk, Tw, Wr

@@ -1,4 +1,4 @@
-"""A richer discretisation of a rod, and the way of states and directions to it."""
+"""A richer discretisation of a rod, and the interpolation of states and directions on it."""
 
 from __future__ import annotations
 

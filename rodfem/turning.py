@@ -1,4 +1,4 @@
-"""How nodal unknowns stand for the rotation of a rod: a quaternion at each node, or one angle for a rod in a plane."""
+"""Rotation parametrisations: a unit quaternion at each node, or one angle for planar rods."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from forms.rotation import IDENTITY, turn, turn_change
 
 Start = Callable[[np.ndarray], np.ndarray] | None
 TWICE = 4 * np.pi
-"""Angle after which a quaternion comes back to itself."""
+"""Period of a quaternion as a function of the angle of rotation."""
 
 
 @dataclass(frozen=True)
 class ByQuaternion:
-    """Four components of a quaternion ``q``, whose unit length is a constraint."""
+    """Rotation as a quaternion ``q`` of four components, whose unit norm is a constraint."""
 
     name = "q"
     size = 4

@@ -1,4 +1,4 @@
-r"""Whether a branch point is one: its equations with an unfolding parameter.
+r"""Branch points, perfect or not: their equations with unfolding parameters.
 
 A branch point is a singular equilibrium at which the load does no work on the null vectors, ``phi_i . F_lam = 0``.  An
 imperfection, however small, takes it apart: of ``f = A xi^3 + B lam xi + eps = 0`` no point is singular *and* has
@@ -18,7 +18,7 @@ and Newton's step is ``dx = s + dlam w + sum_j xi_j V_j`` with
     b_i = s.r_i + dlam q_i + sum_j xi_j V_j.r_i,        tr G = sum_i (s.y_i + dlam V_i.r_i + sum_j xi_j V_j.y_i),
     r_i = d/dt S(x + t w, lam + t) V_i,   y_i = d/dt S(x + t V_i, lam) V_i,   q_i = V_i . d^2/dt^2 F(x + t w, lam + t),
 
-the derivatives by central differences, which are of no account to the result.
+the derivatives by central differences, whose errors do not enter the converged result.
 """
 
 from __future__ import annotations

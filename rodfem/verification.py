@@ -10,7 +10,7 @@ costs one product with ``S``.  What is left must be round-off, relative to ``|S|
 are no part of a generator: what is left is taken across their columns.  The motion of a closed rod along itself is one
 of its mesh up to the mesh's error: of that the quotient alone is asked, with ``F`` along the change of ``g``.
 
-A symmetry that fails is none: it is dropped, and said to be.
+A symmetry that fails is dropped, with a notice.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 EPS = 100 * float(np.finfo(float).eps)
 ROUND_OFF = 1e-8
-"""What may be left of ``S g``, relative to ``|S| |g|``."""
+"""Residual ``S g`` of a symmetry, relative to ``|S| |g|``."""
 ZERO = 1e-5
 """Eigenvalue that a symmetry may have, over the rod's lowest bending eigenvalue, beside round-off."""
 TINY = 0.01

@@ -1,4 +1,4 @@
-"""Watching over the accuracy of a branch while it is traced.
+"""Control of the accuracy of a branch while it is traced.
 
 The error of a point is computed on a richer mesh now and then; in between the decay of its Legendre coefficients
 tells how it has changed since (:mod:`rodfem.grading`), which costs next to nothing.  Where it is too large,

@@ -393,7 +393,7 @@ NAN = float("nan")
         (lambda: Steps(most=10.5), "most is 10.5: give a whole number, as in most=2000"),  # type: ignore[arg-type]
         (lambda: Steps(first=NAN), "first = nan lead nowhere"),
         (lambda: Steps(aim=0.0), "aim = 0 lead nowhere"),
-        (lambda: Steps(most=0), "0 points is none"),
+        (lambda: Steps(most=0), "most is 0: a branch has at least one point"),
         (lambda: Plan(1.0), "span is 1.0: give 2 numbers"),  # type: ignore[arg-type]
         (lambda: Plan((0.0, 1.0, 2.0)), "span is .*: give 2 numbers"),  # type: ignore[arg-type]
         (lambda: Plan(at=0.5), "at is 0.5: give a tuple of numbers"),  # type: ignore[arg-type]

@@ -142,8 +142,8 @@ class Locus:
         n, marks = len(self.values), {m.row: m.kind for m in self.marks}
         shown = sorted({0, n - 1, self.start, *marks, *np.linspace(0, n - 1, min(rows, n)).astype(int).tolist()})
         lines = [
-            f"\nLocus of the {self.kind} in {self.names[0]} and {self.names[1]} (in brackets the estimated error of "
-            "the discretisation across the curve)",
+            f"\nLocus of the {self.kind} in {self.names[0]} and {self.names[1]} (in parentheses the estimated error "
+            "of the discretisation across the curve)",
             f"  {self.names[0]:<24} {self.names[1]:<24} {'ordinate':<14} index",
         ]
         for i in shown:

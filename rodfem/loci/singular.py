@@ -50,7 +50,7 @@ from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import Inertia, combine, orthonormalize
 
 DIFFERENCE = 1e-4
-"""Step of the central differences for the third derivatives, in the metric: they are of no account to the result."""
+"""Step of the central differences for the third derivatives, in the metric: their errors do not enter the result."""
 IMPERFECT = 1e-7
 """An imperfection above this, of the rod's lowest bending eigenvalue, is not round-off."""
 FEWER = 1e-5

@@ -23,7 +23,7 @@ from rodfem.system import System, combine
 FREQUENCIES = (0.5, 1.0)
 AMOUNTS = np.linspace(-2 * np.pi, 2 * np.pi, 96, endpoint=False)
 STILL = 1e-20
-"""Square of a part of the velocity, relative to the state's, that is none but round-off."""
+"""Squared norm of a part of the velocity, relative to that of the state, below which it is round-off."""
 
 
 class Orbit:

@@ -1,4 +1,4 @@
-"""Ways to answer "is it stable?": the inertia of the saddle matrix, and the spectrum of the singular pencil."""
+"""Methods that determine stability: the inertia of the saddle matrix, and the spectrum of the singular pencil."""
 
 from rodfem.lazy import attributes
 

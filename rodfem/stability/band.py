@@ -1,8 +1,8 @@
-r"""What the arithmetic of a count supports, and what decides where it supports none.
+r"""Round-off of an inertia count, and the decision on eigenvalues within it.
 
-A factorisation is that of a matrix which differs by about ``eps |S|``.  An eigenvalue relative to the metric moves by
-that over the smallest mass: ``|S| ~ 1/h``, ``m ~ h`` for linear elements of size h, so that a count knows nothing of an
-eigenvalue within the *band* ``10 eps |S| / m ~ eps/h^2``.  It bounds the worst perturbation of the worst, rough vector.
+The factors of ``S`` are the exact ones of a matrix that differs by about ``eps |S|``.  An eigenvalue relative to the
+metric is then uncertain by that over the smallest mass: ``|S| ~ 1/h``, ``m ~ h`` for linear elements of size h, so that
+a count decides nothing within the *band* ``10 eps |S| / m ~ eps/h^2``.  That is the bound for the roughest vector.
 For one smooth vector y of metric norm 1 independent errors of the entries of S change the quotient ``y.Sy`` by about
 
     eps (sum_ij (S_ij y_i y_j)^2)^(1/2),

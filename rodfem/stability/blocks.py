@@ -1,4 +1,4 @@
-r"""The pencil of a state as named blocks, in the coordinates of one's choice.
+r"""The pencil of a state as named blocks, in given coordinates.
 
 The eigenproblem of a state is the singular pencil ``(K C; C^t 0) x = mu (M 0; 0 0) x``.  ``K`` (m, m) is the second
 derivative of the whole Lagrangian in rotation, strain and centreline, ``C`` (m, p) its derivative in those and the

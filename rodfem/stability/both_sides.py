@@ -1,4 +1,4 @@
-"""Right and left eigenvectors of a rod under loads without a potential, paired."""
+"""Two-sided eigenproblem of a rod under loads without a potential: biorthonormal right and left eigenvectors."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from rodfem.errors import ConvergenceError
 from rodfem.stability.vibration import Vibration
 
 SAME = 1e-6
-"""A left and a right eigenvalue that differ by less than this, relative, are the same."""
+"""Relative difference below which a left and a right eigenvalue are paired."""
 
 ROUND_OFF = 1e-10
-"""An imaginary part smaller than this, relative, is that of a real eigenvalue."""
+"""Relative imaginary part below which an eigenvalue counts as real."""
 
 
 @dataclass(frozen=True)
 class BothSides:
-    """Eigenvalues nearest zero with imaginary part not negative, by real part (k,), their errors and motions.
+    """Eigenvalues nearest zero with non-negative imaginary part, by real part (k,), their errors and motions.
 
-    ``right`` X and ``left`` Z (n, k), this rank's n unknowns: ``X^* M X = 1`` for each, ``X^t M X`` real and positive,
-    ``Z^t M X`` the unit matrix.  ``weighed`` is ``M Z``.
+    ``right`` X and ``left`` Z (n, k) on this rank's n unknowns: ``X^* M X = 1`` for each, ``X^t M X`` real and
+    positive, ``Z^t M X`` the unit matrix.  ``weighed`` is ``M Z``.
     """
 
     values: np.ndarray
@@ -33,7 +33,10 @@ class BothSides:
 
 
 def both_sides(vibration: Vibration, number: int) -> BothSides:
-    """Find ``number`` of them at the state last assembled; :class:`ConvergenceError` where the sides do not match."""
+    """Compute ``number`` biorthonormal left/right eigenpairs nearest zero, at the state last assembled.
+
+    Raises :class:`ConvergenceError` if a right eigenvalue has no left partner.
+    """
     right, left = (find(2 * number + 2, 0.0) for find in (vibration.near, vibration.left))
     upper = right.values.imag > -SAME * abs(right.values)  # one of each pair
     nearest = [i for i in np.argsort(abs(right.values), kind="stable") if upper[i]][:number]

@@ -1,4 +1,4 @@
-"""What a mode of vibration does: bending about one director or the other, torsion, or a mixture."""
+"""Type of a mode of vibration: bending about one director or the other, torsion, or mixed."""
 
 from __future__ import annotations
 

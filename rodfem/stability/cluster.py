@@ -24,7 +24,7 @@ from rodfem.system import System
 BESIDE = 1e-3
 """Distance from zero at which eigenvalues near zero are looked for: the matrix is singular there."""
 LEAST = 0.25
-"""Share of a vector in an invariant subspace below which it is none of its."""
+"""Share of a vector in an invariant subspace below which the vector does not belong to it."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from rodfem.stability.inertia import Index, Inertia
 from rodfem.system import System
 
 PUSHED = 1e-8
-"""A force or moment out of the plane, relative to the bending stiffness over the length, that is none but round-off."""
+"""Force or moment out of the plane, over bending stiffness by length, below which it is round-off."""
 NEAR = 1e-2
 """Distance, in the metric, within which the state in space that belongs to a planar one is sought."""
 

@@ -25,7 +25,7 @@ from rodfem.system import System, combine
 
 EPS = float(np.finfo(float).eps)
 NOISE = 8.0
-"""Round-off in an eigenvalue over what random errors of the matrix's entries sum up to: the largest ratio seen."""
+"""Largest observed ratio of the round-off in an eigenvalue to the effect of random errors of the matrix's entries."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ class Inertia:
         return float(NOISE * EPS * np.sqrt(self.system.comm.allreduce(squares)))
 
     def seed(self, i: int) -> PETSc.Vec:
-        """Vector with a bit of everything but the scalars."""
+        """Generic vector: components along all unknowns of fields, none along scalars."""
         vector = self.system.new_vector()
         begin, end = vector.getOwnershipRange()
         numbers = np.arange(begin, min(end, self.system.fields.field_unknowns))

@@ -144,7 +144,10 @@ class Judge:
                 "use shift-invert, reduction or dense."
             )
         if method == "dense" and self.system.fields.unknowns > LARGEST:
-            raise SceneError(f"Method 'dense' is for at most {LARGEST} unknowns, not {self.system.fields.unknowns}.")
+            raise SceneError(
+                f"Method 'dense' is for at most {LARGEST} unknowns, not {self.system.fields.unknowns}: "
+                "use another method, or a coarser discretisation."
+            )
         return method, "as asked"
 
     def __call__(self, x: PETSc.Vec, method: str = "auto", number: int = 4, interval: Any = None) -> Verdict:

@@ -1,4 +1,4 @@
-r"""Orthonormal bases of what constraints leave free, in factored form.
+r"""Orthonormal bases of the null space of the constraints, in factored form.
 
 A full Q-R factorisation ``C = (Q1 Q2) (R; 0)`` of the constraints' gradients ``C`` (m, p) gives in ``Q2`` (m, m - p) an
 orthonormal basis of the kernel of ``C^t``.  It is kept as Householder reflections, see
@@ -9,8 +9,8 @@ orthonormal basis of the kernel of ``C^t``.  It is kept as Householder reflectio
   most: cyclic reduction.  The rows between two groups, compressed to as many as they couple columns, are a *link*.
   Every second group is eliminated from its two links by a Q-R factorisation of their rows; what is left of them is
   compressed, and is the link between the groups that remain.  Each level halves their number, all its small
-  factorisations are one call, the sum over levels is O(m).  A chain of Givens rotations along the rod would do the same
-  work in m steps one after the other.  Rows that couple nothing any more belong to ``Q2``.
+  factorisations are one call, the sum over levels is O(m).  The chain of Givens rotations along the rod of Kumar &
+  Healey (2010) needs m consecutive steps for the same work.  Rows that couple nothing any more belong to ``Q2``.
 
 Dense columns are treated after the sparse ones, in the kernel of these.
 """
@@ -83,7 +83,7 @@ def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
     C = sp.csr_matrix(C, copy=True)
     m, p = C.shape
     if p > m:
-        raise SceneError(f"{p} constraints on {m} unknowns leave nothing to move: use fewer constraints.")
+        raise SceneError(f"{p} constraints on {m} unknowns leave no free unknown: use fewer constraints.")
     scale = float(abs(C.data).max()) if C.nnz else 1.0
     C.data[abs(C.data) < ROUND_OFF * scale] = 0.0
     C.eliminate_zeros()
@@ -97,7 +97,7 @@ def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
         columns = found.project(C[:, dense].toarray())
         count = columns.shape[1]
         if count > len(found.free):
-            raise SceneError(f"{p} constraints on {m} unknowns leave nothing to move: use fewer constraints.")
+            raise SceneError(f"{p} constraints on {m} unknowns leave no free unknown: use fewer constraints.")
         reflections, R = factor(found.free[None, :], columns[None])
         require_independent(R, scale, int((~dense).sum()) + np.arange(count)[None])
         found.steps.append(reflections)

@@ -1,4 +1,4 @@
-"""Matrices that a rank makes for its own unknowns, as PETSc's and back."""
+"""Conversion of matrices of a rank's own unknowns to PETSc and back."""
 
 from __future__ import annotations
 

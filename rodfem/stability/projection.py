@@ -1,7 +1,7 @@
-r"""The pencil on the kernel of the constraints, known by products and by the inverse of its shifts.
+r"""The pencil projected onto the null space of the constraints: matrix-vector products and shifted inverses.
 
 Shift-invert and Cayley transforms need the inverse of the shifted matrix ``Q2^t A Q2``, ``A = K - sigma M``.  It is a
-part of the inverse of a sparse matrix:
+block of the inverse of a sparse saddle point matrix:
 
     ( A    C ) ( x )   ( Q2 b )
     ( C^t  0 ) ( y ) = (  0   ),        (Q2^t A Q2)^-1 b = Q2^t x:
@@ -36,9 +36,9 @@ from rodfem.stability.matrices import gathered, petsc_matrix
 
 INVERSES = ("saddle", "elimination")
 SINGULAR = 1e-6
-"""A solve that leaves more than this of its right-hand side behind was made with a singular matrix."""
+"""Relative residual of a solve above which its matrix counts as singular."""
 RANK, MASSLESS = 1e-10, 1e-20
-"""Squares of what a unit vector adds to the span of others, and of what is left of it in the mass, that are nothing."""
+"""Squared-norm thresholds below which a unit vector counts as linearly dependent on others, and as massless."""
 
 PREFIX = "rodfem_reduced_inverse_"
 """Prefix of the options of its factors."""

@@ -36,9 +36,9 @@ EXTRA = (1, 4, 14)
 """How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
 
 CONVERGED = 1e-7
-"""A pair with a residual greater than this, relative to the stiffness, is none: the Krylov space broke down."""
+"""Residual, relative to the stiffness, above which a pair is rejected: the Krylov space broke down."""
 NOISE = 1e-6
-"""Size of what is added to the modes of the state before, which may span an invariant space without the lowest one."""
+"""Weight of a generic vector added to the previous modes, which may span an invariant space without the lowest."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,8 @@ class Spectrum:
             self.shift -= step
             step *= 3
         raise ConvergenceError(
-            "The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness."
+            "The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness; give the rod a "
+            "larger mass or rotary inertia."
         )
 
     def below(self, sigma: float) -> int:
@@ -221,7 +222,7 @@ class Spectrum:
     def _purify(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> None:
         """Replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``: without what has no mass, and is arbitrary in them.
 
-        All at once: it is the call that costs, not the column.
+        All at once: the cost is that of the call, hardly of a column.
         """
         right, solved = dense_columns(self.system, len(vectors)), dense_columns(self.system, len(vectors))
         for i, vector in enumerate(vectors):
