@@ -71,8 +71,8 @@ class Format:
             missing = [name for name in needs if name not in entries]
             if missing:
                 raise SceneError(
-                    f"{where} does not say its format and has no {', '.join(missing)}, so it is no {self.name}, or one "
-                    f"of a version of rodfem that wrote less: give {self.file}, or run the scene again."
+                    f"{where} has no {', '.join(missing)}, so it is no {self.name}, or one of a version of rodfem that "
+                    f"wrote less: give {self.file}, or run the scene again."
                 )
             return
         name, version, program = (mark.get(key) for key in KEYS)
