@@ -166,12 +166,12 @@ def read(group: Any, row: int | None = None) -> Setting:
     if DISTRIBUTED in group:
         along = group[DISTRIBUTED]
         distributed = along["s"][:], along["force"][row], along["follower"][row]
-    notes = [tie["note"] for tie in ties if tie["note"]]
+    held, kept = tuple(_made(Support, x, group) for x in supports), tuple(_made(Tie, x, group) for x in ties)
+    notes = [tie.note for tie in kept if tie.note]
     if FOUNDATION in group:
         along = group[FOUNDATION]
         foundation = (along["s"][:], along["stiffness"][:]) if "stiffness" in along else None
         notes += [along.attrs["note"]] if foundation is None else []
-    held, kept = tuple(_made(Support, x, group) for x in supports), tuple(_made(Tie, x, group) for x in ties)
     return Setting(held, section, distributed, foundation, kept, tuple(notes))
 
 

@@ -77,7 +77,7 @@ def _check(files: Sequence[Path], comm: MPI.Comm) -> None:
 def _saved(file: Path, key: dict[str, Any]) -> dict[str, Any] | None:
     """Result in a file, None where there is none for this rod."""
     data = _contents(file)
-    return data["result"] if data.get("key") == key else None
+    return data.get("result") if data.get("key") == key else None
 
 
 def _contents(file: Path) -> dict[str, Any]:
