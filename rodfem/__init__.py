@@ -63,6 +63,8 @@ from typing import Any
 
 from rodfem.lazy import submodule
 
+__version__ = "0.1.0"
+
 _HOMES = {
     "Locus": "loci.locus",
     **dict.fromkeys(

@@ -23,6 +23,7 @@ from rodfem.clock import Clock
 from rodfem.continuation import Equilibria
 from rodfem.errors import SceneError
 from rodfem.fields import Fields
+from rodfem.file_format import DIAGRAM, STATES, read_json
 from rodfem.motion import Motions
 from rodfem.supports import write as write_supports
 from rodfem.supports import write_section
@@ -66,6 +67,7 @@ def as_data(
     points = sum(len(b.points) for b in branches)
     work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
     return {
+        "format": DIAGRAM.mark(),
         "scene": scene.name,
         "title": scene.title or scene.name,
         "parameter": scene.load,
@@ -176,12 +178,8 @@ def save_json(data: dict[str, Any], path: Path) -> None:
 
 
 def load_json(path: Path) -> dict[str, Any]:
-    """Read a diagram; raises :class:`SceneError` where there is none."""
-    try:
-        data: dict[str, Any] = json.loads(Path(path).read_text())
-    except (OSError, json.JSONDecodeError) as trouble:
-        raise SceneError(f"{path} is not a diagram ({trouble}): give the diagram.json of a run.") from trouble
-    return data
+    """Read a diagram; raises :class:`SceneError` where there is none, or one of a newer format."""
+    return read_json(path, DIAGRAM, ("scene", "parameter", "branches"))
 
 
 def save_states(branch: Branch, solvers: Sequence[Equilibria], path: Path, first: bool) -> None:
@@ -210,7 +208,7 @@ def save_states(branch: Branch, solvers: Sequence[Equilibria], path: Path, first
             formulation=system.fields.discretization.formulation,
         )
         if first:
-            file.attrs["first"] = branch.name
+            file.attrs.update(STATES.mark_attributes(), first=branch.name)
             write_section(file, system.scene)
         group = file.create_group(f"branches/{branch.name}")
         for name in samples[0]:
@@ -244,14 +242,15 @@ def _trimmed(row: Any) -> Any:
 def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc.Vec:
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
-    Raises :class:`SceneError` where the file has no such row, has it in the other formulation, or lacks an unknown of
-    the follower's scene.
+    Raises :class:`SceneError` where the file has another or a newer format, or no such row, has it in the other
+    formulation, or lacks an unknown of the follower's scene.
     """
     import h5py
 
     wanted = follower.system.fields.discretization.formulation
     try:
         with h5py.File(path, "r") as file:
+            STATES.check_hdf5(file, ("formulation", "branches"))
             if file.attrs["formulation"] != wanted:
                 raise SceneError(
                     f"{path} holds states of the {file.attrs['formulation']} formulation: choose that, not {wanted}."
@@ -266,10 +265,10 @@ def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc
         ) from trouble
     system = follower.system
     wanted_names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]
-    missing = [name for name in wanted_names if name not in sample]
+    missing = [name for name in ("s", "elements", *wanted_names) if name not in sample]
     if missing:
         raise SceneError(
-            f"{path} has no {', '.join(missing)}, unknowns of the scene {system.scene.name!r}: it was written for "
+            f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
             "another scene, or by another version of rodfem; run the scene again."
         )
     return follower.shape.restore(sample)

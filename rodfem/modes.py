@@ -30,6 +30,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rodfem.errors import SceneError
+from rodfem.file_format import MODES
 from rodfem.setting import Setting, read
 
 if TYPE_CHECKING:
@@ -113,6 +114,9 @@ def save_modes(
     ``states.h5`` (see :func:`rodfem.supports.write`).
     """
     with h5py.File(path, "w" if first else "a") as file:
+        if first:
+            file.attrs.update(MODES.mark_attributes())
+        MODES.check_hdf5(file)
         file.attrs.update(about, normalisation="kinetic energy: mode . M mode = 1")
         group = file.create_group(f"branches/{branch}/{row}")
         for name in ("load", "s", "r", "q", *FIELDS, *LEFT):
@@ -127,10 +131,17 @@ def save_modes(
 
 
 def load_modes(path: Path, branch: str, row: int) -> Modes:
-    """Modes of a saved state; raises :class:`SceneError` where the file has none."""
+    """Modes of a saved state; raises :class:`SceneError` where the file has none, or has another or a newer format."""
     try:
         with h5py.File(path, "r") as file:
+            MODES.check_hdf5(file, ("branches",))
             group = file[f"branches/{branch}/{row}"]
+            missing = [name for name in Modes.__dataclass_fields__ if name not in group]
+            if missing:
+                raise SceneError(
+                    f"{path} has modes of row {row} of the branch {branch!r} without {', '.join(missing)}: another "
+                    "version of rodfem wrote it; run the scene again."
+                )
             arrays = {name: group[name][()] for name in Modes.__dataclass_fields__ if name != "motion"}
             motion = tuple(group["motion"].asstr()[()])
     except (OSError, KeyError) as trouble:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
@@ -21,6 +20,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
+from rodfem.errors import SceneError
+from rodfem.file_format import DIAGRAM, read_json
 from rodfem.plot_pieces import COUNTED, IMPERFECT, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
 
 __all__ = ["draw_diagram", "main"]
@@ -69,6 +70,8 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
 
     Raises
     ------
+    SceneError
+        If these are contents of another or a newer format.
     ValueError
         If there are no branches, if columns of one differ in length, or if the format is unknown.
     KeyError
@@ -83,7 +86,8 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
 
 def figure_of(diagram: Mapping[str, Any]) -> Figure:
     """Figure of a diagram, as :func:`draw_diagram` writes it; raises as that does."""
-    branches = diagram.get("branches") if isinstance(diagram, Mapping) else None
+    DIAGRAM.check(diagram, "The diagram")
+    branches = diagram.get("branches")
     if not branches:
         raise ValueError("the diagram has no branches: expected those of a diagram.json; try that of a scene")
     with matplotlib.rc_context(STYLE):
@@ -284,11 +288,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, help="picture to write (default: the same name with .png)")
     options = parser.parse_args(arguments)
     try:
-        diagram = json.loads(options.diagram.read_text(encoding="utf-8"))
+        diagram = read_json(options.diagram, DIAGRAM, ("title", "parameter_label", "ordinate", "branches"))
         print(draw_diagram(diagram, options.output or options.diagram.with_suffix(".png")))
+    except SceneError as error:
+        print(error, file=sys.stderr)
+        return 2
     except (KeyError, OSError, ValueError) as error:
-        advice = "" if type(error) is ValueError else "; try the diagram.json of a scene"
-        print(f"cannot draw {options.diagram}: {error}{advice}", file=sys.stderr)
+        reason = f"it has no {error}; try the diagram.json of a scene" if isinstance(error, KeyError) else error
+        print(f"cannot draw {options.diagram}: {reason}", file=sys.stderr)
         return 2
     return 0
 

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from rodfem.file_format import DIAGRAM
 from rodfem.plot import DPI, HALO, MARKERS, PALETTE, SIZE, STYLE, at_most
 
 COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5}
@@ -65,7 +66,8 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
     One line a curve, one colour a kind of motion: eigenvalues that are double are two lines on each other, of one
     colour.  Real frequencies are dots, a complex pair is a cross (real part) and a plus (imaginary part), what has
     diverged is a plus; flutter loads are stars, divergence loads triangles.  The axis shows the ``most`` left-most
-    eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any ``omega2``.
+    eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any ``omega2``, and SceneError for
+    contents of another or a newer format.
     """
     figure = figure_of(diagram, most)
     with matplotlib.rc_context(STYLE):
@@ -75,6 +77,7 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
 
 def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
     """Figure of the frequencies of a diagram, as :func:`draw_frequencies` writes it; raises as that does."""
+    DIAGRAM.check(diagram, "The diagram", ("branches",))
     branches = [b for b in diagram["branches"] if b["columns"].get("omega2")]
     if not branches:
         raise ValueError(f"The diagram of {diagram['scene']} has no eigenvalues: run a scene with a follower load.")

@@ -10,6 +10,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from rodfem.file_format import LOCUS
 from rodfem.plot import DPI, FONT, HALO, MARKERS, PALETTE, SIZE, STYLE, _tex
 
 COLORS = {"branch point": PALETTE[1], "fold": PALETTE[2], "flutter": PALETTE[3], "divergence": PALETTE[4]}
@@ -48,11 +49,15 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
 
     Raises
     ------
+    SceneError
+        For contents of another or a newer format.
     ValueError
         Without any locus, or if they are not of the same parameters.
     """
     if not loci:
         raise ValueError("There is no locus to draw: give the contents of at least one file.")
+    for one in loci:
+        LOCUS.check(one, "The locus", ("parameters", "columns", "marks", "start", "labels", "discretization"))
     names = loci[0]["parameters"]
     if any(one["parameters"] != names for one in loci):
         raise ValueError("The loci are of different parameters: draw them one by one.")

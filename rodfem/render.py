@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
+from rodfem.file_format import STATES
 from rodfem.glyphs import DARK, LOAD, glyphs_of
 from rodfem.setting import Setting
 from rodfem.setting import read as read_setting
@@ -65,7 +66,8 @@ def draw_shape(
     Raises
     ------
     ValueError
-        If the file, the branch or the row does not exist, or an argument has no meaning.
+        If the file, the branch or the row does not exist, an argument has no meaning, or (:class:`SceneError`) the
+        file has another or a newer format.
     ImportError
         If PyVista or one of the libraries it needs is missing.
     RuntimeError
@@ -157,6 +159,7 @@ def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
 
     try:
         with h5py.File(states, "r") as file:
+            STATES.check_hdf5(file, ("branches", "parameter", "scene"))
             branches = file["branches"]
             if branch not in branches:
                 raise ValueError(f"{states} has no branch {branch!r}: try one of {sorted(branches)}")

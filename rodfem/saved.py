@@ -15,11 +15,19 @@ from rodfem.continuation import Equilibria, Follower
 from rodfem.diagram import Diagram
 from rodfem.errors import SceneError
 from rodfem.fields import Discretization
+from rodfem.file_format import DIAGRAM
 from rodfem.files import COLUMNS, load_json, load_state
 from rodfem.plan import Plan
 from rodfem.scene import Scene
 from rodfem.solvers import Solver
 
+NEEDED = ("range", "accuracy", "constants", "discretization", "meshes")
+"""Entries of a diagram, beside those that all of its readers need."""
+OF_BRANCH = ("name", "parent", "ended", "columns", "special")
+OF_SPECIAL = (
+    *("kind", "row", "negative_before", "negative_after", "located_to", "coupling", "multiplicity", "error_estimate"),
+    *("ordinate_error_estimate", "followed", "unfolding", "note", "omega2", "meets", "law"),
+)
 SAME = 1e-12
 """Relative difference of two values of a constant that are the same."""
 
@@ -39,10 +47,12 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
     comm
         Ranks that share the rod: as many as there are, whatever number wrote the file.
 
-    Raises :class:`~rodfem.errors.SceneError` where the files are missing, or are those of another scene.
+    Raises :class:`~rodfem.errors.SceneError` where the files are missing, are those of another scene or of a newer
+    format, or lack something.
     """
     folder = Path(folder)
     data = load_json(folder / "diagram.json")
+    _check_entries(data, folder / "diagram.json")
     _check(data, scene, folder)
     solvers = [_solver(scene, data["discretization"]["formulation"], mesh, comm) for mesh in data["meshes"]]
     branches = [_branch(entry, solvers, folder / "states.h5") for entry in data["branches"]]
@@ -50,6 +60,17 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
     diagram = Diagram(scene, plan, branches, solvers)
     diagram.notes.append(f"read from {folder}")
     return diagram
+
+
+def _check_entries(data: dict[str, Any], path: Path) -> None:
+    """Raise :class:`SceneError` where a file without a version lacks what a diagram is made of."""
+    DIAGRAM.check(data, path, NEEDED)
+    for branch in data["branches"]:
+        where = f"{path}, branch {branch.get('name')!r},"
+        DIAGRAM.check(branch, where, OF_BRANCH)
+        DIAGRAM.check(branch["columns"], where, COLUMNS)
+        for special in branch["special"]:
+            DIAGRAM.check(special, where, OF_SPECIAL)
 
 
 def _check(data: dict[str, Any], scene: Scene, folder: Path) -> None:

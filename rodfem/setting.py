@@ -10,13 +10,16 @@ Cross-sections are not part of a scene.  A picture gives them the proportion of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rodfem.errors import SceneError
+
 Floats = NDArray[np.float64]
+T = TypeVar("T")
 
 SUPPORTS, DISTRIBUTED, SECTION, FOUNDATION, TIES = "supports", "distributed", "section", "foundation", "constraints"
 """Groups below that of a branch or a state, and of the file."""
@@ -147,7 +150,8 @@ class Setting:
 def read(group: Any, row: int | None = None) -> Setting:
     """Read what was written below a group of a file, with the section of the file; what is not there is left out.
 
-    ``row`` is that of the state; None where the group has one state only.
+    ``row`` is that of the state; None where the group has one state only.  Raises :class:`SceneError` where a support
+    or a constraint is not whole.
     """
     row, section, distributed, foundation = row or 0, None, None, None
     supports, ties = (
@@ -162,10 +166,22 @@ def read(group: Any, row: int | None = None) -> Setting:
     if DISTRIBUTED in group:
         along = group[DISTRIBUTED]
         distributed = along["s"][:], along["force"][row], along["follower"][row]
-    notes = [tie["note"] for tie in ties if tie["note"]]
+    held, kept = tuple(_made(Support, x, group) for x in supports), tuple(_made(Tie, x, group) for x in ties)
+    notes = [tie.note for tie in kept if tie.note]
     if FOUNDATION in group:
         along = group[FOUNDATION]
         foundation = (along["s"][:], along["stiffness"][:]) if "stiffness" in along else None
         notes += [along.attrs["note"]] if foundation is None else []
-    held = tuple(Support(**support) for support in supports)
-    return Setting(held, section, distributed, foundation, tuple(Tie(**tie) for tie in ties), tuple(notes))
+    return Setting(held, section, distributed, foundation, kept, tuple(notes))
+
+
+def _made(kind: type[T], entries: dict[str, Any], group: Any) -> T:
+    """A support or a constraint from the entries of a file, of which it needs some."""
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    missing = [name for name in names if name not in entries]
+    if missing:
+        raise SceneError(
+            f"{group.file.filename} has a {kind.__name__.lower()} without {', '.join(missing)} in {group.name}: "
+            "another version of rodfem wrote it; run the scene again."
+        )
+    return kind(**{name: entries[name] for name in names})

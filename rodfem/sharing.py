@@ -14,6 +14,7 @@ from typing import Any
 from mpi4py import MPI
 
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.file_format import RESULT
 from rodfem.files import save_json
 from rodfem.runner import writable
 from rodfem.scene import Scene
@@ -39,10 +40,11 @@ def many(
     ``work`` gets no communicator but must use ``MPI.COMM_SELF``, and returns what JSON can hold.  Where it raises
     :class:`SceneError` or :class:`ConvergenceError` the result is ``{"error": sentence}``, and the others go on.
     ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`SceneError` where ``folder``
-    cannot be written.
+    cannot be written, or has a result in another or a newer format.
     """
     writable(folder, comm)
     files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]
+    _check(files, comm)
     mine = range(comm.rank, len(scenes), comm.size)
     for done, i in enumerate(mine, start=1):
         if _saved(files[i], key_of(scenes[i])) is None:
@@ -50,7 +52,7 @@ def many(
                 result = work(scenes[i])
             except (SceneError, ConvergenceError) as trouble:
                 result = {"error": str(trouble)}
-            save_json({"key": key_of(scenes[i]), "result": result}, files[i])
+            save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
         if comm.rank == 0:
             progress(min(done * comm.size, len(scenes)), len(scenes))
     comm.barrier()
@@ -58,10 +60,30 @@ def many(
     return comm.bcast([{} if result is None else result for result in found])
 
 
+def _check(files: Sequence[Path], comm: MPI.Comm) -> None:
+    """Raise :class:`SceneError` on every rank where a file has a format that is not to be written over."""
+    trouble = ""
+    if comm.rank == 0:
+        try:
+            for file in files:
+                RESULT.check(_contents(file), file)
+        except SceneError as error:
+            trouble = str(error)
+    trouble = comm.bcast(trouble)
+    if trouble:
+        raise SceneError(trouble)
+
+
 def _saved(file: Path, key: dict[str, Any]) -> dict[str, Any] | None:
     """Result in a file, None where there is none for this rod."""
+    data = _contents(file)
+    return data.get("result") if data.get("key") == key else None
+
+
+def _contents(file: Path) -> dict[str, Any]:
+    """Entries of a file; none where it is missing or cut off."""
     try:
         data = json.loads(file.read_text())
     except (OSError, ValueError):
-        return None
-    return data["result"] if data.get("key") == key else None
+        return {}
+    return data if isinstance(data, dict) else {}

@@ -101,7 +101,7 @@ def test_files_of_another_scene(diagram: Diagram, folder: Path) -> None:
     other = replace(diagram.scene, parameters={**diagram.scene.parameters, "k0": Parameter(3.0)})
     with pytest.raises(SceneError, match=r"was computed with k0 = 9.42\d+, and the scene has 3: give the scene that"):
         rodfem.load(saved, other)
-    with pytest.raises(SceneError, match="is not a diagram"):
+    with pytest.raises(SceneError, match="is no rodfem diagram"):
         rodfem.load(folder, diagram.scene)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -40,3 +41,19 @@ def test_shared_kept_and_taken_up_again(folder: Path) -> None:
     done.clear()
     assert many(changed, work, folder / "many") == results
     assert COMM.allreduce(len(done)) == 2  # the one that was cut off, the one that has changed
+
+
+@pytest.mark.short
+def test_a_result_of_a_newer_format_is_kept(folder: Path) -> None:
+    """It is refused on every rank, and not written over."""
+    rods = [scene("cord", turns=float(turns)) for turns in (1.0, 1.5, 2.0)]
+    many(rods, lambda rod: {"span": list(rod.span)}, folder)
+    file = folder / "rod-00001.json"
+    if COMM.rank == 0:
+        data = json.loads(file.read_text())
+        file.write_text(json.dumps(data | {"format": data["format"] | {"version": 2, "program": "rodfem 9.1"}}))
+    COMM.barrier()
+    text = file.read_text()
+    with pytest.raises(SceneError, match=r"rod-00001.json was written by rodfem 9.1, in version 2 of the format"):
+        many(rods, lambda rod: {}, folder)
+    assert file.read_text() == text

@@ -26,6 +26,7 @@ from rodfem.branch import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, Special
 from rodfem.continuation import Equilibria, Follower, Steps
 from rodfem.digits import number
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.file_format import LOCUS
 from rodfem.files import save_json
 from rodfem.loci.collision import Collision
 from rodfem.loci.curve import Criterion, Half, Tracer
@@ -123,7 +124,8 @@ class Locus:
         columns["error"] = [[v if np.isfinite(v) else None for v in row] for row in self.error.tolist()]
         columns["omega2"] = [None if np.isnan(v) else v for v in self.omega2.tolist()]
         same = ("scene", "title", "kind", "ordinate_name", "start", "constants", "discretization")
-        return {name: getattr(self, name) for name in same} | {
+        out = {"format": LOCUS.mark(), **{name: getattr(self, name) for name in same}}
+        return out | {
             "parameters": list(self.names),
             "labels": list(self.labels),
             "bounds": [list(b) for b in self.bounds],

@@ -1,0 +1,110 @@
+"""Formats of the files that rodfem writes: names and versions, the mark that a file carries, and its check.
+
+A JSON file carries its mark in the entry ``format``, with ``name``, ``version`` and ``program``; an HDF5 file in the
+attributes ``format``, ``format_version`` and ``program``.  The version of a format rises where a reader of the last one
+would misread a file, or miss what it needs; entries that are merely added do not raise it.  A file without a mark is
+older than all versions: it is read where it has what the reader needs.
+
+Each entry, group and column is described in ``docs/files.md``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rodfem import __version__
+from rodfem.errors import SceneError
+
+if TYPE_CHECKING:
+    import h5py
+
+PROGRAM = f"rodfem {__version__}"
+"""Name and version of the program, as files have it."""
+MARK = "format"
+"""Entry, or attribute, that says what a file is."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """Format of a kind of file: its name, its version as written now, and which file of a run has it, in words."""
+
+    name: str
+    version: int
+    file: str
+
+    def mark(self) -> dict[str, Any]:
+        """Entry ``format`` of a JSON file."""
+        return {"name": self.name, "version": self.version, "program": PROGRAM}
+
+    def mark_attributes(self) -> dict[str, Any]:
+        """Attributes of an HDF5 file."""
+        return {MARK: self.name, f"{MARK}_version": self.version, "program": PROGRAM}
+
+    def check(self, data: Any, where: Path | str, needs: Sequence[str] = ()) -> None:
+        """Check the contents of a JSON file, named ``where`` in what is raised.
+
+        Raises :class:`SceneError` where it has another format, a newer version of this one, or no mark and not all
+        entries that a reader ``needs``.
+        """
+        if not isinstance(data, Mapping):
+            raise SceneError(f"{where} has no entries by name, so it is no {self.name}: give {self.file}.")
+        mark = data.get(MARK)
+        if mark is not None and not isinstance(mark, Mapping):
+            mark = {"name": mark}
+        self._check(mark, data, where, needs)
+
+    def check_hdf5(self, file: h5py.File, needs: Sequence[str] = ()) -> None:
+        """Check an open HDF5 file, as :meth:`check` does; ``needs`` are names of groups, or of attributes."""
+        mark = None
+        if MARK in file.attrs:
+            mark = {key: file.attrs.get(name) for key, name in zip(KEYS, self.mark_attributes(), strict=True)}
+        self._check(mark, {*file.attrs, *file}, file.filename, needs)
+
+    def _check(self, mark: Mapping[str, Any] | None, entries: Any, where: Path | str, needs: Sequence[str]) -> None:
+        if mark is None:
+            missing = [name for name in needs if name not in entries]
+            if missing:
+                raise SceneError(
+                    f"{where} has no {', '.join(missing)}, so it is no {self.name}, or one of a version of rodfem that "
+                    f"wrote less: give {self.file}, or run the scene again."
+                )
+            return
+        name, version, program = (mark.get(key) for key in KEYS)
+        if name != self.name:
+            raise SceneError(f"{where} has the format {name!r}, not {self.name!r}: give {self.file}.")
+        if not isinstance(version, (int, np.integer)) or version < 1:
+            raise SceneError(
+                f"{where} has version {version!r} of the format {self.name!r}, where a whole number from 1 on was "
+                "expected: run the scene again."
+            )
+        if version > self.version:
+            raise SceneError(
+                f"{where} was written by {program}, in version {version} of the format {self.name!r}, and {PROGRAM} "
+                f"reads versions up to {self.version}: read it with {program} or newer, or run the scene again."
+            )
+
+
+KEYS = ("name", "version", "program")
+"""Entries of a mark."""
+DIAGRAM = Format("rodfem diagram", 1, "the diagram.json of a run")
+STATES = Format("rodfem states", 1, "the states.h5 of a run")
+MODES = Format("rodfem modes", 1, "the modes.h5 of a run with --modes")
+LOCUS = Format("rodfem locus", 1, "a locus-1.json, locus-2.json ... of a run with --locus")
+RESULT = Format("rodfem result", 1, "a rod-00000.json, rod-00001.json ... of rodfem.many")
+FORMATS = (DIAGRAM, STATES, MODES, LOCUS, RESULT)
+
+
+def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, Any]:
+    """Contents of a JSON file; raises :class:`SceneError` where it cannot be read, and as :meth:`Format.check` does."""
+    try:
+        data: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as trouble:
+        raise SceneError(f"{path} is no {form.name} ({trouble}): give {form.file}.") from trouble
+    form.check(data, path, needs)
+    return data
