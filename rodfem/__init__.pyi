@@ -1,5 +1,7 @@
 # The public names as type checkers read them; rodfem/__init__.py loads each from the same module when it is used.
 
+__version__: str
+
 from rodfem.branch import Branch as Branch
 from rodfem.branch import Point as Point
 from rodfem.branch import Special as Special
