@@ -23,18 +23,18 @@ import scipy
 import scipy.sparse.linalg as spl
 from petsc4py import PETSc
 
+import rodfem.system
 from benchmarks.common import ROOT, exponent, machine, measured, milliseconds, table, versions
 from benchmarks.store import Store
-from rodfem.continuation import Equilibria
 from rodfem.corrector import Corrector
 from rodfem.fields import Discretization
+from rodfem.solvers import Solver
 from rodfem.stability.band import decide, quotient_error
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.judge import Judge
 from rodfem.stability.matrices import gathered
 from rodfem.stability.rank import rank_of
-from rodfem.system import System
 
 sys.path.append(str(ROOT / "tests"))
 
@@ -64,25 +64,25 @@ ENOUGH = 3.0
 """Seconds after which no judgement is repeated."""
 
 
-def state(formulation: str, elements: int, degree: int, which: str = "straight") -> tuple[System, PETSc.Vec]:
-    """The straight cord, or the buckled one.
+def state(formulation: str, elements: int, degree: int, which: str = "straight") -> tuple[Any, PETSc.Vec]:
+    """The discretised cord, and its straight state or the buckled one.
 
     Neither has a symmetry; the search for one, longer than what is measured, is left out.
     """
-    System._symmetries = lambda self: []  # type: ignore[method-assign]
-    solver = Equilibria(System(scenes.scene("cord"), Discretization(formulation, elements, degree)))
+    rodfem.system.find_symmetries = lambda fields, equations: []
+    solver = Solver(scenes.scene("cord"), Discretization(formulation, elements, degree)).equilibria
     solver.system.set_phase(None)
     load = LOAD if which == "straight" else BUCKLED
     guess = solver.start(load)
     if which == "buckled":
-        coarse, x = states.buckled("cord", formulation, 16, 6, load)
-        guess = solver.shape.restore(Equilibria(coarse).shape.sample(x))
+        _, x = states.buckled("cord", formulation, 16, 6, load)
+        guess = solver.shape.restore(states.solver("cord", formulation, 16, 6).shape.sample(x))
     x, outcome = solver.at_load(guess, load)
     assert outcome.converged
     return solver.system, x
 
 
-def task(method: str, system: System, x: PETSc.Vec) -> Callable[[], Any]:
+def task(method: str, system: Any, x: PETSc.Vec) -> Callable[[], Any]:
     """What is measured."""
     to_judge = Judge(system)
     assert to_judge.inertia is not None
@@ -142,7 +142,7 @@ def measure(method: str, formulation: str, elements: int, degree: int, which: st
     return {"seconds": seconds(run), "memory": memory, "first": first, "unknowns": system.fields.unknowns}
 
 
-def index(system: System, x: PETSc.Vec) -> tuple[float, float]:
+def index(system: Any, x: PETSc.Vec) -> tuple[float, float]:
     """Seconds of an index along a branch, and that over one factorisation.
 
     It is what remains without what Newton's method needs anyway: the assembly, and solves for step and tangent.  All
@@ -311,9 +311,9 @@ def ranks() -> str:
     for elements in (25, 50, 100, 200, 400, 1000, 10_000):
         row = [str(elements)]
         for name, coordinates in (("cord", "tangent"), ("hemitropic", "tangent"), ("hemitropic", "compatible")):
-            system = System(states.scene(name), Discretization("pointwise", elements, 1))
-            pencil = Blocks(system, coordinates).assemble(Equilibria(system).start(20.0 if name == "cord" else 0.1))
-            h = system.scene.length / elements
+            solver = Solver(states.scene(name), Discretization("pointwise", elements, 1)).equilibria
+            pencil = Blocks(solver.system, coordinates).assemble(solver.start(20.0 if name == "cord" else 0.1))
+            h = solver.system.scene.length / elements
             sigma = rank_of(pencil)
             row += [f"{sigma:.4e}", f"{sigma / h:.5f}"]
         rows.append(row)

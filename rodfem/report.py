@@ -72,12 +72,12 @@ def _roots(point: Point) -> dict[str, str]:
 
 
 class Report(Observer):
-    """Prints on rank 0; with ``quiet`` it prints nothing."""
+    """Prints on rank 0."""
 
-    def __init__(self, comm: MPI.Comm = MPI.COMM_WORLD, quiet: bool = False, stream: TextIO | None = None) -> None:
+    def __init__(self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None) -> None:
         """Print to ``stream``, by default the terminal."""
         self.count = INDEX
-        self.on = comm.rank == 0 and not quiet
+        self.on = comm.rank == 0
         self.stream = stream or sys.stdout
         self.live = self.on and self.stream.isatty() and comm.size == 1
 

@@ -91,8 +91,10 @@ class Terminal(Report):
     """Shows a run on the terminal, and keeps its files up to date."""
 
     def __init__(self, plan: Plan, output: Path, comm: MPI.Comm, quiet: bool) -> None:
-        """Write into the folder ``output``, which there is."""
-        super().__init__(comm, quiet)
+        """Write into the folder ``output``, which there is; with ``quiet`` print nothing."""
+        super().__init__(comm)
+        if quiet:
+            self.on = self.live = False
         self.plan, self.output = plan, output
 
     def system(self, system: System, accuracy: float | None = None) -> None:

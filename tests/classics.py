@@ -19,6 +19,7 @@ from forms.energy import bending
 from rodfem import (
     Attachment,
     Constraint,
+    Diagram,
     Discretization,
     End,
     Inertia,
@@ -37,13 +38,9 @@ from rodfem import (
     integral,
     pinned,
     sliding,
+    trace,
 )
-from rodfem.branch import BRANCH_POINT, Branch, Special
-from rodfem.continuation import Equilibria, Follower
-from rodfem.explore import Explorer
-from rodfem.report import Report
-from rodfem.sweep import Sweep
-from rodfem.system import System
+from rodfem.branch import BRANCH_POINT, Special
 
 RIGID = "unshearable and inextensible"
 FORMULATIONS = ("reduced", "pointwise")
@@ -58,8 +55,8 @@ Vector = Callable[[Any], tuple[Any, ...]]
 class Found:
     """Branches of a scene, and what computed them."""
 
-    def __init__(self, solver: Equilibria, branches: list[Branch]) -> None:
-        self.solver, self.branches = solver, branches
+    def __init__(self, diagram: Diagram) -> None:
+        self.solver, self.branches = diagram.solvers[0], diagram.branches
 
     def special(self, kind: str = BRANCH_POINT, branch: int = 0) -> list[Special]:
         """Special points of one kind along a branch."""
@@ -79,18 +76,15 @@ def explore(
     scene: Scene, formulation: str = "auto", elements: int = 8, depth: int = 0, stops: tuple[float, ...] = ()
 ) -> Found:
     """Trace the branches of a conservative scene."""
-    solver = Follower(System(scene, Discretization(formulation, elements, 6)))
-    plan = Plan(scene.span, at=stops, depth=depth, steps=WIDE, error_bars=False)
-    found = Found(solver, Explorer(solver, plan, Report(quiet=True), lambda: None).run())
-    verify(solver, found.branches)
+    plan = Plan(at=stops, depth=depth, steps=WIDE, error_bars=False)
+    found = Found(trace(scene, Discretization(formulation, elements, 6), plan))
+    verify(found.solver, found.branches)
     return found
 
 
 def sweep(scene: Scene, elements: int = 4) -> Found:
     """Frequencies over the range of loads of a scene that is not conservative."""
-    solver = Equilibria(System(scene, Discretization("auto", elements, 6)))
-    plan = Plan(scene.span, error_bars=False)
-    return Found(solver, Sweep(solver, plan, Report(quiet=True), lambda: None).run())
+    return Found(trace(scene, Discretization("auto", elements, 6), Plan(error_bars=False)))
 
 
 # --- columns --------------------------------------------------------------------------------------------------------

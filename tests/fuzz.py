@@ -32,6 +32,7 @@ from rodfem import (
     Plan,
     Ring,
     Scene,
+    Solver,
     Steps,
     at,
     clamped,
@@ -284,7 +285,7 @@ def examine(scene: Scene, depth: int = 0, elements: int = 6, degree: int = 5) ->
     plan = Plan(scene.span, depth=depth, steps=Steps(first=0.05, largest=0.2, most=40), error_bars=False)
     branches: list[Branch] = []
     try:
-        follower = Follower(System(scene, Discretization("auto", elements, degree)))
+        follower = Solver(scene, Discretization("auto", elements, degree)).equilibria
         explorer = Explorer(follower, plan, Report(stream=text), lambda: None)
         branches = explorer.branches
         explorer.run()

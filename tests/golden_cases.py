@@ -13,15 +13,11 @@ import scenes as demos
 import test_classics
 import test_docs
 
+import rodfem
 from rodfem.branch import FLUTTER, Branch, Special
-from rodfem.continuation import Equilibria, Follower
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.plan import Plan
-from rodfem.report import Report
 from rodfem.scene import Scene
-from rodfem.sweep import Sweep
-from rodfem.system import System
 
 DEMOS: dict[str, Callable[[], Scene]] = {
     "hemitropic": rods.scene,
@@ -58,12 +54,8 @@ def trace(scene: Scene) -> list[Branch]:
     By the default discretisation, or twice as many elements where the rod is bent from the start: of a closed rod the
     numbers of a coarse mesh depend on where it is along itself.
     """
-    system = System(scene, Discretization("auto", 8 if scene.start is None else 16, 6))
-    quiet = Report(quiet=True)
-    if scene.conservative:
-        plan = Plan(scene.span, depth=0 if scene.name in FAMILIES else 1)
-        return list(Explorer(Follower(system), plan, quiet, lambda: None).run())
-    return list(Sweep(Equilibria(system), Plan(scene.span), quiet, lambda: None).run())
+    mesh = Discretization("auto", 8 if scene.start is None else 16, 6)
+    return rodfem.trace(scene, mesh, Plan(depth=0 if scene.name in FAMILIES else 1)).branches
 
 
 def record(scene: Scene) -> list[dict[str, Any]]:

@@ -13,13 +13,13 @@ from types import ModuleType
 from rows import verify
 
 from rodfem.branch import Branch, Point, Special
-from rodfem.continuation import Follower
+from rodfem.continuation import Follower, Steps
 from rodfem.explore import Explorer
 from rodfem.fields import Discretization
+from rodfem.observer import Observer
 from rodfem.plan import Plan
-from rodfem.report import Report
 from rodfem.scene import Scene
-from rodfem.system import System
+from rodfem.solvers import Solver
 
 DEMO = Path(__file__).parents[1] / "demos" / "hemitropic.py"
 SPAN = (0.0, 0.95)
@@ -61,7 +61,7 @@ def follower(
     formulation: str = "reduced", elements: int = 8, degree: int = 6, constants: Constants = DEFAULT
 ) -> Follower:
     """The demo on one discretisation."""
-    return Follower(System(scene(constants), Discretization(formulation, elements, degree)))
+    return Solver(scene(constants), Discretization(formulation, elements, degree)).equilibria
 
 
 @cache
@@ -75,11 +75,12 @@ def explored(
     at: tuple[float, ...] = (),
     depth: int = 2,
     error_bars: bool = False,
+    steps: Steps = Steps(),  # noqa: B008, it is frozen
 ) -> list[Branch]:
-    """Branches of the demo."""
-    plan = Plan(span, at=at, depth=depth, error_bars=error_bars)
+    """Branches of the demo; all that are explored on one discretisation share what is set up for it."""
+    plan = Plan(span, at=at, depth=depth, steps=steps, error_bars=error_bars)
     solver = follower(formulation, elements, degree, constants)
-    branches = Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+    branches = Explorer(solver, plan, Observer(), lambda: None).run()
     verify(solver, branches)
     return branches
 

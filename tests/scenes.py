@@ -13,13 +13,10 @@ import numpy as np
 from rows import verify
 
 from rodfem.branch import Branch, Point
-from rodfem.continuation import Follower
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.plan import Plan
-from rodfem.report import Report
 from rodfem.scene import Scene
-from rodfem.system import System
+from rodfem.tracing import trace
 
 DEFAULTS: dict[str, dict[str, Any]] = {
     "cord": {"turns": 1.5, "span": (60.0, 0.0)},
@@ -55,9 +52,8 @@ class Found:
 
     def __init__(self, scene: Scene, discretization: Discretization, depth: int, at: tuple[float, ...]) -> None:
         """Explore the scene over its own span."""
-        self.scene, self.follower = scene, Follower(System(scene, discretization))
-        plan = Plan(scene.span, at=at, depth=depth)
-        self.branches = Explorer(self.follower, plan, Report(quiet=True), lambda: None).run()
+        diagram = trace(scene, discretization, Plan(at=at, depth=depth))
+        self.scene, self.follower, self.branches = scene, diagram.solvers[0], diagram.branches
         verify(self.follower, self.branches)
 
     def __getitem__(self, name: str) -> Branch:

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from rodfem.continuation import Equilibria
 from rodfem.fields import Discretization
 from rodfem.scene import Scene
+from rodfem.solvers import Solver
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.matrices import first_of, gathered
 from rodfem.stability.reduction import Reduction
@@ -25,7 +26,7 @@ def scene(name: str) -> Scene:
 
 @cache
 def solver(name: str, formulation: str, elements: int, degree: int) -> Equilibria:
-    return Equilibria(System(scene(name), Discretization(formulation, elements, degree)))
+    return Solver(scene(name), Discretization(formulation, elements, degree)).equilibria
 
 
 @cache

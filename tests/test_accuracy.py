@@ -21,17 +21,15 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from rodfem.branch import BRANCH_POINT, FLUTTER, FOLD, USER, Branch
-from rodfem.continuation import Follower
+from rodfem.diagram import Diagram
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization, Fields
 from rodfem.files import load_state
-from rodfem.meshes import start_mesh
 from rodfem.plan import Plan
-from rodfem.report import Report
 from rodfem.runner import run
 from rodfem.scene import Scene
-from rodfem.system import System
+from rodfem.solvers import Solver
+from rodfem.tracing import trace
 
 ALONE = [pytest.param(accuracy, marks=pytest.mark.alone) for accuracy in (1e-4, 1e-8, 1e-10)]
 ACCURACIES = pytest.mark.parametrize("accuracy", [1e-6, *ALONE])
@@ -39,19 +37,14 @@ CORD = {"fold": 7.8065554232, "shortening": 0.5793314271, "points": (49.34802200
 """Spectral collocation and shooting; ``k0^2 - w^2`` with ``w = 2 pi`` and ``tan(w/2) = w/2``."""
 
 
-def explored(scene: Scene, accuracy: float, at: tuple[float, ...] = (), depth: int = 1) -> Explorer:
+def explored(scene: Scene, accuracy: float, at: tuple[float, ...] = (), depth: int = 1) -> Diagram:
     """Explore a scene to an accuracy, on meshes of the program's choice."""
-    mesh = start_mesh(scene, "auto", accuracy, MPI.COMM_WORLD)
-    plan = Plan(scene.span, at, depth, accuracy=accuracy)
-    found = Explorer(Follower(System(scene, mesh)), plan, Report(quiet=True), lambda: None)
-    found.run()
-    return found
+    return trace(scene, plan=Plan(at=at, depth=depth, accuracy=accuracy))
 
 
-def special(found: Explorer, branch: str, kind: str) -> list[tuple[float, float]]:
+def special(found: Diagram, branch: str, kind: str) -> list[tuple[float, float]]:
     """Loads and ordinates of the special points of a kind on a branch."""
-    (chosen,) = [b for b in found.branches if b.name == branch]
-    return [(s.point.load, s.point.ordinate) for s in chosen.special if s.kind == kind]
+    return [(s.point.load, s.point.ordinate) for s in found.special(kind, branch)]
 
 
 def claimed(branches: list[Branch]) -> float:
@@ -103,7 +96,7 @@ def deflection(P: float) -> float:
 
 
 @cache
-def pulled(accuracy: float) -> Explorer:
+def pulled(accuracy: float) -> Diagram:
     return explored(taut.scene(), accuracy, at=(4.0, 5.0))
 
 
@@ -128,7 +121,7 @@ def test_graded_mesh_beats_uniform_ones() -> None:
     sizes = np.diff(graded.discretization.vertices)
     assert sizes.max() > 30 * sizes.min()
     assert sizes[[0, -1]] == pytest.approx(sizes.min(), rel=0.1)
-    uniform = Follower(System(taut.scene(), Discretization("auto", 12 * graded.unknowns // 40, 8)))
+    uniform = Solver(taut.scene(), Discretization("auto", 12 * graded.unknowns // 40, 8)).equilibria
     system = uniform.system
     assert system.fields.unknowns > 11 * graded.unknowns
     x = uniform.shape.restore(found.solvers[end.mesh].shape.sample(end.x))
@@ -153,7 +146,7 @@ def test_what_was_used_where(folder: Path) -> None:
             s = file["branches/straight/s"][row]
             s = s[np.isfinite(s)]
             assert s[:: meshes[number]["degree"]] == pytest.approx(meshes[number]["vertices"], abs=1e-14)
-    other = Follower(System(scene, Discretization("auto", 40, 6)))
+    other = Solver(scene, Discretization("auto", 40, 6)).equilibria
     for row in (0, len(rows["load"]) - 1):
         x = load_state(folder / "states.h5", "straight", row, other)
         assert other.shape.ordinate(x) == pytest.approx(rows["ordinate"][row], abs=1e-5)

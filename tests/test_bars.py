@@ -17,14 +17,10 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from rodfem import Discretization, Ordinate, Plan, Scene
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, trace
 from rodfem.branch import BRANCH_POINT, FOLD, Branch
-from rodfem.continuation import Follower
 from rodfem.digits import number
-from rodfem.explore import Explorer
-from rodfem.meshes import start_mesh
 from rodfem.report import Report
-from rodfem.system import System
 
 LARGE = 3.0
 """A bar is not larger than this times the error, but for round-off."""
@@ -36,9 +32,8 @@ DEEP = 8.973089969728
 def explored(scene: Scene, mesh: tuple[int, int] | float, at: tuple[float, ...] = (), depth: int = 0) -> list[Branch]:
     """Explore a scene with error bars, on equal elements of a degree, or to an accuracy."""
     accuracy = mesh if isinstance(mesh, float) else None
-    d = Discretization("auto", *mesh) if isinstance(mesh, tuple) else start_mesh(scene, "auto", mesh, MPI.COMM_WORLD)
-    plan = Plan(scene.span, at, depth, steps=classics.WIDE, accuracy=accuracy)
-    return list(Explorer(Follower(System(scene, d)), plan, Report(quiet=True), lambda: None).run())
+    d = Discretization("auto", *mesh) if isinstance(mesh, tuple) else None
+    return trace(scene, d, Plan(at=at, depth=depth, steps=classics.WIDE, accuracy=accuracy)).branches
 
 
 def check(value: float, exact: float, bar: float) -> None:
@@ -111,22 +106,20 @@ def test_highest_degree() -> None:
 # --- meshes that do not resolve the rod -----------------------------------------------------------------------------
 
 
-def coarse(accuracy: float | None) -> tuple[Follower, list[Branch]]:
+def coarse(accuracy: float | None) -> Diagram:
     """The hemitropic rod on two elements of degree 2 to begin with."""
-    solver = Follower(System(rods.scene(), Discretization("auto", 2, 2)))
-    plan = Plan((0.0, 0.55), (0.5,), 1, accuracy=accuracy)
-    return solver, list(Explorer(solver, plan, Report(quiet=True), lambda: None).run())
+    mesh = Discretization("auto", 2, 2, vertices=(-3.0, 0.0, 3.0))  # given, so that the accuracy chooses none
+    return trace(rods.scene(), mesh, Plan((0.0, 0.55), (0.5,), 1, accuracy=accuracy))
 
 
 def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
     """At 0.5 two meshes agree by accident in the ordinate, not in the strains: its bar is a tenth of its error."""
-    branches = coarse(None)[1]
-    (buckled,) = [b for b in branches if b.name == "branch 1"]
-    (s,) = [s for s in buckled.special if s.kind == "user"]
+    diagram = coarse(None)
+    (s,) = diagram.special("user", "branch 1")
     assert abs(s.point.ordinate - shooting.FIRST[0.5][0]) > 5 * s.ordinate_error
     assert s.resolved is False
     stream = StringIO()
-    Report(stream=stream).table(branches, System(rods.scene(), Discretization("auto", 2, 2)))
+    Report(stream=stream).table(diagram.branches, diagram.solvers[0].system)
     if MPI.COMM_WORLD.rank == 0:
         assert "(at least 2e-03)" in stream.getvalue()
         assert "does not resolve" in stream.getvalue()
@@ -134,8 +127,7 @@ def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
 
 def test_an_accuracy_is_not_reached_by_accident() -> None:
     """Points that agree on two meshes to the accuracy asked for, and are not resolved, are computed on a finer one."""
-    (buckled,) = [b for b in coarse(1e-2)[1] if b.name == "branch 1"]
-    (s,) = [s for s in buckled.special if s.kind == "user"]
+    (s,) = coarse(1e-2).special("user", "branch 1")
     assert s.resolved
     assert abs(s.point.ordinate - shooting.FIRST[0.5][0]) <= s.ordinate_error <= 1e-2 * s.point.ordinate
 

@@ -15,14 +15,11 @@ from scipy.special import ellipe, ellipk
 from forms import loads
 from forms.energy import bending
 from rodfem.branch import BRANCH_POINT, Branch
-from rodfem.continuation import Follower
 from rodfem.ends import pinned
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.plan import Plan
-from rodfem.report import Report
 from rodfem.scene import Ordinate, Scene
-from rodfem.system import System
+from rodfem.tracing import trace
 
 AT = (0.2, 0.325, 0.5, 0.7, 0.9)
 RICH, PLAIN = (16, 8), (8, 6)
@@ -211,8 +208,8 @@ def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
         ordinate=Ordinate("middle", s=0.5, of=lambda r, q: float(np.hypot(r[0], r[1]))),
         span=(0.0, 25.0),
     )
-    solver = Follower(System(column, Discretization("reduced", 8, 6)))
-    found = Explorer(solver, Plan(error_bars=False), Report(quiet=True), lambda: None).run()
+    found = trace(column, Discretization("reduced", 8, 6), Plan(error_bars=False))
+    system = found.solvers[0].system
     (loop,) = [s for b in found if b.name == "branch 1" for s in b.special if s.kind == "branch point"]
     assert loop.point.load == pytest.approx(P0, rel=1e-9)
     assert loop.multiplicity == 2
@@ -222,7 +219,7 @@ def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
         assert branch.ended == "end of range"
         assert branch.points[-1].load == 0.0
         for p in branch.points[1:]:
-            n = [solver.system.scalar(p.x, name) for name in ("n1", "n2")]
+            n = [system.scalar(p.x, name) for name in ("n1", "n2")]
             assert np.hypot(np.hypot(*n), p.load) == pytest.approx(P0, rel=1e-9)
             assert p.energy == pytest.approx(loop.point.energy, rel=1e-9)
             assert (p.negative, p.zero) == (1, 2)
@@ -241,9 +238,7 @@ def test_a_branch_point_right_after_the_beginning_of_a_branch(apart: float) -> N
         "nearly double", SUPPORTS["pinned-pinned"], (48.0, 51.0), planar="e2",
         constants={"k": 4 * pi**4 * (1 + apart), "B2": 1.0}, potential=lambda x, c: loads.spring(x.r, (c.k, 0.0, 0.0)),
     )  # fmt: skip
-    solver = Follower(System(scene, Discretization("auto", 8, 6)))
-    explorer = Explorer(solver, Plan(scene.span, error_bars=False), Report(quiet=True), lambda: None)
-    straight, second, first, *between = explorer.run()
+    straight, second, first, *between = trace(scene, Discretization("auto", 8, 6), Plan(error_bars=False))
     assert [s.point.load for s in straight.special[:2]] == pytest.approx(
         [(5 + apart) * pi**2, (5 + 4 * apart) * pi**2], abs=1e-9
     )

@@ -19,17 +19,31 @@ from rows import verify
 from scipy.optimize import brentq
 
 from forms.energy import bending
-from rodfem import Discretization, Ordinate, Parameter, Plan, Ring, Scene, Steps, clamped, free, pinned, sliding
+from rodfem import (
+    Discretization,
+    Observer,
+    Ordinate,
+    Parameter,
+    Plan,
+    Ring,
+    Scene,
+    Solver,
+    Steps,
+    clamped,
+    free,
+    pinned,
+    sliding,
+    trace,
+)
 from rodfem.bifurcation import directions, leave
 from rodfem.branch import BRANCH_POINT, FOLD
 from rodfem.chain import Row, breaks, chained, explain
-from rodfem.continuation import Follower, _to_load
+from rodfem.continuation import _to_load
 from rodfem.explore import Explorer
 from rodfem.files import _branch_data
 from rodfem.loci.locus import locus
 from rodfem.report import Report
 from rodfem.stability.judge import judge
-from rodfem.system import System
 from rodfem.tracer import equivalent
 
 EULER = pi**2 / 4
@@ -54,11 +68,10 @@ def test_a_rod_under_high_tension() -> None:
 
     The count at the prediction is another one than at the equilibrium; the paper's reduction is a third opinion.
     """
-    solver = Follower(System(localised(), Discretization("reduced", 40, 6)))
-    plan = Plan((3200.0, 2450.0), depth=1, error_bars=False)
-    branches = Explorer(solver, plan, Report(quiet=True), lambda: None).run()
-    verify(solver, branches)
-    (buckled,) = branches[1:]
+    diagram = trace(localised(), Discretization("reduced", 40, 6), Plan(depth=1, error_bars=False))
+    solver = diagram.solvers[0]
+    verify(solver, diagram.branches)
+    (buckled,) = diagram.branches[1:]
     assert {p.negative for p in buckled.points[1:]} == {1}
     for point in buckled.points[10::8]:
         solver.system.set_phase(point.x)
@@ -93,9 +106,7 @@ def test_a_double_point_that_the_mesh_splits() -> None:
         "ring", Ring(odd=True), (2.4, 2.7), load="k", constants={"k": 2.4, "B2": 1.0, "C": 1.5}, start=circle, **ROUND,
         energy=lambda v, k, c: bending((k[0], k[1], k[2] - c.k), (c.B1, c.B2, c.C)),
     )  # fmt: skip
-    solver = Follower(System(scene, Discretization("auto", 8, 6)))
-    plan = Plan(scene.span, depth=0, steps=WIDE)
-    (branch,) = Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+    (branch,) = trace(scene, Discretization("auto", 8, 6), Plan(depth=0, steps=WIDE))
     (special,) = [s for s in branch.special if s.kind == BRANCH_POINT]
     assert (special.negative_before, special.negative_after, special.multiplicity) == (4, 6, 2)
     assert abs(special.point.load - np.sqrt(15) / 1.5) < special.error_estimate
@@ -148,9 +159,8 @@ def test_a_fold_and_a_branch_point_of_opposite_sign_in_one_step(largest: float) 
     """
     scene = winkler()
     scene = replace(scene, parameters={**scene.parameters, "k": Parameter(240.0)})
-    solver = Follower(System(scene, Discretization("auto", 8, 6)))
-    plan = Plan(scene.span, depth=1, steps=Steps(largest=largest), error_bars=False)
-    branch = Explorer(solver, plan, Report(quiet=True), lambda: None).run()[2]
+    plan = Plan(depth=1, steps=Steps(largest=largest), error_bars=False)
+    branch = trace(scene, Discretization("auto", 8, 6), plan)[2]
     found = [(s.kind, s.negative_before, s.negative_after) for s in branch.special[1:3]]
     assert found == [(BRANCH_POINT, 3, 4), (FOLD, 4, 3)]
     assert [s.point.load for s in branch.special[1:3]] == pytest.approx([31.28043, 31.27381], abs=1e-5)
@@ -166,25 +176,22 @@ def test_an_eigenvalue_that_passes_zero_twice_in_one_step(longer: float, apart: 
     constants = (0.0, 1.0, 1.0, meet + longer)
     first = brentq(lambda lam: buckling(lam, *constants), 0.4, 0.5, xtol=1e-15)
     assert 1 - 2 * first == pytest.approx(apart, rel=5e-3)
-    solver = Follower(System(rods.scene(constants), Discretization("reduced", 16, 6)))
-    plan = Plan((0.0, 0.95), depth=0, steps=Steps(largest=0.1), error_bars=False)
-    (straight,) = Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+    mesh, plan = Discretization("reduced", 16, 6), Plan(depth=0, steps=Steps(largest=0.1), error_bars=False)
+    (straight,) = trace(rods.scene(constants), mesh, plan)
     pair = straight.special[1:3]
     assert [(s.negative_before, s.negative_after) for s in pair] == [(2, 4), (4, 2)]
     assert [s.point.load for s in pair] == pytest.approx([first, 1 - first], abs=1e-9)
     # in a shorter rod the eigenvalue comes near zero, and turns back
-    shorter = Follower(System(rods.scene((0.0, 1.0, 1.0, meet - longer)), Discretization("reduced", 16, 6)))
-    (straight,) = Explorer(shorter, plan, Report(quiet=True), lambda: None).run()
+    (straight,) = trace(rods.scene((0.0, 1.0, 1.0, meet - longer)), mesh, plan)
     assert [(s.negative_before, s.negative_after) for s in straight.special] == [(0, 2), (2, 0), (0, 0)]
 
 
 @pytest.mark.alone
 def test_every_row_of_the_ring_demo() -> None:
     scene = scenes.module("ring").scene(Namespace(twisting=1.5, span=(0.0, 1.6)))
-    solver = Follower(System(scene, Discretization("auto", 8, 6)))
-    branches = Explorer(solver, Plan(error_bars=False), Report(quiet=True), lambda: None).run()
-    verify(solver, branches)
-    assert [b.name for b in branches] == ["circle", "branch 1", "branch 1.1", "branch 1.2"]
+    diagram = trace(scene, Discretization("auto", 8, 6), Plan(error_bars=False))
+    verify(diagram.solvers[0], diagram.branches)
+    assert [b.name for b in diagram] == ["circle", "branch 1", "branch 1.1", "branch 1.2"]
 
 
 def test_what_is_not_explained_is_kept() -> None:
@@ -227,9 +234,8 @@ def test_steps_that_do_not_explain_are_repeated() -> None:
         potential=lambda x, c: loads.pressure(x.r, x.dr, c.P), **ROUND,
         energy=lambda v, k, c: (1 + c.e * ufl.cos(2 * c.s)) * bending(k, (c.B1, c.B2, c.C)),
     )  # fmt: skip
-    solver = Follower(System(scene, Discretization("auto", 12, 6)))
-    plan = Plan(scene.span, depth=0, steps=Steps(largest=0.1), error_bars=False)
-    (branch,) = Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+    plan = Plan(depth=0, steps=Steps(largest=0.1), error_bars=False)
+    (branch,) = trace(scene, Discretization("auto", 12, 6), plan)
     assert {p.negative for p in branch.points} == {0}
     assert not branch.unexplained
     assert abs(branch.points[-1].ordinate - 2.0) > 0.3
@@ -250,30 +256,28 @@ def test_branches_that_leave_at_the_end_of_the_range(short: float) -> None:
 
 def test_a_range_that_begins_at_a_branch_point() -> None:
     """What is not looked at is said: the branch point is a row that no search has before it."""
-    terminal = io.StringIO()
     scene = column("range", (clamped(), free(push)), (EULER, 4.0))
-    solver = Follower(System(scene, Discretization("reduced", 8, 6)))
-    (branch,) = Explorer(solver, Plan(scene.span, error_bars=False), Report(stream=terminal), lambda: None).run()
+    diagram = trace(scene, Discretization("reduced", 8, 6), Plan(error_bars=False))
+    (branch,) = diagram
     assert [p.negative for p in branch.points[1:]] == [1] * (len(branch.points) - 1)
-    assert "is singular: 1 eigenvalue(s) vanish there" in terminal.getvalue() or MPI.COMM_WORLD.rank > 0
+    assert any("is singular: 1 eigenvalue(s) vanish there" in sentence for sentence in diagram.warnings)
     assert _branch_data(branch)["singular_start"] == 1
 
 
 def test_eigenvalues_beside_a_critical_load_are_no_family_of_equilibria() -> None:
     """Within the tolerance of a count, yet far above the round-off of their Rayleigh quotients: nothing moves."""
-    terminal = io.StringIO()
     scene = column("range", (clamped(), free(push)), (EULER, EULER + 1e-6))
-    solver = Follower(System(scene, Discretization("reduced", 8, 6)))
-    Explorer(solver, Plan(scene.span, error_bars=False), Report(stream=terminal), lambda: None).run()
-    assert "move freely" not in terminal.getvalue()
-    assert "without being zero: a critical load is close to P = 2.4674011" in terminal.getvalue() or MPI.COMM_WORLD.rank
+    diagram = trace(scene, Discretization("reduced", 8, 6), Plan(error_bars=False))
+    said = " ".join((*diagram.warnings, *diagram.notes))
+    assert "move freely" not in said
+    assert "without being zero: a critical load is close to P = 2.4674011" in said
 
 
 def test_mirror_images_are_compared_at_one_load() -> None:
     """First points at distances that differ by 1e-4, relative, are of a branch and its image all the same."""
     scene = column("mirror", (clamped(), free(push)), (0.0, 6.0))
-    solver = Follower(System(scene, Discretization("reduced", 8, 6)))
-    explorer = Explorer(solver, Plan(scene.span, depth=0, error_bars=False), Report(quiet=True), lambda: None)
+    solver = Solver(scene, Discretization("reduced", 8, 6)).equilibria
+    explorer = Explorer(solver, Plan(scene.span, depth=0, error_bars=False), Observer(), lambda: None)
     (special,) = [s for s in explorer.run()[0].special if s.kind == "branch point" and s.point.load < 4]
     (way,) = directions(solver, special)
     first = leave(solver, special, way, 0.05)
@@ -287,11 +291,9 @@ def test_mirror_images_are_compared_at_one_load() -> None:
 def test_the_last_step_to_a_bound_goes_the_way_of_the_prediction() -> None:
     """From a straight state and a direction into the buckled ones the straight state at the bound is no next point."""
     scene = column("bound", (clamped(), free(push)), (0.0, 6.0))
-    solver = Follower(System(scene, Discretization("reduced", 8, 6)))
-    explorer = Explorer(solver, Plan((0.0, 2.6), depth=0, error_bars=False), Report(quiet=True), lambda: None)
-    (straight,) = explorer.run()
-    (special,) = [s for s in straight.special if s.kind == "branch point"]
-    last = straight.points[-1]
+    diagram = trace(scene, Discretization("reduced", 8, 6), Plan((0.0, 2.6), depth=0, error_bars=False))
+    (special,) = diagram.special("branch point")
+    solver, last = diagram.solvers[0], diagram[0].points[-1]
     aside = last.tangent.copy()
     aside.axpy(1.0, special.null_vectors[0])
     aside.scale(1.0 / solver.system.norm(aside))

@@ -17,10 +17,8 @@ from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 from scipy.special import ellipe, ellipk, jv
 
-from rodfem import Discretization, End, Scene, clamped
-from rodfem.continuation import Follower
+from rodfem import Discretization, End, Scene, Solver, clamped
 from rodfem.stability.vibration import Vibration
-from rodfem.system import System
 
 
 def root(f: Callable[[float], float], a: float, b: float) -> float:
@@ -209,7 +207,7 @@ def test_helix_as_the_degree_grows() -> None:
     """Its error falls to round-off."""
     errors, t = [], 2.0
     for degree in (2, 4, 6, 8, 10):
-        solver = Follower(System(classics.helix(3.0), Discretization("reduced", 6, degree)))
+        solver = Solver(classics.helix(3.0), Discretization("reduced", 6, degree)).equilibria
         x = solver.start(0.0)
         for load in (0.0, 0.5, 1.0, 1.5, t):
             x, outcome = solver.at_load(x, load)
@@ -414,7 +412,7 @@ def test_torque_on_a_cantilever(kind: str) -> None:
     """Nicolai's paradox: where both stiffnesses are equal there is flutter, however small the torque."""
     scene = classics.torque(kind)
     assert not scene.conservative
-    solver = Follower(System(scene, Discretization("pointwise", 4, 6)))
+    solver = Solver(scene, Discretization("pointwise", 4, 6)).equilibria
     x = solver.start(0.0)
     for T in (0.3, 0.6, 0.9):
         x, outcome = solver.at_load(x, T)

@@ -13,10 +13,7 @@ from rods import DEFAULT, explored, follower, specials, user_points
 
 from rodfem.continuation import Steps
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer
 from rodfem.files import load_state, save_states
-from rodfem.plan import Plan
-from rodfem.report import Report
 
 HALF = DEFAULT[3]
 points, weights = leggauss(12)
@@ -84,8 +81,7 @@ def test_loads_are_located_as_precisely_as_they_claim(start: float) -> None:
 
 @pytest.mark.alone
 def test_special_points_do_not_depend_on_the_steps() -> None:
-    plan = Plan((0.0, 0.6), steps=Steps(first=0.05, largest=0.25, aim=2e-2), error_bars=False)
-    coarse = Explorer(follower("reduced", 12, 6), plan, Report(quiet=True), lambda: None).run()
+    coarse = explored("reduced", 12, 6, span=(0.0, 0.6), steps=Steps(first=0.05, largest=0.25, aim=2e-2))
     found = [s.point.load for b in coarse for s in b.special if s.kind in ("branch point", "fold")]
     np.testing.assert_allclose(found, [*closed_form.loads(*DEFAULT), shooting.FOLD[0]], rtol=0, atol=1e-10)
     assert max(len(b.points) for b in coarse) < 20

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from io import StringIO
 from math import pi
 from typing import Any
 
@@ -15,11 +14,9 @@ import ufl
 
 import rodfem.system
 from forms.energy import bending
-from rodfem import Discretization, Plan, Ring, Scene, Steps
-from rodfem.continuation import Equilibria, Follower
-from rodfem.explore import Explorer
+from rodfem import Discretization, Observer, Plan, Ring, Scene, Solver, Steps, trace
+from rodfem.continuation import Equilibria
 from rodfem.newton import relax
-from rodfem.report import Report
 from rodfem.stability.judge import judge
 from rodfem.symmetries import Symmetry, elementary_generators
 from rodfem.system import System
@@ -39,8 +36,8 @@ def ring(planar: str | None = None, B2: float = 1.0, C: float = 1.0, load: Any =
 
 
 @cache
-def system(planar: str | None, B2: float, C: float) -> System:
-    return System(ring(planar, B2, C), Discretization("pointwise", 8, 6))
+def solver(planar: str | None, B2: float, C: float) -> Equilibria:
+    return Solver(ring(planar, B2, C), Discretization("pointwise", 8, 6)).equilibria
 
 
 def ritz(p: float, B: tuple[float, float, float], planar: bool, modes: int = 12) -> np.ndarray:
@@ -87,7 +84,7 @@ def circle_at(found: Equilibria, p: float) -> Any:
 @pytest.mark.parametrize("p", [0.5, 4.5, 9.5])
 @pytest.mark.parametrize(("planar", "B2", "C"), [("e2", 1.0, 1.0), (None, 1.0, 1.0), (None, 1.3, 0.7)])
 def test_index_of_the_circle(planar: str | None, B2: float, C: float, p: float) -> None:
-    found = Equilibria(system(planar, B2, C))
+    found = solver(planar, B2, C)
     verdict = judge(found, circle_at(found, p), number=6)
     mu = ritz(p, (1.0, B2, C), planar is not None)
     translations = 2 if planar else 3
@@ -99,9 +96,8 @@ def test_index_of_the_circle(planar: str | None, B2: float, C: float, p: float) 
 
 def test_special_points_of_the_circle() -> None:
     """It buckles in its plane at n^2, on top of the rotation."""
-    found = Follower(System(ring("e2"), Discretization("pointwise", 8, 6)))
     plan = Plan((0.3, 9.5), depth=0, steps=Steps(first=0.05, largest=0.15), error_bars=False)
-    branch = Explorer(found, plan, Report(quiet=True), lambda: None).run()[0]
+    branch = trace(ring("e2"), Discretization("pointwise", 8, 6), plan)[0]
     points = [s for s in branch.special if s.kind == "branch point"]
     assert [s.point.load for s in points] == pytest.approx([4.0, 9.0], abs=1e-7)
     assert [(s.negative_before, s.negative_after) for s in points] == [(1, 3), (3, 5)]
@@ -141,11 +137,14 @@ def test_a_false_symmetry_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
         return [*found(fields, equations), Symmetry(turn, parts)]
 
     monkeypatch.setattr(rodfem.system, "find_symmetries", more)
-    follower = Follower(System(ring("e2"), Discretization("pointwise", 8, 6)))
-    assert "rotation about e2" in map(str, follower.system.symmetries)
-    text = StringIO()
+    claimed: list[str] = []
+
+    class Ear(Observer):
+        def system(self, system: System, accuracy: float | None = None) -> None:
+            claimed.extend(map(str, system.symmetries))
+
     plan = Plan((0.5, 3.0), depth=0, steps=Steps(first=0.05, largest=0.15), error_bars=False)
-    branch = Explorer(follower, plan, Report(stream=text), lambda: None).run()[0]
-    assert {(p.negative, p.zero) for p in branch.points} == {(1, 2)}
-    said = text.getvalue().count("No symmetry is the rotation about e2")
-    assert said == (1 if follower.system.comm.rank == 0 else 0)
+    diagram = trace(ring("e2"), Discretization("pointwise", 8, 6), plan, Ear())
+    assert "rotation about e2" in claimed
+    assert {(p.negative, p.zero) for p in diagram[0].points} == {(1, 2)}
+    assert sum("No symmetry is the rotation about e2" in sentence for sentence in diagram.warnings) == 1

@@ -17,13 +17,14 @@ from rodfem.continuation import Follower, distance
 from rodfem.errors import SceneError
 from rodfem.explore import Explorer
 from rodfem.fields import Discretization
+from rodfem.observer import Observer
 from rodfem.plan import Plan
 from rodfem.report import Report
 from rodfem.search.deflation import NEW, SAME, Deflation, further, starts, states_at
 from rodfem.search.guesses import turned_state
 from rodfem.search.mirror import mirrors
 from rodfem.search.orbit import Orbit
-from rodfem.system import System
+from rodfem.solvers import Solver
 
 K0 = 3 * pi
 CORD = Problem(Rod(intrinsic=(0.0, K0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])
@@ -103,7 +104,7 @@ def test_hemitropic() -> None:
 
 def test_ring_in_its_plane() -> None:
     """Moved, turned, or run around along itself it is the same ring: a circle, and beyond 3 the pressed one."""
-    follower = Follower(System(classics.pressed_ring(), Discretization("auto", 12, 6)))
+    follower = Solver(classics.pressed_ring(), Discretization("auto", 12, 6)).equilibria
     found = Deflation(follower, 4.0).run(10)
     assert sorted(p.negative for p in found) == [0, 2]
     circle, pressed = sorted(found, key=lambda p: -p.negative)
@@ -127,7 +128,7 @@ def test_ruler() -> None:
     assert force(found.follower, image) < 1e-9
     assert search.nearest_known(image) < SAME
 
-    explorer = Explorer(found.follower, Plan((0.0, 12.0), error_bars=False), Report(quiet=True), lambda: None)
+    explorer = Explorer(found.follower, Plan((0.0, 12.0), error_bars=False), Observer(), lambda: None)
     up, down = starts(buckled, "found")
     for branch in (up, down):
         explorer.trace(branch)
@@ -139,7 +140,7 @@ def test_ruler() -> None:
 
 def test_nothing_to_find() -> None:
     """Under a small load there is one equilibrium: it is found, nothing else is, and the report says so."""
-    follower = Follower(System(scene("ruler", direction="e2"), Discretization()))
+    follower = Solver(scene("ruler", direction="e2"), Discretization()).equilibria
     out = StringIO()
     (only_one,) = further(follower, 0.2, tries=1)
     search = Deflation(follower, 0.2, [only_one])
@@ -162,7 +163,7 @@ def test_known_state_at_another_load() -> None:
 def test_mirrors_are_those_of_the_equations(formulation: str) -> None:
     expected = {"cord": {(1, -1, 1), (1, 1, -1), (1, -1, -1)}, "ruler": {(1, -1, 1)}}
     for name, signs in expected.items():
-        follower = Follower(System(scene(name), Discretization(formulation)))
+        follower = Solver(scene(name), Discretization(formulation)).equilibria
         found = mirrors(follower.system, follower.start(5.0))
         assert {m.signs for m in found} == signs
         x = turned_state(follower.system, follower.start(5.0), 1.0, [1, 2])

@@ -13,17 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from scenes import scene
 
-from rodfem.continuation import Follower
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.plan import Plan
 from rodfem.plot import PALETTE, SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram
 from rodfem.plot_pieces import PLANAR, STABLE, UNSTABLE, hidden, pieces_of
-from rodfem.report import Report
 from rodfem.scene import Ordinate
-from rodfem.system import System
 from rodfem.topology import link
+from rodfem.tracing import trace
 
 
 def branch(name: str, ordinate: list[float], negative: list[int], **more: Any) -> dict[str, Any]:
@@ -126,14 +123,13 @@ def test_imperfect_bifurcations_have_a_mark_and_their_unfolding(folder: Path) ->
 def test_twist_of_a_ring_is_its_link_less_its_writhe() -> None:
     """The ordinate, an integral of the discretised strains, beside the writhe of polygons (Klenin & Langowski)."""
     demo = scene("ring", twisting=1.5, span=(1.0, 1.2))
-    solver = Follower(System(demo, Discretization("reduced", 8, 6)))
-    plan = Plan(demo.span, depth=1, error_bars=False)
-    circle, buckled = Explorer(solver, plan, Report(quiet=True), lambda: None).run()[:2]
+    found = trace(demo, Discretization("reduced", 8, 6), Plan(depth=1, error_bars=False))
+    circle, buckled = found.branches[:2]
     np.testing.assert_allclose([p.ordinate for p in circle.points], 0.0, atol=1e-11)
     checked = 0
     for point in buckled.points[:: max(len(buckled.points) // 6, 1)]:
         if 0.1 < point.ordinate < 0.9:  # before it passes through itself
-            number, _, Wr = link(solver.shape.sample(point.x))
+            number, _, Wr = link(found.solvers[0].shape.sample(point.x))
             assert point.ordinate == pytest.approx(number - Wr, abs=2e-4)
             checked += 1
     assert checked > 1

@@ -11,10 +11,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.condensed import Condensed
-from rodfem.continuation import Follower
 from rodfem.copied import Copied
 from rodfem.factors import Klu, Mumps, lu_package
 from rodfem.fields import Discretization
+from rodfem.solvers import Solver
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.judge import Judge
 from rodfem.stability.matrices import gathered
@@ -166,8 +166,8 @@ def test_long_rods_are_cut(formulation: str, elements: int) -> None:
     """Their index, their eigenvalue nearest zero, and the left-most ones are those of MUMPS on one rank."""
     found = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
-        system = System(states.scene("cord"), Discretization(formulation, elements, 1), comm)
-        solver = Follower(system)
+        solver = Solver(states.scene("cord"), Discretization(formulation, elements, 1), comm).equilibria
+        system = solver.system
         for factors in (solver.inertia.factors, system.lu):
             assert isinstance(factors, Condensed) == (comm.size > 1)
         system.set_phase(None)
@@ -188,7 +188,7 @@ def test_dense_rows_do_not_fill_in(formulation: str, elements: int, degree: int)
 
     Where one of them is the pivot of a sparse row KLU takes tens to hundreds of times as long as MUMPS.
     """
-    solver = Follower(System(states.scene("hemitropic"), Discretization(formulation, elements, degree), MPI.COMM_SELF))
+    solver = Solver(states.scene("hemitropic"), Discretization(formulation, elements, degree), MPI.COMM_SELF).equilibria
     solver.system.set_phase(None)
     x = solver.start(0.3, 0.4)
     solver.inertia.assemble(x)

@@ -18,13 +18,10 @@ from rods import specials
 from scenes import scene
 
 from rodfem.branch import Branch
-from rodfem.continuation import Equilibria
 from rodfem.fields import Discretization
-from rodfem.plan import Plan
-from rodfem.report import Report
+from rodfem.solvers import Solver
 from rodfem.stability.vibration import Vibration
-from rodfem.sweep import Sweep
-from rodfem.system import System
+from rodfem.tracing import trace
 
 DEMO = Path(__file__).parents[1] / "demos" / "follower.py"
 
@@ -32,7 +29,7 @@ DEMO = Path(__file__).parents[1] / "demos" / "follower.py"
 @cache
 def vibration(P: float, elements: int = 8, degree: int = 6, **constants: object) -> Vibration:
     """The pencil of the demo at one load."""
-    solver = Equilibria(System(scene("follower", **constants), Discretization("pointwise", elements, degree)))
+    solver = Solver(scene("follower", **constants), Discretization("pointwise", elements, degree)).equilibria
     x, outcome = solver.at_load(solver.start(P), P)
     assert outcome.converged
     found = Vibration(solver.system)
@@ -43,8 +40,7 @@ def vibration(P: float, elements: int = 8, degree: int = 6, **constants: object)
 @cache
 def swept(span: tuple[float, float], rotary_inertia: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Branch:
     rod = scene("follower", span=span, rotary_inertia=rotary_inertia)
-    solver = Equilibria(System(rod, Discretization("pointwise", 4, 6)))
-    (branch,) = Sweep(solver, Plan(span), Report(quiet=True), lambda: None).run()
+    (branch,) = trace(rod, Discretization("pointwise", 4, 6))
     return branch
 
 

@@ -10,11 +10,9 @@ import classics
 import numpy as np
 import pytest
 
-from rodfem import Discretization, End, Plan, Scene, SceneError, sweep
+from rodfem import Discretization, End, Plan, Scene, SceneError, Solver, sweep, trace
 from rodfem.continuation import Equilibria
-from rodfem.report import Report
 from rodfem.stability.judge import judge
-from rodfem.system import System
 
 
 def scene(kind: str, balanced: bool = True) -> Scene:
@@ -30,7 +28,7 @@ def scene(kind: str, balanced: bool = True) -> Scene:
 
 @cache
 def solver(kind: str) -> Equilibria:
-    return Equilibria(System(scene(kind), Discretization("auto", 4, 6)))
+    return Solver(scene(kind), Discretization("auto", 4, 6)).equilibria
 
 
 def straight(found: Equilibria, load: float) -> Any:
@@ -82,9 +80,9 @@ def test_a_motion_that_a_load_drives(kind: str) -> None:
 def test_a_double_divergence_is_one(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside zero round-off makes a complex pair of a double eigenvalue: it is not two simple ones, nor flutter."""
     monkeypatch.setattr(sweep, "LOADS", 15)
-    coarse, loads = Equilibria(System(scene(kind), Discretization("auto", 2, 4))), []
+    loads = []
     for span in ((6.0, 6.5), (6.2, 6.3)):
-        (branch,) = sweep.Sweep(coarse, Plan(span, error_bars=False), Report(quiet=True), lambda: None).run()
+        (branch,) = trace(scene(kind), Discretization("auto", 2, 4), Plan(span, error_bars=False))
         found, _ = branch.special
         assert (found.kind, found.negative_before, found.negative_after) == ("divergence", 0, 2)
         loads.append(found.point.load)

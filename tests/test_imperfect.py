@@ -11,12 +11,8 @@ from classics import ON_AXIS, SUPPORTS, Found, column, push, turned
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc
 
-from rodfem import Discretization, Ordinate, Plan, Scene, clamped, free, pinned, sliding
+from rodfem import Discretization, Ordinate, Plan, Scene, Solver, clamped, free, pinned, sliding, trace
 from rodfem.branch import BRANCH_POINT, FOLD, IMPERFECT, Special
-from rodfem.continuation import Follower
-from rodfem.explore import Explorer
-from rodfem.report import Report
-from rodfem.system import System
 from rodfem.unfolding import unfold
 
 EULER = pi**2 / 4
@@ -33,11 +29,7 @@ def cantilever(lateral: float, more: Any = None) -> Scene:
 
 def diagram(scene: Scene, depth: int = 1, mesh: Discretization | None = None, **plan: Any) -> Found:
     """Branches of a scene and their solver, with the default steps."""
-    solver = Follower(System(scene, mesh or Discretization("reduced", 8, 6)))
-    explorer = Explorer(
-        solver, Plan(scene.span, depth=depth, error_bars=False, **plan), Report(quiet=True), lambda: None
-    )
-    return Found(solver, explorer.run())
+    return Found(trace(scene, mesh or Discretization("reduced", 8, 6), Plan(depth=depth, error_bars=False, **plan)))
 
 
 def load_of(k: float, lateral: float, side: float) -> float:
@@ -96,7 +88,7 @@ def test_unfolding_is_the_work_of_the_imperfection() -> None:
     for lateral in (0.0, 1e-6):
         straight = diagram(cantilever(0.0), depth=0)
         special = straight.special()[0]
-        solver = Follower(System(cantilever(lateral), Discretization("reduced", 8, 6)))
+        solver = Solver(cantilever(lateral), Discretization("reduced", 8, 6)).equilibria
         found = unfold(solver, special)
         assert found is not None
         assert found.load == pytest.approx(EULER, abs=1e-11)

@@ -14,11 +14,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from states import buckled, plain, scene
 
-from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.factoring import factors_of
 from rodfem.fields import Discretization
 from rodfem.scene import Inertia
+from rodfem.solvers import Solver
 from rodfem.stability.band import decide
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.inertia import Inertia as Count
@@ -28,7 +28,6 @@ from rodfem.stability.pencil import Inverse, assemble_pencil, symmetry_modes, we
 from rodfem.stability.projection import INVERSES
 from rodfem.stability.rank import rank_of, smallest_singular
 from rodfem.stability.reduction import Reduction
-from rodfem.system import System
 
 pytestmark = pytest.mark.alone
 
@@ -89,7 +88,7 @@ def test_methods_agree(name: str, load: float, bent: bool, formulation: str) -> 
 def test_methods_agree_with_other_ends_and_constraints(name: str, formulation: str) -> None:
     """Moving ends are rows, their moments and multipliers of constraints columns of C; eigenvalues come in pairs."""
     given = getattr(classics, name)()
-    solver = Equilibria(System(given, Discretization(formulation, 4, 3)))
+    solver = Solver(given, Discretization(formulation, 4, 3)).equilibria
     x, outcome = solver.first(0.9 * given.span[0] + 0.1 * given.span[1])
     assert outcome.converged
     to_judge = Judge(solver.system)
@@ -130,7 +129,7 @@ def test_names() -> None:
 @cache
 def reference() -> tuple[Judge, PETSc.Vec]:
     inertia = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (1e-3, 1e-3, 2e-3))
-    solver = Equilibria(System(replace(scenes.scene("cord"), inertia=inertia), Discretization("pointwise", 9, 6)))
+    solver = Solver(replace(scenes.scene("cord"), inertia=inertia), Discretization("pointwise", 9, 6)).equilibria
     solver.system.set_phase(None)
     x, outcome = solver.at_load(solver.start(20.0), 20.0)
     assert outcome.converged
@@ -145,7 +144,7 @@ def test_reference_values(method: str) -> None:
 
 
 def test_parameters_of_cayley_follow_a_branch() -> None:
-    solver = Equilibria(System(scene("cord"), Discretization("reduced", *SMALL)))
+    solver = Solver(scene("cord"), Discretization("reduced", *SMALL)).equilibria
     to_judge = Judge(solver.system)
     work = []
     for load in (30.0, 31.0, 32.0, 48.0, 60.0):
@@ -237,7 +236,7 @@ def test_interval_between_eigenvalues() -> None:
 def test_triple_cluster(method: str, apart: float) -> None:
     """A cantilever bends about d1 and d2 and twists with equal stiffness, mu = (pi/2)^2 thrice; a thrust parts them."""
     given = classics.euler("clamped-free").varying("P", (0.0, 1.0), B2=1.0)
-    solver = Equilibria(System(given, Discretization("reduced", *SMALL)))
+    solver = Solver(given, Discretization("reduced", *SMALL)).equilibria
     x, _ = solver.at_load(solver.start(apart), apart)
     to_judge = Judge(solver.system)
     for number in (2, 3, 4):
@@ -259,7 +258,7 @@ def test_triple_cluster(method: str, apart: float) -> None:
 @pytest.mark.parametrize("name", ["cord", "ruler"])
 def test_fields_without_mass(name: str, mass: float, rotary: tuple[float, float, float]) -> None:
     inertia = Inertia(rho_A=lambda c: mass, rho_I=lambda c: rotary)
-    solver = Equilibria(System(replace(scene(name), inertia=inertia), Discretization("pointwise", *SMALL)))
+    solver = Solver(replace(scene(name), inertia=inertia), Discretization("pointwise", *SMALL)).equilibria
     load = {"cord": 20.0, "ruler": 2.0}[name]
     x, outcome = solver.first(load)
     assert outcome.converged
@@ -277,7 +276,7 @@ def test_fields_without_mass(name: str, mass: float, rotary: tuple[float, float,
 def test_an_unstable_direction_without_mass(method: str) -> None:
     """Its eigenvalue is minus infinity."""
     inertia = Inertia(rho_I=lambda c: (0.0, 1.0, 0.0))
-    solver = Equilibria(System(replace(scene("cord"), inertia=inertia), Discretization("reduced", *SMALL)))
+    solver = Solver(replace(scene("cord"), inertia=inertia), Discretization("reduced", *SMALL)).equilibria
     x, _ = solver.first(20.0)
     with pytest.raises(ConvergenceError, match="no lower end"):
         Judge(solver.system)(x, method, 2)
@@ -288,7 +287,7 @@ def test_an_unstable_direction_without_mass(method: str) -> None:
 def test_no_mass_at_all(method: str) -> None:
     """One sentence: infinite eigenvalues are none."""
     inertia = Inertia(rho_I=lambda c: (0.0, 0.0, 0.0))
-    solver = Equilibria(System(replace(scene("cord"), inertia=inertia), Discretization("reduced", *SMALL)))
+    solver = Solver(replace(scene("cord"), inertia=inertia), Discretization("reduced", *SMALL)).equilibria
     x, _ = solver.first(60.0)
     with pytest.raises(SceneError, match="give it a mass or a rotary inertia"):
         Judge(solver.system)(x, method, 2)
@@ -310,7 +309,7 @@ def test_more_constraints_than_half_the_unknowns() -> None:
 
 def test_exact_zero() -> None:
     """At the buckling load of this discretisation, found by bisection of the quotient, mu is zero to round-off."""
-    solver = Equilibria(System(scene("cord"), Discretization("reduced", *SMALL)))
+    solver = Solver(scene("cord"), Discretization("reduced", *SMALL)).equilibria
     solver.system.set_phase(None)
     count = Count(solver.system)
 
@@ -335,7 +334,7 @@ def test_exact_zero() -> None:
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_small_eigenvalues_on_many_elements(formulation: str) -> None:
     """On either side of the buckling load, ever closer: right, or zero within what is said to be unknown."""
-    solver = Equilibria(System(scene("cord"), Discretization(formulation, 10_000, 1)))
+    solver = Solver(scene("cord"), Discretization(formulation, 10_000, 1)).equilibria
     solver.system.set_phase(None)
     count = Count(solver.system)
 
@@ -377,8 +376,8 @@ def test_smallest_singular_value(formulation: str) -> None:
 def test_smallest_singular_value_is_of_the_size_of_an_element() -> None:
     ratios = []
     for n in (50, 100, 200):
-        system = System(scene("cord"), Discretization("pointwise", n, 1))
-        pencil = Blocks(system).assemble(Equilibria(system).start(20.0))
+        solver = Solver(scene("cord"), Discretization("pointwise", n, 1)).equilibria
+        pencil = Blocks(solver.system).assemble(solver.start(20.0))
         ratios.append(rank_of(pencil) * n)
     assert abs(np.diff(ratios)).max() < 0.05 * ratios[-1]
 

@@ -23,18 +23,16 @@ from scipy.optimize import brentq
 
 from forms.energy import bending
 from rodfem.branch import Branch, Special
-from rodfem.continuation import Equilibria, Follower, Steps
+from rodfem.continuation import Equilibria, Steps
+from rodfem.diagram import Diagram
 from rodfem.ends import clamped, free
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.loci.locus import Locus, locus
 from rodfem.plan import Plan
 from rodfem.plot_locus import _footer, draw_locus
-from rodfem.report import Report
 from rodfem.scene import Ordinate, Parameter, Scene
-from rodfem.sweep import Sweep
-from rodfem.system import System
+from rodfem.tracing import trace
 
 pytestmark = pytest.mark.alone
 
@@ -55,7 +53,7 @@ def bent(s: np.ndarray) -> np.ndarray:
 
 
 @cache
-def cantilever(load: str, span: tuple[float, float]) -> tuple[Follower, list[Branch]]:
+def cantilever(load: str, span: tuple[float, float]) -> Diagram:
     """An inextensible cantilever under a thrust lam and a small force e across it, in the plane of weak bending."""
     rod = Scene(
         name="cantilever",
@@ -69,9 +67,7 @@ def cantilever(load: str, span: tuple[float, float]) -> tuple[Follower, list[Bra
         ordinate=Ordinate("deflection of the tip", s=1.0, of=lambda r, q: float(r[0])),
         span=span,
     )
-    solver = Follower(System(rod, Discretization("reduced", 4, 6)))
-    plan = Plan(span, depth=0, error_bars=False)
-    return solver, Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+    return trace(rod, Discretization("reduced", 4, 6), Plan(depth=0, error_bars=False))
 
 
 def root(f, guess: float) -> float:  # type: ignore[no-untyped-def]
@@ -147,9 +143,9 @@ def test_fold_ends_where_the_pitchfork_changes_its_side() -> None:
 
 def test_cusp() -> None:
     """A thrust above Euler's and a force across that sweeps from one side to the other: folds that meet at a cusp."""
-    solver, (branch,) = cantilever("e", (0.3, -0.3))
-    fold, other = specials(branch, "fold")
-    found = locus(solver, fold, "lam", ((-0.5, 0.5), (2.0, 3.0)), steps=WIDE, error_bars=0)
+    diagram = cantilever("e", (0.3, -0.3))
+    fold, other = diagram.special("fold")
+    found = locus(diagram.solvers[0], fold, "lam", ((-0.5, 0.5), (2.0, 3.0)), steps=WIDE, error_bars=0)
     (cusp,) = found.marks
     assert cusp.kind == "cusp"
     assert found.values[cusp.row] == pytest.approx([0, pi**2 / 4], abs=1e-9)
@@ -161,9 +157,9 @@ def test_cusp() -> None:
 
 
 def test_a_parameter_that_destroys_the_branch_point() -> None:
-    solver, (branch,) = cantilever("lam", (0.0, 4.0))
-    (euler,) = specials(branch, "branch point")
-    found = locus(solver, euler, "e", ((0.0, 4.0), (-1.0, 1.0)), steps=WIDE, error_bars=0)
+    diagram = cantilever("lam", (0.0, 4.0))
+    (euler,) = diagram.special("branch point")
+    found = locus(diagram.solvers[0], euler, "e", ((0.0, 4.0), (-1.0, 1.0)), steps=WIDE, error_bars=0)
     assert len(found.values) == 1
     assert found.ended == ("e is an imperfection that destroys the branch point",) * 2
 
@@ -171,8 +167,7 @@ def test_a_parameter_that_destroys_the_branch_point() -> None:
 def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rodfem.sweep.LOADS", 6)
     rod = demo_scene("follower", span=(19.0, 21.0))
-    solver = Equilibria(System(rod, Discretization("pointwise", 4, 6)))
-    (branch,) = Sweep(solver, Plan(rod.span, error_bars=False), Report(quiet=True), lambda: None).run()
+    solver, branch = swept(rod)
     (flutter,) = specials(branch, "flutter")
     found = locus(solver, flutter, "J1", ((18.0, 22.0), (0.0, 0.004)), steps=WIDE, error_bars=2)
     assert found.ended == ("J1 = 0, its bound", "J1 = 0.004, its bound")
@@ -183,9 +178,8 @@ def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None
 
 def swept(scene: Scene) -> tuple[Equilibria, Branch]:
     """Frequencies over the range of a scene, and what computed them."""
-    solver = Equilibria(System(scene, Discretization("pointwise", 4, 6)))
-    (branch,) = Sweep(solver, Plan(scene.span, error_bars=False), Report(quiet=True), lambda: None).run()
-    return solver, branch
+    diagram = trace(scene, Discretization("pointwise", 4, 6), Plan(error_bars=False))
+    return diagram.solvers[0], diagram[0]
 
 
 def test_flutter_of_a_rod_that_bends_alike(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:

@@ -25,7 +25,7 @@ from rodfem.modes import SYMMETRY, Modes, load_modes, save_modes
 from rodfem.motion import Motions
 from rodfem.plot_modes import FRAMES, GROWS, amplitude, draw_modes, main
 from rodfem.scene import Scene
-from rodfem.system import System
+from rodfem.solvers import Solver
 
 pytestmark = pytest.mark.short
 
@@ -34,7 +34,7 @@ FINE = Discretization("reduced", 6, 6)
 
 def state(given: Scene, discretization: Discretization, load: float, steps: int = 1) -> tuple[Equilibria, PETSc.Vec]:
     """Equilibrium that Newton's method finds from the scene's start, in ``steps`` of the load."""
-    solver = Equilibria(System(given, discretization))
+    solver = Solver(given, discretization).equilibria
     x, outcome = solver.first(load / steps)
     for part in np.linspace(0, load, steps + 1)[2:]:
         x, outcome = solver.at_load(x, part)

@@ -5,14 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mpi4py import MPI
-from rods import DEFAULT, explored, follower, scene
+from rods import explored, follower, scene
 
-from rodfem.continuation import Follower
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization
 from rodfem.plan import Plan
-from rodfem.report import Report
-from rodfem.system import System
+from rodfem.tracing import trace
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one")
 
@@ -21,9 +18,8 @@ pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares sever
 def test_ranks_change_nothing(formulation: str) -> None:
     together = explored(formulation, 7, 3)
     shared = follower(formulation, 7, 3)
-    alone = Follower(System(scene(DEFAULT), Discretization(formulation, 7, 3), MPI.COMM_SELF))
-    plan = Plan((0.0, 0.95), error_bars=False)
-    by_itself = Explorer(alone, plan, Report(MPI.COMM_SELF, quiet=True), lambda: None).run()
+    by_itself = trace(scene(), Discretization(formulation, 7, 3), Plan(error_bars=False), comm=MPI.COMM_SELF)
+    alone = by_itself.solvers[0]
     assert shared.system.fields.unknowns == alone.system.fields.unknowns
     assert [len(b.points) for b in together] == [len(b.points) for b in by_itself]
     for a, b in zip(together, by_itself, strict=True):

@@ -13,10 +13,10 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 from states import buckled, plain, scene
 
-from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fields import Discretization
 from rodfem.scene import Inertia
+from rodfem.solvers import Solver
 from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.stability.inertia import Inertia as Index
 from rodfem.stability.kernel import kernel
@@ -79,8 +79,8 @@ def below(p: Pencil) -> float:
 
 
 def sizes(name: str, formulation: str, coordinates: str, elements: int, degree: int) -> tuple[int, int]:
-    system = System(scene(name), Discretization(formulation, elements, degree))
-    found = Blocks(system, coordinates).assemble(Equilibria(system).start(0.1))
+    solver = Solver(scene(name), Discretization(formulation, elements, degree)).equilibria
+    system, found = solver.system, Blocks(solver.system, coordinates).assemble(solver.start(0.1))
     assert found.K.getSize() == found.M.getSize() == (found.C.getSize()[0],) * 2
     assert (
         sum(system.comm.allreduce(len(found.where[n])) for n in ("theta", "q", "v", "r") if n in found.where)
@@ -220,8 +220,8 @@ def test_work_is_linear() -> None:
     """Reflections of twice as long a rod take twice the memory: that is what a product reads."""
     kernels = []
     for elements in (64, 128):
-        system = System(scene("cord"), Discretization("pointwise", elements, 2))
-        p = Blocks(system).assemble(Equilibria(system).start(60.0))
+        solver = Solver(scene("cord"), Discretization("pointwise", elements, 2)).equilibria
+        p = Blocks(solver.system).assemble(solver.start(60.0))
         kernels.append(kernel(gathered(p.C), p.place))
     short, long = kernels
     assert 1.9 < long.memory / short.memory < 2.1
@@ -260,8 +260,8 @@ def test_elimination_is_the_same_inverse(name: str, load: float, bent: bool) -> 
 
 def test_all_eigenvalues_of_a_small_rod() -> None:
     """Strains have no mass: 9 of the 12 unknowns of the kernel move, the others are infinite eigenvalues."""
-    system = System(scene("hemitropic"), Discretization("reduced", 4, 1))
-    solver = Equilibria(system)
+    solver = Solver(scene("hemitropic"), Discretization("reduced", 4, 1)).equilibria
+    system = solver.system
     p = Blocks(system).assemble(solver.at_load(solver.start(0.1), 0.1)[0])
     reduction = Reduction(p)
     n = reduction.projection.kernel.dimension
@@ -301,7 +301,7 @@ def test_negative_eigenvalues_are_those_of_the_index() -> None:
 @cache
 def reference_pencil(coordinates: str) -> Pencil:
     inertia = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (1e-3, 1e-3, 2e-3))
-    solver = Equilibria(System(replace(scenes.scene("cord"), inertia=inertia), Discretization("pointwise", 9, 6)))
+    solver = Solver(replace(scenes.scene("cord"), inertia=inertia), Discretization("pointwise", 9, 6)).equilibria
     x, outcome = solver.at_load(solver.start(20.0), 20.0)
     assert outcome.converged
     return Blocks(solver.system, coordinates).assemble(x)

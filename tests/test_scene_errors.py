@@ -14,8 +14,8 @@ import ufl
 from mpi4py import MPI
 from rods import run_demo
 
-from rodfem import ends, scene
-from rodfem.continuation import Follower, Steps
+from rodfem import ends, scene, trace
+from rodfem.continuation import Steps
 from rodfem.ends import (
     Attachment,
     End,
@@ -30,11 +30,9 @@ from rodfem.ends import (
     pinned,
 )
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization, Fields
 from rodfem.files import load_json
 from rodfem.plan import Plan
-from rodfem.report import Report
 from rodfem.runner import run
 from rodfem.scene import Inertia, Ordinate, Parameter, Scene
 from rodfem.system import System
@@ -258,9 +256,8 @@ def test_functions_that_a_number_satisfies_but_no_expression() -> None:
 def test_a_rod_squeezed_to_nothing() -> None:
     """The energy is written in v3, not in v3 - 1: without a load the rod has no length."""
     scene = Scene(**(GOOD | {"energy": lambda v, k, c: ufl.dot(v, v) + ufl.dot(k, k)}))
-    solver = Follower(System(scene, Discretization("reduced", 4, 2)))
     with pytest.raises(SceneError, match=r"squeezed to a stretch.*v\[2\] - 1"):
-        Explorer(solver, Plan(scene.span, error_bars=False), Report(quiet=True), lambda: None).run()
+        trace(scene, Discretization("reduced", 4, 2), Plan(error_bars=False))
 
 
 def turns(s: np.ndarray, count: int) -> np.ndarray:
@@ -443,7 +440,5 @@ def test_constraints_that_repeat_each_other() -> None:
         ((at(0.0, lambda x, c: x.r[1]),), "constraint 1 of the scene"),
     ):
         rod = Scene(**(GOOD | {"constraints": constraints}))
-        solver = Follower(System(rod, Discretization("pointwise", 4, 6)))
-        plan = Plan(rod.span, error_bars=False)
         with pytest.raises(SceneError, match=f"depend on one another .{words}"):
-            Explorer(solver, plan, Report(quiet=True), lambda: None).run()
+            trace(rod, Discretization("pointwise", 4, 6), Plan(error_bars=False))

@@ -16,25 +16,21 @@ from mpi4py import MPI
 from rods import specials
 
 from rodfem.branch import Branch
-from rodfem.clock import Clock
-from rodfem.continuation import Equilibria
 from rodfem.fields import Discretization
-from rodfem.files import as_data
-from rodfem.plan import Plan
 from rodfem.plot_frequencies import curves, draw_frequencies
 from rodfem.report import Report
 from rodfem.scene import Scene
+from rodfem.solvers import Solver
 from rodfem.stability.vibration import Vibration
-from rodfem.sweep import Sweep
-from rodfem.system import System
+from rodfem.tracing import trace
 
 
 def swept(scene: Scene, monkeypatch: pytest.MonkeyPatch, loads: int = 26) -> tuple[Branch, dict, str]:
     """Frequencies over the range of a scene: branch, diagram, and what the terminal shows."""
     monkeypatch.setattr("rodfem.sweep.LOADS", loads)
-    solver, out = Equilibria(System(scene, Discretization("pointwise", 4, 6))), StringIO()
-    (branch,) = Sweep(solver, Plan(scene.span), Report(stream=out), lambda: None).run()
-    return branch, as_data([branch], [solver.system], Clock(), scene.span), out.getvalue()
+    out = StringIO()
+    diagram = trace(scene, Discretization("pointwise", 4, 6), observer=Report(stream=out))
+    return diagram[0], diagram.data, out.getvalue()
 
 
 def named(kinds: Callable[[str], bool], data: dict) -> bool:
@@ -111,7 +107,7 @@ def test_divergence_is_marked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_long_pencil_on_any_number_of_ranks() -> None:
     """22001 unknowns: cut at the ranks where there are several (exact: the frequency equation)."""
-    solver = Equilibria(System(classics.partly_following(1.0, (0.0, 25.0)), Discretization("pointwise", 2000, 1)))
+    solver = Solver(classics.partly_following(1.0, (0.0, 25.0)), Discretization("pointwise", 2000, 1)).equilibria
     x, outcome = solver.at_load(solver.start(10.0), 10.0)
     assert outcome.converged
     vibration = Vibration(solver.system)

@@ -11,11 +11,11 @@ from rods import scene as hemitropic
 from scenes import scene
 
 from forms.energy import bending
-from rodfem.continuation import Equilibria
 from rodfem.ends import Constants, End, Ring, clamped, free, pinned
 from rodfem.fields import Discretization
 from rodfem.newton import relax
 from rodfem.scene import Ordinate, Parameter, Scene
+from rodfem.solvers import Solver
 from rodfem.system import FEW, System
 from rodfem.topology import link, writhe
 
@@ -88,7 +88,7 @@ def test_a_fine_mesh_has_the_same_symmetries(rod: Scene, expected: int) -> None:
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_generators_are_null_vectors(formulation: str) -> None:
     """``S g = 0`` at an equilibrium, for the buckled pinned rod and both its symmetries."""
-    solver = Equilibria(System(column(pinned(), SLIDING, B=1.0), Discretization(formulation, 8, 6)))
+    solver = Solver(column(pinned(), SLIDING, B=1.0), Discretization(formulation, 8, 6)).equilibria
     system = solver.system
     x = solver.start(15.0, bent=0.8)
     system.set_phase(x)
@@ -117,7 +117,7 @@ def test_first_equilibrium_far_from_the_start() -> None:
         ordinate=MIDDLE,
         span=(0.0, 20.0),
     )
-    solver = Equilibria(System(coiled, Discretization("reduced", 8, 6)))
+    solver = Solver(coiled, Discretization("reduced", 8, 6)).equilibria
     x, outcome = solver.first(0.0)
     assert outcome.converged
     assert solver.energy(x) == pytest.approx(0.0, abs=1e-12)  # without tension it takes its own shape, a helix

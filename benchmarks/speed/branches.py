@@ -19,72 +19,61 @@ from benchmarks.speed.run import PARTS
 from benchmarks.speed.scenes import loads, scene, value
 from benchmarks.targets import TARGETS
 from rodfem.branch import Branch
-from rodfem.clock import Clock
-from rodfem.continuation import Equilibria, Follower
+from rodfem.diagram import Diagram
 from rodfem.errors import ConvergenceError
-from rodfem.explore import Explorer
 from rodfem.fields import Discretization
+from rodfem.observer import Observer
 from rodfem.plan import Plan
-from rodfem.report import Report
-from rodfem.sweep import Sweep
-from rodfem.system import System
+from rodfem.tracing import trace
 
 rodfem.clock.perf_counter = process_time
 """The clock measures processor time here, so that other work on the machine does not count."""
 
 
-class Timed(Explorer):
-    """An explorer that keeps the processor time of each branch, and the clock's parts of it."""
+class Timed(Observer):
+    """Notes the processor time of the setting up, of each branch with the clock's parts of it, and of all branches."""
 
-    def __init__(self, *arguments: Any) -> None:
-        """Explore as ever."""
-        super().__init__(*arguments)
+    def __init__(self) -> None:
+        """The setting up begins."""
+        self.started = process_time()
+        self.setup = self.run = 0.0
         self.cost: dict[str, dict[str, float]] = {}
 
-    def trace(self, branch: Branch) -> None:
-        """Trace a branch and note what it took."""
-        clock = self.follower.system.clock
-        before, started = dict(clock.seconds), process_time()
-        super().trace(branch)
-        self.cost[branch.name] = cost(clock, before, started)
+    def system(self, system: Any, accuracy: float | None = None) -> None:
+        """Note what the setting up took."""
+        self.clock, now = system.clock, process_time()
+        self.setup, self.started = now - self.started, now
+
+    def branch(self, branch: Branch) -> None:
+        """A branch begins."""
+        self.before, self.begun = dict(self.clock.seconds), process_time()
+
+    def complete(self, diagram: Diagram) -> None:
+        """Note the processor time of the last branch, that of following it alone, and the parts of this."""
+        now, clock = process_time(), self.clock
+        self.run, seconds = now - self.started, now - self.begun
+        parts = {name: clock.seconds.get(name, 0.0) - self.before.get(name, 0.0) for name in (*PARTS, "location")}
+        self.cost[diagram[-1].name] = {"seconds": seconds, "following": seconds - parts.pop("location"), **parts}
 
 
-def cost(clock: Clock, before: dict[str, float], started: float) -> dict[str, float]:
-    """Processor time since ``started``, that of following alone, and the parts of this."""
-    seconds = process_time() - started
-    parts = {name: clock.seconds.get(name, 0.0) - before.get(name, 0.0) for name in (*PARTS, "location")}
-    return {"seconds": seconds, "following": seconds - parts.pop("location"), **parts}
-
-
-def explored(solver: Equilibria, name: str) -> tuple[list[Branch], dict[str, dict[str, float]], float]:
-    """All branches of depth 1, what each cost, and the processor time of the whole."""
-    system, quiet = solver.system, Report(quiet=True)
-    plan = Plan(system.scene.span, at=loads(name), depth=1, error_bars=False)
-    started = process_time()
-    if isinstance(solver, Follower):
-        explorer = Timed(solver, plan, quiet, lambda: None)
-        branches = explorer.run()
-        return branches, explorer.cost, process_time() - started
-    before = dict(system.clock.seconds)
-    branches = Sweep(solver, plan, quiet, lambda: None).run()
-    return branches, {branches[0].name: cost(system.clock, before, started)}, process_time() - started
+def traced(name: str, mesh: Discretization) -> tuple[Diagram, Timed]:
+    """All branches of depth 1, and what they cost."""
+    timed = Timed()
+    return trace(scene(name), mesh, Plan(at=loads(name), depth=1, error_bars=False), timed), timed
 
 
 def measure(name: str, formulation: str, elements: int, degree: int, runs: int) -> list[dict[str, Any]]:
     """Medians of time, and errors, of each branch with targets."""
-    started = process_time()
-    system = System(scene(name), Discretization(formulation, elements, degree), clock=Clock())
-    solver = Follower(system) if system.scene.conservative else Equilibria(system)
-    setup = process_time() - started
-    explored(solver, name)  # fills caches
-    made = [explored(solver, name) for _ in range(runs)]
+    mesh = Discretization(formulation, elements, degree)
+    first, uncounted = traced(name, mesh)  # fills caches
+    made = [timed for _, timed in (traced(name, mesh) for _ in range(runs))]
     out = []
-    for branch in made[0][0]:
+    for branch in first:
         targets = TARGETS[name].get(branch.name)
         if targets is None:
             continue
         values = {t.name: value(t, branch) for t in targets}
-        costs = [c[branch.name] for _, c, _ in made]
+        costs = [timed.cost[branch.name] for timed in made]
         out.append(
             {
                 "scene": name,
@@ -92,12 +81,12 @@ def measure(name: str, formulation: str, elements: int, degree: int, runs: int) 
                 "formulation": formulation,
                 "elements": elements,
                 "degree": degree,
-                "unknowns": system.fields.unknowns,
+                "unknowns": first.solvers[0].system.fields.unknowns,
                 "runs": runs,
                 "points": len(branch.points),
                 "loads": [round(p.load, 6) for p in branch.points],
-                "setup": setup,
-                "run": median(r for _, _, r in made),
+                "setup": uncounted.setup,
+                "run": median(timed.run for timed in made),
                 **{part: median(c[part] for c in costs) for part in costs[0]},
                 "values": {k: None if isnan(v) else v for k, v in values.items()},
                 "errors": {t.name: abs(values[t.name] / t.reference - 1) for t in targets if not isnan(values[t.name])},

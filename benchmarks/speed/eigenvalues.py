@@ -18,16 +18,15 @@ import numpy as np
 
 from benchmarks.references import Spectrum, spectra
 from benchmarks.speed.scenes import with_inertia
-from rodfem.continuation import Equilibria
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fields import Discretization
+from rodfem.solvers import Solver
 from rodfem.stability.judge import Judge
-from rodfem.system import System
 
 
 def measure(spectrum: Spectrum, formulation: str, elements: int, degree: int, runs: int) -> dict[str, Any]:
     """Median time, and the largest relative error of the reference eigenvalues."""
-    solver = Equilibria(System(with_inertia(spectrum), Discretization(formulation, elements, degree)))
+    solver = Solver(with_inertia(spectrum), Discretization(formulation, elements, degree)).equilibria
     solver.system.set_phase(None)
     x, outcome = solver.at_load(solver.start(spectrum.load), spectrum.load)
     if not outcome.converged:

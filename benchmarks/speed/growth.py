@@ -22,10 +22,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from benchmarks.speed.scenes import scene
-from rodfem.continuation import Follower
 from rodfem.errors import ConvergenceError
 from rodfem.fields import Discretization
-from rodfem.system import System
+from rodfem.solvers import Solver
 
 import states  # isort: skip
 
@@ -40,13 +39,14 @@ def memory() -> float:
     return float(COMM.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)) / 1024
 
 
-def first(solver: Follower, state: str) -> PETSc.Vec:
+def first(solver: Any, state: str) -> PETSc.Vec:
     """State at the load, refined from a coarse mesh where it is buckled."""
     solver.system.set_phase(None)
     guess = solver.start(LOAD)
     if state == "buckled":
-        coarse, x = states.buckled("cord", solver.system.fields.discretization.formulation, 16, 6, LOAD)
-        guess = solver.shape.restore(Follower(coarse).shape.sample(x))
+        coarse = "cord", solver.system.fields.discretization.formulation, 16, 6
+        _, x = states.buckled(*coarse, LOAD)
+        guess = solver.shape.restore(states.solver(*coarse).shape.sample(x))
     x, outcome = solver.at_load(guess, LOAD)
     if not outcome.converged:
         raise ConvergenceError(f"no {state} state")
@@ -69,7 +69,7 @@ def timed(name: str, work: Callable[[], Any]) -> dict[str, float]:
 def measure(state: str, formulation: str, elements: int, comm: MPI.Comm) -> dict[str, Any]:
     """Times in seconds and memory in MB."""
     before, started, wall = memory(), process_time(), perf_counter()
-    solver = Follower(System(scene("cord"), Discretization(formulation, elements, DEGREE), comm))
+    solver: Any = Solver(scene("cord"), Discretization(formulation, elements, DEGREE), comm).equilibria
     setup = {"setup": process_time() - started, "setup wall": perf_counter() - wall}
     x = first(solver, state)
     corrections: list[int] = []
