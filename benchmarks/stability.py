@@ -23,18 +23,18 @@ import scipy
 import scipy.sparse.linalg as spl
 from petsc4py import PETSc
 
-import rodfem.system
+import rodfem.fem.system
 from benchmarks.common import ROOT, exponent, machine, measured, milliseconds, table, versions
 from benchmarks.store import Store
-from rodfem.corrector import Corrector
-from rodfem.fields import Discretization
-from rodfem.solvers import Solver
-from rodfem.stability.band import decide, quotient_error
+from rodfem.continuation.corrector import Corrector
+from rodfem.diagram.solver import Solver
+from rodfem.fem.fields import Discretization
+from rodfem.linalg.matrices import gathered
+from rodfem.stability.assessment import Judge
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.inertia import Inertia
-from rodfem.stability.judge import Judge
-from rodfem.stability.matrices import gathered
 from rodfem.stability.rank import rank_of
+from rodfem.stability.round_off import decide, quotient_error
 
 sys.path.append(str(ROOT / "tests"))
 
@@ -69,7 +69,7 @@ def state(formulation: str, elements: int, degree: int, which: str = "straight")
 
     Neither has a symmetry; the search for one, longer than what is measured, is left out.
     """
-    rodfem.system.find_symmetries = lambda fields, equations: []
+    rodfem.fem.system.find_symmetries = lambda fields, equations: []
     solver = Solver(scenes.scene("cord"), Discretization(formulation, elements, degree)).equilibria
     solver.system.set_phase(None)
     load = LOAD if which == "straight" else BUCKLED
@@ -382,9 +382,9 @@ Pointwise:
 
 The band is the half width of the interval about zero in which inertia alone decides nothing, relative to the system's
 metric: 10 eps |S| over the smallest mass. Inside it the Rayleigh quotient of the pair nearest zero decides, which
-round-off blurs by no more than the number in the next column (`rodfem/stability/band.py`). The band grows like n as
-long as the largest entries of S are those of the constraints, then like n^2; the other number like n^1.5. Few elements
-of high degree reach more digits with a narrower band.
+round-off blurs by no more than the number in the next column (`rodfem/stability/round_off.py`). The band grows like n
+as long as the largest entries of S are those of the constraints, then like n^2; the other number like n^1.5. Few
+elements of high degree reach more digits with a narrower band.
 
 {band}
 ## The rank of the constraints

@@ -17,11 +17,11 @@ Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section
 from argparse import Namespace
 from math import hypot, inf
 
-import rodfem.cli as cli
+import rodfem.app.cli as cli
 from forms.energy import bending
-from rodfem.ends import clamped, free
 from rodfem.errors import SceneError
-from rodfem.scene import Inertia, Ordinate, Parameter, Scene
+from rodfem.problem.ends import clamped, free
+from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 
 
 def scene(options: Namespace) -> Scene:

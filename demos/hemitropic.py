@@ -20,10 +20,10 @@ Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section
 from argparse import Namespace
 from math import hypot, inf
 
-import rodfem.cli as cli
+import rodfem.app.cli as cli
 from forms.energy import hemitropic
-from rodfem.ends import clamped
-from rodfem.scene import Ordinate, Parameter, Scene
+from rodfem.problem.ends import clamped
+from rodfem.problem.scene import Ordinate, Parameter, Scene
 
 
 def scene(options: Namespace) -> Scene:

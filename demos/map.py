@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-import rodfem.cli as cli
+import rodfem.app.cli as cli
 from forms.energy import hemitropic
-from rodfem.ends import clamped
-from rodfem.fields import Discretization
-from rodfem.plan import Plan
-from rodfem.report import Report
-from rodfem.scene import Ordinate, Parameter, Scene
-from rodfem.sharing import many
-from rodfem.tracing import trace
+from rodfem.app.many import many
+from rodfem.app.terminal import Report
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
+from rodfem.fem.fields import Discretization
+from rodfem.problem.ends import clamped
+from rodfem.problem.scene import Ordinate, Parameter, Scene
 
 
 def scene(A: float, highest: float) -> Scene:

@@ -20,10 +20,10 @@ from math import inf, pi
 
 import numpy as np
 
-import rodfem.cli as cli
+import rodfem.app.cli as cli
 from forms.energy import bending
-from rodfem.ends import Ring
-from rodfem.scene import Ordinate, Parameter, Scene
+from rodfem.problem.ends import Ring
+from rodfem.problem.scene import Ordinate, Parameter, Scene
 
 TWIST = r"twist $\int k_3\,ds/2\pi$"
 

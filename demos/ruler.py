@@ -17,11 +17,11 @@ Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section
 
 from argparse import Namespace
 
-import rodfem.cli as cli
+import rodfem.app.cli as cli
 from forms.energy import bending, logarithmic_stretch
-from rodfem.ends import clamped, free
 from rodfem.errors import SceneError
-from rodfem.scene import Ordinate, Parameter, Scene
+from rodfem.problem.ends import clamped, free
+from rodfem.problem.scene import Ordinate, Parameter, Scene
 
 DIRECTIONS = {"e1": (1.0, 0.0), "e2": (0.0, 1.0)}
 

@@ -1,4 +1,4 @@
-"""Modules of a package as its attributes, loaded when they are used: ``help(rodfem.modes)`` after ``import rodfem``."""
+"""Modules of a package as its attributes, loaded when they are used: ``help(rodfem.modes)``."""
 
 from __future__ import annotations
 

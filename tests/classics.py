@@ -40,7 +40,7 @@ from rodfem import (
     sliding,
     trace,
 )
-from rodfem.branch import BRANCH_POINT, Special
+from rodfem.continuation.branch import BRANCH_POINT, Special
 
 RIGID = "unshearable and inextensible"
 FORMULATIONS = ("reduced", "pointwise")

@@ -44,14 +44,14 @@ from rodfem import (
     pinned,
     sliding,
 )  # fmt: skip
-from rodfem.branch import Branch
-from rodfem.continuation import Follower
+from rodfem.app.terminal import Report
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.solvers import Follower
+from rodfem.diagram.explorer import Explorer
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.explore import Explorer
-from rodfem.report import Report
-from rodfem.stability.matrices import gathered
+from rodfem.fem.system import System
+from rodfem.linalg.matrices import gathered
 from rodfem.stability.pencil import assemble_pencil
-from rodfem.system import System
 
 ZERO, NEAR = 1e-7, 1e-4
 """An eigenvalue less than the first, over the lowest bending one, is zero; between the two it may be either."""

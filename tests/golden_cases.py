@@ -14,10 +14,10 @@ import test_classics
 import test_docs
 
 import rodfem
-from rodfem.branch import FLUTTER, Branch, Special
-from rodfem.fields import Discretization
-from rodfem.plan import Plan
-from rodfem.scene import Scene
+from rodfem.continuation.branch import FLUTTER, Branch, Special
+from rodfem.diagram.plan import Plan
+from rodfem.fem.fields import Discretization
+from rodfem.problem.scene import Scene
 
 DEMOS: dict[str, Callable[[], Scene]] = {
     "hemitropic": rods.scene,

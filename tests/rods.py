@@ -12,14 +12,14 @@ from types import ModuleType
 
 from rows import verify
 
-from rodfem.branch import Branch, Point, Special
-from rodfem.continuation import Follower, Steps
-from rodfem.explore import Explorer
-from rodfem.fields import Discretization
-from rodfem.observer import Observer
-from rodfem.plan import Plan
-from rodfem.scene import Scene
-from rodfem.solvers import Solver
+from rodfem.continuation.branch import Branch, Point, Special
+from rodfem.continuation.observer import Observer
+from rodfem.continuation.solvers import Follower, Steps
+from rodfem.diagram.explorer import Explorer
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import Solver
+from rodfem.fem.fields import Discretization
+from rodfem.problem.scene import Scene
 
 DEMO = Path(__file__).parents[1] / "demos" / "hemitropic.py"
 SPAN = (0.0, 0.95)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rodfem.branch import BRANCH_POINT, FOLD, Branch
-from rodfem.continuation import Follower
-from rodfem.stability.judge import judge
+from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch
+from rodfem.continuation.solvers import Follower
+from rodfem.stability.assessment import judge
 
 
 def verify(follower: Follower, branches: Sequence[Branch], explained: bool = True) -> None:

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from rows import verify
 
-from rodfem.branch import Branch, Point
-from rodfem.fields import Discretization
-from rodfem.plan import Plan
-from rodfem.scene import Scene
-from rodfem.tracing import trace
+from rodfem.continuation.branch import Branch, Point
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
+from rodfem.fem.fields import Discretization
+from rodfem.problem.scene import Scene
 
 DEFAULTS: dict[str, dict[str, Any]] = {
     "cord": {"turns": 1.5, "span": (60.0, 0.0)},

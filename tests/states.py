@@ -10,14 +10,14 @@ import rods
 import scenes
 from petsc4py import PETSc
 
-from rodfem.continuation import Equilibria
-from rodfem.fields import Discretization
-from rodfem.scene import Scene
-from rodfem.solvers import Solver
+from rodfem.continuation.solvers import Equilibria
+from rodfem.diagram.solver import Solver
+from rodfem.fem.fields import Discretization
+from rodfem.fem.system import System
+from rodfem.linalg.matrices import first_of, gathered
+from rodfem.problem.scene import Scene
 from rodfem.stability.blocks import Blocks
-from rodfem.stability.matrices import first_of, gathered
 from rodfem.stability.reduction import Reduction
-from rodfem.system import System
 
 
 def scene(name: str) -> Scene:

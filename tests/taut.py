@@ -8,8 +8,8 @@ of a pendulum), and shortens the rod by ``2 (1 - cos(ANGLE/2)) / sqrt(T)``; the 
 from math import cos, pi, sin
 
 from forms.energy import bending
-from rodfem.ends import clamped, sliding
-from rodfem.scene import Ordinate, Parameter, Scene
+from rodfem.problem.ends import clamped, sliding
+from rodfem.problem.scene import Ordinate, Parameter, Scene
 
 ANGLE = pi / 3
 

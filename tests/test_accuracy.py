@@ -20,16 +20,16 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from rodfem.branch import BRANCH_POINT, FLUTTER, FOLD, USER, Branch
-from rodfem.diagram import Diagram
+from rodfem.app.run import run
+from rodfem.continuation.branch import BRANCH_POINT, FLUTTER, FOLD, USER, Branch
+from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import Solver
+from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
-from rodfem.fields import Discretization, Fields
-from rodfem.files import load_state
-from rodfem.plan import Plan
-from rodfem.runner import run
-from rodfem.scene import Scene
-from rodfem.solvers import Solver
-from rodfem.tracing import trace
+from rodfem.fem.fields import Discretization, Fields
+from rodfem.output.files import load_state
+from rodfem.problem.scene import Scene
 
 ALONE = [pytest.param(accuracy, marks=pytest.mark.alone) for accuracy in (1e-4, 1e-8, 1e-10)]
 ACCURACIES = pytest.mark.parametrize("accuracy", [1e-6, *ALONE])

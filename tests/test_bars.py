@@ -18,9 +18,9 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, trace
-from rodfem.branch import BRANCH_POINT, FOLD, Branch
-from rodfem.digits import number
-from rodfem.report import Report
+from rodfem.app.terminal import Report
+from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch
+from rodfem.output.digits import number
 
 LARGE = 3.0
 """A bar is not larger than this times the error, but for round-off."""

@@ -14,12 +14,12 @@ from scipy.special import ellipe, ellipk
 
 from forms import loads
 from forms.energy import bending
-from rodfem.branch import BRANCH_POINT, Branch
-from rodfem.ends import pinned
-from rodfem.fields import Discretization
-from rodfem.plan import Plan
-from rodfem.scene import Ordinate, Scene
-from rodfem.tracing import trace
+from rodfem.continuation.branch import BRANCH_POINT, Branch
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
+from rodfem.fem.fields import Discretization
+from rodfem.problem.ends import pinned
+from rodfem.problem.scene import Ordinate, Scene
 
 AT = (0.2, 0.325, 0.5, 0.7, 0.9)
 RICH, PLAIN = (16, 8), (8, 6)

@@ -35,16 +35,16 @@ from rodfem import (
     sliding,
     trace,
 )
-from rodfem.bifurcation import directions, leave
-from rodfem.branch import BRANCH_POINT, FOLD
-from rodfem.chain import Row, breaks, chained, explain
-from rodfem.continuation import _to_load
-from rodfem.explore import Explorer
-from rodfem.files import _branch_data
-from rodfem.loci.locus import locus
-from rodfem.report import Report
-from rodfem.stability.judge import judge
-from rodfem.tracer import equivalent
+from rodfem.app.terminal import Report
+from rodfem.codim2.locus import locus
+from rodfem.continuation.branch import BRANCH_POINT, FOLD
+from rodfem.continuation.index_chain import Row, breaks, chained, explain
+from rodfem.continuation.solvers import _to_load
+from rodfem.continuation.special_points import directions, leave
+from rodfem.diagram.explorer import Explorer
+from rodfem.diagram.tracer import equivalent
+from rodfem.output.files import _branch_data
+from rodfem.stability.assessment import judge
 
 EULER = pi**2 / 4
 """Buckling load of the clamped-free column."""

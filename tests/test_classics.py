@@ -18,7 +18,7 @@ from scipy.optimize import brentq, fsolve
 from scipy.special import ellipe, ellipk, jv
 
 from rodfem import Discretization, End, Scene, Solver, clamped
-from rodfem.stability.vibration import Vibration
+from rodfem.stability.nonsymmetric import Vibration
 
 
 def root(f: Callable[[float], float], a: float, b: float) -> float:
@@ -386,7 +386,7 @@ def cantilever(mu: complex, P: float, tip: float, middle: float) -> complex:
 def test_flutter_with_masses(
     tip: float, middle: float, span: tuple, about: tuple | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rodfem.sweep.LOADS", 6)
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
     scene = classics.beck(tip, middle, span)
     assert not scene.conservative
     (flutter,) = sweep(scene).special("flutter")
@@ -401,7 +401,7 @@ def test_flutter_with_masses(
 
 
 def test_leipholz(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rodfem.sweep.LOADS", 6)
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
     scene = classics.leipholz()
     assert not scene.conservative
     assert sweep(scene).loads("flutter") == pytest.approx([40.0537365149], rel=1e-9)

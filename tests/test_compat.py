@@ -16,8 +16,8 @@ from rods import follower, run_demo, scene
 
 from rodfem import compat
 from rodfem.errors import EnvironmentTrouble
-from rodfem.fields import Discretization
-from rodfem.system import System
+from rodfem.fem.fields import Discretization
+from rodfem.fem.system import System
 
 COMM = MPI.COMM_WORLD
 DEGREES = pytest.mark.parametrize("degree", [1, 2, 3, 6, 8])

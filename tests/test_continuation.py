@@ -11,9 +11,9 @@ import shooting
 from numpy.polynomial.legendre import leggauss
 from rods import DEFAULT, explored, follower, specials, user_points
 
-from rodfem.continuation import Steps
+from rodfem.continuation.solvers import Steps
 from rodfem.errors import SceneError
-from rodfem.files import load_state, save_states
+from rodfem.output.files import load_state, save_states
 
 HALF = DEFAULT[3]
 points, weights = leggauss(12)

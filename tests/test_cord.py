@@ -12,7 +12,7 @@ from rods import specials, user_points
 from scenes import Found, explored
 from scipy.optimize import brentq
 
-from rodfem.branch import Point
+from rodfem.continuation.branch import Point
 
 AT = (39.9, 40.0, 40.1)
 K0 = 3 * pi

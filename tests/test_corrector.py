@@ -7,10 +7,10 @@ import pytest
 import rods
 import scenes
 
-from rodfem.branch import BRANCH_POINT, FOLD, Branch
-from rodfem.continuation import Follower
-from rodfem.corrector import NEAR
-from rodfem.newton import TOLERANCE, correct
+from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch
+from rodfem.continuation.corrector import NEAR
+from rodfem.continuation.solvers import Follower
+from rodfem.fem.newton import TOLERANCE, correct
 
 BENT = {"hemitropic": ("branch 1", 0.5), "cord": ("branch 2", 30.0), "ruler": ("branch 1", 8.0)}
 

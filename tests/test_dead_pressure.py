@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 import ufl
 
-import rodfem.system
+import rodfem.fem.system
 from forms.energy import bending
 from rodfem import Discretization, Observer, Plan, Ring, Scene, Solver, Steps, trace
-from rodfem.continuation import Equilibria
-from rodfem.newton import relax
-from rodfem.stability.judge import judge
-from rodfem.symmetries import Symmetry, elementary_generators
-from rodfem.system import System
+from rodfem.continuation.solvers import Equilibria
+from rodfem.fem.newton import relax
+from rodfem.fem.symmetries import Symmetry, elementary_generators
+from rodfem.fem.system import System
+from rodfem.stability.assessment import judge
 
 
 def radial(c: Any) -> tuple[Any, ...]:
@@ -129,14 +129,14 @@ def test_symmetries_of_a_loaded_ring(load: Any, potential: Any, motions: list[st
 
 def test_a_false_symmetry_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rotation of the ring is none: claimed, it is dropped at the first state, and said to be."""
-    found = rodfem.system.find_symmetries
+    found = rodfem.fem.system.find_symmetries
 
     def more(fields: Any, equations: Any) -> list[Symmetry]:
         parts = elementary_generators(fields)
         turn = np.array([float(p.name == "rotation about e2" or p.matrix[0][-1] == 1.0) for p in parts])
         return [*found(fields, equations), Symmetry(turn, parts)]
 
-    monkeypatch.setattr(rodfem.system, "find_symmetries", more)
+    monkeypatch.setattr(rodfem.fem.system, "find_symmetries", more)
     claimed: list[str] = []
 
     class Ear(Observer):

@@ -12,19 +12,19 @@ import rods
 from integration import Problem, Rod
 from scenes import Found, explored, scene
 
-from rodfem.branch import Point
-from rodfem.continuation import Follower, distance
+from rodfem.app.terminal import Report
+from rodfem.continuation.branch import Point
+from rodfem.continuation.observer import Observer
+from rodfem.continuation.solvers import Follower, distance
+from rodfem.deflation.discrete_symmetries import mirrors
+from rodfem.deflation.group_orbit import Orbit
+from rodfem.deflation.guesses import turned_state
+from rodfem.deflation.search import NEW, SAME, Deflation, further, starts, states_at
+from rodfem.diagram.explorer import Explorer
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import Solver
 from rodfem.errors import SceneError
-from rodfem.explore import Explorer
-from rodfem.fields import Discretization
-from rodfem.observer import Observer
-from rodfem.plan import Plan
-from rodfem.report import Report
-from rodfem.search.deflation import NEW, SAME, Deflation, further, starts, states_at
-from rodfem.search.guesses import turned_state
-from rodfem.search.mirror import mirrors
-from rodfem.search.orbit import Orbit
-from rodfem.solvers import Solver
+from rodfem.fem.fields import Discretization
 
 K0 = 3 * pi
 CORD = Problem(Rod(intrinsic=(0.0, K0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])

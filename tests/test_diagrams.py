@@ -13,14 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from scenes import scene
 
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
-from rodfem.fields import Discretization
-from rodfem.plan import Plan
-from rodfem.plot import PALETTE, SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram
-from rodfem.plot_pieces import PLANAR, STABLE, UNSTABLE, hidden, pieces_of
-from rodfem.scene import Ordinate
-from rodfem.topology import link
-from rodfem.tracing import trace
+from rodfem.fem.fields import Discretization
+from rodfem.fem.link import link
+from rodfem.output.plot_diagram import PALETTE, SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram
+from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE, hidden, pieces_of
+from rodfem.problem.scene import Ordinate
 
 
 def branch(name: str, ordinate: list[float], negative: list[int], **more: Any) -> dict[str, Any]:

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from rows import verify
 
-from rodfem.branch import Branch
-from rodfem.ends import Attachment, clamped, free
+from rodfem.app.terminal import Report
+from rodfem.continuation.branch import Branch
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
-from rodfem.fields import Discretization
-from rodfem.places import needs_centreline
-from rodfem.plan import Plan
-from rodfem.report import Report
-from rodfem.scene import Inertia, Scene
-from rodfem.tracing import trace
+from rodfem.fem.fields import Discretization
+from rodfem.problem.ends import Attachment, clamped, free
+from rodfem.problem.local_state import needs_centreline
+from rodfem.problem.scene import Inertia, Scene
 
 PAGE = Path(__file__).parents[1] / "docs" / "rods.md"
 

@@ -10,15 +10,15 @@ import states
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.condensed import Condensed
-from rodfem.copied import Copied
-from rodfem.factors import Klu, Mumps, lu_package
-from rodfem.fields import Discretization
-from rodfem.solvers import Solver
+from rodfem.diagram.solver import Solver
+from rodfem.fem.fields import Discretization
+from rodfem.fem.system import System
+from rodfem.linalg.factorization import Klu, Mumps, lu_package
+from rodfem.linalg.matrices import gathered
+from rodfem.linalg.replicated import Copied
+from rodfem.linalg.substructured import Condensed
+from rodfem.stability.assessment import Judge
 from rodfem.stability.inertia import Inertia
-from rodfem.stability.judge import Judge
-from rodfem.stability.matrices import gathered
-from rodfem.system import System
 
 pytestmark = pytest.mark.short
 

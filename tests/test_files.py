@@ -15,8 +15,8 @@ from numpy.polynomial import legendre
 from rods import DEFAULT, run_demo
 from scipy.spatial.transform import Rotation
 
-from rodfem.plot import draw_diagram
-from rodfem.report import Report
+from rodfem.app.terminal import Report
+from rodfem.output.plot_diagram import draw_diagram
 
 pytestmark = pytest.mark.short
 

@@ -17,11 +17,11 @@ from mpi4py import MPI
 from rods import specials
 from scenes import scene
 
-from rodfem.branch import Branch
-from rodfem.fields import Discretization
-from rodfem.solvers import Solver
-from rodfem.stability.vibration import Vibration
-from rodfem.tracing import trace
+from rodfem.continuation.branch import Branch
+from rodfem.diagram.solver import Solver
+from rodfem.diagram.trace import trace
+from rodfem.fem.fields import Discretization
+from rodfem.stability.nonsymmetric import Vibration
 
 DEMO = Path(__file__).parents[1] / "demos" / "follower.py"
 

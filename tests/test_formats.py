@@ -18,18 +18,19 @@ from test_docs import page, scenes
 
 import rodfem
 from forms.energy import bending
-from rodfem import plot, plot_modes, render
-from rodfem.branch import Unexplained
+from rodfem.app.many import many
+from rodfem.app.run import run
+from rodfem.continuation.branch import Unexplained
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import Solver
 from rodfem.errors import SceneError
-from rodfem.fields import Discretization
+from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM, FORMATS, LOCUS, MODES, PROGRAM, RESULT, STATES
-from rodfem.files import load_state
-from rodfem.plan import Plan
-from rodfem.plot_locus import draw_locus
-from rodfem.runner import run
-from rodfem.scene import Parameter, Scene
-from rodfem.sharing import many
-from rodfem.solvers import Solver
+from rodfem.output import plot_diagram as plot
+from rodfem.output import plot_modes, render
+from rodfem.output.files import load_state
+from rodfem.output.plot_locus import draw_locus
+from rodfem.problem.scene import Parameter, Scene
 
 HOME = Path(__file__).parents[1]
 PAGE = (HOME / "docs" / "files.md").read_text()

@@ -10,9 +10,10 @@ import classics
 import numpy as np
 import pytest
 
-from rodfem import Discretization, End, Plan, Scene, SceneError, Solver, sweep, trace
-from rodfem.continuation import Equilibria
-from rodfem.stability.judge import judge
+from rodfem import Discretization, End, Plan, Scene, SceneError, Solver, trace
+from rodfem.continuation.solvers import Equilibria
+from rodfem.diagram import sweep
+from rodfem.stability.assessment import judge
 
 
 def scene(kind: str, balanced: bool = True) -> Scene:

@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 import rodfem
 from rodfem import Diagram, Discretization, Observer, Parameter, Plan, SceneError
-from rodfem.branch import Branch
+from rodfem.continuation.branch import Branch
 
 MESH = Discretization("reduced", 8, 6)
 SHORT = Plan((60.0, 30.0), depth=1)

@@ -12,8 +12,8 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc
 
 from rodfem import Discretization, Ordinate, Plan, Scene, Solver, clamped, free, pinned, sliding, trace
-from rodfem.branch import BRANCH_POINT, FOLD, IMPERFECT, Special
-from rodfem.unfolding import unfold
+from rodfem.continuation.branch import BRANCH_POINT, FOLD, IMPERFECT, Special
+from rodfem.continuation.unfolding import unfold
 
 EULER = pi**2 / 4
 

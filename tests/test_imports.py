@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -14,17 +15,19 @@ import pytest
 HOME = Path(__file__).parents[1]
 LEVELS = 23
 """Levels of the modules of ``rodfem``: lower it when there are fewer, never raise it."""
-CIRCLES = [{"rodfem.diagram", "rodfem.tracing"}]
+ROOMS = 11
+"""Levels of its packages."""
+CIRCLES = [{"rodfem.diagram.diagram", "rodfem.diagram.trace"}]
 """Modules that import each other inside functions (a diagram can be traced again): add none."""
 MATRICES = {
-    "rodfem.factors",
-    "rodfem.factoring",
-    "rodfem.copied",
-    "rodfem.condensed",
-    "rodfem.piece",
-    "rodfem.stability.matrices",
-    "rodfem.stability.reflections",
-    "rodfem.stability.kernel",
+    "rodfem.linalg.factorization",
+    "rodfem.linalg.selection",
+    "rodfem.linalg.replicated",
+    "rodfem.linalg.substructured",
+    "rodfem.linalg.subdomain",
+    "rodfem.linalg.matrices",
+    "rodfem.linalg.householder",
+    "rodfem.linalg.null_space",
 }
 """Linear algebra, which knows nothing of rods."""
 BELOW_MATRICES = {"rodfem.errors", "rodfem.compat"}
@@ -109,6 +112,38 @@ def test_no_more_levels() -> None:
     assert levels(arrows()) <= LEVELS
 
 
+def rooms() -> dict[str, set[str]]:
+    """Packages, and single modules beside them, that each imports."""
+
+    def room(module: str) -> str:
+        return ".".join(module.split(".")[:2])
+
+    graph: dict[str, set[str]] = {}
+    for module, found in arrows().items():
+        if module != "rodfem":
+            others = {room(other) for other in found if other != "rodfem"} - {room(module)}
+            graph[room(module)] = graph.get(room(module), set()) | others
+    return graph
+
+
+def test_rooms_know_only_those_below() -> None:
+    """As docs/architecture.md lists them, from top to bottom; the statement of a problem knows no dolfinx."""
+    assert circles(rooms()) == []
+    assert levels(rooms()) <= ROOMS
+    page = (HOME / "docs" / "architecture.md").read_text()
+    order = re.findall(r"^\| `([a-z0-9]+)` \|", page[page.index("## The rooms") :], flags=re.MULTILINE)
+    assert {f"rodfem.{name}" for name in order} == {
+        name for name in rooms() if (HOME / name.replace(".", "/")).is_dir()
+    }
+    for place, name in enumerate(order):
+        above = {f"rodfem.{other}" for other in order[:place]}
+        assert not rooms()[f"rodfem.{name}"] & above, name
+    for module, tree in modules().items():
+        if module.startswith("rodfem.problem"):
+            known = {name.split(".")[0] for name in imports(tree)}
+            assert known.isdisjoint({"dolfinx", "petsc4py", "slepc4py", "mpi4py"}), module
+
+
 def test_circles_and_levels_of_a_graph() -> None:
     graph = {"a": {"b"}, "b": {"c"}, "c": {"d", "b"}, "d": set(), "e": {"e", "a"}}
     assert circles(graph) == [{"b", "c"}, {"e"}]
@@ -129,8 +164,8 @@ def test_command_line_is_known_to_programs_alone() -> None:
             isinstance(statement, ast.If) and ast.unparse(statement.test) == "__name__ == '__main__'"
             for statement in tree.body
         )
-        assert module == "rodfem.cli" or program or "argparse" not in names, module
-        assert not any(name.startswith("rodfem.cli") for name in names), module
+        assert module == "rodfem.app.cli" or program or "argparse" not in names, module
+        assert not any(name.startswith("rodfem.app.cli") for name in names), module
 
 
 def test_matrices_know_no_rods() -> None:
@@ -141,11 +176,11 @@ def test_matrices_know_no_rods() -> None:
 
 def test_arrows_are_what_the_interpreter_follows() -> None:
     """Loading a module loads those that the graph says it reaches, and packages."""
-    program = "import sys, rodfem.sharing; print(*(m for m in sys.modules if m.startswith('rodfem')))"
+    program = "import sys, rodfem.app.many; print(*(m for m in sys.modules if m.startswith('rodfem')))"
     out = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=HOME).stdout
-    reached, new = set(), {"rodfem.sharing"}
+    reached, new = set(), {"rodfem.app.many"}
     while new:
         reached |= new
         new = set().union(*(arrows()[module] for module in new)) - reached
-    packages = {"rodfem", "rodfem.lazy", "rodfem.loci", "rodfem.search", "rodfem.stability"}
+    packages = {"rodfem", "rodfem.lazy", *(name for name in modules() if (HOME / name.replace(".", "/")).is_dir())}
     assert set(out.split()) - packages == reached - packages

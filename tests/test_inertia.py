@@ -12,9 +12,9 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 from rods import DEFAULT, explored, follower, user_points
 
-from rodfem.branch import Point
-from rodfem.continuation import Follower
-from rodfem.stability.spectrum import Spectrum
+from rodfem.continuation.branch import Point
+from rodfem.continuation.solvers import Follower
+from rodfem.stability.symmetric import Spectrum
 
 SMALL = (6, 3)
 FORMULATIONS = pytest.mark.parametrize("formulation", ["reduced", "pointwise"])

@@ -14,20 +14,20 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from states import buckled, plain, scene
 
+from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.factoring import factors_of
-from rodfem.fields import Discretization
-from rodfem.scene import Inertia
-from rodfem.solvers import Solver
-from rodfem.stability.band import decide
+from rodfem.fem.fields import Discretization
+from rodfem.linalg.matrices import gathered, petsc_matrix
+from rodfem.linalg.selection import factors_of
+from rodfem.problem.scene import Inertia
+from rodfem.stability.assessment import METHODS, Judge, judge
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.inertia import Inertia as Count
-from rodfem.stability.judge import METHODS, Judge, judge
-from rodfem.stability.matrices import gathered, petsc_matrix
 from rodfem.stability.pencil import Inverse, assemble_pencil, symmetry_modes, weighed_modes, with_factors
 from rodfem.stability.projection import INVERSES
 from rodfem.stability.rank import rank_of, smallest_singular
 from rodfem.stability.reduction import Reduction
+from rodfem.stability.round_off import decide
 
 pytestmark = pytest.mark.alone
 

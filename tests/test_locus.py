@@ -22,17 +22,17 @@ from scenes import scene as demo_scene
 from scipy.optimize import brentq
 
 from forms.energy import bending
-from rodfem.branch import Branch, Special
-from rodfem.continuation import Equilibria, Steps
-from rodfem.diagram import Diagram
-from rodfem.ends import clamped, free
+from rodfem.codim2.locus import Locus, locus
+from rodfem.continuation.branch import Branch, Special
+from rodfem.continuation.solvers import Equilibria, Steps
+from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
-from rodfem.fields import Discretization
-from rodfem.loci.locus import Locus, locus
-from rodfem.plan import Plan
-from rodfem.plot_locus import _footer, draw_locus
-from rodfem.scene import Ordinate, Parameter, Scene
-from rodfem.tracing import trace
+from rodfem.fem.fields import Discretization
+from rodfem.output.plot_locus import _footer, draw_locus
+from rodfem.problem.ends import clamped, free
+from rodfem.problem.scene import Ordinate, Parameter, Scene
 
 pytestmark = pytest.mark.alone
 
@@ -165,7 +165,7 @@ def test_a_parameter_that_destroys_the_branch_point() -> None:
 
 
 def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rodfem.sweep.LOADS", 6)
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
     rod = demo_scene("follower", span=(19.0, 21.0))
     solver, branch = swept(rod)
     (flutter,) = specials(branch, "flutter")
@@ -184,7 +184,7 @@ def swept(scene: Scene) -> tuple[Equilibria, Branch]:
 
 def test_flutter_of_a_rod_that_bends_alike(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     """Two pairs of frequencies meet at once: where each does in its plane, down to where the double one vanishes."""
-    monkeypatch.setattr("rodfem.sweep.LOADS", 6)
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
     solver, branch = swept(classics.partly_following(1.0, (15.0, 25.0), strong=1.0))
     (special,) = specials(branch, "flutter")
     assert (special.negative_before, special.negative_after) == (0, 4)
@@ -202,7 +202,7 @@ def test_flutter_of_a_rod_that_bends_alike(monkeypatch: pytest.MonkeyPatch, fold
 @pytest.mark.parametrize(("strong", "which"), [(10.0, 0), (1.0, 1)])
 def test_divergence(strong: float, which: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """``cos sqrt P = share/(share - 1)``: one curve, through both loads of a share, which turns at one half."""
-    monkeypatch.setattr("rodfem.sweep.LOADS", 6)
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
     solver, branch = swept(classics.partly_following(0.2, (0.0, 25.0), strong))
     both = specials(branch, "divergence")
     assert [s.point.load for s in both] == pytest.approx([np.arccos(-0.25) ** 2, (2 * pi - np.arccos(-0.25)) ** 2])

@@ -11,9 +11,9 @@ import pytest
 from mpi4py import MPI
 from scenes import scene
 
+from rodfem.app.many import many
 from rodfem.errors import SceneError
-from rodfem.scene import Scene
-from rodfem.sharing import many
+from rodfem.problem.scene import Scene
 
 COMM = MPI.COMM_WORLD
 

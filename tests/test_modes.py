@@ -17,15 +17,15 @@ from scipy.spatial.transform import Rotation
 from states import buckled, plain, scene
 from states import solver as solver_of
 
-from rodfem.continuation import Equilibria
+from rodfem.continuation.solvers import Equilibria
+from rodfem.diagram.solver import Solver
 from rodfem.errors import SceneError
-from rodfem.fields import Discretization
-from rodfem.mode_finder import ModeFinder
-from rodfem.modes import SYMMETRY, Modes, load_modes, save_modes
-from rodfem.motion import Motions
-from rodfem.plot_modes import FRAMES, GROWS, amplitude, draw_modes, main
-from rodfem.scene import Scene
-from rodfem.solvers import Solver
+from rodfem.fem.fields import Discretization
+from rodfem.modes.finder import ModeFinder
+from rodfem.modes.modes import SYMMETRY, Modes, load_modes, save_modes
+from rodfem.modes.perturbation import Motions
+from rodfem.output.plot_modes import FRAMES, GROWS, amplitude, draw_modes, main
+from rodfem.problem.scene import Scene
 
 pytestmark = pytest.mark.short
 

@@ -10,13 +10,13 @@ from petsc4py import PETSc
 from states import plain
 
 from rodfem.errors import ConvergenceError
+from rodfem.fem.system import System
+from rodfem.stability.assessment import Judge
 from rodfem.stability.blocks import Blocks
-from rodfem.stability.judge import Judge
+from rodfem.stability.nonsymmetric import Vibration
 from rodfem.stability.pencil import in_interval, shift_invert, with_factors
 from rodfem.stability.projection import PREFIX
 from rodfem.stability.reduction import Reduction
-from rodfem.stability.vibration import Vibration
-from rodfem.system import System
 
 pytestmark = pytest.mark.alone
 

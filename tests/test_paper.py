@@ -20,9 +20,9 @@ from forms.kinematics import RODS, UNDEFORMED, curvature, strain
 from forms.lagrangian import pointwise, reduced
 from forms.rotation import product, rotation
 from rodfem import compat
+from rodfem.fem.system import System
+from rodfem.linalg.matrices import gathered
 from rodfem.stability.blocks import Blocks
-from rodfem.stability.matrices import gathered
-from rodfem.system import System
 
 pytestmark = pytest.mark.alone
 

@@ -16,16 +16,28 @@ from matplotlib.image import imread
 
 from forms import loads
 from forms.energy import bending
-from rodfem.ends import Attachment, End, at, clamped, elastic, everywhere, free, hinged, integral, pinned, sliding
 from rodfem.errors import SceneError
-from rodfem.glyphs import DARK, GREY, LOAD, STEEL, glyphs_of
-from rodfem.render import _read, draw_shape_safely, triad
-from rodfem.scene import Inertia, Ordinate, Parameter, Scene
-from rodfem.setting import read
-from rodfem.solids import FLATTEST, SIDES, profile_of, round_arrow
-from rodfem.supports import foundation_of, supports_of, ties_of, write, write_section
-from rodfem.typical import typical_state
-from rodfem.view import view_of
+from rodfem.output.glyphs import DARK, GREY, LOAD, STEEL, glyphs_of
+from rodfem.output.render import _read, draw_shape_safely, triad
+from rodfem.output.solids import FLATTEST, SIDES, profile_of, round_arrow
+from rodfem.output.typical import typical_state
+from rodfem.output.view import view_of
+from rodfem.problem.ends import (
+    Attachment,
+    End,
+    at,
+    clamped,
+    elastic,
+    everywhere,
+    free,
+    hinged,
+    integral,
+    pinned,
+    sliding,
+)
+from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
+from rodfem.problem.setting import read
+from rodfem.problem.supports import foundation_of, supports_of, ties_of, write, write_section
 
 pytestmark = pytest.mark.alone
 

@@ -7,9 +7,9 @@ import pytest
 from mpi4py import MPI
 from rods import explored, follower, scene
 
-from rodfem.fields import Discretization
-from rodfem.plan import Plan
-from rodfem.tracing import trace
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
+from rodfem.fem.fields import Discretization
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one")
 

@@ -13,17 +13,17 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 from states import buckled, plain, scene
 
+from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.fields import Discretization
-from rodfem.scene import Inertia
-from rodfem.solvers import Solver
+from rodfem.fem.fields import Discretization
+from rodfem.fem.system import System
+from rodfem.linalg.matrices import gathered
+from rodfem.linalg.null_space import kernel
+from rodfem.problem.scene import Inertia
 from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.stability.inertia import Inertia as Index
-from rodfem.stability.kernel import kernel
-from rodfem.stability.matrices import gathered
 from rodfem.stability.projection import INVERSES, Projection
 from rodfem.stability.reduction import Reduction, cayley_parameters
-from rodfem.system import System
 
 pytestmark = pytest.mark.alone
 

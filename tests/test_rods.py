@@ -17,7 +17,7 @@ from scipy.special import fresnel
 from forms import loads
 from forms.energy import bending, logarithmic_stretch
 from rodfem import Inertia, Ordinate, Ring, Scene, at, clamped, elastic, free, hinged, pinned, sliding
-from rodfem.digits import number, rounded_up
+from rodfem.output.digits import number, rounded_up
 
 Found = Callable[[float], float]
 MASS = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0))

@@ -11,7 +11,7 @@ from rods import specials, user_points
 from scenes import Found, explored
 from scipy.optimize import newton
 
-from rodfem.branch import Point
+from rodfem.continuation.branch import Point
 
 AT = (5.95, 6.0, 6.05)
 STIFFNESS = (1.0, 10.0, 1.0)

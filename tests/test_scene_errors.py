@@ -14,9 +14,16 @@ import ufl
 from mpi4py import MPI
 from rods import run_demo
 
-from rodfem import ends, scene, trace
-from rodfem.continuation import Steps
-from rodfem.ends import (
+from rodfem import trace
+from rodfem.app.run import run
+from rodfem.continuation.solvers import Steps
+from rodfem.diagram.plan import Plan
+from rodfem.errors import SceneError
+from rodfem.fem.fields import Discretization, Fields
+from rodfem.fem.system import System
+from rodfem.output.files import load_json
+from rodfem.problem import ends, scene
+from rodfem.problem.ends import (
     Attachment,
     End,
     Ring,
@@ -29,13 +36,7 @@ from rodfem.ends import (
     integral,
     pinned,
 )
-from rodfem.errors import SceneError
-from rodfem.fields import Discretization, Fields
-from rodfem.files import load_json
-from rodfem.plan import Plan
-from rodfem.runner import run
-from rodfem.scene import Inertia, Ordinate, Parameter, Scene
-from rodfem.system import System
+from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 
 pytestmark = pytest.mark.short
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rods import DEFAULT, Constants, explored, specials
 
-from rodfem.branch import Special
+from rodfem.continuation.branch import Special
 
 REFERENCE: dict[Constants, list[float]] = {
     DEFAULT: [0.114304214520030, 0.332039079723330],

@@ -15,19 +15,19 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 from rods import specials
 
-from rodfem.branch import Branch
-from rodfem.fields import Discretization
-from rodfem.plot_frequencies import curves, draw_frequencies
-from rodfem.report import Report
-from rodfem.scene import Scene
-from rodfem.solvers import Solver
-from rodfem.stability.vibration import Vibration
-from rodfem.tracing import trace
+from rodfem.app.terminal import Report
+from rodfem.continuation.branch import Branch
+from rodfem.diagram.solver import Solver
+from rodfem.diagram.trace import trace
+from rodfem.fem.fields import Discretization
+from rodfem.output.plot_frequencies import curves, draw_frequencies
+from rodfem.problem.scene import Scene
+from rodfem.stability.nonsymmetric import Vibration
 
 
 def swept(scene: Scene, monkeypatch: pytest.MonkeyPatch, loads: int = 26) -> tuple[Branch, dict, str]:
     """Frequencies over the range of a scene: branch, diagram, and what the terminal shows."""
-    monkeypatch.setattr("rodfem.sweep.LOADS", loads)
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", loads)
     out = StringIO()
     diagram = trace(scene, Discretization("pointwise", 4, 6), observer=Report(stream=out))
     return diagram[0], diagram.data, out.getvalue()
@@ -89,7 +89,7 @@ def test_divergence_is_marked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
             super().__init__(*given, **more)
             drawn.append(self)
 
-    monkeypatch.setattr("rodfem.plot_frequencies.Figure", Kept)
+    monkeypatch.setattr("rodfem.output.plot_frequencies.Figure", Kept)
     if MPI.COMM_WORLD.rank == 0:
         draw_frequencies(data, folder / "frequencies.png")
         (axes,) = drawn[0].axes

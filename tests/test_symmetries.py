@@ -11,13 +11,13 @@ from rods import scene as hemitropic
 from scenes import scene
 
 from forms.energy import bending
-from rodfem.ends import Constants, End, Ring, clamped, free, pinned
-from rodfem.fields import Discretization
-from rodfem.newton import relax
-from rodfem.scene import Ordinate, Parameter, Scene
-from rodfem.solvers import Solver
-from rodfem.system import FEW, System
-from rodfem.topology import link, writhe
+from rodfem.diagram.solver import Solver
+from rodfem.fem.fields import Discretization
+from rodfem.fem.link import link, writhe
+from rodfem.fem.newton import relax
+from rodfem.fem.system import FEW, System
+from rodfem.problem.ends import Constants, End, Ring, clamped, free, pinned
+from rodfem.problem.scene import Ordinate, Parameter, Scene
 
 MIDDLE = Ordinate("displacement of the middle", s=0.5, of=lambda r, q: hypot(r[0], r[1]))
 

@@ -22,7 +22,9 @@ pytestmark = pytest.mark.alone
 
 def test_stub_and_lazy_exports_are_the_same() -> None:
     """``__init__.pyi``, which type checkers read, against the table by which ``__init__.py`` loads names."""
-    lines = {f"from rodfem.{home} import {name} as {name}" for name, home in rodfem._HOMES.items()}
+    lines = {f"from rodfem.{home} import {name} as {name}" for name, home in rodfem._HOMES.items()} | {
+        "__version__: str"
+    }
     stub = {ast.unparse(statement) for statement in ast.parse((HOME / "rodfem" / "__init__.pyi").read_text()).body}
     assert not lines - stub, "add to rodfem/__init__.pyi:\n" + "\n".join(sorted(lines - stub))
     assert not stub - lines, "remove from rodfem/__init__.pyi:\n" + "\n".join(sorted(stub - lines))
@@ -65,7 +67,7 @@ def test_types_of_an_installed_package(tmp_path: Path, monkeypatch: pytest.Monke
     types = re.findall('Revealed type is "(.*)"', out)
     assert len(types) == len(revealed)
     assert "Any" not in types
-    assert any(shown.endswith("-> rodfem.scene.Scene") for shown in types)
+    assert any(shown.endswith("-> rodfem.problem.scene.Scene") for shown in types)
 
 
 def test_help_is_short_and_names_all() -> None:

@@ -21,11 +21,11 @@ from mpi4py import MPI
 from rods import run_demo
 
 import rodfem
-from rodfem.ends import Attachment, clamped, free
-from rodfem.fields import Discretization
-from rodfem.plan import Plan
-from rodfem.runner import run
-from rodfem.scene import Inertia, Ordinate, Scene
+from rodfem.app.run import run
+from rodfem.diagram.plan import Plan
+from rodfem.fem.fields import Discretization
+from rodfem.problem.ends import Attachment, clamped, free
+from rodfem.problem.scene import Inertia, Ordinate, Scene
 
 HOME = Path(__file__).parents[1]
 FIRST = MPI.COMM_WORLD.rank == 0
@@ -160,7 +160,7 @@ def test_branch_points_below_the_depth_are_counted(folder: Path, capfd: pytest.C
 
 
 def test_modules_are_attributes() -> None:
-    """In an interpreter that has loaded nothing else, as ``import rodfem; help(rodfem.modes)``."""
+    """In an interpreter that has loaded nothing else, as ``import rodfem; help(rodfem.modes.modes)``."""
     if not FIRST:
         return
     pages = ["README.md", "docs/rods.md", "rodfem/__init__.py"]
@@ -168,7 +168,7 @@ def test_modules_are_attributes() -> None:
     named = {name for name in re.findall(r"\b((?:rodfem|forms)\.[a-zA-Z_.]*[a-zA-Z_])", text) if "XX" not in name}
     table = re.findall(r"^\| (`[a-z_/`, ]+) \|", text[text.index("## How it works") :], flags=re.MULTILINE)
     named |= {"rodfem." + name.replace("/", ".") for row in table for name in re.findall(r"`([a-z_/]+)`", row)}
-    assert {"rodfem.modes", "rodfem.stability.judge", "rodfem.topology.link", "forms.loads"} <= named
+    assert {"rodfem.modes.modes", "rodfem.stability.assessment", "rodfem.fem.link.link", "forms.loads"} <= named
     lines = ["import pydoc, rodfem, forms"] + [f"pydoc.render_doc({name})" for name in sorted(named)]
     environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(HOME), "HOME": str(Path.home())}
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, env=environment)
@@ -179,13 +179,13 @@ def test_what_is_no_module_is_named() -> None:
     for owner, words in ((rodfem, "it has Attachment, "), (rodfem.stability, "'rodfem.stability' has no")):
         with pytest.raises(AttributeError, match=words):
             _ = owner.nothing
-    assert "Modes of one state" in pydoc.render_doc(rodfem.modes)
+    assert "Modes of one state" in pydoc.render_doc(rodfem.modes.modes)
 
 
 @pytest.mark.alone
 def test_python_of_the_readme(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     """All its blocks, one after the other, as they stand."""
-    monkeypatch.setattr("rodfem.runner._draw", lambda *_: None)
+    monkeypatch.setattr("rodfem.app.run._draw", lambda *_: None)
     monkeypatch.chdir(folder)
     names: dict[str, Any] = {}
     for block in re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), flags=re.DOTALL):

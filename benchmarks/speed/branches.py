@@ -14,19 +14,19 @@ from statistics import median
 from time import process_time
 from typing import Any
 
-import rodfem.clock
+import rodfem.timing
 from benchmarks.speed.run import PARTS
 from benchmarks.speed.scenes import loads, scene, value
 from benchmarks.targets import TARGETS
-from rodfem.branch import Branch
-from rodfem.diagram import Diagram
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.observer import Observer
+from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
 from rodfem.errors import ConvergenceError
-from rodfem.fields import Discretization
-from rodfem.observer import Observer
-from rodfem.plan import Plan
-from rodfem.tracing import trace
+from rodfem.fem.fields import Discretization
 
-rodfem.clock.perf_counter = process_time
+rodfem.timing.perf_counter = process_time
 """The clock measures processor time here, so that other work on the machine does not count."""
 
 

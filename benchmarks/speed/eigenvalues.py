@@ -18,10 +18,10 @@ import numpy as np
 
 from benchmarks.references import Spectrum, spectra
 from benchmarks.speed.scenes import with_inertia
+from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.fields import Discretization
-from rodfem.solvers import Solver
-from rodfem.stability.judge import Judge
+from rodfem.fem.fields import Discretization
+from rodfem.stability.assessment import Judge
 
 
 def measure(spectrum: Spectrum, formulation: str, elements: int, degree: int, runs: int) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any
 from benchmarks.common import MPIRUN, ROOT, environment
 
 HEAVY = ("numpy", "scipy.spatial.transform", "scipy.optimize", "mpi4py.MPI", "petsc4py.PETSc", "slepc4py.SLEPc")
-IMPORTS = (*HEAVY, "ufl", "dolfinx.fem", "h5py", "rodfem.runner")
+IMPORTS = (*HEAVY, "ufl", "dolfinx.fem", "h5py", "rodfem.app.run")
 """Modules imported one after the other to see what each adds."""
 
 

@@ -22,9 +22,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from benchmarks.speed.scenes import scene
+from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError
-from rodfem.fields import Discretization
-from rodfem.solvers import Solver
+from rodfem.fem.fields import Discretization
 
 import states  # isort: skip
 

@@ -11,9 +11,9 @@ from typing import Any
 from benchmarks.common import ROOT
 from benchmarks.references import Spectrum
 from benchmarks.targets import TARGETS, Target
-from rodfem.branch import Branch
-from rodfem.report import LABELS
-from rodfem.scene import Inertia, Scene
+from rodfem.app.terminal import LABELS
+from rodfem.continuation.branch import Branch
+from rodfem.problem.scene import Inertia, Scene
 
 sys.path.append(str(ROOT / "tests"))
 

@@ -1,5 +1,5 @@
-"""Methods that determine stability: the inertia of the saddle matrix, and the spectrum of the singular pencil."""
+"""Is an equilibrium stable?  Inertia, eigensolvers, the paper's reduction, and one interface to all."""
 
 from rodfem.lazy import attributes
 
-__getattr__ = attributes(__name__)
+__getattr__ = attributes("rodfem.stability")

@@ -42,11 +42,11 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from rodfem.ends import Ring
 from rodfem.errors import SceneError
-from rodfem.stability.matrices import block_matrix, first_of, local_rows, petsc_matrix
+from rodfem.fem.system import System
+from rodfem.linalg.matrices import block_matrix, first_of, local_rows, petsc_matrix
+from rodfem.problem.ends import Ring
 from rodfem.stability.pencil import assemble_pencil
-from rodfem.system import System
 
 COORDINATES = ("full", "tangent", "compatible")
 
@@ -86,7 +86,7 @@ class Pencil:
 
 
 class Blocks:
-    """Makes the :class:`Pencil` of states of one :class:`~rodfem.system.System`, in one set of coordinates.
+    """Makes the :class:`Pencil` of states of one :class:`~rodfem.fem.system.System`, in one set of coordinates.
 
     Attributes
     ----------

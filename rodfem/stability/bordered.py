@@ -6,9 +6,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.factoring import factors_of
+from rodfem.fem.system import System
+from rodfem.linalg.selection import factors_of
 from rodfem.stability.inertia import inertia_factors
-from rodfem.system import System
 
 
 class Bordered:

@@ -18,8 +18,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.stability.vibration import REAL, Frequencies, Vibration
-from rodfem.system import System
+from rodfem.fem.system import System
+from rodfem.stability.nonsymmetric import REAL, Frequencies, Vibration
 
 BESIDE = 1e-3
 """Distance from zero at which eigenvalues near zero are looked for: the matrix is singular there."""

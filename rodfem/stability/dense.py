@@ -19,8 +19,8 @@ import numpy as np
 import scipy.linalg
 
 from rodfem.errors import ConvergenceError
+from rodfem.linalg.matrices import gathered
 from rodfem.stability.blocks import Pencil
-from rodfem.stability.matrices import gathered
 
 RANK = 1e-11
 """Singular values below this, relative to the norm of the pencil's matrices, are zero."""

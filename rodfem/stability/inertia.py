@@ -19,9 +19,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.factoring import factors_of
-from rodfem.factors import Factors
-from rodfem.system import System, combine
+from rodfem.fem.system import System, combine
+from rodfem.linalg.factorization import Factors
+from rodfem.linalg.selection import factors_of
 
 EPS = float(np.finfo(float).eps)
 NOISE = 8.0
@@ -49,7 +49,7 @@ def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
 
 
 class Inertia:
-    """Counts eigenvalues and finds the ones nearest zero, at states of one :class:`~rodfem.system.System`.
+    """Counts eigenvalues and finds the ones nearest zero, at states of one :class:`~rodfem.fem.system.System`.
 
     Eigenvalues ``mu`` are relative to the system's metric.  ``tolerance`` is the half width of what counts as zero, the
     larger of 1e-7 of the rod's lowest bending eigenvalue and of ``resolution``: what the arithmetic resolves.

@@ -2,7 +2,7 @@
 
 SLEPc's options have the prefix ``rodfem_`` (``-rodfem_eps_monitor``, ``-rodfem_eps_ncv 40``, ``-rodfem_st_type``, ...),
 and overrule what is set here.  Those of the factorisation inside are ``-rodfem_st_...`` for a pencil without symmetry,
-else ``-rodfem_lu_...`` (see :mod:`rodfem.factors`).
+else ``-rodfem_lu_...`` (see :mod:`rodfem.linalg.factorization`).
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import SceneError
-from rodfem.factors import PIVOTS, Factors, lu_package, ordering, prefer_options
-from rodfem.system import System, combine
+from rodfem.fem.system import System, combine
+from rodfem.linalg.factorization import PIVOTS, Factors, lu_package, ordering, prefer_options
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""

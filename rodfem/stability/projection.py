@@ -28,11 +28,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.factoring import factors_of
+from rodfem.linalg.matrices import gathered, petsc_matrix
+from rodfem.linalg.null_space import kernel
+from rodfem.linalg.selection import factors_of
 from rodfem.stability.blocks import Pencil
 from rodfem.stability.inertia import inertia_factors
-from rodfem.stability.kernel import kernel
-from rodfem.stability.matrices import gathered, petsc_matrix
 
 INVERSES = ("saddle", "elimination")
 SINGULAR = 1e-6

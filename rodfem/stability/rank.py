@@ -21,8 +21,8 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.linalg.matrices import gathered
 from rodfem.stability.blocks import Pencil
-from rodfem.stability.matrices import gathered
 from rodfem.stability.projection import factored
 
 DEPENDENT = 1e-12

@@ -1,7 +1,7 @@
 r"""Eigenvalues by reduction: the pencil of a state on the kernel of its constraints.
 
-With ``C = (Q1 Q2) (R; 0)`` from :mod:`rodfem.stability.kernel`, the perturbations that fulfil the constraints are ``x =
-Q2 z``, and the singular pencil ``(K C; C^t 0), (M 0; 0 0)`` of size m + p becomes
+With ``C = (Q1 Q2) (R; 0)`` from :mod:`rodfem.linalg.null_space`, the perturbations that fulfil the constraints are ``x
+= Q2 z``, and the singular pencil ``(K C; C^t 0), (M 0; 0 0)`` of size m + p becomes
 
     Q2^t K Q2 z = mu Q2^t M Q2 z,        of size m - p,
 

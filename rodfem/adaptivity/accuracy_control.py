@@ -1,0 +1,190 @@
+"""Control of the accuracy of a branch while it is traced.
+
+The error of a point is computed on a richer mesh now and then; in between the decay of its Legendre coefficients
+tells how it has changed since (:mod:`rodfem.adaptivity.grading`), which costs next to nothing.  Where it is too large,
+:class:`TooCoarse` is raised: the explorer then has a mesh made for that very state, carries the last points over, and
+goes on there (:mod:`rodfem.adaptivity.mesh_sequence`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite, isnan
+
+import numpy as np
+
+from rodfem.adaptivity.error_estimate import Again, Richer
+from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
+from rodfem.continuation.branch import Branch, Point, Special
+from rodfem.continuation.observer import Observer
+from rodfem.continuation.solvers import Follower
+from rodfem.errors import ConvergenceError
+from rodfem.fem.newton import correct
+
+SHARP = 1e-9
+"""For a better accuracy than this points get one more step of Newton's method, to round-off."""
+TRIES, MOST = 4, 16
+"""Meshes tried at one place, and in a run."""
+SURE = 10.0
+"""An error estimated by the decay of coefficients counts where it is this much better than the accuracy."""
+GROWN, SELDOM = 1.5, 10
+"""An error is computed again where the indicator has grown by this factor, and at the latest after so many points."""
+NEAR = 0.1
+"""Points of a branch nearer to each other than this, in arclength, are at one place."""
+
+
+@dataclass
+class Checked:
+    """A point whose error was computed: its indicator, its error, and how many points came since."""
+
+    indicator: float
+    error: float
+    since: int = 0
+
+
+class Watch:
+    """Watches over the accuracy of the points of one branch."""
+
+    def __init__(self, meshes: Meshes, bounds: tuple[float, float]) -> None:
+        """Begin a branch; its points at the ``bounds`` of the load are judged at that very load."""
+        self.meshes, self.bounds = meshes, bounds
+        self.checked: Checked | None = None
+        self.place, self.error, self.tries = -np.inf, np.inf, 0
+        self.excused = -np.inf
+
+    @property
+    def accuracy(self) -> float:
+        """The accuracy asked for, infinite without one."""
+        return self.meshes.accuracy or np.inf
+
+    def row(self, point: Point, follower: Follower) -> None:
+        """Estimate the error of a point, by computation where need be; raises :class:`TooCoarse`."""
+        if self.meshes.accuracy is None:
+            return
+        if self.accuracy < SHARP:
+            self._polish(point, follower)
+        indicator = self.meshes.gauge(follower.mesh)(point.x).indicator
+        last = self.checked
+        if last is not None and last.since < SELDOM and not self._at_bound(point):
+            point.estimate = last.error * max(1.0, indicator / last.indicator)
+            if indicator < GROWN * last.indicator or point.estimate * SURE < self.accuracy:
+                last.since += 1
+                return
+        with follower.system.clock.purpose("error bars"):
+            point.estimate = self._computed(point)
+        self.checked = Checked(max(indicator, 1e-30), point.estimate)
+        if point.estimate * GROWN > self.accuracy and point.arclength > self.excused:
+            raise TooCoarse(point, point.estimate)
+
+    def special(self, special: Special) -> None:
+        """Estimate the errors of a special point; raises :class:`TooCoarse` where another mesh may help."""
+        if self.meshes.accuracy is None:
+            return
+        with self.meshes.followers[special.point.mesh].system.clock.purpose("error bars"):
+            self.meshes.richer(special.point.mesh).estimate(special)
+        self.judge(special)
+
+    def judge(self, special: Special) -> None:
+        """Raise :class:`TooCoarse` for a special point with too large an error, where another mesh may help."""
+        error = self._error_of(special)
+        located = special.located_to / max(1.0, abs(special.point.load))
+        if error > self.accuracy > located and special.point.arclength > self.excused:
+            raise TooCoarse(special.point, error, special.null_vectors, 2.0 if special.zero_of == "stretch" else 1.0)
+
+    def _error_of(self, special: Special) -> float:
+        """Estimated error of a special point; never within the accuracy where the mesh does not resolve its state."""
+        error = self.meshes.error_of(special)
+        return max(error, GROWN * self.accuracy) if special.resolved is False else error
+
+    def drifting(self, point: Point) -> None:
+        """Raise :class:`TooCoarse` for a point at which the mesh breaks a symmetry, where another mesh may help."""
+        if self.meshes.accuracy is not None and point.arclength > self.excused:
+            raise TooCoarse(point, float("inf"), why="the mesh breaks a symmetry")
+
+    def label(self, special: Special) -> None:
+        """Say at a special point whether the accuracy was not reached, and why."""
+        if self.meshes.accuracy is None:
+            return
+        special.point.estimate = error = self._error_of(special)
+        if error > self.accuracy and not special.note:
+            located = special.located_to / max(1.0, abs(special.point.load)) > self.accuracy
+            why = f"located to {special.located_to:.0e} only" if located else "finer meshes did not lower the error"
+            special.note = f"accuracy {self.accuracy:g} not reached: {why}"
+
+    def summary(self, branch: Branch, observer: Observer) -> None:
+        """Say on which meshes a branch was traced, and the largest error of its points."""
+        if self.meshes.accuracy is None:
+            return
+        used = [self.meshes.followers[number].system for number in sorted({p.mesh for p in branch.points})]
+        worst = max(p.estimate for p in branch.points if not isnan(p.estimate))
+        observer.accuracy(used, worst, self.meshes.accuracy)
+
+    def another(self, trouble: TooCoarse, observer: Observer) -> Follower | None:
+        """Follower on a mesh for the state that was too coarse; None, which is reported, where no mesh helps there."""
+        if abs(trouble.point.arclength - self.place) < NEAR:
+            self.tries += 1
+            helps = not isfinite(trouble.error) or trouble.error < 0.5 * self.error
+        else:
+            self.tries, helps = 0, True
+        self.place, self.error = trouble.point.arclength, trouble.error
+        self.checked = None
+        if not helps or self.tries >= TRIES or len(self.meshes.followers) >= MOST:
+            self.excused = trouble.point.arclength + NEAR
+            why = "finer meshes do not lower the error" if not helps else f"{self.tries + 1} finer meshes did not do"
+            if len(self.meshes.followers) >= MOST:
+                why = f"{MOST} meshes are the most"
+            observer.warn(f"The accuracy is not reached near load {trouble.point.load:.6g} ({trouble}): {why}.")
+            return None
+        return self.meshes.raised(trouble, self.tries)
+
+    def _polish(self, point: Point, follower: Follower) -> None:
+        """Solve a point once more where its last correction was not far below the accuracy."""
+        if point.tangent is None or point.error < 0.01 * self.accuracy or point.error == 0.0:
+            return
+        system = follower.system
+        row = follower.axis if self._at_bound(point) else follower.row(point.tangent)
+        system.set_phase(point.x)
+        point.error = correct(system, point.x, row, reach=1e-3).error
+        point.load, point.ordinate = system.scalar(point.x), follower.shape.ordinate(point.x)
+        point.energy, point.stretch = follower.energy(point.x), follower.shape.stretch(point.x)
+
+    def _at_bound(self, point: Point) -> bool:
+        return min(abs(point.load - bound) for bound in self.bounds) < 1e-9 * abs(self.bounds[1] - self.bounds[0])
+
+    def _computed(self, point: Point) -> float:
+        """Error of a point across its branch, or at its load on a bound; :class:`TooCoarse` where its index errs."""
+        richer = self.meshes.richer(point.mesh)
+        richer.follower.damp(self.meshes.followers[point.mesh].system.damping > 0)
+        try:
+            again = richer.again(point, fixed_load=self._at_bound(point))
+        except ConvergenceError:
+            return float("inf")
+        negative = self._index(point, richer, again)
+        if negative != point.negative and point.arclength > self.excused:
+            follower = self.meshes.followers[point.mesh]
+            follower.system.set_phase(point.x)
+            follower.inertia.count(point.x)
+            modes = follower.inertia.nearest(abs(negative - point.negative), accuracy=1e-2)[1]
+            raise TooCoarse(
+                point,
+                float("inf"),
+                [m.copy() for m in modes],
+                why=f"index {point.negative}, {negative} on a richer mesh",
+            )
+        values = point.load, point.ordinate
+        error = max(e / max(1.0, abs(v)) for e, v in zip(again.errors(point), values, strict=True))
+        return error if again.resolved else max(error, GROWN * self.accuracy)
+
+    @staticmethod
+    def _index(point: Point, richer: Richer, again: Again) -> int:
+        """Index on the richer mesh; the point's own where eigenvalues that are zero on one of the two make up for it.
+
+        One factorisation tells that it is the same; only where it does not a second tells zero eigenvalues from others.
+        """
+        inertia, drifts = richer.follower.inertia, richer.system.active_drifts()
+        inertia.assemble(again.x)
+        below = inertia.below(-inertia.tolerance)
+        if below < point.negative:
+            index = inertia.count(again.x)
+            return point.negative if point.negative <= index.negative + max(index.zero - drifts, 0) else index.negative
+        return point.negative if below <= point.negative + max(point.zero - drifts, 0) else below

@@ -1,0 +1,195 @@
+r"""Error bars: every special point is computed again on a richer discretisation, started from the first.
+
+Elements half as long, of one degree more.  With errors ``e`` of the first and ``e'`` of the richer result their
+difference is ``d = e - e'``, so that ``|e| <= |d| / (1 - rho)`` with ``rho >= |e' / e|``.  Halving alone leaves
+``2^-(k+1)`` of what elements of degree k miss of a smooth state, and about the square of that of loads, and of
+positions at vertices.  How smooth it is the states themselves tell: by the last Legendre coefficients of the strains on
+the two meshes, whose ratio bounds that of loads and positions amply.  To that comes what location and arithmetic leave
+open of the richer result.
+
+All of this is asymptotic.  Errors of loads and positions are of second order in those of strains only while these are
+small, and a single value may agree on two meshes by accident, where what it has of either sign cancels; norms do not
+cancel.  Where the strains of the state, or of its null vector, differ between the two meshes by more than
+:data:`RESOLVED_TO` of themselves, the first mesh does not resolve the state, and ``d`` is no bound but what its error
+may well exceed.
+
+The state, its tangent and the null vector are interpolated, so that this costs a few solves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.adaptivity.grading import Gauge, weights_of
+from rodfem.continuation.branch import BRANCH_POINT, FOLD, Law, Point, Special
+from rodfem.continuation.locate import WINDOW, refine
+from rodfem.continuation.normal_form import ROUND_OFF, Origin, law_of, ordinate_along
+from rodfem.continuation.solvers import Follower
+from rodfem.errors import ConvergenceError
+from rodfem.fem.newton import correct
+from rodfem.fem.transfer import Transfer, richer_system
+
+AMPLE, MOST = 2.0, 0.75
+"""Safety factor on the ratio of the last coefficients, which may be small by coincidence; and the largest ratio of
+errors: beyond it neither mesh resolves the state."""
+RESOLVED_TO = 0.1
+"""Relative change of the strains on the richer mesh, up to which a mesh resolves a state: a tenth.  Its square, of the
+order of which errors of loads are, is one per cent."""
+RESOLVED = 1e-9
+"""Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
+NARROW = 1 / 128
+"""Part of the usual window on which a special point is located again."""
+STEADY = 3.0
+"""Uncertainty of a result, in units of its change by one more step of Newton's method."""
+
+
+def halved(degree: int) -> float:
+    """Largest part of the error of a smooth state on elements of ``degree`` that remains on halved elements."""
+    return float(0.5 ** (degree + 1))
+
+
+def bound(value: complex, richer: complex, left: float, rho: float) -> float:
+    """Bound of the error of a value of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``."""
+    return abs(richer - value) / (1 - rho) + left
+
+
+@dataclass(frozen=True)
+class Again:
+    """A point computed again: state, load and ordinate, what location and arithmetic leave open of these two.
+
+    ``rho`` is the part of the errors of the first discretisation that is left; the strains of the state or of its null
+    vector, the one that did so more, have ``changed`` by that part of themselves.
+    """
+
+    x: PETSc.Vec
+    load: float
+    ordinate: float
+    load_left: float
+    ordinate_left: float
+    rho: float
+    changed: float
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the first discretisation resolves the state: otherwise the errors may exceed their bounds."""
+        return self.changed <= RESOLVED_TO
+
+    def errors(self, point: Point) -> tuple[float, float]:
+        """Bounds of the errors in load and ordinate of the point as first computed."""
+        load = bound(point.load, self.load, self.load_left, self.rho)
+        return load, bound(point.ordinate, self.ordinate, self.ordinate_left, self.rho)
+
+
+class Richer:
+    """A second, richer discretisation of the system of a follower, and its estimates."""
+
+    def __init__(self, follower: Follower) -> None:
+        """Compile and allocate the richer system."""
+        self.coarse, self.system = follower, richer_system(follower.system)
+        self.follower = Follower(self.system)
+        self.transfer = Transfer(follower.system, self.system)
+        self._origins: list[tuple[Special, Origin, float]] = []
+        weights = weights_of(self.system.scene)
+        self._gauges = Gauge(follower, weights), Gauge(self.follower, weights)
+
+    def rho(self, before: Sequence[PETSc.Vec], after: Sequence[PETSc.Vec]) -> float:
+        """Ratio of the errors of a state (and its null vector) on the richer discretisation and on the first."""
+        degree = self.coarse.system.fields.discretization.degree
+        first, last = (g.unresolved(x, more) for g, (x, *more) in zip(self._gauges, (before, after), strict=True))
+        if degree < 3 or last < RESOLVED:  # the last coefficients are the strains themselves, or round-off
+            return halved(degree)
+        return max(halved(degree), min(AMPLE * last / max(first, RESOLVED), MOST))
+
+    def estimate(self, special: Special) -> None:
+        """Set ``error_estimate`` and ``ordinate_error`` of a special point, bounds of its errors in load and ordinate.
+
+        They are infinite where the richer discretisation does not find the point, and no bounds where the point is not
+        ``resolved``, which is set, too.
+        """
+        if special.zero_of == "stretch":
+            return  # it has its own estimate: see :mod:`rodfem.adaptivity.zero_stretch`
+        point, at_a_load = special.point, special.kind not in (FOLD, BRANCH_POINT)
+        self.system.damping = self.coarse.system.damping
+        try:
+            again = self.again(point, fixed_load=True) if at_a_load else self._located(special)
+        except ConvergenceError as trouble:
+            special.error_estimate = special.ordinate_error = float("inf")
+            special.resolved = False
+            special.note = f"no error estimate: {trouble}"
+            return
+        load_error, special.ordinate_error = again.errors(point)
+        special.resolved = again.resolved
+        special.error_estimate = special.ordinate_error if at_a_load else max(load_error, special.located_to)
+
+    def again(self, point: Point, *, fixed_load: bool) -> Again:
+        """Solve for a point on the richer discretisation, at its load or across its tangent.
+
+        One more step of Newton's method tells what arithmetic leaves open.  Raises :class:`ConvergenceError` where
+        there is no such point.
+        """
+        system, x = self.system, self.transfer(point.x, state=True)
+        first = x.copy()
+        row = self.follower.axis
+        if not fixed_load and point.tangent is not None:
+            row = self.follower.row(self.transfer(point.tangent, state=False))
+        system.set_phase(x)
+        if not correct(system, x, row, reach=1.0).converged:
+            raise ConvergenceError(
+                f"the richer discretisation has no equilibrium near load {point.load:.8g}: use more elements"
+            )
+        load, ordinate = system.scalar(x), self.follower.shape.ordinate(x)
+        equations, step = system.new_vector(), system.new_vector()
+        system.residual(x, equations)
+        system.solve(equations, step)
+        x.axpy(-1.0, step)
+        last = system.scalar(x), self.follower.shape.ordinate(x)
+        moved = np.abs(np.subtract(last, (load, ordinate)))
+        left = STEADY * moved + ROUND_OFF * np.maximum(1.0, np.abs(last))
+        changed = self._gauges[1].changed(first, x, state=True)
+        return Again(x, *last, float(left[0]), float(left[1]), self.rho([point.x], [x]), changed)
+
+    def law(self, special: Special, direction: PETSc.Vec, law: Law) -> None:
+        """Set the uncertainty of a law of the first discretisation: that of the rod's law, infinite without another."""
+        self.system.damping = self.coarse.system.damping
+        way, again, rho = self.transfer(direction, state=False), None, 0.0
+        for known, origin, left in self._origins:
+            if known is special:
+                again, rho = law_of(self.follower, origin, way), left
+        if again is None or (again.kind, again.power) != (law.kind, law.power):
+            law.uncertainty = float("inf")
+        else:
+            law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
+
+    def _located(self, special: Special) -> Again:
+        """The fold or branch point on the richer discretisation, and its ordinate."""
+        follower, point = self.follower, special.point
+        if point.tangent is None:
+            raise ConvergenceError("the branch has no tangent there")
+        x = self.transfer(point.x, state=True)
+        tangent = self.transfer(point.tangent, state=False)
+        mode = self.transfer(special.null_vectors[0], state=False)
+        mode.scale(1.0 / self.system.norm(mode))
+
+        def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+            y = x.copy()
+            y.axpy(s, tangent)
+            return y, tangent
+
+        # few nodes tell where an eigenvalue crosses zero better than where the load has its extremum
+        zero_of = "mu" if special.kind == FOLD else special.zero_of
+        try:
+            found = refine(follower, curve, 0.0, NARROW * WINDOW, mode, zero_of, beside=point.load)
+        except ConvergenceError:  # it lies farther away
+            found = refine(follower, curve, 0.0, WINDOW, mode, zero_of, beside=point.load)
+        ordinate = follower.shape.ordinate(found.x)
+        slope = ordinate_along(follower, found.x, found.tangent)
+        left = abs(slope) * found.along + ROUND_OFF * max(1.0, abs(ordinate))
+        sharp, gauge = follower.inertia.sharpened(mode), self._gauges[1]
+        rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
+        changed = max(gauge.changed(x, found.x, state=True), gauge.changed(mode, sharp, state=False))
+        self._origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
+        return Again(found.x, found.load, ordinate, found.uncertainty, left, rho, changed)

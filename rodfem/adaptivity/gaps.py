@@ -1,0 +1,116 @@
+"""Gaps: branch points that an imperfection has taken apart, and how continuation resolves them.
+
+Near such a point two branches, that would cross without the imperfection, bend away from each other.  The state and the
+load at which they would cross are known from :mod:`rodfem.continuation.unfolding`.  Steps in proportion to the distance
+from there follow the bend of either branch, however sharp it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rodfem.adaptivity.mesh_sequence import Meshes
+from rodfem.continuation.branch import Point, Special
+from rodfem.continuation.solvers import Follower
+from rodfem.continuation.unfolding import Unfolded, unfold
+from rodfem.fem.newton import correct
+
+SHARE = 0.25
+"""Largest step near a gap, relative to the distance from where the branches would cross."""
+LEAST = 1e-6
+"""Least bound of a step."""
+ARM = 0.05
+"""Distance, in the metric, at which the four arms that would meet are looked for."""
+DIFFERS = 0.5
+"""Unfolding parameters that a richer mesh lowers below this share are the mesh's own."""
+
+
+class Gap(Exception):
+    """A step of continuation has jumped from one branch to another, across the gap at this special point."""
+
+    def __init__(self, special: Special, unfolded: Unfolded) -> None:
+        """Keep what was found."""
+        super().__init__(f"imperfect, unfolding {unfolded.size:.0e}")
+        self.special, self.unfolded = special, unfolded
+        self.point = replace(special.point, x=unfolded.x, load=unfolded.load)
+
+
+class Gaps:
+    """The gaps of one run: which special points are taken apart, and the steps that resolve them."""
+
+    def __init__(self, meshes: Meshes) -> None:
+        """Begin with none."""
+        self.meshes = meshes
+        self.known: list[Gap] = []
+
+    def examine(self, follower: Follower, special: Special) -> Gap | None:
+        """Solve for a branch point with unfolding parameters, and record their size; the gap, if it is taken apart.
+
+        The load and the state of a branch point are then those that solve its equations.
+        """
+        found = unfold(follower, special)
+        if found is None:
+            return None
+        special.unfolding = found.size
+        if found.size <= found.noise:
+            sharpen(follower, special, found)
+            return None
+        return None if self._of_the_mesh(special, found) else Gap(special, found)
+
+    def _of_the_mesh(self, special: Special, found: Unfolded) -> bool:
+        """Whether the mesh takes the branch point apart, not the rod: a mesh need not have a symmetry of the scene."""
+        richer = self.meshes.richer(special.point.mesh)
+        point = replace(special.point, x=richer.transfer(found.x, state=True))
+        modes = [richer.transfer(v, state=False) for v in special.null_vectors]
+        for mode in modes:
+            mode.scale(1.0 / richer.system.norm(mode))
+        again = unfold(richer.follower, replace(special, point=point, null_vectors=modes))
+        return again is not None and again.size < DIFFERS * found.size + again.noise
+
+    def open(self, gap: Gap, follower: Follower) -> bool:
+        """Add a gap; False where it is known already, so that smaller steps have not resolved it."""
+        for known in self.known:
+            apart = self.meshes.here(known.point, follower).x.copy()
+            apart.axpy(-1.0, gap.point.x)
+            if follower.system.norm(apart) < LEAST:
+                return False
+        self.known.append(gap)
+        return True
+
+    def reach(self, follower: Follower, point: Point) -> float:
+        """Largest step from a point: in proportion to the distance from the nearest gap."""
+        least = float("inf")
+        for gap in self.known:
+            apart = self.meshes.here(gap.point, follower).x.copy()
+            apart.axpy(-1.0, point.x)
+            least = min(least, follower.system.norm(apart))
+        return max(SHARE * least, LEAST)
+
+
+def sharpen(follower: Follower, special: Special, found: Unfolded) -> None:
+    """Give a branch point the state and the load that solve its equations, where they are those that were located."""
+    if abs(found.load - special.point.load) > 10 * special.located_to:
+        return
+    special.point = replace(
+        special.point,
+        x=found.x,
+        load=found.load,
+        ordinate=follower.shape.ordinate(found.x),
+        energy=follower.energy(found.x),
+        stretch=follower.shape.stretch(found.x),
+    )
+
+
+def arms(follower: Follower, gap: Gap) -> list[Point]:
+    """Equilibria on the branches that would cross at a gap, a little away from it: up to four."""
+    system, out = follower.system, []
+    for direction in gap.unfolded.directions:
+        row = follower.row(direction)
+        for sign in (1.0, -1.0):
+            x = gap.unfolded.x.copy()
+            x.axpy(sign * ARM, direction)
+            system.set_phase(x)
+            outcome = correct(system, x, row, reach=ARM)
+            if outcome.converged:
+                out.append(follower.point(x, 0.0, follower.tangent(row, at=x), outcome))
+    return out

@@ -1,0 +1,220 @@
+r"""Graded meshes: how smooth a state is along the rod, and the cheapest elements that resolve it to an accuracy.
+
+On each element the Legendre coefficients of the strains (curvature and stretch, weighted as in the stored energy) decay
+like ``A rho^-j``, for singularities of the state at a distance ``h (rho - 1/rho) / 4`` across the rod (Trefethen,
+Approximation Theory and Approximation Practice, chapter 8).  With elements of degree k the strains are missed by
+``A rho^-k``, and loads and positions, being stationary, by the *square* of that, integrated along the rod; the factor
+in front is measured by a computation on a richer mesh.  On an element of another size the distance stays, and ``rho``
+follows: how large an element may be at each place is had in closed form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial import legendre
+from petsc4py import PETSc
+
+from rodfem import compat
+from rodfem.continuation.solvers import Equilibria
+from rodfem.fem.fields import Discretization, Fields, turning_of
+from rodfem.problem.scene import Scene
+
+DEGREES = range(4, 11)
+"""Degrees to choose from."""
+FIXED, PER_DEGREE = 600.0, 0.27
+"""Cost of a point of a branch with n unknowns of degree k is as ``FIXED + n (1 + PER_DEGREE k)``: measured, cord."""
+KEEP = 0.15
+"""Another degree than the present one must save this part of the cost: its forms have to be compiled or loaded."""
+LARGEST = 3.0
+"""No element grows by more than this factor at a time: the decay was measured on the element that there is."""
+LEAST_DECAY, MOST_DECAY = 1.5, 1e3
+ROUND_OFF = 1e-12
+"""Coefficients below this, of the largest, are round-off."""
+
+
+@dataclass(frozen=True)
+class Smoothness:
+    """Decay of the strains of a state on the elements of a mesh: ``|coefficient j| < amplitude decay^-j``.
+
+    ``vertices`` has shape (E + 1,), ``amplitude`` and ``decay`` (E,).
+    """
+
+    vertices: np.ndarray
+    degree: int
+    amplitude: np.ndarray
+    decay: np.ndarray
+
+    @property
+    def indicator(self) -> float:
+        """Squared norm of what elements of this degree miss of the strains: as the error of a load, up to a factor."""
+        missed = self.amplitude * self.decay ** -float(self.degree)
+        return float(np.sum(np.diff(self.vertices) * missed**2))
+
+    def sizes(self, degree: int, indicator: float) -> np.ndarray:
+        """Size of element at each present one with which, everywhere on the rod, the indicator has that value, (E,)."""
+        length = self.vertices[-1] - self.vertices[0]
+        needed = (self.amplitude**2 * length / indicator) ** (0.5 / degree)
+        needed = np.maximum(needed, LEAST_DECAY)
+        factor = (self.decay - 1 / self.decay) / (needed - 1 / needed)
+        return np.asarray(np.diff(self.vertices) * np.minimum(factor, LARGEST))
+
+    def fulfilled_by(self, mesh: Discretization, vertices: np.ndarray, indicator: float) -> bool:
+        """Whether elements with these vertices are nowhere larger than the indicator allows."""
+        sizes = self.sizes(mesh.degree, indicator)
+        for a, b in pairwise(vertices):
+            over = (self.vertices[:-1] < b) & (self.vertices[1:] > a)
+            if b - a > 1.05 * sizes[over].min():
+                return False
+        return True
+
+
+class Gauge:
+    """Measures how smooth the states of one discretisation are; collective."""
+
+    def __init__(self, solver: Equilibria, weights: list[tuple[str, np.ndarray]]) -> None:
+        """Tabulate the transformation from nodal values to Legendre coefficients; ``weights`` by :func:`weights_of`."""
+        self.solver, self.weights = solver, weights
+        fields = solver.system.fields
+        self._cells = slice(0, fields.owned_cells)
+        degrees = {b.name: b.degree for b in fields.blocks}
+        self._series = {}
+        for name, _ in weights:
+            d = degrees[name]
+            series = np.linalg.inv(legendre.legvander(2 * compat.nodes(d) - 1, d))
+            series = legendre.legder(series, axis=0) if name == fields.turning.name else series
+            self._series[name] = series / np.sqrt(2 * np.arange(len(series)) + 1)[:, None]
+
+    def __call__(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec] = ()) -> Smoothness:
+        """Smoothness of a state and of changes of it (null vectors) together."""
+        shape = self.solver.shape
+        starts, rows = shape.gather(shape.start), shape.gather(self._squares(x, directions))
+        order = np.argsort(starts)
+        vertices = np.append(starts[order], self.solver.system.scene.interval[1])
+        return _decay(vertices, np.sqrt(rows[order]))
+
+    def unresolved(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec] = ()) -> float:
+        """Norm of the last two coefficients over that of all, or one, of a state and of changes of it together."""
+        system = self.solver.system
+        parts = system.comm.allreduce(self.solver.shape.size @ self._squares(x, directions))
+        return float(np.sqrt(parts[-2:].sum() / max(parts.sum(), system.scene.length)))
+
+    def changed(self, before: PETSc.Vec, after: PETSc.Vec, *, state: bool) -> float:
+        """Norm of the change of the strains over that of those after, or one radian along the rod.
+
+        Of two states, or (``state=False``) of two null vectors of metric norm 1, of either sign.
+        """
+        system, apart = self.solver.system, before.copy()
+        same = state or (system.metric * before).dot(after) >= 0
+        apart.axpy(-1.0 if same else 1.0, after)
+        squares = self._squares(None, [apart]), self._squares(after, []) if state else self._squares(None, [after])
+        change, size = (float(system.comm.allreduce(np.sum(self.solver.shape.size @ parts))) for parts in squares)
+        return float(np.sqrt(change / max(size, system.scene.length)))
+
+    def _squares(self, x: PETSc.Vec | None, directions: Sequence[PETSc.Vec]) -> np.ndarray:
+        """Squared coefficients of the strains on the elements of this rank, (elements, degree)."""
+        fields, shape = self.solver.system.fields, self.solver.shape
+        squares = np.zeros((fields.owned_cells, fields.discretization.degree))
+        for vector in directions if x is None else (x, *directions):
+            self.solver.system.bring(vector)
+            values = fields.u.x.array
+            if vector is not x:
+                values = np.where(fields.number < 0, 0.0, values)  # a state is held there, a change of it is zero
+            for name, weights in self.weights:
+                series = np.einsum("jn,cni->cji", self._series[name], values[fields.dofs[name][self._cells]])
+                if name == fields.turning.name:
+                    series *= (2 / shape.size)[:, None, None]
+                squares += series**2 @ weights**2
+        return squares
+
+
+def weights_of(scene: Scene) -> list[tuple[str, np.ndarray]]:
+    """Weights of curvature (derivative of q or an angle) and of free strains v: root of stiffness over bending."""
+    stiffness = np.diag(scene.stiffness())
+    free = len(scene.free_strains)
+    bending = stiffness[free:].min()
+    turning = turning_of(scene)
+    out = [(turning.name, np.full(turning.size, scene.length * (1.0 if turning.name == "q" else 0.5)))]
+    return [*out, ("v", scene.length * np.sqrt(abs(stiffness[:free] / bending)))] if free else out
+
+
+def _decay(vertices: np.ndarray, coefficients: np.ndarray) -> Smoothness:
+    """Fit ``A rho^-j`` to the monotone envelope of the last coefficients of each element above round-off."""
+    elements, degree = coefficients.shape
+    envelope = np.maximum.accumulate(coefficients[:, ::-1], axis=1)[:, ::-1]
+    floor = max(ROUND_OFF * coefficients.max(), 1e-300)
+    amplitude, decay = np.full(elements, floor), np.full(elements, MOST_DECAY)
+    for e, row in enumerate(envelope):
+        last = int(np.count_nonzero(row > floor))
+        first = max(min(degree // 2 - 1, last - 3), 0)
+        if last - first < 2:
+            continue
+        j, logarithms = np.arange(first, last), np.log(row[first:last])
+        middle = (first + last - 1) / 2
+        slope = (j - middle) @ logarithms / ((j - middle) @ (j - middle))  # of the line of least squares
+        level = logarithms.mean() - slope * middle
+        decay[e] = np.clip(np.exp(-slope), LEAST_DECAY, MOST_DECAY)
+        above = row[first:last] * decay[e] ** j
+        amplitude[e] = max(np.exp(level), above[-1])
+    return Smoothness(vertices, degree, amplitude, decay)
+
+
+def pieces_of(scene: Scene) -> np.ndarray:
+    """Arclengths at which elements must meet: ends, joints, and where the ordinate is taken.
+
+    The centreline is as accurate as a load at vertices only, and far less inside of elements.
+    """
+    a, b = scene.interval
+    inner = [s for s in (*scene.joints, *scene.ordinate.places) if min(s - a, b - s) > 1e-9 * scene.length]
+    out = [a]
+    for s in sorted(inner):
+        if s - out[-1] > 1e-9 * scene.length:
+            out.append(s)
+    return np.array([*out, b])
+
+
+def first_mesh(scene: Scene, formulation: str, elements: int, degree: int) -> Discretization:
+    """About so many elements of nearly equal size."""
+    pieces = pieces_of(scene)
+    counts = np.maximum(np.ceil(np.diff(pieces) / scene.length * elements - 1e-6).astype(int), 1)
+    inner = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
+    vertices = tuple(map(float, np.concatenate([pieces[:1], *inner])))
+    return Discretization(formulation, len(vertices) - 1, degree, vertices)
+
+
+def cost(fields: Fields, elements: int, degree: int) -> float:
+    """Cost of a point of a branch with that many elements of a degree, in units of an unknown of degree zero."""
+    unknowns = elements * degree * sum(b.size for b in fields.blocks)
+    return FIXED + unknowns * (1 + PER_DEGREE * degree)
+
+
+def cheapest(solver: Equilibria, found: Smoothness, indicator: float) -> Discretization:
+    """Cheapest discretisation with which the indicator of a state falls to that value: degree, number, vertices."""
+    fields = solver.system.fields
+    present = fields.discretization
+    best: tuple[float, Discretization] | None = None
+    for degree in sorted({*DEGREES, present.degree}):
+        vertices = _place(fields, found, found.sizes(degree, indicator))
+        effort = cost(fields, len(vertices) - 1, degree) * (1.0 if degree == present.degree else 1 + KEEP)
+        if best is None or effort < best[0]:
+            mesh = replace(present, elements=len(vertices) - 1, degree=degree, vertices=tuple(map(float, vertices)))
+            best = effort, mesh
+    assert best is not None
+    return best[1]
+
+
+def _place(fields: Fields, found: Smoothness, sizes: np.ndarray) -> np.ndarray:
+    """Vertices of a mesh with elements of these sizes, an element for each rank at least."""
+    number = np.append(0.0, np.cumsum(np.diff(found.vertices) / sizes))
+    number *= max(1.0, (max(2, fields.comm.size) + 0.1) / number[-1])
+    pieces = pieces_of(fields.scene)
+    at = np.interp(pieces, found.vertices, number)
+    out = [pieces[:1]]
+    for left, right, a, b in zip(pieces, pieces[1:], at, at[1:], strict=False):
+        count = max(1, int(np.ceil(b - a - 0.05)))
+        inner = np.interp(np.linspace(a, b, count + 1)[1:-1], number, found.vertices)
+        out += [inner[(inner > left) & (inner < right)], np.array([right])]
+    return np.concatenate(out)

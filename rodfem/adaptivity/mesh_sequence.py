@@ -1,0 +1,191 @@
+"""The discretisations of one run: one, or with an accuracy asked for as many as its branches need.
+
+Every point knows the number of its mesh.  Here meshes are made, and points carried from one to another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite, log10
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.adaptivity.error_estimate import Richer
+from rodfem.adaptivity.grading import Gauge, cheapest, cost, first_mesh, weights_of
+from rodfem.continuation.branch import BRANCH_POINT, FOLD, Point, Special
+from rodfem.continuation.solvers import Follower
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.fields import Discretization
+from rodfem.fem.newton import correct
+from rodfem.fem.symmetries import may_slide
+from rodfem.fem.system import System
+from rodfem.problem.scene import Scene
+
+FINEST, COARSEST = 1e-10, 1e-1
+"""Least and greatest accuracy that can be asked for; the former is near round-off."""
+OF_A_RING = 1e-8
+"""Accuracy with which a uniform ring is computed at least."""
+MARGIN = 100.0
+"""A new mesh is made for an accuracy better than the one asked for by this factor: it is to last for a while."""
+FURTHER = 10.0
+"""By this factor more at each further try at one place."""
+
+
+def check_accuracy(accuracy: float) -> None:
+    """Raise :class:`SceneError` for an accuracy outside :data:`FINEST` to :data:`COARSEST`."""
+    if not FINEST <= accuracy <= COARSEST:
+        raise SceneError(
+            f"An accuracy of {accuracy:g} is not attainable: ask for one between {FINEST:g} (round-off) and "
+            f"{COARSEST:g}."
+        )
+
+
+def internal_accuracy(scene: Scene, accuracy: float) -> float:
+    """Accuracy to work with: a mesh breaks the symmetry of a uniform ring along itself, which must not be seen."""
+    return min(accuracy, OF_A_RING) if may_slide(scene) and not scene.depends_on_s() else accuracy
+
+
+def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) -> Discretization:
+    """Discretisation to start with: few elements, of a degree that grows with the digits asked for."""
+    degree = round(4 - log10(internal_accuracy(scene, accuracy)) / 2)
+    return first_mesh(scene, formulation, max(4, comm.size), min(max(degree, 4), 9))
+
+
+class TooCoarse(Exception):
+    """The mesh does not resolve a state to the accuracy: its ``error`` is too large, infinite where it is not known.
+
+    ``directions`` are null vectors to be resolved besides; the error falls as the indicator to the power ``order``.
+    """
+
+    def __init__(
+        self, point: Point, error: float, directions: Sequence[PETSc.Vec] = (), order: float = 1.0, why: str = ""
+    ) -> None:
+        """Keep what a new mesh is chosen from, and in words what was found."""
+        super().__init__(why or f"estimated error {error:.0e}")
+        self.point, self.error, self.directions, self.order = point, error, list(directions), order
+
+
+class Meshes:
+    """The followers of one run, by the number of their mesh, and their richer companions."""
+
+    def __init__(self, follower: Follower, accuracy: float | None) -> None:
+        """Begin with one mesh; None as accuracy: no other is made."""
+        self.followers = [follower]
+        self.accuracy = None if accuracy is None else internal_accuracy(follower.system.scene, accuracy)
+        self._richer: dict[int, Richer] = {}
+        self._gauges: dict[int, Gauge] = {}
+        if accuracy is not None:
+            self._weights = weights_of(follower.system.scene)
+
+    def gauge(self, number: int) -> Gauge:
+        """Gauge of the smoothness of states on a mesh."""
+        if number not in self._gauges:
+            self._gauges[number] = Gauge(self.followers[number], self._weights)
+        return self._gauges[number]
+
+    def richer(self, number: int) -> Richer:
+        """Companion of a mesh, on halves of its elements one degree richer, made when it is first asked for."""
+        if number not in self._richer:
+            self._richer[number] = Richer(self.followers[number])
+        return self._richer[number]
+
+    def error_of(self, special: Special) -> float:
+        """Estimated error of a special point in load and ordinate, relative to those that exceed one."""
+        error = special.ordinate_error / max(1.0, abs(special.point.ordinate))
+        if special.kind in (FOLD, BRANCH_POINT) or special.zero_of == "stretch":
+            error = max(error, special.error_estimate / max(1.0, abs(special.point.load)))
+        return error
+
+    def raised(self, trouble: TooCoarse, tries: int) -> Follower:
+        """Follower on the cheapest mesh for the state that was too coarse: one that there is, or a new one."""
+        assert self.accuracy is not None
+        old = self.followers[trouble.point.mesh]
+        error = trouble.error if isfinite(trouble.error) else 1e3 * self.accuracy
+        found = self.gauge(old.mesh)(trouble.point.x, trouble.directions)
+        gain = self.accuracy / (error * MARGIN * FURTHER**tries)
+        indicator = max(found.indicator, 1e-300) * gain**trouble.order
+        mesh = cheapest(old, found, indicator)
+        fields = old.system.fields
+        affordable = 1.2 * cost(fields, mesh.elements, mesh.degree)
+        for known in self.followers:
+            d = known.system.fields.discretization
+            vertices = self.vertices(known.mesh)
+            if known is not old and cost(fields, d.elements, d.degree) <= affordable:
+                if found.fulfilled_by(d, vertices, indicator):
+                    return known
+        s = old.system
+        with s.clock("setup"):
+            new = Follower(System(s.scene, mesh, s.comm, s.clock, symmetries=s.symmetries), old.modes)
+        new.mesh = len(self.followers)
+        self.followers.append(new)
+        return new
+
+    def vertices(self, number: int) -> np.ndarray:
+        """Arclengths at which the elements of a mesh meet, (E + 1,)."""
+        return self.followers[number].system.fields.all_vertices()
+
+    # --- points on another mesh --------------------------------------------------------------------------------
+
+    def state(self, x: PETSc.Vec, source: int, target: Follower) -> PETSc.Vec:
+        """State of one mesh interpolated on another."""
+        return target.shape.restore(self.followers[source].shape.sample(x))
+
+    def direction(self, d: PETSc.Vec, x: PETSc.Vec, source: int, target: Follower) -> PETSc.Vec:
+        """Change of the state ``x`` of one mesh interpolated on another: the difference of two states."""
+        moved = x.copy()
+        moved.axpy(1.0, d)
+        out = self.state(moved, source, target)
+        out.axpy(-1.0, self.state(x, source, target))
+        return out
+
+    def here(self, point: Point, target: Follower) -> Point:
+        """Point with its state and tangent interpolated, not solved, on another mesh; itself if it is on that."""
+        if point.mesh == target.mesh:
+            return point
+        x = self.state(point.x, point.mesh, target)
+        tangent = None if point.tangent is None else self.direction(point.tangent, point.x, point.mesh, target)
+        return replace(point, x=x, tangent=tangent, mesh=target.mesh)
+
+    def carried(self, point: Point, target: Follower, fixed_load: bool) -> Point | None:
+        """Point solved on another mesh, on the plane across its tangent or at its load; None where that fails."""
+        guess = self.here(point, target)
+        if guess.tangent is None:
+            return None
+        x, system = guess.x, target.system
+        system.set_phase(x)
+        row = target.axis if fixed_load else target.row(guess.tangent)
+        outcome = correct(system, x, row, reach=0.5)
+        if fixed_load and not outcome.converged:  # too far from a state on a far finer mesh: from the scene's start
+            x, outcome = target.first(point.load)
+        if not outcome.converged:
+            return None
+        side = target.row(guess.tangent)
+        return target.point(x, point.arclength, target.tangent(side, at=x), outcome)
+
+    def carry(self, history: Sequence[Point], target: Follower, from_branch_point: bool) -> list[tuple[Point, Point]]:
+        """Last points of a branch solved on another mesh: pairs of old and new, in order.
+
+        Points whose index is another there are left out, so that an eigenvalue that passes zero is met again.  The
+        start of a branch keeps its load; a branch point from which one leaves is not carried.
+        """
+        starts = history[0].arclength == 0.0
+        first = 1 if starts and from_branch_point else 0
+        pairs: list[tuple[Point, Point]] = []
+        for number in range(len(history) - 1, first - 1, -1):
+            old = history[number]
+            new = self.carried(old, target, fixed_load=starts and number == 0)
+            if new is not None and (pairs or number == first or new.negative == old.negative):
+                pairs.insert(0, (old, new))
+            elif pairs:
+                break
+            if len(pairs) == 4:
+                break
+        if not pairs:
+            raise ConvergenceError(
+                f"The branch could not be carried to another mesh near load {history[-1].load:.8g}: use --elements and "
+                "--degree instead of an accuracy."
+            )
+        return pairs

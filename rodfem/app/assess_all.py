@@ -1,0 +1,66 @@
+"""Verdicts on the states at the loads of a plan, and their modes: the options ``--method`` and ``--modes``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from rodfem.app.terminal import Report
+from rodfem.continuation.branch import USER, Branch
+from rodfem.continuation.solvers import Equilibria
+from rodfem.diagram.plan import Plan
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.system import System
+from rodfem.modes.finder import ModeFinder
+from rodfem.modes.modes import save_modes
+from rodfem.output.plot_modes import draw_modes
+from rodfem.stability.assessment import Judge
+
+
+def check_method(system: System, plan: Plan) -> None:
+    """Raise :class:`SceneError` for a method that does not apply, before anything is computed."""
+    Judge(system).choose(plan.method or "auto", plan.modes)
+
+
+def judge_users(
+    branches: list[Branch], solvers: Sequence[Equilibria], plan: Plan, output: Path, report: Report, figures: bool
+) -> None:
+    """Judge the states at the loads of the plan; save and draw their modes, if they are wanted.
+
+    Each on the mesh on which it was computed.
+    """
+    system = solvers[0].system
+    scene = system.scene
+    about = {"scene": scene.name, "title": scene.title or scene.name, "parameter": scene.load}
+    about |= {k: v for k, v in asdict(system.fields.discretization).items() if k != "vertices"}
+    which = "left-most eigenvalues mu = omega^2" if scene.conservative else "eigenvalues mu = omega^2 nearest zero"
+    report.say(f"\nIs it stable? ({which})")
+    finders: dict[int, ModeFinder] = {}
+    saved: list[tuple[str, int]] = []
+    for branch, special in ((b, s) for b in branches for s in b.special if s.kind == USER):
+        where, mesh = f"{scene.load} = {special.point.load:.10g}", special.point.mesh
+        if mesh not in finders:
+            finders[mesh] = ModeFinder(solvers[mesh], plan.error_bars)
+        finder = finders[mesh]
+        try:
+            if not plan.modes:
+                report.verdict(branch.name, where, finder.judge(special.point.x, plan.method))
+                continue
+            verdict, modes = finder(special.point.x, plan.modes, plan.method or "auto")
+        except (SceneError, ConvergenceError) as trouble:
+            report.warn(str(trouble))
+            continue
+        report.verdict(branch.name, where, verdict, modes)
+        if system.comm.rank == 0:
+            path = output / "modes.h5"
+            save_modes(modes, path, branch.name, special.row, about, first=not saved, scene=scene)
+        saved.append((branch.name, special.row))
+    if not saved:
+        return
+    pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
+    for (name, row), picture in zip(saved, pictures, strict=False):
+        for suffix in (".png", ".gif") if system.comm.rank == 0 else ():
+            draw_modes(output / "modes.h5", name, row, output / f"{picture}{suffix}")
+    report.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")

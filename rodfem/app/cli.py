@@ -1,0 +1,257 @@
+"""The command line that all demos share.
+
+Importing this module checks the installation first: a script gets one sentence, and leaves with status 2, where a
+module is missing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NoReturn
+
+from rodfem.errors import ConvergenceError, EnvironmentTrouble, SceneError
+
+NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
+
+
+def check_installation() -> None:
+    """Leave with one sentence and status 2 where this Python lacks a module."""
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        sys.stderr.write(
+            f"error: {sys.executable} has no module {', '.join(missing)}: run 'make setup', which installs what is "
+            "missing, and use .venv/bin/python (or any Python that sees Debian's python3-dolfinx).\n"
+        )
+        sys.exit(2)
+
+
+check_installation()
+
+
+class Parser(argparse.ArgumentParser):
+    """Argument parser whose complaints are one sentence, printed once under MPI."""
+
+    def gives(self, name: str, words: Sequence[str]) -> bool:
+        """Whether the command line sets an option, by an abbreviation maybe."""
+        full = next(action.option_strings[0] for action in self._actions if action.dest == name)
+        return any(word.split("=")[0] in [full[:end] for end in range(3, len(full) + 1)] for word in words)
+
+    def error(self, message: str) -> NoReturn:
+        """Print ``message`` and leave with status 2."""
+        complain(f"{message[:1].upper()}{message[1:]}; see {self.prog} --help.")
+
+
+def complain(sentence: str) -> NoReturn:
+    """Print one sentence on rank 0 and leave with status 2 on every rank."""
+    from mpi4py import MPI
+
+    if MPI.COMM_WORLD.rank == 0:
+        sys.stderr.write(f"error: {sentence}\n")
+        sys.stderr.flush()
+    MPI.COMM_WORLD.barrier()
+    sys.exit(2)
+
+
+def parser_for(
+    name: str,
+    description: str,
+    load: str,
+    span: tuple[float, float],
+    elements: int,
+    degree: int,
+    formulation: str = "auto",
+) -> Parser:
+    """Return the options that every demo has; a demo adds its own constants."""
+    parser = Parser(
+        prog=f"{name}.py",
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="Options for PETSc and SLEPc go after a lone --, as in: -- -log_view",
+    )
+    group = parser.add_argument_group("discretisation")
+    group.add_argument(
+        "--elements",
+        type=int,
+        default=elements,
+        metavar="N",
+        help=f"number of finite elements along the rod (default {elements})",
+    )
+    group.add_argument(
+        "--degree",
+        type=int,
+        default=degree,
+        metavar="K",
+        help=f"polynomial degree; the error falls as h^(2K) (default {degree})",
+    )
+    group.add_argument(
+        "--formulation",
+        default=formulation,
+        metavar="{auto,reduced,pointwise}",
+        help="reduced: no centreline, the contact force as scalars; pointwise: all fields "
+        f"(default {formulation}: reduced where the scene allows it)",
+    )
+    group.add_argument(
+        "--accuracy",
+        type=float,
+        default=None,
+        metavar="EPS",
+        help="instead of elements and degree: choose meshes on the way such that loads and ordinates are in error by "
+        "less than EPS (relative to values greater than one)",
+    )
+    group = parser.add_argument_group("what to compute")
+    group.add_argument(
+        "--range",
+        dest="span",
+        type=float,
+        nargs=2,
+        default=span,
+        metavar=("A", "B"),
+        help=f"start at {load} = A, stay between A and B (default {span[0]:g} {span[1]:g})",
+    )
+    group.add_argument(
+        "--at",
+        type=float,
+        nargs="+",
+        default=[],
+        metavar="LOAD",
+        help=f"compute every branch also at exactly these values of {load}",
+    )
+    group.add_argument(
+        "--step",
+        type=float,
+        default=0.05,
+        metavar="S",
+        help="largest step along a branch, in radian of rotation (root mean square; default 0.05)",
+    )
+    group.add_argument(
+        "--depth",
+        type=int,
+        default=2,
+        metavar="D",
+        help="follow what leaves from branch points of branches of a depth less than D; the first branch has depth 0, "
+        "what leaves from it 1, and so on (default 2)",
+    )
+    group.add_argument(
+        "--spectrum",
+        type=int,
+        default=0,
+        metavar="K",
+        help="also compute the K left-most eigenvalues of every state with SLEPc",
+    )
+    group.add_argument(
+        "--method",
+        default="",
+        metavar="NAME",
+        help="judge the states at the loads of --at by auto, count, shift-invert, cayley, slicing, reduction or dense, "
+        "and print all that it says",
+    )
+    group.add_argument(
+        "--modes",
+        type=int,
+        default=0,
+        metavar="K",
+        help="find and draw the K left-most modes of the states at the loads of --at",
+    )
+    group.add_argument(
+        "--search",
+        type=int,
+        default=0,
+        metavar="TRIES",
+        help="at each load of --at also look for equilibria that no branch has reached, with that many tries",
+    )
+    group.add_argument(
+        "--locus",
+        nargs=3,
+        default=None,
+        metavar=("NAME", "LOW", "HIGH"),
+        help="follow every special point in the plane of the load and the constant NAME from LOW to HIGH",
+    )
+    group = parser.add_argument_group("output")
+    group.add_argument(
+        "--output",
+        type=Path,
+        default=Path("results") / name,
+        metavar="DIR",
+        help=f"folder for files and pictures (default results/{name})",
+    )
+    group.add_argument("--no-figures", dest="figures", action="store_false", help="draw nothing")
+    return parser
+
+
+def pair(words: Sequence[str] | None) -> tuple[str, float, float] | None:
+    """Name and interval of a second parameter; raises :class:`SceneError` for what are no numbers."""
+    if words is None:
+        return None
+    try:
+        return words[0], float(words[1]), float(words[2])
+    except ValueError:
+        raise SceneError(f"{words[1]} to {words[2]} is no interval: give two numbers after {words[0]}.") from None
+
+
+def main(
+    parser: Parser,
+    scene_of: Callable[[argparse.Namespace], Any],
+    defaults: Callable[[argparse.Namespace], Mapping[str, Any]] | None = None,
+    arguments: Sequence[str] | None = None,
+) -> None:
+    """Parse the command line, build the scene, run it; bad input ends with one sentence and status 2.
+
+    ``defaults`` gives values that the other options call for, by name, for options that the user does not give.
+    """
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
+    options = parser.parse_args(ours)
+    for name, value in defaults(options).items() if defaults else ():
+        if not parser.gives(name, ours):
+            setattr(options, name, value)
+    import petsc4py
+
+    petsc4py.init(["rodfem", *petsc])  # before PETSc is loaded, for options that it reads only then (-log_view)
+    from petsc4py import PETSc
+
+    try:
+        from rodfem.app.run import run
+        from rodfem.continuation.solvers import Steps
+        from rodfem.diagram.plan import Plan
+        from rodfem.fem.fields import Discretization
+
+        if petsc:  # once more, for a PETSc that was running already
+            PETSc.Options().insertString(" ".join(petsc))
+        if options.accuracy is not None:
+            for name in ("elements", "degree"):
+                if parser.gives(name, ours):
+                    raise SceneError(
+                        f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy."
+                    )
+        discretization = Discretization(options.formulation, options.elements, options.degree)
+        scene = scene_of(options)
+        span = tuple(options.span)
+        steps = Steps(largest=options.step)
+        at = tuple(options.at)
+        plan = Plan(
+            span,
+            at,
+            depth=options.depth,
+            spectrum=options.spectrum,
+            steps=steps,
+            tries=options.search,
+            locus=pair(options.locus),
+            method=options.method,
+            modes=options.modes,
+            accuracy=options.accuracy,
+        )
+        run(scene, discretization, plan, options.output, figures=options.figures)
+    except KeyboardInterrupt:
+        from mpi4py import MPI
+
+        if MPI.COMM_WORLD.rank == 0:
+            sys.stderr.write(f"\ninterrupted; the branches that were finished are in {options.output}\n")
+        sys.exit(130)
+    except (SceneError, EnvironmentTrouble, ConvergenceError) as trouble:
+        complain(str(trouble))
+    except PETSc.Error as trouble:
+        complain(f"PETSc gave up ({str(trouble).splitlines()[0]}): try other constants or another discretisation.")

@@ -1,0 +1,89 @@
+"""Many rods: the same work on a list of scenes, shared among the ranks, each rod on one of them.
+
+Results are files, one for each rod, written whole as they finish: an interrupted run goes on where it stopped, on any
+number of ranks.  A rod that is no longer the same (other constants, another range) is computed anew.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from rodfem.app.run import writable
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.file_format import RESULT
+from rodfem.output.files import save_json
+from rodfem.problem.scene import Scene
+
+Work = Callable[[Scene], dict[str, Any]]
+
+
+def key_of(scene: Scene) -> dict[str, Any]:
+    """What a saved result must agree in with a scene to be used again."""
+    constants = {name: p.value for name, p in scene.parameters.items()}
+    return {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants}
+
+
+def many(
+    scenes: Sequence[Scene],
+    work: Work,
+    folder: Path,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    progress: Callable[[int, int], None] = lambda done, all_of_them: None,
+) -> list[dict[str, Any]]:
+    """Return ``work(scene)`` for all scenes, in order, on every rank; rods are dealt out to the ranks in turn.
+
+    ``work`` gets no communicator but must use ``MPI.COMM_SELF``, and returns what JSON can hold.  Where it raises
+    :class:`SceneError` or :class:`ConvergenceError` the result is ``{"error": sentence}``, and the others go on.
+    ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`SceneError` where ``folder``
+    cannot be written, or has a result in another or a newer format.
+    """
+    writable(folder, comm)
+    files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]
+    _check(files, comm)
+    mine = range(comm.rank, len(scenes), comm.size)
+    for done, i in enumerate(mine, start=1):
+        if _saved(files[i], key_of(scenes[i])) is None:
+            try:
+                result = work(scenes[i])
+            except (SceneError, ConvergenceError) as trouble:
+                result = {"error": str(trouble)}
+            save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
+        if comm.rank == 0:
+            progress(min(done * comm.size, len(scenes)), len(scenes))
+    comm.barrier()
+    found = [_saved(file, key_of(scene)) for file, scene in zip(files, scenes, strict=True)] if comm.rank == 0 else []
+    return comm.bcast([{} if result is None else result for result in found])
+
+
+def _check(files: Sequence[Path], comm: MPI.Comm) -> None:
+    """Raise :class:`SceneError` on every rank where a file has a format that is not to be written over."""
+    trouble = ""
+    if comm.rank == 0:
+        try:
+            for file in files:
+                RESULT.check(_contents(file), file)
+        except SceneError as error:
+            trouble = str(error)
+    trouble = comm.bcast(trouble)
+    if trouble:
+        raise SceneError(trouble)
+
+
+def _saved(file: Path, key: dict[str, Any]) -> dict[str, Any] | None:
+    """Result in a file, None where there is none for this rod."""
+    data = _contents(file)
+    return data.get("result") if data.get("key") == key else None
+
+
+def _contents(file: Path) -> dict[str, Any]:
+    """Entries of a file; none where it is missing or cut off."""
+    try:
+        data = json.loads(file.read_text())
+    except (OSError, ValueError):
+        return {}
+    return data if isinstance(data, dict) else {}

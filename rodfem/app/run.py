@@ -1,0 +1,178 @@
+"""One run of a scene from beginning to end: solve, save as it goes, draw."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from mpi4py import MPI
+
+from rodfem import compat
+from rodfem.app.terminal import Report
+from rodfem.continuation.branch import END, USER, Branch
+from rodfem.continuation.solvers import Equilibria
+from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.fields import Discretization
+from rodfem.fem.system import System
+from rodfem.output.files import save_json, save_states
+from rodfem.output.typical import typical_state
+from rodfem.problem.scene import Scene
+
+GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
+"""What a picture's caption shows for TeX names."""
+
+
+def writable(folder: Path, comm: MPI.Comm) -> None:
+    """Make ``folder``; raises :class:`SceneError` on every rank where it cannot be written."""
+    trouble = ""
+    if comm.rank == 0:
+        probe = folder / f".probe-{os.getpid()}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            probe.write_text("")
+            probe.unlink()
+        except OSError as error:
+            trouble = error.strerror or str(error)
+    trouble = comm.bcast(trouble)
+    if trouble:
+        raise SceneError(f"The output folder {folder} cannot be written ({trouble}): choose another one with --output.")
+
+
+def run(
+    scene: Scene,
+    discretization: Discretization | None = None,
+    plan: Plan | None = None,
+    output: Path | None = None,
+    *,
+    figures: bool = True,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    quiet: bool = False,
+) -> Diagram:
+    """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
+
+    By default 8 elements of degree 6 (few elements to start with where the plan has an accuracy), the scene's own span,
+    and the folder ``results/<name>``.  Files are updated after every branch: an interrupted run keeps all completed
+    branches.  Returns the diagram.  Raises :class:`~rodfem.errors.SceneError` for bad input, before any computation,
+    and :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
+    """
+    plan = plan or Plan()
+    output = output or Path("results") / scene.name
+    if scene.conservative:
+        compat.require_real_petsc()
+    plan.check(scene)
+    writable(output, comm)
+    terminal = Terminal(plan, output, comm, quiet)
+    diagram = trace(scene, discretization, plan, terminal, comm=comm)
+    branches, clock = diagram.branches, diagram.clock
+    if comm.rank == 0:
+        save_json(diagram.data, output / "diagram.json")
+    terminal.table(branches, diagram.solvers[0].system)
+    terminal.spectra(branches, scene)
+    terminal.frequencies(branches, scene.load)
+    terminal.timing(clock, sum(len(b.points) for b in branches))
+    terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
+    if plan.method or plan.modes:
+        from rodfem.app.assess_all import judge_users
+
+        judge_users(branches, diagram.solvers, plan, output, terminal, figures)
+    if plan.locus is not None:
+        _loci(branches, diagram.solvers, plan, output, terminal, figures)
+    if figures and comm.rank == 0:
+        _draw(output, terminal)
+    comm.barrier()
+    return diagram
+
+
+class Terminal(Report):
+    """Shows a run on the terminal, and keeps its files up to date."""
+
+    def __init__(self, plan: Plan, output: Path, comm: MPI.Comm, quiet: bool) -> None:
+        """Write into the folder ``output``, which there is; with ``quiet`` print nothing."""
+        super().__init__(comm)
+        if quiet:
+            self.on = self.live = False
+        self.plan, self.output = plan, output
+
+    def system(self, system: System, accuracy: float | None = None) -> None:
+        """Say what is solved, and refuse a method that does not apply before anything is computed."""
+        super().system(system, accuracy)
+        if self.plan.method or self.plan.modes:
+            from rodfem.app.assess_all import check_method
+
+            check_method(system, self.plan)
+
+    def complete(self, diagram: Diagram) -> None:
+        """Save all that there is: an interrupted run keeps all completed branches."""
+        with diagram.clock("files"):
+            if diagram.solvers[0].system.comm.rank == 0:
+                save_json(diagram.data, self.output / "diagram.json")
+            first = len(diagram) == 1
+            save_states(diagram.branches[-1], diagram.solvers, self.output / "states.h5", first=first)
+
+
+def _loci(
+    branches: list[Branch], solvers: Sequence[Equilibria], plan: Plan, output: Path, report: Report, figures: bool
+) -> None:
+    """Follow all special points in the plane of two parameters; each into a file of its own, all into one picture.
+
+    Each on the mesh on which it was found.
+    """
+    from rodfem.codim2.locus import Locus, locus
+    from rodfem.output.plot_locus import draw_locus
+
+    if plan.locus is None:
+        return
+    name, low, high = plan.locus
+    span = plan.over(solvers[0].system.scene)
+    load = (min(span), max(span))
+    saved: list[dict] = []
+    for branch in branches:
+        known: list[Locus] = []
+        for special in branch.special:
+            if special.kind in (USER, END) or special.meets is not None:
+                continue
+            if any(found.passes(special) for found in known):
+                report.say(f"\nThe {special.kind} of {branch.name} at {special.point.load:.8g} is on a locus above")
+                continue
+            if plan.accuracy is not None:
+                report.say("\nA locus stays on the mesh of its special point: its own estimate says how accurate it is")
+            report.say(f"\nLocus of the {special.kind} of {branch.name} at {special.point.load:.8g}")
+            try:
+                found = locus(solvers[special.point.mesh], special, name, (load, (low, high)))
+            except (SceneError, ConvergenceError) as trouble:
+                report.warn(str(trouble))
+                continue
+            report.say(found.text())
+            saved.append(found.data())
+            known.append(found)
+            if solvers[0].system.comm.rank == 0:
+                found.save(output / f"locus-{len(saved)}.json")
+    if saved and figures and solvers[0].system.comm.rank == 0:
+        draw_locus(saved, output / "locus.png")
+        report.say(f"Loci in {output}{os.sep}: locus-1.json ..., locus.png")
+
+
+def _draw(output: Path, report: Report) -> None:
+    """Draw the diagram, and the shape of a stable state if there is one."""
+    from rodfem.output.files import load_json
+    from rodfem.output.plot_diagram import draw_diagram
+    from rodfem.output.plot_frequencies import draw_frequencies
+    from rodfem.output.render import draw_shape_safely
+
+    data = load_json(output / "diagram.json")
+    if any("omega2" in branch["columns"] for branch in data["branches"]):
+        draw_frequencies(data, output / "diagram.png")
+        report.say(f"Picture in {output}{os.sep}: diagram.png")
+        return
+    draw_diagram(data, output / "diagram.png")
+    branch, row, words = typical_state(data)
+    caption = f"{data['title']}, {branch}, {GREEK.get(data['parameter_label'], data['parameter'])} = {words}"
+    picture = output / "shape.png"
+    trouble = draw_shape_safely(output / "states.h5", branch, row, picture, caption=caption)
+    report.say(f"Pictures in {output}{os.sep}: diagram.png" + ("" if trouble else ", shape.png"))
+    if trouble:
+        report.say(trouble)

@@ -1,0 +1,295 @@
+"""What the terminal shows, on rank 0 only: what is solved, special points as they are found, a final table."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from math import isfinite
+from typing import TextIO
+
+import numpy as np
+from mpi4py import MPI
+
+from forms.kinematics import RODS
+from rodfem.continuation.branch import (
+    BRANCH_POINT,
+    DIVERGENCE,
+    END,
+    FLUTTER,
+    FOLD,
+    IMPERFECT,
+    USER,
+    Branch,
+    Law,
+    Point,
+    Special,
+    not_followed,
+)
+from rodfem.continuation.observer import Observer
+from rodfem.fem.fields import Discretization
+from rodfem.fem.system import System
+from rodfem.modes.modes import Modes
+from rodfem.output.digits import index_in_words, number, rounded_up
+from rodfem.problem.scene import Scene
+from rodfem.stability.assessment import Verdict
+from rodfem.timing import Clock
+
+LABELS = {FOLD: "LP", BRANCH_POINT: "BP", FLUTTER: "HB", DIVERGENCE: "BP", IMPERFECT: "IB", USER: "UZ", END: "EP"}
+"""AUTO's two-letter labels."""
+INDEX, UNSTABLE = "index", "unstable"
+"""Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
+STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
+
+
+def _law(law: Law, resolved: bool | None) -> str:
+    """Local law of a branch point, whose state the mesh has ``resolved`` or not, in words."""
+    if law.side == 0:
+        return f"{law.kind}: a family of equilibria at one and the same load"
+    sign, x = "-" if law.coefficient < 0 else "+", "x" if law.power == 1 else f"x^{law.power}"
+    return f"{law.kind}, load = load_b {sign} {number(abs(law.coefficient), law.uncertainty, resolved)} {x} + ..."
+
+
+def _mesh(system: System) -> str:
+    """Discretisation in words: elements, the smallest and the largest where they differ, degree, unknowns."""
+    d = system.fields.discretization
+    words = f"{d.elements} elements of degree {d.degree}"
+    if d.vertices is not None:
+        sizes = np.diff(d.vertices)
+        if sizes.max() > 1.1 * sizes.min():
+            words += f", {sizes.min():.2g} to {sizes.max():.2g} long"
+    return f"{words}, {system.fields.unknowns} unknowns"
+
+
+def _roots(point: Point) -> dict[str, str]:
+    """Frequencies of a point in words for each kind of motion; a complex pair of them once, with +-."""
+    words: dict[str, list[str]] = {}
+    for value, kind in zip(point.omega2, point.motion, strict=True):
+        w = complex(*value) ** 0.5
+        if value[1] >= 0:
+            text = f"{w.real:.4f}" if value[0] >= 0 else f"{abs(w.imag):.4f}i"
+            words.setdefault(kind, []).append(text if value[1] == 0 else f"{w.real:.4f}+-{abs(w.imag):.4f}i")
+    return {kind: "  ".join(texts[:4]) + (" ..." if len(texts) > 4 else "") for kind, texts in words.items()}
+
+
+class Report(Observer):
+    """Prints on rank 0."""
+
+    def __init__(self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None) -> None:
+        """Print to ``stream``, by default the terminal."""
+        self.count = INDEX
+        self.on = comm.rank == 0
+        self.stream = stream or sys.stdout
+        self.live = self.on and self.stream.isatty() and comm.size == 1
+
+    def say(self, line: str = "", end: str = "\n") -> None:
+        """Print one line."""
+        if self.on:
+            if self.live:
+                self.stream.write("\r\033[K")
+            self.stream.write(line + end)
+            self.stream.flush()
+
+    def note(self, sentence: str) -> None:
+        """Print it."""
+        self.say(sentence)
+
+    def compiling(self) -> None:
+        """Say why the first run takes longer."""
+        self.say("Compiling the forms for the first time (some seconds; kept in ~/.cache/fenics for later runs) ...")
+
+    def system(self, system: System, accuracy: float | None = None) -> None:
+        """Say what is solved, with how many unknowns, what was left out, and the accuracy asked for."""
+        scene, f = system.scene, system.fields
+        d = f.discretization
+        self.say(
+            f"{scene.title or scene.name}: {scene.rod} rod, {d.formulation} formulation, "
+            f"{d.elements} elements of degree {d.degree}, {f.unknowns} unknowns"
+        )
+        if accuracy is not None and scene.conservative:
+            self.say(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
+        self.say(f"  unknowns: {f.describe()}, load {scene.load}")
+        self.count = INDEX if scene.conservative else UNSTABLE
+        if not scene.conservative:
+            loads = ", ".join(scene.without_potential())
+            self.say(f"  not conservative ({loads}): stability is a matter of frequencies, not of an index")
+        for line in f.left_out():
+            self.say(f"  left out: {line}")
+        self._ignored(scene)
+
+    def _ignored(self, scene: Scene) -> None:
+        """Say which terms of the stored energy count for nothing in a rod of that kind, and in which they would."""
+        ignored = scene.ignored_strains
+        if not ignored:
+            return
+        wanted = {*scene.free_strains, *ignored}
+        kind = min((rod for rod, free in RODS.items() if wanted <= set(free)), key=lambda rod: len(RODS[rod]))
+        self.warn(
+            f"The stored energy depends on {', '.join(STRAINS[i] for i in ignored)}, but a rod that is {scene.rod} "
+            f"keeps that undeformed, so that it counts for nothing: leave it out, or choose rod={kind!r}."
+        )
+
+    def frequency_mesh(self, mesh: Discretization, number: int, change: float, asked: float) -> None:
+        """Say which mesh was chosen for frequencies, and by how much they still change."""
+        word = "" if change <= asked else f", above the {asked:g} asked for: round-off"
+        self.say(
+            f"{mesh.elements} elements of degree {mesh.degree} for an accuracy of {asked:g}: with half as many more "
+            f"the {number} frequencies change by {rounded_up(change):.0e}{word}"
+        )
+
+    def mesh(self, system: System, load: float, why: str) -> None:
+        """Say that a branch goes on with another mesh, and why."""
+        self.say(f"  from {system.scene.load} = {load:.6g} on {_mesh(system)} ({why})")
+
+    def accuracy(self, used: Sequence[System], worst: float, asked: float) -> None:
+        """Say with which meshes a branch was traced, and the error of the worst of its points."""
+        word = "" if worst <= asked else f", above the {asked:g} asked for"
+        self.say(f"  largest error {rounded_up(worst):.0e}{word}; {'; '.join(_mesh(system) for system in used)}")
+
+    def branch(self, branch: Branch) -> None:
+        """Head a new branch."""
+        origin = f" from {branch.parent[0]}, special point {branch.parent[1] + 1}" if branch.parent else ""
+        self.say(f"\n{branch.name}{origin}")
+        self.say(f"       load           ordinate       int W ds  {self.count:>6}  zero  located to")
+
+    def progress(self, branch: Branch, point: Point) -> None:
+        """Keep one line up to date while a branch is traced (on a terminal only)."""
+        if self.live:
+            self.say(
+                f"  ... {len(branch.points)} points, load {point.load:.5f}, "
+                f"ordinate {point.ordinate:.5f}, {self.count} {point.negative}",
+                end="",
+            )
+
+    def special(self, branch: Branch, special: Special) -> None:
+        """Print a special point as it is found, as AUTO does."""
+        self.say("  " + self._line(special))
+
+    def _line(self, special: Special) -> str:
+        p = special.point
+        meets = f"  meets {special.meets[0]}" if special.meets else ""
+        return (
+            f"{LABELS[special.kind]}   {round(p.load, 10) + 0.0:<14.10f} {round(p.ordinate, 9) + 0.0:<14.9f} "
+            f"{p.energy:<10.6f} "
+            f"{index_in_words(special):>{max(6, len(self.count))}} {p.zero:>5}  {special.located_to:.0e}{meets}"
+        )
+
+    def law(self, special: Special) -> None:
+        """Print the local law of a branch point, if it has one."""
+        if special.law is not None:
+            law = _law(special.law, special.resolved)
+            self.say(f"\nAt load {special.point.load:.8g}: {law}; x is the change of the ordinate")
+
+    def finished(self, branch: Branch) -> None:
+        """Close a branch: its last point and why it ended."""
+        if branch.special and branch.special[-1].kind == END:
+            self.say("  " + self._line(branch.special[-1]))
+        self.say(f"  {len(branch.points)} points; ended: {branch.ended}")
+
+    def table(self, branches: Sequence[Branch], system: System) -> None:
+        """Print the final table: every special point with its error bar."""
+        scene = system.scene
+        self.say(f"\nSpecial points (in brackets a bound of the error; ordinate: {scene.ordinate.name})")
+        self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
+        for branch in branches:
+            for s in branch.special:
+                exact = s.kind in (USER, END) and s.zero_of != "stretch"
+                load = f"{s.point.load:.10g}" if exact else number(s.point.load, s.error_estimate, s.resolved)
+                zero = f", {s.point.zero} zero" if s.point.zero else ""
+                ordinate = number(s.point.ordinate, s.ordinate_error, s.resolved)
+                self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {index_in_words(s)}{zero}")
+                if s.kind == FLUTTER:
+                    self.say(f"    double eigenvalue omega^2 = {number(s.omega2, s.omega2_error)}")
+                if s.note:
+                    self.say(f"    {s.note}")
+            for sentence in filter(None, (branch.start_in_words(scene.load), *map(str, branch.unexplained))):
+                self.warn(f"{branch.name}: {sentence}")
+
+        if coarse := sum(s.resolved is False for b in branches for s in b.special):
+            self.warn(
+                f"The mesh does not resolve {coarse} special point{'s'[: coarse > 1]}: what stands in brackets is "
+                "no bound there, and the rod need not have such a point; use more elements or a higher degree."
+            )
+        missed = not_followed(branches)
+        if missed:
+            deepest = max(
+                b.depth for b in branches if any(s.kind == BRANCH_POINT and not s.switched for s in b.special)
+            )
+            self.say(
+                f"  {missed} branch point{'s were' if missed > 1 else ' was'} not followed, at the depth of switches: "
+                f"--depth {deepest + 1} follows what leaves there"
+            )
+
+    def spectra(self, branches: Sequence[Branch], scene: Scene) -> None:
+        """Print the left-most eigenvalues of the special points, if they were asked for."""
+        rows = [(b, s) for b in branches for s in b.special if s.point.spectrum]
+        if rows:
+            inertia = "the scene's inertia" if scene.has_inertia else "unit rotary inertia"
+            self.say(f"\nLeft-most eigenvalues mu = omega^2 for {inertia} (symmetry modes left out)")
+        for branch, s in rows:
+            self.say(
+                f"  {branch.name:<12} {s.kind:<13} {s.point.load:<13.8g} "
+                + "  ".join(f"{mu:.6g}" for mu in s.point.spectrum)
+            )
+
+    def frequencies(self, branches: Sequence[Branch], load: str, rows: int = 11) -> None:
+        """Print the square roots of the left-most eigenvalues against the load, if the scene has them."""
+        points = [p for b in branches for p in b.points if p.omega2]
+        if not points:
+            return
+        self.say(f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load}")
+        shown = points[:: max(1, (len(points) - 1) // (rows - 1))]
+        columns = [_roots(p) for p in shown]
+        widths = {
+            kind: max(len(c.get(kind, "")) for c in [*columns, {kind: kind}])
+            for kind in sorted({k for c in columns for k in c})
+        }
+        self.say(f"  {load:>10}  " + "   ".join(f"{kind:<{width}}" for kind, width in widths.items()))
+        for p, column in zip(shown, columns, strict=True):
+            words = "   ".join(f"{column.get(kind, ''):<{width}}" for kind, width in widths.items())
+            self.say(f"  {p.load:10.4f}  {words}".rstrip())
+        if "torsion" not in widths:
+            self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
+
+    def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:
+        """Print what a judgement says of one state, with its modes where they were found."""
+        many = "s"[: found.negative != 1]
+        unstable = f"unstable in {found.negative} direction{many}"
+        if self.count == UNSTABLE:
+            unstable = f"unstable, {found.negative} eigenvalue{many} negative or complex"
+        unstable = "stable" if found.stable else unstable
+        zero = f", {found.zero} zero" if found.zero else ""
+        self.say(f"  {name}, {load}: {unstable}{zero}")
+        motions = ("",) * len(found.values) if modes is None else modes.motion
+        errors = np.full(len(found.values), np.nan) if modes is None else modes.error
+        values, residuals = (found.values, found.errors) if modes is None else (modes.value, modes.residual)
+        for value, residual, error, motion in zip(values, residuals, errors, motions, strict=True):
+            doubt = f" ({rounded_up(error):.0e})" if isfinite(error) else ""
+            number = f"{value.real:.10g}" if value.imag == 0 else f"{complex(value):.9g}"
+            known = f"residual {residual:.0e}" if isfinite(residual) else ""
+            self.say(f"    mu = {number + doubt:<28} {known:<15} {motion}".rstrip())
+        proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
+        took = f"{found.factorisations} factorisation{'s'[: found.factorisations != 1]}, {1e3 * found.seconds:.1f} ms"
+        self.say(f"    {found.method} ({found.reason}){proof}; {took}")
+        if found.band:
+            inside = ", ".join(f"{m:.3g} +- {u:.0e}" for m, u in zip(found.inside, found.uncertainty, strict=True))
+            self.say(
+                f"    inertia decides beyond {found.band:.1e} (in the metric of rotations)"
+                + (f"; inside: {inside}" if inside else "")
+            )
+
+    def warn(self, sentence: str) -> None:
+        """Say what went wrong without stopping."""
+        self.say(f"  ! {sentence}")
+
+    def timing(self, clock: Clock, points: int) -> None:
+        """Print where the time went."""
+        s = clock.seconds
+        work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
+        parts = [
+            f"{name} {s.get(name, 0.0):.2f} s"
+            for name in ("setup", "assembly", "solve", "stability", "location", "error bars", "files")
+        ]
+        self.say(f"\nTime: {', '.join(parts)}; {clock.total():.2f} s in all")
+        known = "index" if self.count == INDEX else "frequencies"
+        each = 1e3 * work / max(points, 1)
+        self.say(f"{points} points with their {known}, {each:.2f} ms each (assembly, solve, stability)")

@@ -1,0 +1,102 @@
+r"""Where two frequencies of a rod under a load without a potential collide, in the plane of two parameters.
+
+Two eigenvalues ``mu1``, ``mu2`` of the pencil ``S x = mu M x`` collide where ``D = ((mu1 - mu2)/2)^2`` vanishes (see
+:mod:`rodfem.stability.cluster`: two pairs of equal ones where the rod bends alike in all planes).  The eigenvalues have
+a square root there, but ``D`` is smooth in both parameters, so that ``D(a, b) = 0`` is a smooth curve as long as the
+gradient of ``D`` does not vanish: the boundary of flutter (Seyranian & Mailybaev, *Multiparameter
+Stability Theory with Mechanical Applications*, World Scientific 2003, chapters 2 and 5).  A point of it is found on a
+given line of the plane by the secant method for ``D``, its tangent from central differences.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.codim2.parameter_plane import Node, Plane
+from rodfem.continuation.solvers import Equilibria
+from rodfem.errors import ConvergenceError
+from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure
+from rodfem.stability.nonsymmetric import Vibration
+
+FIRST = 1e-4
+"""First step of the secants, relative to the bounds."""
+SHARP, NOISE = 1e-12, 1e-8
+"""Steps of the secants that end them: by their own size, or where they no longer shrink."""
+DIFFERENCE = 1e-3
+"""Step of the central differences of ``D``, relative to the bounds."""
+
+
+class Collision:
+    """Corrects points of the plane to where two eigenvalues near ``omega2`` collide."""
+
+    def __init__(self, solver: Equilibria, plane: Plane) -> None:
+        """Allocate the pencil."""
+        self.solver, self.plane = solver, plane
+        self.vibration = Vibration(solver.system)
+
+    def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
+        """Size of a step: parameters over the widths of their bounds."""
+        return float(np.linalg.norm(dp / self.plane.width))
+
+    def correct(
+        self, p: np.ndarray, x: PETSc.Vec, tangent: tuple[np.ndarray, PETSc.Vec | None], near: Node, reach: float = 1.0
+    ) -> Node:
+        """Point of the curve on the line through ``p`` across ``tangent``; raises :class:`ConvergenceError`.
+
+        ``near`` is a point of the curve whose double eigenvalue and invariant subspace (``modes``) are close by.
+        """
+        width, forward = self.plane.width, tangent[0] / self.plane.width
+        forward = forward / np.linalg.norm(forward)
+        across = np.array([-forward[1], forward[0]])
+        self.plane.line(p, across * width)
+        basis = np.stack([v.array_r.real for v in near.modes], axis=1)
+        t, last, here, x = self._collide(x, Cluster(basis, near.omega2), reach)
+        p, omega2 = p + t * across * width, here.cluster.mean
+        gradient, clearest = np.zeros(2), here
+        for which in (0, 1):
+            self.plane.line(p, (np.arange(2) == which) * width)
+            low, high = (self._measured(h, x, Cluster(basis, omega2))[0] for h in (-DIFFERENCE, DIFFERENCE))
+            gradient[which] = (high.discriminant - low.discriminant) / (2 * DIFFERENCE)
+            clearest = max((clearest, low, high), key=lambda m: m.spread)
+        if not np.linalg.norm(gradient):
+            raise ConvergenceError("the discriminant is constant")
+        dq = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
+        dq = dq if dq @ forward >= 0 else -dq
+        self.plane.show(p)
+        self.solver.system.set_load(x, float(p[0]))
+        located = np.maximum(last * abs(across) * width, 1e-12 * np.maximum(1.0, abs(p)))
+        ordinate = self.solver.shape.ordinate(x)
+        still, modes = self.solver.system.new_vector(), as_vectors(self.solver.system, clearest.cluster.basis)
+        return Node(p, x, dq * width, still, located, ordinate=ordinate, omega2=omega2, modes=modes)
+
+    def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> tuple[float, float, Measured, PETSc.Vec]:
+        """Zero of ``D`` on the line last set, from t = 0, by secants: t, its last change, the cluster, state.
+
+        Secants end where they no longer shrink: ``D`` has a round-off of about ``eps mu^2``.
+        """
+        t, other = 0.0, FIRST
+        now, x = self._measured(t, x, cluster)
+        at_other = self._measured(other, x, cluster)[0].discriminant
+        before = np.inf
+        for _ in range(12):
+            if now.discriminant == at_other:
+                break
+            step = -now.discriminant * (other - t) / (at_other - now.discriminant)
+            if abs(step) < SHARP or (abs(step) < NOISE and abs(step) > 0.3 * before):
+                return t, abs(step), now, x
+            other, at_other, before = t, now.discriminant, abs(step)
+            t += step
+            if abs(t) > reach:
+                break
+            now, x = self._measured(t, x, Cluster(cluster.basis, now.cluster.mean))
+        raise ConvergenceError("two eigenvalues do not collide near by")
+
+    def _measured(self, t: float, guess: PETSc.Vec, cluster: Cluster) -> tuple[Measured, PETSc.Vec]:
+        """The cluster at ``t`` on the line last set, and the state there."""
+        self.solver.system.set_phase(None)
+        x, outcome = self.solver.at_load(guess, t)
+        if not outcome.converged:
+            raise ConvergenceError("no equilibrium is found there")
+        self.vibration.assemble(x)
+        return measure(self.vibration, cluster), x

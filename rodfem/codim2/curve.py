@@ -1,0 +1,193 @@
+"""Following a curve of special points in a plane of parameters: steps, bounds, turning points, cusps, ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from petsc4py import PETSc
+from scipy.optimize import brentq
+
+from rodfem.codim2.parameter_plane import Node, Plane, between, predict
+from rodfem.codim2.singular import Destroyed
+from rodfem.continuation.solvers import Steps
+from rodfem.errors import ConvergenceError
+
+LOCATED = 1e-8
+"""Arclength to which turning points and cusps are located: their parameters are so to its square."""
+
+
+class Criterion(Protocol):
+    """What defines a locus: corrects a guess to it."""
+
+    def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
+        """Size of a step."""
+
+    def correct(
+        self, p: np.ndarray, x: PETSc.Vec, tangent: tuple[np.ndarray, PETSc.Vec | None], near: Node, reach: float = 1.0
+    ) -> Node:
+        """Point of the locus on the plane through ``(p, x)`` across ``tangent``."""
+
+
+@dataclass
+class Half:
+    """One direction of a curve: nodes, marked ones by number, why it ended."""
+
+    nodes: list[Node]
+    marks: dict[int, str] = field(default_factory=dict)
+    ended: str = ""
+
+
+class Tracer:
+    """Follows a curve from a node in the direction of its tangent."""
+
+    def __init__(self, criterion: Criterion, plane: Plane, steps: Steps) -> None:
+        """Steps are relative to the bounds of the plane."""
+        self.criterion, self.plane, self.steps = criterion, plane, steps
+
+    def run(self, start: Node) -> Half:
+        """Follow to an end."""
+        half, history, step = Half([start]), [start], self.steps.first
+        ahead = start.p + 1e-9 * start.dp
+        over = self.plane.outside(ahead)
+        if over is not None:
+            half.ended = self._bound(*over)
+            return half
+        while len(history) < self.steps.most:
+            last = history[-1]
+            try:
+                node, moved, bound = self._next(history, step)
+            except Destroyed as trouble:
+                half.ended = str(trouble)
+                return half
+            except ConvergenceError as trouble:
+                step /= 2
+                if step < self.steps.smallest:
+                    half.ended = f"no convergence with steps of {self.steps.smallest:g}: {trouble}"
+                    return half
+                continue
+            half.ended = self._between(half, last, node)
+            if half.ended:
+                return half
+            half.nodes.append(node)
+            if bound:
+                half.ended = bound
+                return half
+            if len(history) > 10 and self._closes(start, last, node):
+                half.nodes.append(start)
+                half.ended = "closed curve"
+                return half
+            history.append(node)
+            order = min(len(history) - 1, 3) + 1
+            step = min(
+                step * min(max((self.steps.aim / max(moved, 1e-12)) ** (1 / order), 0.4), 1.6), self.steps.largest
+            )
+        half.ended = f"{self.steps.most} points reached"
+        return half
+
+    def _next(self, history: list[Node], step: float) -> tuple[Node, float, str]:
+        """Next node, how far it is from its prediction, and the bound that it is on; ConvergenceError to retry."""
+        last = history[-1]
+        p, x, dp, dx = predict(history, last.s + step)
+        over = self.plane.outside(p)
+        if over is None:
+            node = self._after(last, self.criterion.correct(p, x, (dp, dx), last, 0.5 * step))
+            turn = self._cosine(node, dp, dx)
+            over = self.plane.outside(node.p)
+            if over is None:
+                if turn < 0.9 or node.s - last.s > 2 * step:
+                    raise ConvergenceError("the curve bends too sharply")
+                p = p - node.p
+                x.aypx(-1.0, node.x)
+                return node, self.criterion.length(p, x), ""
+            p = node.p
+        which, bound = over
+        share = (bound - last.p[which]) / (p[which] - last.p[which])
+        p, x, dp, dx = predict(history, last.s + share * step)
+        p[which] = bound
+        axis = (np.arange(2) == which) * self.plane.width
+        node = self.criterion.correct(p, x, (axis, None), last, max(0.5 * step, 1e-6))
+        node.p[which] = bound
+        node = self._after(last, node if self._cosine(node, dp, dx) >= 0 else node.reversed())
+        other = self.plane.outside(node.p)
+        if other is not None or node.s - last.s > 2 * step:
+            raise ConvergenceError("it leaves near a corner of the bounds")
+        return node, 0.0, self._bound(which, bound)
+
+    def _bound(self, which: int, bound: float) -> str:
+        return f"{self.plane.names[which]} = {bound:g}, its bound"
+
+    def _after(self, last: Node, node: Node) -> Node:
+        change = node.x.copy()
+        change.axpy(-1.0, last.x)
+        node.s = last.s + self.criterion.length(node.p - last.p, change)
+        return node
+
+    def _cosine(self, node: Node, dp: np.ndarray, dx: PETSc.Vec) -> float:
+        """Cosine between a node's tangent and a direction."""
+        plus, minus = node.dx.copy(), node.dx.copy()
+        size = self.criterion.length(dp, dx)
+        plus.axpy(1 / size, dx)
+        minus.axpy(-1 / size, dx)
+        a, b = (self.criterion.length(node.dp + s * dp / size, v) for s, v in ((1, plus), (-1, minus)))
+        return (a * a - b * b) / 4
+
+    def _between(self, half: Half, a: Node, b: Node) -> str:
+        """Insert what lies between two nodes; a reason if the curve ends there."""
+        names = self.plane.names
+        if a.coupling @ b.coupling < 0:
+            return self._last(half, a, b, lambda n: float(n.coupling @ a.coupling), "the fold ends on a branch point")
+        if a.omega2 * b.omega2 < 0:
+            return self._last(half, a, b, lambda n: n.omega2, "the double eigenvalue vanishes: divergence")
+        found: list[tuple[Node, str]] = []
+        if a.curvature * b.curvature < 0:
+            found = self._located(a, b, lambda n: n.curvature, "cusp")
+        else:
+            for i in np.flatnonzero(a.dp * b.dp < 0):
+                found += self._located(a, b, lambda n, i=i: float(n.dp[i]), f"turns in {names[i]}")  # type: ignore[misc]
+        for node, kind in sorted(found, key=lambda item: item[0].s):
+            half.marks[len(half.nodes)] = kind
+            half.nodes.append(node)
+        if a.rest != b.rest:
+            half.marks[len(half.nodes)] = "another eigenvalue has vanished since the row before, seen from the start"
+        return ""
+
+    def _located(self, a: Node, b: Node, f: Callable[[Node], float], kind: str) -> list[tuple[Node, str]]:
+        """Node between two others at which ``f`` vanishes; none where it cannot be located."""
+
+        def at(s: float) -> Node:
+            p, x, dp, dx = between(a, b, s)
+            return self.criterion.correct(p, x, (dp, dx), a)
+
+        try:
+            s = brentq(lambda s: f(at(s)), a.s, b.s, xtol=LOCATED)
+            node = at(s)
+        except (ConvergenceError, ValueError):
+            return []
+        node.s = s
+        return [(node, kind)]
+
+    def crossed(self, a: Node, b: Node, which: int, value: float) -> list[Node]:
+        """Node between two neighbours at which a parameter has a value; none where it cannot be located."""
+        return [node for node, _ in self._located(a, b, lambda n: float(n.p[which]) - value, "")]
+
+    def _last(self, half: Half, a: Node, b: Node, f: Callable[[Node], float], sentence: str) -> str:
+        """End at a node where ``f`` vanishes."""
+        found = self._located(a, b, f, sentence)
+        where = (a.p + b.p) / 2
+        if found and not np.any(abs(found[0][0].p - where) > abs(b.p - a.p) + 1e-3 * self.plane.width):
+            half.marks[len(half.nodes)] = sentence
+            half.nodes.append(found[0][0])
+            where = found[0][0].p
+        return f"{sentence} near {', '.join(f'{n} = {v:.8g}' for n, v in zip(self.plane.names, where, strict=True))}"
+
+    def _closes(self, start: Node, a: Node, b: Node) -> bool:
+        """Whether the curve passes its beginning again between two nodes."""
+        whole, part = (b.p - a.p) / self.plane.width, (start.p - a.p) / self.plane.width
+        size = float(np.linalg.norm(whole))
+        if not size or not 0 < part @ whole <= size**2 or self._cosine(b, start.dp, start.dx) < 0.5:
+            return False
+        aside = abs(part[0] * whole[1] - part[1] * whole[0]) / size
+        return aside < 0.05 * size and abs(start.ordinate - a.ordinate) <= 2 * abs(b.ordinate - a.ordinate) + 1e-9

@@ -1,0 +1,311 @@
+r"""Loci of special points in the plane of two parameters: the boundary of stability.
+
+A fold, a branch point, a flutter or a divergence load ``lam`` of a scene moves as another of its parameters does.  Its
+curve in the plane of both is followed by pseudo-arclength continuation of the equations that define it, in the space of
+the state and *both* parameters (see :mod:`rodfem.codim2.singular` and :mod:`rodfem.codim2.collision`): neither is the
+independent one, so that the curve may turn back with respect to either, and a fold's curve goes through cusps, where it
+is smooth but for its projection on the plane.  Both directions are followed, to the bounds, exactly, or to where the
+special point changes its kind.
+
+Arclength is measured with the parameters relative to the widths of their bounds, and the state in its metric.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.adaptivity.error_estimate import Richer
+from rodfem.codim2.collision import Collision
+from rodfem.codim2.curve import Criterion, Half, Tracer
+from rodfem.codim2.parameter_plane import Interval, Node, Plane
+from rodfem.codim2.singular import Singular, null_vectors
+from rodfem.continuation.branch import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, Special
+from rodfem.continuation.solvers import Equilibria, Follower, Steps
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.transfer import Transfer, richer_system
+from rodfem.file_format import LOCUS
+from rodfem.output.digits import number
+from rodfem.output.files import save_json
+from rodfem.stability.cluster import as_vectors
+from rodfem.stability.inertia import Inertia
+
+STEPS = Steps(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
+"""Steps of a locus, as shares of the bounds."""
+SAME = 1e-6
+"""Loads of special points that differ by less than this, relative, may be one and the same point of a curve."""
+
+
+@dataclass
+class Mark:
+    """A row of a locus where something happens: ``kind`` says what."""
+
+    kind: str
+    row: int
+
+
+@dataclass
+class Locus:
+    """A curve of special points in the plane of two parameters, one row a point, in order along the curve.
+
+    Attributes
+    ----------
+    kind
+        ``fold``, ``branch point``, ``flutter`` or ``divergence``.
+    names, bounds
+        The two parameters, the scene's load first, and their intervals.
+    values
+        Both parameters, (n, 2).
+    ordinate
+        The scene's ordinate, (n,).
+    index
+        Index of the equilibria on the two sides of the curve, (n, 2): the eigenvalues that vanish on it positive, and
+        negative.  -1 for flutter and divergence.
+    omega2
+        The double eigenvalue of flutter, (n,), nan for others.
+    located_to
+        How far the parameters are uncertain for the given discretisation, (n, 2).
+    error
+        How far, measured across the curve, that of a discretisation one degree richer is away in either parameter, (n,
+        2); nan where it was not asked for, inf where the richer one does not find the point.
+    marks
+        Rows at which the curve turns in a parameter, cusps, and rows (away from the start) before which another
+        eigenvalue has passed through zero, not located.
+    start
+        Row of the special point from which the curve was started.
+    ended
+        Why it ends, at its first and at its last row.
+    states
+        State vector of each row, of the system on which the locus was computed; not saved.
+    crossings
+        Load and ordinate at the start, and wherever else the curve passes the second parameter's value there; not
+        saved.
+    """
+
+    scene: str
+    title: str
+    kind: str
+    names: tuple[str, str]
+    labels: tuple[str, str]
+    ordinate_name: str
+    bounds: tuple[Interval, Interval]
+    values: np.ndarray
+    ordinate: np.ndarray
+    index: np.ndarray
+    omega2: np.ndarray
+    located_to: np.ndarray
+    error: np.ndarray
+    marks: list[Mark]
+    start: int
+    ended: tuple[str, str]
+    constants: dict[str, float]
+    discretization: dict[str, Any]
+    states: list[PETSc.Vec] = field(default_factory=list)
+    crossings: list[tuple[float, float]] = field(default_factory=list)
+
+    def passes(self, special: Special) -> bool:
+        """Whether the curve passes the line of its start again at another special point of that scene."""
+        here = np.array([special.point.load, special.point.ordinate])
+        near = SAME * np.maximum(1.0, abs(here))
+        return self.kind == special.kind and any((abs(here - there) <= near).all() for there in self.crossings)
+
+    def data(self) -> dict[str, Any]:
+        """Plain lists, numbers and strings for a file; what was not computed is None."""
+        columns: dict[str, list] = {name: self.values[:, i].tolist() for i, name in enumerate(self.names)}
+        columns["ordinate"] = self.ordinate.tolist()
+        for key, table in (("index", self.index), ("located_to", self.located_to)):
+            columns[key] = table.tolist()
+        columns["error"] = [[v if np.isfinite(v) else None for v in row] for row in self.error.tolist()]
+        columns["omega2"] = [None if np.isnan(v) else v for v in self.omega2.tolist()]
+        same = ("scene", "title", "kind", "ordinate_name", "start", "constants", "discretization")
+        out = {"format": LOCUS.mark(), **{name: getattr(self, name) for name in same}}
+        return out | {
+            "parameters": list(self.names),
+            "labels": list(self.labels),
+            "bounds": [list(b) for b in self.bounds],
+            "columns": columns,
+            "without_estimate": np.flatnonzero(np.isinf(self.error[:, 0])).tolist(),
+            "marks": [{"kind": m.kind, "row": m.row} for m in self.marks],
+            "ended": list(self.ended),
+        }
+
+    def save(self, path: Path) -> None:
+        """Write :meth:`data` as JSON, whole or not at all; call it on one rank."""
+        save_json(self.data(), path)
+
+    def text(self, rows: int = 12) -> str:
+        """Rows of the curve for the terminal: some of them, its ends, and all that are marked."""
+        n, marks = len(self.values), {m.row: m.kind for m in self.marks}
+        shown = sorted({0, n - 1, self.start, *marks, *np.linspace(0, n - 1, min(rows, n)).astype(int).tolist()})
+        lines = [
+            f"\nLocus of the {self.kind} in {self.names[0]} and {self.names[1]} (in parentheses the estimated error "
+            "of the discretisation across the curve)",
+            f"  {self.names[0]:<24} {self.names[1]:<24} {'ordinate':<14} index",
+        ]
+        for i in shown:
+            pair = [
+                f"{v:.10g}" if np.isnan(e) else number(v, e) for v, e in zip(self.values[i], self.error[i], strict=True)
+            ]
+            index = f"{self.index[i, 0]}|{self.index[i, 1]}" if self.index[i, 0] >= 0 else ""
+            note = "start" if i == self.start else marks.get(i, "")
+            lines.append(f"  {pair[0]:<24} {pair[1]:<24} {self.ordinate[i] + 0.0:<14.8f} {index:<6} {note}".rstrip())
+        return "\n".join([*lines, f"  {n} points; ends: {self.ended[0]}; {self.ended[1]}"])
+
+
+def locus(
+    solver: Equilibria,
+    special: Special,
+    parameter: str,
+    bounds: tuple[Interval, Interval],
+    steps: Steps = STEPS,
+    error_bars: int = 5,
+) -> Locus:
+    """Follow a special point in the plane of the scene's load and a second parameter, to both sides.
+
+    Parameters
+    ----------
+    solver
+        The :class:`~rodfem.continuation.solvers.Follower` that found the special point, or for flutter and divergence
+        the :class:`~rodfem.continuation.solvers.Equilibria` of the sweep.  It is left as it was found.
+    special
+        A fold, a branch point, a flutter load or a divergence load.
+    parameter
+        Name of the second parameter of the scene.
+    bounds
+        Intervals of the load and of the second parameter, on which the curve ends exactly.
+    steps
+        Control of the step; lengths are relative to the bounds.
+    error_bars
+        At how many rows, besides the marked ones, the error of the discretisation is estimated; 0: at none.
+
+    Raises
+    ------
+    SceneError
+        For a parameter, bounds or a kind of special point that make no sense.
+    ConvergenceError
+        Where the special point itself is not found again.
+    """
+    system, scene = solver.system, solver.system.scene
+    plane = Plane(system, parameter, bounds)
+    p = np.array([special.point.load, scene.parameters[parameter].value])
+    if plane.outside(p) is not None:
+        raise SceneError(
+            f"The special point at {scene.load} = {p[0]:g}, {parameter} = {p[1]:g} is outside the bounds: widen them."
+        )
+    with system.clock.purpose("locus"), plane.kept():
+        plane.look(p, 0)
+        guess = _guess(solver, special, p)
+        criterion = _criterion(solver, plane, special.kind, guess)
+        first = criterion.correct(p, special.point.x, (np.array([0.0, 1.0]) * plane.width, None), guess, 0.1)
+        tracer = Tracer(criterion, plane, steps)
+        onwards = tracer.run(first)
+        backwards = Half([first], ended="closed curve")
+        if onwards.ended != "closed curve":
+            backwards = tracer.run(first.reversed())
+        nodes = backwards.nodes[:0:-1] + onwards.nodes
+        start = len(backwards.nodes) - 1
+        marks = {start - i: kind for i, kind in backwards.marks.items()} | {
+            start + i: kind for i, kind in onwards.marks.items()
+        }
+        crossings = [(float(first.p[0]), first.ordinate)]
+        for a, b in (pair for half in (backwards, onwards) for pair in pairwise(half.nodes[1:])):
+            if (a.p[1] - p[1]) * (b.p[1] - p[1]) < 0:
+                crossings += [(float(n.p[0]), n.ordinate) for n in tracer.crossed(a, b, 1, float(p[1]))]
+        error = np.full((len(nodes), 2), np.nan)
+        if error_bars:
+            rows = np.linspace(0, len(nodes) - 1, error_bars).round().astype(int).tolist()
+            _estimate(solver, special.kind, plane, nodes, sorted({*rows, *marks}), error)
+    rest, k = np.array([n.rest for n in nodes]), special.multiplicity
+    d = system.fields.discretization
+    return Locus(
+        scene=scene.name,
+        title=scene.title or scene.name,
+        kind=special.kind,
+        names=plane.names,
+        labels=(scene.parameters[scene.load].label or scene.load, scene.parameters[parameter].label or parameter),
+        ordinate_name=scene.ordinate.name,
+        bounds=bounds,
+        values=np.array([n.p for n in nodes]),
+        ordinate=np.array([n.ordinate for n in nodes]),
+        index=np.stack([rest, np.where(rest >= 0, rest + k, -1)], axis=1),
+        omega2=np.array([n.omega2 for n in nodes]),
+        located_to=np.array([n.located_to for n in nodes]),
+        error=error,
+        marks=[Mark(kind, row) for row, kind in sorted(marks.items())],
+        start=start,
+        ended=(backwards.ended, onwards.ended),
+        constants={name: v.value for name, v in scene.parameters.items() if name not in plane.names},
+        discretization={
+            "formulation": d.formulation,
+            "elements": d.elements,
+            "degree": d.degree,
+            "unknowns": system.fields.unknowns,
+        },
+        states=[n.x for n in nodes],
+        crossings=crossings,
+    )
+
+
+def _guess(solver: Equilibria, special: Special, p: np.ndarray) -> Node:
+    """The special point as a point of the plane; raises :class:`SceneError` for a kind that has no locus."""
+    if special.kind not in (FOLD, BRANCH_POINT, FLUTTER, DIVERGENCE):
+        raise SceneError(
+            f"A point of the kind {special.kind!r} has no locus: choose a fold, branch point, flutter or divergence."
+        )
+    if special.kind in (FOLD, BRANCH_POINT) and not isinstance(solver, Follower):
+        raise SceneError("The locus of a fold or a branch point needs the follower that found it.")
+    x, left = special.point.x, list[PETSc.Vec]()
+    modes = list(special.null_vectors)
+    if special.kind == FLUTTER:
+        if special.cluster is None or special.note:
+            raise SceneError(f"This flutter has no locus: {special.note or 'it was not found by a sweep'}.")
+        modes = as_vectors(solver.system, special.cluster.basis)
+    if special.kind == DIVERGENCE:
+        number = abs(special.negative_after - special.negative_before)
+        solver.system.set_phase(x)
+        modes, left = null_vectors(Inertia(solver.system), x, number)
+    return Node(p, x, p, x, p, omega2=special.omega2 if special.kind == FLUTTER else np.nan, modes=modes, left=left)
+
+
+def _criterion(solver: Equilibria, plane: Plane, kind: str, near: Node) -> Criterion:
+    """What defines the locus of a kind of special points, one of which is ``near``."""
+    if kind == FLUTTER:
+        return Collision(solver, plane)
+    return Singular(solver, plane, near.modes, kind == FOLD, near.left)
+
+
+def _estimate(
+    solver: Equilibria, kind: str, plane: Plane, nodes: Sequence[Node], rows: list[int], error: np.ndarray
+) -> None:
+    """Fill ``rows`` of ``error`` with the distance, across the curve, to that of a richer discretisation."""
+    richer: Equilibria
+    if isinstance(solver, Follower):
+        found = Richer(solver)
+        richer, transfer = found.follower, found.transfer
+    else:
+        richer = Equilibria(richer_system(solver.system))
+        transfer = Transfer(solver.system, richer.system)
+    other = Plane(richer.system, plane.names[1], (tuple(plane.bounds[0]), tuple(plane.bounds[1])))
+    criterion: Criterion | None = None
+    for row in rows:
+        node = nodes[row]
+        x = transfer(node.x, state=True)
+        modes, left = ([transfer(v, state=False) for v in side] for side in (node.modes, node.left))
+        near = Node(node.p, x, node.dp, x, node.p, omega2=node.omega2, modes=modes, left=left)
+        if criterion is None:
+            criterion = _criterion(richer, other, kind, near)
+        along = node.dp
+        if np.linalg.norm(along / plane.width) < 1e-3:  # a cusp
+            along = nodes[min(row + 1, len(nodes) - 1)].p - nodes[max(row - 1, 0)].p
+        try:
+            error[row] = np.maximum(abs(criterion.correct(node.p, x, (along, None), near, 0.1).p - node.p), 0)
+        except ConvergenceError:
+            error[row] = np.inf
+            continue
+        error[row] = np.maximum(error[row], node.located_to)

@@ -1,0 +1,149 @@
+"""A plane of two parameters of a scene, and points of curves in it."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.continuation.solvers import lagrange
+from rodfem.errors import SceneError
+from rodfem.fem.system import System
+from rodfem.stability.inertia import combine
+
+Interval = tuple[float, float]
+
+
+@dataclass
+class Node:
+    """A point of a locus: parameters ``p`` (2,), state ``x``, and its unit tangent ``dp``, ``dx`` at arclength ``s``.
+
+    ``rest`` counts the negative eigenvalues other than those that vanish here (-1: not counted).  At folds ``coupling``
+    (2,) is the derivative of the equations in the two parameters along the null vector, in units of the bounds, and
+    ``curvature`` the second one along it.  ``omega2`` is a double eigenvalue.  ``modes`` are the null vectors, or a
+    basis of the double eigenvalue's invariant subspace; ``left`` the left null vectors where they are others.
+    """
+
+    p: np.ndarray
+    x: PETSc.Vec
+    dp: np.ndarray
+    dx: PETSc.Vec
+    located_to: np.ndarray
+    s: float = 0.0
+    ordinate: float = float("nan")
+    rest: int = -1
+    omega2: float = float("nan")
+    curvature: float = 0.0
+    coupling: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    modes: list[PETSc.Vec] = field(default_factory=list)
+    left: list[PETSc.Vec] = field(default_factory=list)
+
+    def reversed(self) -> Node:
+        """The same point with the opposite tangent."""
+        dx = self.dx.copy()
+        dx.scale(-1.0)
+        return replace(self, dp=-self.dp, dx=dx)
+
+
+class Plane:
+    """Sets the constants of the equations of a system to points and lines of the plane of two parameters.
+
+    The first parameter is the scene's load.  ``bounds`` are their intervals, whose ``width`` (2,) scales them.
+    """
+
+    def __init__(self, system: System, parameter: str, bounds: tuple[Interval, Interval]) -> None:
+        """Check parameter and bounds; raises :class:`SceneError`."""
+        scene = system.scene
+        if parameter not in scene.parameters:
+            raise SceneError(
+                f"{parameter!r} is no parameter of the scene: choose one of {', '.join(scene.parameters)}."
+            )
+        if parameter == scene.load:
+            raise SceneError(f"{parameter!r} is the load itself: choose a second parameter to vary.")
+        self.system, self.names = system, (scene.load, parameter)
+        for name, (low, high) in zip(self.names, bounds, strict=True):
+            if not low < high:
+                raise SceneError(f"The bounds {low:g}, {high:g} of {name} are empty: give the lower one first.")
+            scene.parameters[name].check(name, low)
+            scene.parameters[name].check(name, high)
+        for end in bounds[1]:  # the stored energy must be convex at both ends
+            replace(scene, parameters=_with(scene.parameters, {parameter: end}))
+        self.bounds = np.array(bounds, dtype=float)
+        self.width = self.bounds[:, 1] - self.bounds[:, 0]
+        self.index = [system.equations.names.index(name) for name in self.names]
+        self._scene = scene
+
+    def home(self) -> np.ndarray:
+        """The second parameter's value in the scene, and a load of zero: (2,)."""
+        return np.array([0.0, self._scene.parameters[self.names[1]].value])
+
+    def line(self, origin: np.ndarray, direction: np.ndarray) -> None:
+        """Make the scalar unknown ``load`` stand for ``t`` in ``origin + t direction``."""
+        equations = self.system.equations
+        equations.base.value[self.index] = origin
+        equations.direction.value[:] = 0.0
+        equations.direction.value[self.index] = direction
+
+    def look(self, p: np.ndarray, which: int) -> None:
+        """Make the scalar unknown stand for parameter number ``which``; the other one has its value in ``p``."""
+        axis = np.arange(2) == which
+        self.line(np.where(axis, 0.0, p), axis.astype(float))
+
+    def show(self, p: np.ndarray) -> None:
+        """Let the scalar unknown be the load and the scene have the second parameter of ``p``, to evaluate shapes."""
+        self.look(p, 0)
+        scene = copy.copy(self._scene)  # unlike replace(), without all the checks
+        object.__setattr__(scene, "parameters", _with(scene.parameters, {self.names[1]: float(p[1])}))
+        self.system.scene = scene
+
+    def outside(self, p: np.ndarray) -> tuple[int, float] | None:
+        """Number of a parameter that is out of bounds and its bound, the one farthest out; None inside."""
+        over = np.maximum(p - self.bounds[:, 1], self.bounds[:, 0] - p) / self.width
+        which = int(np.argmax(over))
+        if over[which] <= 0:
+            return None
+        return which, float(self.bounds[which, int(p[which] > self.bounds[which, 1])])
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Restore on exit all that a locus changes: constants, phase conditions, the scene shown to shapes."""
+        system, equations = self.system, self.system.equations
+        base, direction = equations.base.value.copy(), equations.direction.value.copy()
+        phases, offset, scene = list(system.phases), list(system._phase_offset), system.scene
+        try:
+            yield
+        finally:
+            equations.base.value[:], equations.direction.value[:] = base, direction
+            system.phases[:], system._phase_offset[:], system.scene = phases, offset, scene
+
+
+def _with(parameters: Mapping, values: Mapping[str, float]) -> dict:
+    """Parameters of a scene with other values for some."""
+    return {name: replace(p, value=values.get(name, p.value)) for name, p in parameters.items()}
+
+
+def predict(nodes: list[Node], s: float) -> tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]:
+    """Extrapolate a locus to arclength ``s``: parameters, state, and their derivatives in ``s``."""
+    last = nodes[-1]
+    if len(nodes) < 3:
+        x = last.x.copy()
+        x.axpy(s - last.s, last.dx)
+        return last.p + (s - last.s) * last.dp, x, last.dp, last.dx
+    recent = nodes[-4:]
+    value, slope = lagrange(np.array([n.s for n in recent]), s)
+    p, x = np.array([n.p for n in recent]), [n.x for n in recent]
+    return value @ p, combine(x, value), slope @ p, combine(x, slope)
+
+
+def between(a: Node, b: Node, s: float) -> tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]:
+    """Cubic through two nodes with their tangents at arclength ``s``: parameters, state, and their derivatives."""
+    h = b.s - a.s
+    t = (s - a.s) / h
+    value = np.array([(1 + 2 * t) * (1 - t) ** 2, h * t * (1 - t) ** 2, t * t * (3 - 2 * t), h * t * t * (t - 1)])
+    slope = np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
+    p, x = np.array([a.p, a.dp, b.p, b.dp]), [a.x, a.dx, b.x, b.dx]
+    return value @ p, combine(x, value), slope @ p, combine(x, slope)

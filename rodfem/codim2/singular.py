@@ -1,0 +1,324 @@
+r"""Equilibria whose second variation is singular, as a regular system of equations in two parameters.
+
+Let ``F(x, a, b) = 0`` be the equations of equilibrium with the phase conditions of the symmetries that the state
+breaks, and ``S = F_x``, which is symmetric where all loads have a potential.  With vectors ``psi`` near ``M phi``,
+``phi`` the null vectors, the matrix
+
+    ( S       psi )  ( V )     ( 0 )
+    ( psi^t   0   )  ( G )  =  ( I )
+
+is regular where ``S`` is singular, and ``S`` is singular exactly where the small matrix ``G`` is; its derivative along
+any ``z`` is ``-V^t S_z V`` (Govaerts, *Numerical Methods for Bifurcations of Dynamical Equilibria*, SIAM 2000,
+chapters 3 and 4).  All solves below are with this one bordered matrix.
+
+*Fold*: ``F = 0`` and ``G = 0`` in ``(x, a, b)``.  The curve has the null vector of
+
+    ( phi.F_a   phi.F_b   0           )
+    ( G_a       G_b       phi.S_phi phi )
+
+as its tangent ``(da, db, xi)``, ``xi`` the share of ``phi`` in ``dx`` (Doedel, Keller & Kernevez, Int. J. Bifurcation
+Chaos 1 (1991) 493-520).  It is regular also at a *cusp*, where ``phi.S_phi phi = 0`` and ``da = db = 0``; only where
+``phi.F_a = phi.F_b = 0`` is it not: there the fold ends on a branch point.
+
+*Branch point*: ``phi.F_a = phi.F_b = 0`` all along the curve, because of a symmetry that ``phi`` breaks.  Then ``F +
+beta psi = 0``, ``psi.(x - x0) = 0`` and ``tr G = 0`` are regular in ``(x, beta, a, b)``, and ``beta = 0``: the equation
+``psi.(x - x0) = 0`` keeps the state symmetric, and ``beta`` is the imperfection that a parameter would have to make up
+for.  Where it does not vanish the parameter destroys the branch point.  Null vectors that a symmetry relates are
+several columns of ``psi``, and ``G`` is a multiple of the identity.
+
+*Divergence* under loads without a potential: ``S`` is not symmetric.  The columns of the border are near ``M`` times
+the left null vectors, its rows near ``M`` times the right ones, and with ``W`` the solution of the transposed bordered
+equations the derivative of ``G`` is ``-W^t S_z V``; else all is as for a branch point.  No square root appears where
+divergence meets flutter, a double zero eigenvalue with one null vector: ``S`` is as singular there as elsewhere.
+
+The index of a symmetric ``S`` comes for free: the negative eigenvalues of the bordered matrix, less all constraints and
+the columns of ``psi``, are those of the second variation on what is orthogonal to the null vectors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.codim2.parameter_plane import Node, Plane
+from rodfem.continuation.solvers import Equilibria, Follower
+from rodfem.errors import ConvergenceError
+from rodfem.fem.newton import ROUND_OFF, TOLERANCE
+from rodfem.stability.bordered import Bordered
+from rodfem.stability.inertia import Inertia, combine, orthonormalize
+
+DIFFERENCE = 1e-4
+"""Step of the central differences for the third derivatives, in the metric: their errors do not enter the result."""
+IMPERFECT = 1e-7
+"""An imperfection above this, of the rod's lowest bending eigenvalue, is not round-off."""
+FEWER = 1e-5
+"""Null vectors whose eigenvalues differ by more than this, of the same, are not related by a symmetry."""
+
+
+class Destroyed(ConvergenceError):
+    """A special point that does not go on to be what it was; says why."""
+
+
+@dataclass
+class _Linear:
+    """What is known at a state: residual solve, responses to the two parameters, right and left null vectors, G_z."""
+
+    s0: PETSc.Vec
+    b0: np.ndarray
+    response: list[PETSc.Vec]
+    b: np.ndarray
+    v: list[PETSc.Vec]
+    w: list[PETSc.Vec]
+    g: float
+    spread: float
+    grad_x: PETSc.Vec
+    grad_p: np.ndarray
+    rest: int
+
+
+class Singular:
+    """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence."""
+
+    def __init__(
+        self,
+        solver: Equilibria,
+        plane: Plane,
+        vectors: list[PETSc.Vec],
+        fold: bool,
+        left: list[PETSc.Vec] | None = None,
+    ) -> None:
+        """Take the null vectors of a special point, and the ``left`` ones where the matrix is not symmetric."""
+        self.solver, self.system, self.plane, self.fold = solver, solver.system, plane, fold
+        self.saddle = solver.inertia if isinstance(solver, Follower) else Inertia(solver.system)
+        self.metric = self.saddle.metric
+        self._adopt(vectors, left or [])
+        self.saddle.assemble(vectors[0])  # for its pattern
+        constraints = None if left else self.saddle.constraints
+        self.bordered = Bordered(self.system, self.saddle.matrix, len(vectors), constraints)
+        self.turned: Bordered | None = None
+        if left:
+            self._transposed = self.saddle.matrix.transpose(PETSc.Mat())
+            self.turned = Bordered(self.system, self._transposed, len(vectors), None)
+
+    def _adopt(self, vectors: list[PETSc.Vec], left: list[PETSc.Vec]) -> None:
+        """Border with these vectors from now on, made orthonormal in the metric."""
+        self.phi = [self.metric * v for v in self._orthonormal(vectors)]
+        self.psi = [self.metric * v for v in self._orthonormal(left)] if left else self.phi
+
+    def _orthonormal(self, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
+        done: list[PETSc.Vec] = []
+        for vector in vectors:
+            v = vector.copy()
+            self.system.set_load(v, 0.0)
+            for other in done:
+                v.axpy(-(self.metric * other).dot(v), other)
+            v.scale(1.0 / self.system.norm(v))
+            done.append(v)
+        return done
+
+    def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
+        """Size of a step: parameters over the widths of their bounds, the state in the metric."""
+        return float(np.hypot(np.linalg.norm(dp / self.plane.width), self._norm(dx)))
+
+    def _norm(self, d: PETSc.Vec) -> float:
+        return float(max((self.metric * d).dot(d), 0.0)) ** 0.5
+
+    def correct(
+        self, p: np.ndarray, x: PETSc.Vec, tangent: tuple[np.ndarray, PETSc.Vec | None], near: Node, reach: float = 1.0
+    ) -> Node:
+        """Point of the locus on the plane through ``(p, x)`` across ``tangent``; raises :class:`ConvergenceError`.
+
+        With None for the state's part of the tangent the plane is that of the parameters alone: a line of theirs.
+        ``near`` is a point of the curve whose null vectors are close by.
+        """
+        self._adopt(near.modes, near.left)
+        p, x, origin = np.array(p, dtype=float), x.copy(), (np.array(p, dtype=float), x.copy())
+        self.system.set_phase(x)
+        row_p = tangent[0] / self.plane.width**2
+        row_x = None if tangent[1] is None else self.metric * tangent[1]
+        scale = self.length(tangent[0], tangent[1] or self.system.new_vector())
+        old: _Linear | None = None
+        before, total = np.inf, 0.0
+        for _ in range(12):
+            now = self._linear(p, x, origin[1], old)
+            gone = x.copy()
+            gone.axpy(-1.0, origin[1])
+            along = row_p @ (p - origin[0]) + (row_x.dot(gone) if row_x else 0.0)
+            dp, dx = self._step(now, row_p, row_x, along, scale)
+            size = self.length(dp, dx)
+            p, total = p + dp, total + size
+            x.axpy(1.0, dx)
+            if not np.isfinite(size) or total > reach:
+                break
+            if size < TOLERANCE or (ROUND_OFF > size > 0.5 * before):
+                return self._node(p, x, tangent, abs(dp))
+            old = now if size < 0.1 * before and size < 0.02 else None
+            before = size
+        raise ConvergenceError("Newton's method does not converge")
+
+    def _step(
+        self, at: _Linear, row_p: np.ndarray, row_x: PETSc.Vec | None, along: float, scale: float
+    ) -> tuple[np.ndarray, PETSc.Vec]:
+        """Newton's correction of parameters and state."""
+        free = [at.s0, *at.response] + ([at.v[0]] if self.fold else [])
+        g = np.array([at.grad_x.dot(w) for w in free])
+        g[0] += at.g
+        g[1:3] += at.grad_p
+        r = np.array([row_x.dot(w) if row_x else 0.0 for w in free])
+        r[0] += along
+        r[1:3] += row_p
+        rows = [g, r / scale]
+        if self.fold:
+            rows.append(np.array([at.b0[0], *at.b[:, 0], at.g]))
+        table = np.array(rows)
+        unknowns = table[:, 1:] * np.append(self.plane.width, [1.0] * (len(free) - 3))
+        size = abs(unknowns).max(axis=1)
+        try:
+            z = np.linalg.solve(unknowns / size[:, None], -table[:, 0] / size)
+        except np.linalg.LinAlgError as trouble:
+            raise ConvergenceError("the curve is singular") from trouble
+        dp = z[:2] * self.plane.width
+        return dp, combine(free, np.array([1.0, *dp, *z[2:]]))
+
+    def _columns(self, p: np.ndarray, x: PETSc.Vec, w: PETSc.Vec | None) -> tuple[list[PETSc.Vec], PETSc.Vec]:
+        """Derivatives of ``F`` in both parameters at ``x``, and ``S^t w``."""
+        system, scratch, columns = self.system, self.system.new_vector(), []
+        x, image = x.copy(), scratch
+        for which in (0, 1):
+            self.plane.look(p, which)
+            system.set_load(x, float(p[which]))
+            system.residual(x, scratch)
+            matrix = system.jacobian(self.solver.axis)
+            column = matrix * self.solver.axis
+            system.set_load(column, 0.0)
+            columns.append(column)
+            if w is not None and which == 0:
+                image = matrix.createVecRight()
+                matrix.multTranspose(w, image)
+                system.set_load(image, 0.0)
+        self.plane.look(p, 0)
+        return columns, image
+
+    def _linear(self, p: np.ndarray, x: PETSc.Vec, reference: PETSc.Vec, old: _Linear | None) -> _Linear:
+        """Linearise at a point; with ``old`` its derivatives serve again."""
+        system, bordered, k = self.system, self.bordered, len(self.psi)
+        columns = self._columns(p, x, None)[0] if old is None else []
+        system.set_load(x, float(p[0]))
+        self.plane.look(p, 0)
+        right = system.new_vector()
+        system.residual(x, right)
+        right.scale(-1.0)
+        if not np.isfinite(right.norm()):
+            raise ConvergenceError("the stored energy is not defined there")
+        self.saddle.assemble(x)
+        rest = bordered.factor(self.psi, self.phi)
+        gauge = np.zeros(k)
+        if not self.fold:
+            gone = x.copy()
+            gone.axpy(-1.0, reference)
+            gauge = np.array([-w.dot(gone) for w in self.phi])
+        s0, b0 = bordered.solve(right, gauge)
+        solved = [bordered.solve(None, e) for e in np.eye(k)]
+        v, G = [w for w, _ in solved], np.array([row for _, row in solved])
+        g = float(np.trace(G)) / k
+        spread = float(abs(G - g * np.eye(k)).max())
+        if old is not None:
+            return _Linear(s0, b0, old.response, old.b, v, old.w, g, spread, old.grad_x, old.grad_p, rest)
+        responses = []
+        for column in columns:
+            column.scale(-1.0)
+            responses.append(bordered.solve(column, np.zeros(k)))
+        w = self._left(v)
+        grad_x, grad_p = self._gradient(p, x, v, w)
+        b = np.array([row for _, row in responses])
+        return _Linear(s0, b0, [y for y, _ in responses], b, v, w, g, spread, grad_x, grad_p, rest)
+
+    def _left(self, v: list[PETSc.Vec]) -> list[PETSc.Vec]:
+        """Left null vectors at the state last factored, those of the columns of ``psi``; the right ones by symmetry."""
+        if self.turned is None:
+            return v
+        self.saddle.matrix.transpose(self._transposed)
+        self.turned.factor(self.phi, self.psi)
+        return [self.turned.solve(None, e)[0] for e in np.eye(len(self.psi))]
+
+    def _gradient(
+        self, p: np.ndarray, x: PETSc.Vec, v: list[PETSc.Vec], w: list[PETSc.Vec]
+    ) -> tuple[PETSc.Vec, np.ndarray]:
+        """Derivatives of ``tr G / k``: as ``S`` is a derivative itself, ``w.S_z v`` is ``z.d/de S(x + e v)^t w``."""
+        grad_x, grad_p = self.system.new_vector(), np.zeros(2)
+        for right, left in zip(v, w, strict=True):
+            for sign in (1.0, -1.0):
+                y = x.copy()
+                y.axpy(sign * DIFFERENCE, right)
+                columns, image = self._columns(p, y, left)
+                factor = -sign / (2 * DIFFERENCE * len(v))
+                grad_x.axpy(factor, image)
+                grad_p += factor * np.array([column.dot(left) for column in columns])
+        return grad_x, grad_p
+
+    def _node(self, p: np.ndarray, x: PETSc.Vec, along: tuple[np.ndarray, PETSc.Vec | None], last: np.ndarray) -> Node:
+        """Evaluate tangent, count and records at a point of the locus, and border with its null vectors."""
+        at = self._linear(p, x, x, None)
+        scale = self.saddle.scale
+        if not self.fold and abs(at.b0).max() > IMPERFECT * scale:
+            raise Destroyed(f"{self.plane.names[1]} is an imperfection that destroys the branch point")
+        if at.spread > FEWER * scale:
+            raise Destroyed(f"its {len(self.psi)} zero eigenvalues do not vanish together any more")
+        width = self.plane.width
+        g = (np.array([at.grad_x.dot(w) for w in at.response]) + at.grad_p) * width
+        curvature = at.grad_x.dot(at.v[0])
+        coupling = at.b[:, 0] * width
+        if self.fold:
+            a, b = np.array([*coupling, at.g]), np.array([*g, curvature])
+            z = np.cross(a / max(np.linalg.norm(a), 1e-300), b / np.linalg.norm(b))
+            dp, free, weights = z[:2] * width, [*at.response, at.v[0]], np.array([*(z[:2] * width), z[2]])
+        else:
+            dp = np.array([-g[1], g[0]]) * width
+            free, weights = at.response, dp
+        dx = combine(free, weights)
+        size = self.length(dp, dx)
+        forward = along[0] / width**2 @ dp + ((self.metric * dx).dot(along[1]) if along[1] else 0.0)
+        size = size if forward >= 0 else -size
+        dx.scale(1.0 / size)
+        located = np.maximum(last, 1e-12 * np.maximum(1.0, abs(p)))
+        self.plane.show(p)
+        return Node(
+            p,
+            x,
+            dp / size,
+            dx,
+            located,
+            ordinate=self.solver.shape.ordinate(x),
+            rest=at.rest,
+            curvature=float(curvature) if self.fold else 0.0,
+            coupling=coupling if self.fold else np.zeros(2),
+            modes=at.v,
+            left=[] if self.turned is None else at.w,
+        )
+
+
+def null_vectors(saddle: Inertia, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
+    """Right and left null vectors of the tangent matrix at ``x``, not symmetric, with the ``number`` it has there.
+
+    By solves with borders that are arbitrary at first.  Of several the left ones are turned such that each is along
+    the right one of the same number as far as it can be: where a symmetry relates them ``G`` is a multiple of one.
+    """
+    system, metric = saddle.system, saddle.metric
+    saddle.assemble(x)
+    transposed = saddle.matrix.transpose(PETSc.Mat())
+    straight, turned = (Bordered(system, matrix, number, None) for matrix in (saddle.matrix, transposed))
+    right = left = [saddle.seed(i) for i in range(number)]
+    for _ in range(3):
+        orthonormalize(right, metric)
+        orthonormalize(left, metric)
+        phi, psi = ([metric * v for v in side] for side in (right, left))
+        straight.factor(psi, phi)
+        turned.factor(phi, psi)
+        right, left = ([one.solve(None, e)[0] for e in np.eye(number)] for one in (straight, turned))
+    orthonormalize(right, metric)
+    orthonormalize(left, metric)
+    overlap = np.array([[(metric * v).dot(w) for w in left] for v in right])
+    u, _, vt = np.linalg.svd(overlap)
+    return right, [combine(left, column) for column in (vt.T @ u.T).T]

@@ -1,0 +1,206 @@
+"""Results of a continuation: points, special points and branches of equilibria."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from petsc4py import PETSc
+
+if TYPE_CHECKING:
+    from rodfem.stability.cluster import Cluster
+
+FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
+NOT_TRACED = "not traced"
+IMPERFECT = "imperfect bifurcation"
+"""A branch point that an imperfection has taken apart, where steps of continuation do not resolve its pieces."""
+FLUTTER, DIVERGENCE = "flutter", "divergence"
+"""Under loads without a potential: a pair of frequencies becomes complex; one becomes imaginary."""
+
+
+@dataclass(repr=False)
+class Point:
+    """One equilibrium: state ``x``, unit ``tangent``, ``arclength`` from the start of the branch, and records.
+
+    ``energy`` is the stored energy ``int W ds`` alone, without the potential of the loads: of two equilibria at one
+    load the one with less of it need not be the one with less total energy.  ``slope`` is the load's component of the
+    tangent, ``drift`` the largest drift scalar (zero but for round-off), ``error`` the last Newton correction, ``mesh``
+    the number of the discretisation that ``x`` belongs to, and ``estimate`` the error of the discretisation in load and
+    ordinate, where an accuracy was asked for.  ``determinant`` is the logarithm of the size of the saddle matrix's
+    determinant, at the state whose factors told the index.  Of
+    frequencies ``omega2`` are the eigenvalues (real and imaginary part), ``motion`` what the rod does in each, and
+    ``curve`` the numbers of their curves against the load.
+    """
+
+    x: PETSc.Vec
+    tangent: PETSc.Vec | None
+    arclength: float
+    load: float
+    ordinate: float
+    energy: float
+    stretch: float
+    negative: int
+    zero: int
+    slope: float
+    drift: float
+    error: float
+    spectrum: list[float] = field(default_factory=list)
+    omega2: list[list[float]] = field(default_factory=list)
+    motion: list[str] = field(default_factory=list)
+    curve: list[int] = field(default_factory=list)
+    negative_in_space: int | None = None
+    mesh: int = 0
+    estimate: float = float("nan")
+    determinant: float = float("nan")
+
+    @property
+    def index(self) -> int:
+        """Number of negative eigenvalues; without a potential of those that are negative or complex."""
+        return self.negative
+
+    @property
+    def stable(self) -> bool:
+        """Whether no eigenvalue is negative: zero ones, which :attr:`zero` counts, leave it undecided beyond that."""
+        return self.negative == 0
+
+    def __repr__(self) -> str:
+        """Load, ordinate and stability."""
+        word = "stable" if self.stable else f"unstable, index {self.negative}"
+        return f"<Point at load {self.load:.10g}: ordinate {self.ordinate:.6g}, {word}>"
+
+
+@dataclass
+class Law:
+    """``load = load_b + coefficient x^power + ...``, a bound of the coefficient's error, and the kind of bifurcation.
+
+    ``side`` is the sign of the load's change on the bifurcating branch.
+    """
+
+    kind: str
+    coefficient: float
+    power: int
+    uncertainty: float
+    side: int
+
+    def judge(self, index_below: int, index_above: int) -> None:
+        """Name a pitchfork by the index of the branch that it leaves at loads just below and just above."""
+        if self.kind == "pitchfork":
+            there, here = (index_above, index_below) if self.side > 0 else (index_below, index_above)
+            self.kind = "supercritical pitchfork" if there > here else "subcritical pitchfork"
+
+
+@dataclass(repr=False)
+class Special:
+    """A special point: what it is, how precisely it was located, its null vectors, and the index on either side.
+
+    ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` bounds its error, that of the
+    discretisation included: of the load for folds and branch points, of the ordinate at user points and ends;
+    ``ordinate_error`` bounds that of the ordinate at all (see :mod:`rodfem.adaptivity.error_estimate`).  Where the mesh
+    has not ``resolved`` the state they are what the errors may well exceed; None: not examined.  ``coupling`` is the
+    cosine between the null vector and the derivative of the equations in the load: zero at a branch point, not at a
+    fold. ``unfolding`` is the size of the unfolding parameters that make it a branch point, relative to the metric as
+    eigenvalues are (:mod:`rodfem.continuation.unfolding`): round-off, unless an imperfection has taken it apart.
+    ``omega2`` is the double eigenvalue of flutter, ``cluster`` the :class:`~rodfem.stability.cluster.Cluster` of the
+    eigenvalues that collide.
+    """
+
+    kind: str
+    point: Point
+    negative_before: int
+    negative_after: int
+    located_to: float
+    null_vectors: list[PETSc.Vec] = field(default_factory=list)
+    coupling: float = 0.0
+    error_estimate: float = float("nan")
+    ordinate_error: float = float("nan")
+    resolved: bool | None = None
+    meets: tuple[str, int] | None = None
+    switched: bool = False
+    row: int = -1
+    zero_of: str = "mu"
+    note: str = ""
+    law: Law | None = None
+    omega2: float = float("nan")
+    omega2_error: float = float("nan")
+    unfolding: float = float("nan")
+    cluster: Cluster | None = None
+
+    def __repr__(self) -> str:
+        """Kind, load and change of the index."""
+        change = f"{self.negative_before}->{self.negative_after}"
+        return f"<Special point: {self.kind} at load {self.point.load:.10g}, index {change}>"
+
+    @property
+    def multiplicity(self) -> int:
+        """Number of eigenvalues that cross or touch zero here."""
+        return len(self.null_vectors)
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """Two neighbouring rows between which the index changes from ``before`` to ``after`` without a special point."""
+
+    a: Point
+    b: Point
+    before: int
+    after: int
+
+    def __str__(self) -> str:
+        """Say it in a sentence."""
+        return (
+            f"Between loads {self.a.load:.8g} and {self.b.load:.8g} the index changes from {self.before} to "
+            f"{self.after}, and no special point was found that says why: use smaller steps (--step) or more elements."
+        )
+
+
+@dataclass(repr=False)
+class Branch:
+    """A connected piece of equilibria: its points in order, its special points, where it came from and why it ended.
+
+    ``begins`` is the index right after the branch point that it leaves, where the indices of the trunk tell it.
+    ``singular_start`` is the number of eigenvalues that vanish at the first state of a range and not all along the
+    branch: a branch point there, if it is one, is not located.
+    """
+
+    name: str
+    parent: tuple[str, int] | None
+    depth: int
+    points: list[Point] = field(default_factory=list)
+    special: list[Special] = field(default_factory=list)
+    ended: str = NOT_TRACED
+    unexplained: list[Unexplained] = field(default_factory=list)
+    begins: int | None = None
+    singular_start: int = 0
+
+    def __repr__(self) -> str:
+        """Name, size and end."""
+        return f"<Branch {self.name!r}: {len(self.points)} points, {len(self.special)} special, ended: {self.ended}>"
+
+    def start_in_words(self, load: str) -> str:
+        """Sentence on a first state that is singular, for a load of that name; empty where it is not."""
+        if not self.singular_start:
+            return ""
+        return (
+            f"The first state, at {load} = {self.points[0].load:.8g}, is singular: {self.singular_start} eigenvalue(s) "
+            "vanish there that do not all along the branch. What else leaves it is not followed: begin before it."
+        )
+
+    def insert(self, special: Special) -> None:
+        """Put a special point among the points by its arclength, and renumber the rows of all special points."""
+        self.special.append(special)
+        self.points.append(special.point)
+        self.renumber()
+
+    def renumber(self) -> None:
+        """Sort points and special points along the branch and set their rows."""
+        self.points.sort(key=lambda p: p.arclength)
+        row = {id(p): i for i, p in enumerate(self.points)}
+        self.special.sort(key=lambda s: s.point.arclength)
+        for special in self.special:
+            special.row = row[id(special.point)]
+
+
+def not_followed(branches: Sequence[Branch]) -> int:
+    """Number of branch points from which no branch was sought, as the depth of the plan was reached."""
+    return sum(s.kind == BRANCH_POINT and not s.switched for b in branches for s in b.special)

@@ -1,0 +1,88 @@
+"""The load at which eigenvalues of a rod under loads without a potential collide, between two loads of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from scipy.optimize import linear_sum_assignment
+
+from rodfem.continuation.locate import real_root, zero_uncertainty
+from rodfem.errors import ConvergenceError
+from rodfem.stability.cluster import Cluster, Measured
+from rodfem.stability.nonsymmetric import MULTIPLE, Frequencies, groups
+
+MOVED = 0.3
+"""A complex eigenvalue that changes by more than this, relative, in a step may be another one."""
+RANK = 1e-6
+"""Relative distance of eigenvalues above which their vectors span their invariant subspace well."""
+
+AtLoad = Callable[[float, Cluster], Measured]
+
+
+@dataclass(frozen=True)
+class Located:
+    """Load of a collision, its uncertainty for the given mesh, and the cluster there."""
+
+    load: float
+    uncertainty: float
+    cluster: Cluster
+
+
+def unmatched(found: Frequencies, others: np.ndarray) -> list[list[int]]:
+    """Places of the complex eigenvalues of ``found`` that go on from none of ``others``, with their conjugates.
+
+    Equal ones are together.
+    """
+    upper = [i for i, v in enumerate(found.values) if v.imag > 0]
+    mine, there = found.values[upper][:, None], others[others.imag > 0]
+    distance = abs(mine - there[None, :]) / abs(mine)
+    rows, columns = linear_sum_assignment(distance)
+    matched = {upper[i] for i, j in zip(rows, columns, strict=True) if distance[i, j] < MOVED}
+    new = [i for i in upper if i not in matched]
+    values = found.values
+    out = []
+    for group in groups(values[new]):
+        members = [new[i] for i in group]
+        mirrored = values[members[0]].conjugate()
+        conjugates = [j for j, v in enumerate(values) if abs(v - mirrored) < MULTIPLE * abs(v)]
+        if len(conjugates) == len(members):
+            out.append([*members, *conjugates])
+    return out
+
+
+def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> Located:
+    """Load at which ``D`` of a cluster vanishes, from about ``load``; raises :class:`ConvergenceError`.
+
+    Chebyshev interpolation on a piece that is moved to the zero and shrunk until the last coefficient says that
+    it is sharp.  The cluster is taken over from where its eigenvalues are farthest apart.
+    """
+    half, best = width, Located(load, np.inf, cluster)
+    t = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
+    for _ in range(12):
+        found = [at(float(node), cluster) for node in load + half * t]
+        d, mean = np.array([f.discriminant for f in found]), np.array([f.cluster.mean for f in found])
+        series = chebyshev.chebfit(t, d, 5)
+        root = real_root(series, 0.0)
+        clearest = max(found, key=lambda f: f.spread)
+        if clearest.spread > RANK:
+            cluster = clearest.cluster
+        if root is None:
+            slope = (d[-1] - d[0]) / (2 * half)
+            load += float(np.clip(-(d[0] + d[-1]) / 2 / slope, -2 * half, 2 * half))
+            continue
+        load += half * root
+        cluster = Cluster(cluster.basis, float(chebyshev.chebval(root, chebyshev.chebfit(t, mean, 5))))
+        uncertainty = max(half * zero_uncertainty(series, root), 1e-12 * abs(load))
+        if abs(root) < 1 and uncertainty < best.uncertainty:
+            best = Located(load, uncertainty, cluster)
+        elif best.uncertainty < 1e-8 * abs(load):
+            break
+        if best.uncertainty < 1e-11 * abs(load):
+            break
+        half /= 4
+    if not np.isfinite(best.uncertainty):
+        raise ConvergenceError(f"The flutter load near {load:.6g} could not be located: use a smaller range.")
+    return best

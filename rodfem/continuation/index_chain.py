@@ -1,0 +1,103 @@
+"""Consistency of the indices along a branch: rows and special points.
+
+From row to row the index changes by the sum of the changes at the special points in between, each with its own index
+before and after.  A row allows an interval: eigenvalues that are zero within the tolerance of the count may be of
+either sign.  If the intervals of two neighbours are disjoint, the chain is broken: an eigenvalue has crossed zero
+unseen, or a number is wrong.  A branch keeps the breaks that no smaller step explains in :attr:`Branch.unexplained`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
+
+from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch, Point, Special, Unexplained
+
+Interval = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A point of a branch with the least and the greatest index compatible with its smallest eigenvalues."""
+
+    point: Point
+    low: int
+    high: int
+
+    @property
+    def decided(self) -> bool:
+        """Whether its index is known."""
+        return self.low == self.high
+
+    def crossing(self, other: Row) -> list[int]:
+        """Numbers of the eigenvalues that have changed sign between two rows; one that is zero at either has not."""
+        return list(range(self.high, other.low)) or list(range(other.high, self.low))
+
+
+def chained(low: int, high: int, specials: Sequence[Special], last_low: int, last_high: int) -> bool:
+    """Whether special points in order lead from an index between ``low`` and ``high`` to one between the others."""
+    intervals = [(low, high)]
+    for special in specials:
+        intervals += [(special.negative_before,) * 2, (special.negative_after,) * 2]
+    intervals.append((last_low, last_high))
+    return all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(intervals[::2], intervals[1::2], strict=True))
+
+
+def breaks(points: Sequence[Point], specials: Sequence[Special], begins: int | None = None) -> list[Unexplained]:
+    """Neighbours among rows in order of arclength, some of them special points, whose indices do not agree.
+
+    ``begins`` is the index right after the first row, where it is known although it is none of these special points.
+    """
+    at = {id(s.point): s for s in specials if s.kind in (FOLD, BRANCH_POINT)}
+    persistent = persistent_zeros(points)
+    found = []
+    for a, b in pairwise(points):
+        left, right = _beside(a, at, persistent, after=True), _beside(b, at, persistent, after=False)
+        if a is points[0] and begins is not None:
+            left = begins, begins
+        if left[1] < right[0] or right[1] < left[0]:
+            found.append(Unexplained(a, b, left[0], right[0]))
+    return found
+
+
+def persistent_zeros(points: Sequence[Point]) -> int:
+    """Number of eigenvalues that are zero at every row: of symmetries, or of families of equilibria at one load."""
+    return min((p.zero for p in points), default=0)
+
+
+def _beside(point: Point, at: dict[int, Special], persistent: int, after: bool) -> Interval:
+    """Least and greatest index right before or after a row."""
+    special = at.get(id(point))
+    if special is not None:
+        index = special.negative_after if after else special.negative_before
+        return index, index
+    return point.negative, point.negative + max(point.zero - persistent, 0)
+
+
+def explain(branch: Branch) -> None:
+    """Check the whole branch, which must be in order, and keep what is not explained."""
+    branch.unexplained = breaks(branch.points, branch.special, branch.begins)
+
+
+def merge_doubles(branch: Branch) -> None:
+    """Make one of neighbouring branch points that the error of the discretisation does not tell apart.
+
+    A mesh that lacks a symmetry of the rod splits a multiple eigenvalue: its zeros are apart by no more than the error.
+    """
+    for p, q in list(pairwise(branch.special)):
+        apart = abs(p.point.load - q.point.load)
+        if (
+            p.kind == q.kind == BRANCH_POINT
+            and p.zero_of == q.zero_of == "mu"
+            and p.point.mesh == q.point.mesh
+            and apart <= p.error_estimate + q.error_estimate < inf
+        ):
+            q.null_vectors = p.null_vectors + q.null_vectors
+            q.negative_before = p.negative_before
+            q.point.zero += p.multiplicity
+            q.note = f"{q.multiplicity} eigenvalues that this mesh does not tell apart vanish within {apart:.0e}"
+            branch.special.remove(p)
+            branch.points = [point for point in branch.points if point is not p.point]
+            branch.renumber()

@@ -1,0 +1,326 @@
+r"""Location of zeros of an eigenvalue or of the slope of the load on a branch.
+
+The bordered system is (nearly) singular near such a point, where equilibria are therefore not computed.  The branch is
+solved at Chebyshev nodes on a short interval around the point; the eigenvalue, the load and the state are smooth
+functions of arclength, and are interpolated with spectral accuracy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from petsc4py import PETSc
+
+from rodfem.continuation.branch import Point
+from rodfem.continuation.solvers import Follower, hermite
+from rodfem.errors import ConvergenceError
+from rodfem.fem.newton import correct
+from rodfem.fem.system import System, combine
+
+NODES, FEWER = 6, 4
+"""Number of nodes of an interpolant, and of one over a very short piece."""
+WINDOW = 0.02
+"""Half length, in the metric, of the interval of a branch on which a special point is interpolated."""
+ROUND_OFF = 1e-12
+"""Uncertainty of a load, relative to it or to one, by Newton's tolerance and the conditioning near a singular point."""
+SHARP = 1e-11
+"""Uncertainty of a load on the given mesh below which the interpolation is not refined further."""
+PART = 0.02
+"""Relative uncertainty at which the difference of two loads is accepted."""
+
+NARROWER = 6
+"""Largest number of times a bracket is narrowed until the crossing eigenvalue is among those nearest zero."""
+
+Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
+
+
+@dataclass
+class Sample:
+    """A solved point of a piece of a branch: parameter ``s``, state, load, the eigenvalue looked at, and the index."""
+
+    s: float
+    x: PETSc.Vec
+    load: float
+    mu: float
+    below: int
+
+
+def solve_at(follower: Follower, curve: Curve, s: float) -> PETSc.Vec:
+    """Equilibrium on the plane through ``curve(s)`` across its direction; raises :class:`ConvergenceError`."""
+    x, direction = curve(s)
+    follower.system.set_phase(x)
+    outcome = correct(follower.system, x, follower.row(direction))
+    if not outcome.converged:
+        raise ConvergenceError(
+            f"No equilibrium near load {follower.system.scalar(x):.8g} while locating a special point: "
+            "use smaller steps (--step)."
+        )
+    return x
+
+
+def solve_beside(follower: Follower, curve: Curve, s: float, aside: float) -> tuple[PETSc.Vec, float]:
+    """Solve at ``s``, or at ``s + aside`` if the bordered matrix is singular there; returns state and parameter."""
+    try:
+        return solve_at(follower, curve, s), s
+    except ConvergenceError:
+        return solve_at(follower, curve, s + aside), s + aside
+
+
+def across(system: System, vectors: Sequence[PETSc.Vec], still: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
+    """Metric-orthonormal basis of span(``vectors``) modulo span(``still``), the persistent null vectors."""
+    known, out = list(still), []
+    for vector in vectors:
+        rest = vector.copy()
+        for _ in range(2):
+            for k in known:
+                rest.axpy(-(system.metric * k).dot(rest), k)
+        if (size := system.norm(rest)) > 0.5 * system.norm(vector) or not still:
+            rest.scale(1.0 / size)
+            out.append(rest)
+            known.append(rest)
+    return out
+
+
+def eigenvalue(
+    follower: Follower, x: PETSc.Vec, order: int, still: Sequence[PETSc.Vec] = ()
+) -> tuple[float, PETSc.Vec]:
+    """Eigenvalue number ``order`` (0 is the left-most) of the state ``x``, one of those near zero, and its vector.
+
+    Eigenvalues of the vectors ``still``, zero on the whole branch, are not numbered.
+    """
+    below = follower.inertia.count(x).negative
+    position = order - below if order >= below else below - 1 - order
+    for wanted in (position + 1, position + 3, position + 6, position + 12):
+        values, vectors = follower.inertia.nearest(wanted + len(still), accuracy=1e-4)
+        if still:
+            moving = [i for i, v in enumerate(vectors) if across(follower.system, [v], still)]
+            values, vectors = values[moving], [vectors[i] for i in moving]
+        side = np.flatnonzero(
+            values >= -follower.inertia.tolerance if order >= below else values < -follower.inertia.tolerance
+        )
+        if len(side) > position:
+            chosen = side[np.argsort(abs(values[side]))[position]]
+            return float(values[chosen]), vectors[chosen].copy()
+    raise ConvergenceError(f"Eigenvalue number {order} is not among those nearest zero; use smaller steps (--step).")
+
+
+def sample(
+    follower: Follower, curve: Curve, s: float, mode: PETSc.Vec, persistent: int = 0, counted: bool = True
+) -> Sample:
+    """Solve at ``s`` and evaluate ``1 / (mode . M S^-1 M mode)`` there.
+
+    For a ``mode`` near the null vector this is the eigenvalue that vanishes, up to second order in their
+    difference, but unlike the ordered eigenvalues it is smooth where others come by; its zero is where ``S`` is
+    singular.  Eigenvalues within the tolerance of zero, of which ``persistent`` stay zero, count by its sign.  Unless
+    ``counted``, they are among those below: one factorisation instead of two.
+    """
+    x, inertia = solve_at(follower, curve, s), follower.inertia
+    if not counted:
+        inertia.assemble(x)
+        below = inertia.below(inertia.tolerance)
+        return Sample(s, x, follower.system.scalar(x), inertia.response(mode), below)
+    index = inertia.count(x)
+    mu = inertia.response(mode)
+    crossing = index.zero - follower.system.active_drifts() - persistent  # small ones take the sign of this one
+    return Sample(s, x, follower.system.scalar(x), mu, index.negative + (crossing if mu < 0 else 0))
+
+
+@dataclass
+class Located:
+    """A zero found on a piece of a branch: parameter, state, direction, load, slope of the load, uncertainty, index.
+
+    The ``uncertainty`` is of the load, ``along`` is that of the parameter, and ``arithmetic`` the part of the first
+    that no sharper interpolation lowers.
+    """
+
+    s: float
+    x: PETSc.Vec
+    tangent: PETSc.Vec
+    load: float
+    slope: float
+    uncertainty: float
+    before: int
+    after: int
+    along: float
+    arithmetic: float
+
+
+def interpolate(samples: list[Sample], zero_of: str, guess: float, noise: float = 0.0) -> Located | None:
+    """Zero of ``mu`` or of the load's slope by Chebyshev interpolation; None where it is not near the piece.
+
+    The uncertainty of the load is what the last coefficients of the two interpolants can contribute at the zero, at
+    least what the solver's tolerance leaves open, and what round-off of size ``noise`` in ``mu``, the same in all
+    samples, moves the zero by.
+    """
+    s = np.array([p.s for p in samples])
+    middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
+    t = (s - middle) / half
+    loads, values = np.array([p.load for p in samples]), np.array([p.mu for p in samples])
+    load = chebyshev.chebfit(t, loads - loads[0], len(t) - 1)
+    slope = chebyshev.chebder(load)
+    f = chebyshev.chebfit(t, values, len(t) - 1) if zero_of == "mu" else slope
+    root = real_root(f, (guess - middle) / half)
+    if root is None:
+        return None
+    load_at = float(chebyshev.chebval(root, load)) + loads[0]
+    slope_at = float(chebyshev.chebval(root, slope))
+    left = zero_uncertainty(f, root)
+    tail = abs(load[-1]) + abs(slope_at) * left
+    floor = ROUND_OFF * max(1.0, abs(load_at))
+    moved = abs(noise / float(chebyshev.chebval(root, chebyshev.chebder(f)))) if zero_of == "mu" else 0.0
+    arithmetic = floor + abs(slope_at) * moved
+    weights, slopes = _barycentric(t, root)
+    states = [p.x for p in samples]
+    x, tangent = combine(states, weights), combine(states, slopes / half)
+    before = [p.below for p in samples if p.s < middle + half * root] or [samples[0].below]
+    after = [p.below for p in samples if p.s >= middle + half * root] or [samples[-1].below]
+    return Located(
+        *(middle + half * root, x, tangent, load_at, slope_at / half, max(tail - floor, 0.0) + arithmetic),
+        *(before[-1], after[0], half * (left + moved), arithmetic),
+    )
+
+
+def real_root(series: np.ndarray, guess: float) -> float | None:
+    """Real zero nearest to ``guess`` of a Chebyshev series on [-1, 1], or a little outside; None without one."""
+    roots = chebyshev.chebroots(series)
+    real = roots[abs(roots.imag) < 1e-6].real
+    real = real[abs(real) <= 1.5]
+    return float(real[np.argmin(abs(real - guess))]) if len(real) else None
+
+
+def zero_uncertainty(series: np.ndarray, root: float) -> float:
+    """How far the last coefficient of a Chebyshev series can move its ``root``."""
+    slope = float(chebyshev.chebval(root, chebyshev.chebder(series)))
+    return float(abs(series[-1] / slope)) if slope else float("inf")
+
+
+def _barycentric(nodes: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of the values at nodes in the interpolating polynomial at ``t`` and in its derivative."""
+    degree = len(nodes) - 1
+    inverse = np.linalg.inv(chebyshev.chebvander(nodes, degree))
+    derivative = chebyshev.chebder(np.eye(degree + 1), axis=0)
+    value, slope = (chebyshev.chebvander(np.array([t]), d)[0] for d in (degree, degree - 1))
+    return value @ inverse, slope @ derivative @ inverse
+
+
+def refine(
+    follower: Follower,
+    curve: Curve,
+    center: float,
+    half: float,
+    mode: PETSc.Vec,
+    zero_of: str,
+    persistent: int = 0,
+    beside: float | None = None,
+) -> Located:
+    """Solve at Chebyshev nodes around ``center``, moved until the zero lies among them, shrunk until it is sharp.
+
+    Where only the distance of its load from the one ``beside`` it is wanted, that to :data:`PART` of itself is sharp
+    enough, :data:`FEWER` nodes do, and nothing is counted.
+    """
+    best: Located | None = None
+    count = NODES if beside is None else FEWER
+    for _ in range(10):
+        nodes = center + half * np.cos(np.pi * (np.arange(count)[::-1] + 0.5) / count)
+        samples = [sample(follower, curve, s, mode, persistent, counted=beside is None) for s in nodes]
+        located = interpolate(samples, zero_of, center, follower.inertia.noise(mode))
+        if located is not None and abs(located.s - center) <= half:
+            sharp = SHARP if beside is None else max(SHARP, PART * abs(located.load - beside))
+            settled = best is not None and located.uncertainty > 0.1 * best.uncertainty
+            if settled or located.uncertainty - located.arithmetic < sharp:
+                return located if best is None or located.uncertainty < best.uncertainty else best
+            best, center, half = located, located.s, half / 4
+        elif located is not None:
+            center = located.s
+        elif best is not None:
+            return best
+        else:
+            mu = [samples[0].mu, samples[-1].mu] if zero_of == "mu" else _slopes(samples)
+            step = -mu[0] * (nodes[-1] - nodes[0]) / (mu[1] - mu[0]) if mu[1] != mu[0] else half
+            center = nodes[0] + float(np.clip(step, -4 * half, 6 * half))
+    if best is not None:
+        return best
+    raise ConvergenceError(
+        f"A special point near load {samples[0].load:.8g} could not be located; use smaller steps (--step)."
+    )
+
+
+def _slopes(samples: list[Sample]) -> list[float]:
+    """Slopes of the load at both ends of a piece."""
+    a, b, y, z = samples[0], samples[1], samples[-2], samples[-1]
+    return [(b.load - a.load) / (b.s - a.s), (z.load - y.load) / (z.s - y.s)]
+
+
+def crossing_mode(
+    follower: Follower, curve: Curve, ends: tuple[float, float], order: int, still: Sequence[PETSc.Vec]
+) -> tuple[float, PETSc.Vec]:
+    """Where on a piece of a branch eigenvalue ``order`` changes its sign, nearly, and its vector there.
+
+    To a tenth of what is interpolated, or so near that it is among the eigenvalues nearest to zero.
+    """
+    width = 0.1 * min(WINDOW, ends[1] - ends[0])
+    for _ in range(NARROWER):
+        x, s = solve_beside(follower, curve, bracket(follower, curve, ends, order, still, width), 1e-3 * width)
+        try:
+            return s, eigenvalue(follower, x, order, still)[1]
+        except ConvergenceError:
+            width /= 16
+    raise ConvergenceError(
+        f"Eigenvalue number {order} is not among those nearest zero near load {follower.system.scalar(x):.8g}; use "
+        "smaller steps (--step)."
+    )
+
+
+def bracket(
+    follower: Follower,
+    curve: Curve,
+    ends: tuple[float, float],
+    order: int,
+    still: Sequence[PETSc.Vec],
+    width: float,
+) -> float:
+    """Where on a piece of a branch eigenvalue ``order`` changes its sign, to ``width``.
+
+    By bisection with counts: they know the number of an eigenvalue however many others lie nearer to zero.  The end
+    where it is negative is returned: on the other side it may have changed its number with positive ones that stay
+    near zero (torsion of a taut string, say).  Where the counts at both ends agree it is zero next to an end: the one
+    at which it is smaller.
+    """
+    low, high = ends
+    h = high - low
+
+    def passed(s: float) -> bool:
+        return follower.inertia.count(solve_beside(follower, curve, s, 1e-3 * h)[0]).negative > order
+
+    first = passed(low)
+    if first == passed(high):
+        left, right = (
+            eigenvalue(follower, solve_beside(follower, curve, s, 1e-3 * h)[0], order, still)[0] for s in ends
+        )
+        return low if abs(left) < abs(right) else high
+    while high - low > width:
+        middle = (low + high) / 2
+        low, high = (middle, high) if passed(middle) == first else (low, middle)
+    return low if first else high
+
+
+def locate(
+    follower: Follower, a: Point, b: Point, order: int, zero_of: str, still: Sequence[PETSc.Vec] = ()
+) -> Located:
+    """Locate the zero of eigenvalue ``order`` (or of the load's slope) between two points of a branch."""
+
+    def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+        return hermite(a, b, s)
+
+    h = b.arclength - a.arclength
+    if zero_of == "slope":
+        x, guess = solve_beside(follower, curve, a.arclength + h * a.slope / (a.slope - b.slope), 1e-3 * h)
+        follower.inertia.count(x)
+        mode = follower.inertia.nearest(1, accuracy=1e-2)[1][0].copy()
+    else:
+        piece = a.arclength + 1e-3 * h, b.arclength - 1e-3 * h
+        guess, mode = crossing_mode(follower, curve, piece, order, still)
+    return refine(follower, curve, guess, min(WINDOW, 0.45 * h), mode, zero_of, len(still))

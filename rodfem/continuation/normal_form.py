@@ -1,0 +1,127 @@
+"""The local law of a bifurcating branch: how its load leaves that of the branch point.
+
+With ``x`` the change of the scene's ordinate, a pitchfork obeys ``load = load_b + c x + ...`` where ``x`` is
+quadratic in the amplitude (a shortening, say), ``load = load_b + c x^2 + ...`` where it is linear (a
+displacement).  A pitchfork is supercritical where the branch exists on the side on which the index of the branch
+that it leaves is higher, else subcritical.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.continuation.branch import Law, Special
+from rodfem.continuation.solvers import VERTICAL, Follower
+from rodfem.fem.newton import correct
+
+AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
+"""Amplitudes, in the metric, at which the branch is solved: the positive half of eight Chebyshev nodes."""
+ROUND_OFF = 1e-12
+"""Least uncertainty of an ordinate by round-off, relative to it or to one."""
+BESIDE = 1e-3
+"""Distance along a branch, in the metric, over which the slope of the ordinate is taken."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """A branch point: state, load and ordinate, and the uncertainties of the latter two by its location."""
+
+    x: PETSc.Vec
+    load: float
+    ordinate: float
+    load_left: float
+    ordinate_left: float
+
+
+def origin_of(follower: Follower, special: Special) -> Origin:
+    """Branch point of a mesh; along a branch its ordinate is as uncertain as its load, times the ratio of slopes."""
+    p = special.point
+    left = ROUND_OFF * max(1.0, abs(p.ordinate))
+    if p.tangent is not None and p.slope:
+        left += abs(ordinate_along(follower, p.x, p.tangent) / p.slope) * special.located_to
+    return Origin(p.x, p.load, p.ordinate, special.located_to, left)
+
+
+def ordinate_along(follower: Follower, x: PETSc.Vec, direction: PETSc.Vec) -> float:
+    """Change of the ordinate of ``x`` along a direction, of unit size in the metric."""
+    beside = x.copy()
+    beside.axpy(BESIDE / follower.system.norm(direction), direction)
+    return (follower.shape.ordinate(beside) - follower.shape.ordinate(x)) / BESIDE
+
+
+def law_of(follower: Follower, origin: Origin, direction: PETSc.Vec) -> Law | None:
+    """Law of the branch that leaves ``origin`` along ``direction``; None if it cannot be computed from nearby points.
+
+    At a pitchfork the load is an even function of the amplitude, and the ordinate an even or an odd one;
+    polynomials through four amplitudes give their leading coefficients.  Uncertain is what those through three miss,
+    what the load is odd by, and what the location of the branch point leaves open: of loads and ordinates that are
+    measured from it, divided by the square of an amplitude.
+    """
+    row = follower.row(direction)
+    near = [_near(follower, origin, direction, row, float(a)) for a in (*AMPLITUDES, -AMPLITUDES[-1])]
+    if None in near:
+        return None
+    loads, ordinates = np.array(near, dtype=float).T
+    plus, minus = loads[-2], loads[-1]
+    span = follower.system.scene.span
+    if max(map(abs, loads)) < VERTICAL * abs(span[1] - span[0]):
+        return Law("vertical branch", 0.0, 1, max(map(abs, loads)) / max(map(abs, ordinates)), 0)
+    uneven = abs(plus - minus) / (abs(plus) + abs(minus))
+    if uneven > 0.1:
+        best = _slope(loads, ordinates)
+        left = abs(best - _slope(loads[[2, 4]], ordinates[[2, 4]])) + _left(_slope, loads, ordinates, origin)
+        return Law("transcritical", best, 1, left, int(np.sign(plus)))
+    growth = abs(ordinates[0] / ordinates[3]) if ordinates[3] else np.inf
+    odd = growth < (AMPLITUDES[0] / AMPLITUDES[3]) ** 1.5
+
+    def leading(loads: np.ndarray, ordinates: np.ndarray, count: int = 4) -> float:
+        return _leading(loads[:4], ordinates[:4], odd, count)
+
+    best = leading(loads, ordinates)
+    if not np.isfinite(best):
+        return None
+    left = abs(best - leading(loads, ordinates, 3)) + uneven * abs(best) + _left(leading, loads, ordinates, origin)
+    return Law("pitchfork", best, 2 if odd else 1, left, int(np.sign(plus)))
+
+
+def _near(
+    follower: Follower, origin: Origin, direction: PETSc.Vec, row: PETSc.Vec, amplitude: float
+) -> tuple[float, float] | None:
+    """Changes of load and ordinate at an amplitude of the bifurcating branch; None where Newton's method fails."""
+    system = follower.system
+    x = origin.x.copy()
+    x.axpy(amplitude, direction)
+    system.set_phase(x)
+    if not correct(system, x, row, reach=2.0 * abs(amplitude)).converged:
+        return None
+    return system.scalar(x) - origin.load, follower.shape.ordinate(x) - origin.ordinate
+
+
+def _left(
+    of: Callable[[np.ndarray, np.ndarray], float], loads: np.ndarray, ordinates: np.ndarray, origin: Origin
+) -> float:
+    """Greatest change of a coefficient with loads and ordinates that are uncertain as those of the origin are."""
+    best, left = of(loads, ordinates), 0.0
+    for one in np.eye(len(loads)):
+        left += abs(of(loads + one * origin.load_left, ordinates) - best)
+        left += abs(of(loads, ordinates + one * origin.ordinate_left) - best)
+    return left
+
+
+def _slope(loads: np.ndarray, ordinates: np.ndarray) -> float:
+    """Slope of the load in the ordinate from the last two points, on both sides of the branch point."""
+    return float((loads[-2] - loads[-1]) / (ordinates[-2] - ordinates[-1]))
+
+
+def _leading(loads: np.ndarray, ordinates: np.ndarray, odd: bool, count: int) -> float:
+    """Ratio of the leading coefficients of the load and of the ordinate (squared if odd) in the amplitude."""
+    a = AMPLITUDES[-count:]
+    powers = np.vander(a**2, count, increasing=True)
+    load = np.linalg.solve(powers, loads[-count:] / a**2)[0]
+    x = np.linalg.solve(powers, ordinates[-count:] / (a if odd else a**2))[0]
+    scale = x**2 if odd else x
+    return float(load / scale) if abs(scale) > 1e-12 else float("nan")

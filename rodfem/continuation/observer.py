@@ -1,0 +1,98 @@
+"""Observers of a computation: what is told of it while it goes on.
+
+The computation itself prints nothing and writes no file.  A terminal (:class:`rodfem.app.terminal.Report`), a writer of
+files or a notebook derives from :class:`Observer` and overrides the events that it wants; events are the same on all
+ranks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from rodfem.continuation.branch import Branch, Point, Special
+
+if TYPE_CHECKING:
+    from rodfem.diagram.diagram import Diagram
+    from rodfem.fem.fields import Discretization
+    from rodfem.fem.system import System
+
+
+class Observer:
+    """Hears every event, and does nothing.
+
+    Nothing that is handed over may be changed.
+    """
+
+    def compiling(self) -> None:
+        """Forms are compiled, which takes some seconds."""
+
+    def system(self, system: System, accuracy: float | None = None) -> None:
+        """A scene has been discretised; an ``accuracy`` may be asked for."""
+
+    def frequency_mesh(self, mesh: Discretization, number: int, change: float, asked: float) -> None:
+        """A mesh was chosen on which ``number`` frequencies still ``change``, relative; an error was ``asked`` for."""
+
+    def branch(self, branch: Branch) -> None:
+        """A branch begins."""
+
+    def progress(self, branch: Branch, point: Point) -> None:
+        """A point has been added to a branch."""
+
+    def special(self, branch: Branch, special: Special) -> None:
+        """A special point has been located; its error bars come with the end of its branch."""
+
+    def law(self, special: Special) -> None:
+        """The local law of a branch point is known."""
+
+    def mesh(self, system: System, load: float, why: str) -> None:
+        """A branch goes on with another mesh from a load."""
+
+    def accuracy(self, used: Sequence[System], worst: float, asked: float) -> None:
+        """A branch was traced on meshes with a largest error, where one was ``asked`` for."""
+
+    def finished(self, branch: Branch) -> None:
+        """A branch has ended, and has its error bars."""
+
+    def complete(self, diagram: Diagram) -> None:
+        """One more branch of a diagram is complete, and can be saved."""
+
+    def note(self, sentence: str) -> None:
+        """Something worth knowing."""
+
+    def warn(self, sentence: str) -> None:
+        """Something went wrong, without stopping the computation."""
+
+
+class Recorder(Observer):
+    """Keeps warnings and notes, and hands every event on to a listener."""
+
+    def __init__(self, listener: Observer) -> None:
+        """Nothing is recorded yet."""
+        self.listener = listener
+        self.warnings: list[str] = []
+        self.notes: list[str] = []
+
+    def note(self, sentence: str) -> None:
+        """Keep it and hand it on."""
+        self.notes.append(sentence.strip())
+        self.listener.note(sentence)
+
+    def warn(self, sentence: str) -> None:
+        """Keep it and hand it on."""
+        self.warnings.append(sentence)
+        self.listener.warn(sentence)
+
+
+def _handed_on(event: str) -> Callable[..., None]:
+    """Return the method of a recorder that hands an event on."""
+
+    def hand_on(self: Recorder, *what: object) -> None:
+        getattr(self.listener, event)(*what)
+
+    return hand_on
+
+
+for _event in vars(Observer):
+    if not _event.startswith("_") and _event not in vars(Recorder):
+        setattr(Recorder, _event, _handed_on(_event))

@@ -1,0 +1,446 @@
+"""Pseudo-arclength continuation: following a curve of equilibria with control of the step.
+
+The predictor extrapolates the last points of the branch by a polynomial in arclength (up to cubic); the corrector
+is Newton's method on the plane through the prediction orthogonal to the predicted direction (Keller 1977).  The
+step is chosen such that the corrector moves a prediction by a set distance: small where the curve bends, large
+where it does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.continuation.branch import Point
+from rodfem.continuation.corrector import SENSITIVE, Corrector
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.convexity import Convexity
+from rodfem.fem.newton import TOLERANCE, Outcome, correct, relax
+from rodfem.fem.shape import Shape
+from rodfem.fem.system import System, combine
+from rodfem.problem.kinds import real, whole
+from rodfem.stability.inertia import Index, Inertia
+from rodfem.stability.out_of_plane import InSpace
+from rodfem.stability.round_off import decide
+from rodfem.stability.symmetric import Spectrum
+
+LEVEL = 0.05
+"""Slope of the load (in spans per unit of arclength) below which it is computed anew at the corrected state, unless the
+correction was too small to change its sign."""
+VERTICAL = 1e-8
+"""Slope of the load (in spans per unit of arclength) below which it counts as constant along a branch."""
+STILL = 1e-6
+"""Damping of Newton's method at a singular first state, over the lowest bending eigenvalue."""
+STRAYED = 0.3
+"""If Newton's method moves the initial guess farther than this (metric norm), the result is not accepted as the first
+state."""
+HELD = 1e-8
+"""Drift scalar, over the lowest bending eigenvalue, above which phase conditions hold a state off the equilibrium."""
+ALIGNED = 0.9
+"""Least cosine between the direction of a prediction and the tangent at the corrected point."""
+ON_BOUND = 1e-8
+"""Distance from a bound, in spans, below which a load counts as on it: branches of constant load may lie there."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Control of the step, in the metric (root mean square rotation in radian, load over its span).
+
+    ``largest`` also bounds how coarse a branch is drawn; ``aim`` is the distance from prediction to correction that is
+    aimed at; ``most`` the number of points at which a branch is given up.
+    """
+
+    first: float = 0.02
+    largest: float = 0.05
+    smallest: float = 1e-5
+    aim: float = 2e-3
+    most: int = 2000
+
+    def __post_init__(self) -> None:
+        """Check kinds and the largest step; raises :class:`SceneError`."""
+        for name in ("first", "largest", "smallest", "aim"):
+            real(name, getattr(self, name), getattr(Steps, name))
+        if whole("most", self.most, Steps.most) < 1:
+            raise SceneError(f"most is {self.most}: a branch has at least one point; give most=1 or more.")
+        if not self.smallest < self.largest <= 1:
+            raise SceneError(
+                f"A step of {self.largest:g} is out of bounds: choose more than {self.smallest:g}, at most 1."
+            )
+        for name in ("first", "smallest", "aim"):
+            if not getattr(self, name) > 0:
+                raise SceneError(f"Steps with {name} = {getattr(self, name):g} lead nowhere: give more than 0.")
+
+
+class Equilibria:
+    """Computes equilibria of one :class:`~rodfem.fem.system.System` at given loads, and their shapes."""
+
+    def __init__(self, system: System) -> None:
+        """Tabulate the shape; ``mesh`` is the number of this discretisation where there are several."""
+        self.system, self.mesh = system, 0
+        self.shape = Shape(system)
+        self.axis = system.load_axis()
+
+    def start(self, load: float, bent: float = 0.0) -> PETSc.Vec:
+        """First guess at ``load``: the scene's ``start`` rotation, undeformed strains, zero forces.
+
+        ``bent`` is the size, in radian, of a smooth rotation on top: a taut straight rod is a singular place to start.
+        """
+        system, f = self.system, self.system.fields
+        x = f.coordinates(f.discretization.degree)
+        turned = f.turning.start(system.scene.start, x.ravel(), system.scene.interval)
+        f.u.x.array[f.number >= 0] = 0.0
+        dofs = f.dofs[f.turning.name]
+        held, clamped = f.number[dofs] < 0, f.u.x.array[dofs]
+        if bent:
+            along = (x.ravel() - system.scene.interval[0]) / system.scene.length
+            turned = f.turning.turned(turned, bent * _bend(along))
+        f.u.x.array[dofs] = np.where(held, clamped, turned.reshape(*x.shape, -1))
+        if "v" in f.dofs:
+            f.u.x.array[f.dofs["v"]] = [1.0 if i == 2 else 0.0 for i in system.scene.free_strains]
+        f.u.x.array[f.copies[:, -1]] = load
+        self.shape.place_centreline(load)
+        out = system.take()
+        system.set_load(out, load)
+        return out
+
+    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, Outcome]:
+        """Equilibrium at exactly ``load`` by Newton's method from ``guess``; the phase reference must be set."""
+        x = guess.copy()
+        self.system.set_load(x, load)
+        outcome = correct(self.system, x, self.axis, reach=reach)
+        self.system.set_load(x, load)  # steps at fixed load may have moved it by round-off
+        return x, outcome
+
+    def first(self, load: float) -> tuple[PETSc.Vec, Outcome]:
+        """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill.
+
+        Also where Newton's method ends at an unstable one that is nowhere near the start.
+        """
+        guess = self.start(load)
+        self.system.set_phase(guess)
+        x, outcome = self.at_load(guess, load)
+        if outcome.converged and (outcome.moved < STRAYED or self.is_stable(x)):
+            return x, outcome
+        damping, self.system.damping = self.system.damping, STILL * self.system.stiffness_scale
+        still, found = self.at_load(guess, load)  # the start may be one of a family, along which it need not move
+        self.system.damping = damping
+        if found.converged and found.moved < STRAYED:
+            return still, found
+        other = self.downhill(load)
+        return other if other[1].converged else (x, outcome)
+
+    def downhill(self, load: float) -> tuple[PETSc.Vec, Outcome]:
+        """Equilibrium at ``load`` by going downhill from the scene's start, and from there bent a little.
+
+        From a symmetrical start the way down may end on a saddle: a stable state is preferred.
+        """
+        first: tuple[PETSc.Vec, Outcome] | None = None
+        for bent in (0.0, 0.4, 0.8):
+            x = self.start(load, bent)
+            self.system.set_phase(x)
+            outcome = relax(self.system, x, self.axis)
+            for _ in range(3):  # phase conditions taken far away may hold a state off the equilibrium
+                if outcome.converged and self.system.drift(x) > HELD * self.system.stiffness_scale:
+                    self.system.set_phase(x)
+                    x, outcome = self.at_load(x, load)
+            if outcome.converged and self.is_stable(x):
+                return x, outcome
+            if first is None or (outcome.converged and not first[1].converged):
+                first = x, outcome
+        assert first is not None
+        return first
+
+    def is_stable(self, x: PETSc.Vec) -> bool:
+        """Whether an equilibrium is stable, as far as is known without counting."""
+        return True
+
+    def energy(self, x: PETSc.Vec) -> float:
+        """Stored energy of the state ``x``."""
+        self.system.bring(x)
+        mine = fem.assemble_scalar(self.system.equations.energy)
+        return float(self.system.comm.allreduce(mine, op=MPI.SUM))
+
+
+class Follower(Equilibria):
+    """Computes equilibria along branches, with their index and records.
+
+    It owns what such a computation needs once: Newton's factors (in the system), the stability matrix, the shape.
+    """
+
+    def __init__(self, system: System, spectrum: int = 0) -> None:
+        """Allocate matrices and tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
+        super().__init__(system)
+        self.inertia = Inertia(system)
+        self.corrector = Corrector(self.inertia)
+        self.modes = spectrum
+        self.spectrum = Spectrum(self.inertia) if spectrum else None
+
+    @cached_property
+    def convexity(self) -> Convexity | None:
+        """Convexity of the stored energy, where it varies along a branch."""
+        scene = self.system.scene
+        return Convexity(self.system) if not scene.is_quadratic() or scene.depends_on_s() else None
+
+    @cached_property
+    def space(self) -> InSpace | None:
+        """Index in space of a planar rod, where all its loads have a potential there."""
+        scene = self.system.scene
+        return None if scene.planar is None or scene.without_potential(in_space=True) else InSpace(self.system)
+
+    def is_stable(self, x: PETSc.Vec) -> bool:
+        """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
+        return self.inertia.count(x).negative == 0
+
+    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, Outcome]:
+        """As for any equilibria, but with the symmetric factors where they serve."""
+        x = guess.copy()
+        self.system.set_load(x, load)
+        outcome = self.corrector.correct(x, self.axis, reach=reach)
+        return (x, outcome) if outcome is not None else super().at_load(guess, load, reach)
+
+    def point(
+        self,
+        x: PETSc.Vec,
+        arclength: float,
+        tangent: PETSc.Vec | None,
+        outcome: Outcome | None = None,
+        index: Index | None = None,
+    ) -> Point:
+        """Evaluate all records of the equilibrium ``x``; its index is counted unless given."""
+        system = self.system
+        if index is None:
+            index = decide(self.inertia, x).index
+        determinant = self.inertia.factors.determinant()
+        return Point(
+            x=x,
+            tangent=tangent,
+            arclength=arclength,
+            load=system.scalar(x),
+            ordinate=self.shape.ordinate(x),
+            energy=self.energy(x),
+            stretch=self.shape.stretch(x),
+            negative=index.negative,
+            zero=index.zero,
+            slope=float("nan") if tangent is None else system.scalar(tangent),
+            drift=system.drift(x),
+            error=outcome.error if outcome else 0.0,
+            spectrum=self._leftmost(x, index),
+            negative_in_space=None if self.space is None else self.space.count(x).negative,
+            mesh=self.mesh,
+            determinant=determinant,
+        )
+
+    def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:
+        """Left-most eigenvalues by SLEPc, if asked for; :class:`ConvergenceError` where they contradict the inertia."""
+        if self.spectrum is None:
+            return []
+        modes = self.spectrum.leftmost(x, self.modes)
+        tolerance = self.inertia.tolerance / self.system.scene.length
+        least, most = modes.negative(tolerance), modes.negative(-tolerance)
+        if not least <= min(index.negative, self.modes) <= most or not modes.certified:
+            raise ConvergenceError(
+                f"SLEPc finds {least} negative eigenvalues at "
+                f"{self.system.scene.load} = {self.system.scalar(x):.8g}, the inertia "
+                f"{index.negative}: ask for more eigenvalues, or use a richer discretisation."
+            )
+        return [float(value) for value in modes.values]
+
+    def correct(
+        self, x: PETSc.Vec, row: PETSc.Vec, reach: float, slope: float
+    ) -> tuple[Outcome, PETSc.Vec | None, Index | None]:
+        """Correct a prediction in place; also its unit tangent on the side of ``row``, and its index.
+
+        The tangent is None without convergence, the index where the factors that served the correction do not tell it.
+        ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at ``x``
+        itself and not at the prediction.
+        """
+        outcome = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)
+        regular = outcome is not None
+        if outcome is None:
+            outcome = correct(self.system, x, row, most=8, reach=reach)
+        if not outcome.converged:
+            return outcome, None, None
+        tangent = self.corrector.tangent_along(row) if regular else self.tangent(row)
+        new, span = self.system.scalar(tangent), abs(self.system.scene.span[1] - self.system.scene.span[0])
+        if new * slope <= 0 or abs(new) < min(LEVEL, SENSITIVE * outcome.moved) * span:
+            tangent = self.tangent(row, at=x)
+            regular = self.corrector.regular
+        return outcome, tangent, self.corrector.index(x) if regular else None
+
+    def damp(self, freedoms: int) -> None:
+        """Keep Newton's method from moving along families of equilibria at one load, where there are any."""
+        self.system.damping = self.inertia.tolerance if freedoms > 0 else 0.0
+
+    def row(self, direction: PETSc.Vec) -> PETSc.Vec:
+        """Row of the arclength equation for a direction: the metric times it, for a direction of unit size."""
+        row = self.system.metric * direction
+        row.scale(1.0 / self.system.norm(direction))
+        return row
+
+    def tangent(self, row: PETSc.Vec, at: PETSc.Vec | None = None) -> PETSc.Vec:
+        """Unit tangent of the branch on the side to which ``row`` points.
+
+        From the LU factors of the last correction, which belong to a state nearby; with ``at`` from new ones at that
+        very state, symmetric where they serve.
+        """
+        if at is not None:
+            if self.corrector.factor(at):
+                return self.corrector.tangent_along(row)
+            self.system.residual(at, self.system.new_vector())
+            self.system.factor(row)
+        tangent = self.system.new_vector()
+        self.system.solve(self.axis, tangent)
+        tangent.scale(1.0 / self.system.norm(tangent))
+        return tangent
+
+    def load_tangent(self, x: PETSc.Vec, increasing: bool) -> PETSc.Vec:
+        """Unit tangent at the regular point ``x``, in the direction of in- or decreasing load."""
+        tangent = self.tangent(self.axis, at=x)
+        if not increasing:
+            tangent.scale(-1.0)
+        return tangent
+
+
+def _bend(x: np.ndarray) -> np.ndarray:
+    """Smooth rotation vector of size about one that vanishes at both ends, (m, 3); ``x`` (m,) in [0, 1]."""
+    return np.outer(np.sin(np.pi * x), (0.6, 0.8, 0.3)) + np.outer(np.sin(2 * np.pi * x), (0.5, -0.4, 0.2))
+
+
+def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of the values at ``nodes`` in their interpolating polynomial at ``s``, and in its derivative there."""
+    known = [float(x) for x in nodes]
+    value, slope = np.empty(len(known)), np.empty(len(known))
+    for j, node in enumerate(known):
+        p, dp, scale = 1.0, 0.0, 1.0
+        for i, other in enumerate(known):
+            if i != j:
+                dp = dp * (s - other) + p
+                p *= s - other
+                scale *= node - other
+        value[j], slope[j] = p / scale, dp / scale
+    return value, slope
+
+
+def predict(points: list[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """Extrapolate a branch to arclength ``s``: state and direction, from up to four points or one and its tangent."""
+    last = points[-1]
+    if len(points) < 3:
+        if last.tangent is None:
+            raise ValueError("A branch of one point needs a tangent to be continued.")
+        x = last.x.copy()
+        x.axpy(s - last.arclength, last.tangent)
+        return x, last.tangent
+    recent = points[-4:]
+    value, slope = lagrange(np.array([p.arclength for p in recent]), s)
+    states = [p.x for p in recent]
+    return combine(states, value), combine(states, slope)
+
+
+def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """Cubic through two points with their tangents at arclength ``s`` between them: state and direction."""
+    if a.tangent is None or b.tangent is None:
+        raise ValueError("Both ends of a piece of a branch need a tangent.")
+    h = b.arclength - a.arclength
+    t = (s - a.arclength) / h
+    parts = [a.x, a.tangent, b.x, b.tangent]
+    value = np.array([(1 + 2 * t) * (1 - t) ** 2, h * t * (1 - t) ** 2, t * t * (3 - 2 * t), h * t * t * (t - 1)])
+    slope = np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
+    return combine(parts, value), combine(parts, slope)
+
+
+def follow(
+    follower: Follower,
+    points: list[Point],
+    steps: Steps,
+    bounds: tuple[float, float],
+    reach: Callable[[Point], float] = lambda point: float("inf"),
+) -> Iterator[Point | str]:
+    """Continue a branch from its last point, yielding accepted points; a string at the end says why it ended.
+
+    ``bounds`` are the least and the greatest load; the branch ends exactly on them.  The caller appends (and may
+    insert) points in ``points``.  The direction is that of the last point's tangent.  ``reach`` bounds the step from a
+    point.
+    """
+    system, step = follower.system, min(steps.first, steps.largest)
+    span = abs(system.scene.span[1] - system.scene.span[0])
+    low, high = (bound + sign * ON_BOUND * span for bound, sign in zip(bounds, (-1, 1), strict=True))
+    follower.corrector.restart()
+    while len(points) < steps.most:
+        last = points[-1]
+        most = min(reach(last), steps.largest)
+        step = min(step, most)
+        known = points
+        if system.damping and last.tangent is not None:  # across a family, along which the path is not determined
+            known = [replace(last, tangent=follower.tangent(follower.row(last.tangent), at=last.x))]
+        x, direction = predict(known, last.arclength + step)
+        load, outcome, tangent, index = system.scalar(x), None, None, None
+        if low <= load <= high:
+            row = follower.row(direction)
+            if last.tangent is None or row.dot(last.tangent) > 0:  # else an extrapolation that turns back
+                system.set_phase(x)
+                outcome, tangent, index = follower.correct(x, row, 0.5 * step, last.slope)
+                if outcome.converged:
+                    load = system.scalar(x)
+        if not low <= load <= high or _on_bound(load, last, bounds, span):
+            bound = min(bounds, key=lambda bound: abs(bound - load))
+            point = _to_load(follower, points, load, bound, step, steps.smallest)
+            if point is not None:
+                yield point
+                yield "end of range"
+                return
+        elif outcome is not None and tangent is not None and row.dot(tangent) > ALIGNED:
+            yield follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome, index)
+            order = 2 if system.damping else min(len(points) - 1, 3) + 1
+            factor = (steps.aim / max(outcome.moved, 1e-12)) ** (1 / order)
+            step = min(step * min(max(factor, 0.4), 1.6), steps.largest)
+            continue
+        step /= 2
+        if step < min(steps.smallest, 0.01 * most):
+            why = f"steps below {steps.smallest:g}"
+            if last.zero > system.active_drifts():
+                why += f"; {last.zero - system.active_drifts()} eigenvalues vanish there to working accuracy"
+            yield f"no convergence at {system.scene.load} = {last.load:.6g} ({why})"
+            return
+    yield f"{steps.most} points reached"
+
+
+def distance(system: System, a: PETSc.Vec, b: PETSc.Vec) -> float:
+    """Distance of two states in the metric."""
+    change = a.copy()
+    change.aypx(-1.0, b)
+    return system.norm(change)
+
+
+def _on_bound(load: float, last: Point, bounds: tuple[float, float], span: float) -> bool:
+    """Whether a step from ``last`` that changes the load ends on a bound of the range, but for round-off."""
+    near = min(abs(bound - load) for bound in bounds)
+    return near < ON_BOUND * span and abs(last.load - load) > 2 * ON_BOUND * span
+
+
+def _to_load(
+    follower: Follower, points: list[Point], beyond: float, load: float, step: float, least: float
+) -> Point | None:
+    """Last point of a branch, exactly at ``load``; None where it is not accepted as any other point of the branch is.
+
+    ``beyond`` is the load that a whole step leads to.  The step to ``load`` is a part of it, of length ``least`` or
+    more, and Newton's method may go half as far from the prediction.
+    """
+    last, system = points[-1], follower.system
+    fraction = (load - last.load) / (beyond - last.load)
+    length = max(fraction * step, least)
+    x, direction = predict(points, last.arclength + fraction * step)
+    row = follower.row(direction)
+    system.set_phase(x)
+    x, outcome = follower.at_load(x, load, reach=0.5 * length)
+    if not outcome.converged:
+        return None
+    tangent = follower.load_tangent(x, beyond > last.load)
+    if not row.dot(tangent) > ALIGNED:
+        return None
+    return follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome)

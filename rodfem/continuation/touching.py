@@ -1,0 +1,122 @@
+r"""Pairs of crossings inside one step: an eigenvalue that passes zero and comes back leaves the index as it was.
+
+The index of two neighbouring rows does not show them.  The determinant of the saddle matrix does, the product of all
+eigenvalues up to factors that change little: on the way to its lowest value it falls before the step and rises after
+it.  A simple eigenvalue gives it a parabola near such a pair, a double one the square of one,
+
+    det^(1/m)(s) ~ c ((s - s_m)^2 - r^2),    crossings at s_m -+ r,    m = 1, 2,
+
+which three rows determine.  Where its vertex lies inside a step, well below the values at both ends, the branch is
+solved there.  Successive parabolic interpolation (Brent 1973, chapter 5) ends at a state with another index, or at a
+lowest value that is not zero.  Determinants come with the factors that count the index: they cost nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import exp, inf, isfinite
+
+from rodfem.continuation.branch import Point
+from rodfem.continuation.solvers import Follower
+from rodfem.continuation.special_points import point_between
+
+LOWER = 0.5
+"""A vertex below this share of the value at the lower end of a step is looked at."""
+MULTIPLICITIES = (1, 2)
+TRIES = 10
+"""Interpolations until a lowest value is given up."""
+CLOSER = 4
+"""Interpolations after which the vertex is believed."""
+MARGIN = 1e-3
+"""Part of a step, at its ends, in which no state is solved."""
+Sample = tuple[float, float]
+"""Arclength, and a value whose lowest is sought."""
+
+
+class Touching:
+    """The last rows of a branch, and what their determinants tell of the steps between them."""
+
+    def __init__(self) -> None:
+        """No row yet."""
+        self._rows: list[Point] = []
+        self._begun = True
+
+    def restart(self, row: Point) -> None:
+        """Begin at a row."""
+        self._rows, self._begun = [row], True
+
+    def add(self, row: Point) -> None:
+        """Go on to the next row."""
+        self._begun = len(self._rows) < 2
+        self._rows = [*self._rows[-1:], row]
+
+    def between(self, follower: Follower, a: Point, b: Point) -> list[Point]:
+        """Rows to insert, in order of arclength, where an eigenvalue passes zero twice in the step from ``a`` to ``b``.
+
+        The first step of a branch is looked at with the second: its row before that step then comes first.
+        """
+        if len(self._rows) < 2 or self._rows[-1] is not a:
+            return []
+        rows = [self._rows[-2], a, b]
+        found = []
+        if self._begun and rows[0].negative == a.negative:
+            early = inside(follower, rows, rows[0], a)
+            found += [rows[0], *early, a] if early else []
+        return found + inside(follower, rows, a, b)
+
+
+def inside(follower: Follower, rows: Sequence[Point], p: Point, q: Point) -> list[Point]:
+    """A state between the neighbours ``p`` and ``q`` among three rows whose index is not theirs, if there is one."""
+    for multiplicity in MULTIPLICITIES:
+        samples = [(row.arclength, relative(row, p, multiplicity)) for row in rows]
+        if all(isfinite(value) for _, value in samples):
+            found = lowest(follower, samples, p, q, multiplicity)
+            if found is not None:
+                return [found]
+    return []
+
+
+def relative(row: Point, other: Point, multiplicity: int) -> float:
+    """Root of the determinant at a row over that at another, with the sign that the indices say; nan if not known."""
+    exponent = (row.determinant - other.determinant) / multiplicity
+    return float((-1) ** (row.negative - other.negative) * exp(min(exponent, 600.0)))
+
+
+def lowest(follower: Follower, samples: list[Sample], p: Point, q: Point, multiplicity: int) -> Point | None:
+    """State between two rows, towards the lowest value that the samples lead to, if its index differs from theirs."""
+    known = [sample for sample in samples if sample[0] in (p.arclength, q.arclength)]
+    least = min(value for _, value in known)
+    margin = MARGIN * (q.arclength - p.arclength)
+    for tried in range(TRIES):
+        s, value = vertex(samples)
+        close = 0 < tried < CLOSER  # the first parabolas reach too far to tell how low it is
+        if not p.arclength < s < q.arclength or (value > LOWER * least and not close):
+            break
+        s = min(max(s, p.arclength + margin), q.arclength - margin)
+        state = point_between(follower, p, q, s)
+        if state is None or differs(state, p):
+            return state
+        size = relative(state, p, multiplicity)
+        if not size < least or any(s == other for other, _ in samples):
+            break
+        least = size
+        known = sorted([*known, (s, size)])
+        middle = known.index((s, size))
+        samples = known[middle - 1 : middle + 2]
+    return None
+
+
+def differs(state: Point, row: Point) -> bool:
+    """Whether the index of a state is not known to be that of a row."""
+    return state.negative != row.negative or state.zero > row.zero
+
+
+def vertex(samples: Sequence[Sample]) -> Sample:
+    """Vertex of the parabola through three samples; at infinity where it has no lowest value."""
+    (a, f), (b, g), (c, h) = samples
+    first, second = (g - f) / (b - a), (h - g) / (c - b)
+    curvature = (second - first) / (c - a)
+    if not curvature > 0:
+        return inf, 0.0
+    s = (a + b) / 2 - first / (2 * curvature)
+    return s, g + (s - b) * (first + curvature * (s - a))

@@ -1,0 +1,152 @@
+r"""Mirror images and reversals: the discrete symmetries that a discretised scene turns out to have.
+
+A reflection or half turn of space is ``S = diag(s1, s2, s3)`` with signs ``s_i``; together with the same reflection of
+the directors, and perhaps with a reversal of the rod (``sigma = -1``, otherwise 1), it carries a state to ::
+
+    R -> S R S,   r -> S r,   v -> sigma S v,   k -> sigma det(S) S k,   n -> sigma S n,   eta -> eta,
+
+in quaternions ``(q0, vec q) -> (q0, det(S) S vec q)``, fields being read from the other end where the rod is reversed.
+A stretch stays positive only if ``s3 = sigma``, which leaves seven candidates beside the identity.  Whether a scene
+has one of them is not asked of the scene but of its equations: with ``F`` their residual and ``T`` the map, ``T`` is a
+symmetry of the discrete problem if and only if ``F(T x) . T y = F(x) . y`` for all ``x`` and ``y``.  One smooth state
+without any symmetry of its own and one direction decide that to round-off, at the cost of two residuals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.fem.system import System
+
+ACCURACY = 1e-12
+"""Relative difference of ``F(T x) . T y`` and ``F(x) . y`` below which a map is a symmetry."""
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """The map of signs ``s`` = (s1, s2, s3), with a reversal of the rod or not; applies to states of a system."""
+
+    signs: tuple[int, int, int]
+    reversal: bool
+
+    def __str__(self) -> str:
+        """Return the map in words."""
+        words = "diag(" + ", ".join(f"{s:+d}" for s in self.signs) + ")"
+        return words + " and reversal of the rod" if self.reversal else words
+
+    def weights(self, field: str, components: tuple[int, ...], normal: int | None = None) -> np.ndarray:
+        """Signs of the components of a field, or of scalar contact forces (``n``); ``normal`` that of the plane."""
+        s = np.array(self.signs, dtype=float)
+        full = {
+            "q": np.concatenate([[1.0], s.prod() * s]),
+            "angle": (s.prod() * s)[[normal or 0]],
+            "eta": np.ones(1),
+            "r": s,
+            "v": -s if self.reversal else s,
+            "n": -s if self.reversal else s,
+        }[field]
+        return full[list(components)]
+
+    def __call__(self, system: System, x: PETSc.Vec) -> PETSc.Vec:
+        """Image of the state ``x``; drift scalars of the image are zero."""
+        f, u = system.fields, system.fields.u.x.array
+        system.bring(x)
+        held = f.number < 0
+        clamped = u[held]
+        for block in f.blocks:
+            components = system.scene.free_strains if block.name == "v" else tuple(range(block.size))
+            values = u[f.dofs[block.name]]
+            if self.reversal:
+                values = _reversed(system, values, block.degree)
+            values = values * self.weights(block.name, components, system.scene.normal)
+            if block.name == "r" and self.reversal:
+                values = values - _misfit(system, values)
+            u[f.dofs[block.name]] = values
+        for position, i in enumerate(f.forces):
+            u[f.copies[:, position]] *= self.weights("n", (i,))
+        image = system.take()
+        u[held] = clamped
+        return image
+
+
+def _reversed(system: System, values: np.ndarray, degree: int) -> np.ndarray:
+    """Nodal values (cells, nodes, components) of a field as read from the other end of the rod."""
+    f = system.fields
+    order = np.argsort(f.coordinates(degree)[0])
+    here = f.vertices[:, 0].copy()
+    gathered = system.comm.allgather((here[: f.owned_cells], values[: f.owned_cells][:, order]))
+    starts = np.concatenate([start for start, _ in gathered])
+    table = np.concatenate([part for _, part in gathered])[np.argsort(starts)]
+    tolerance = 1e-9 * system.scene.length
+    cell = np.searchsorted(np.sort(starts), here - tolerance)
+    out = np.empty_like(values)
+    out[:, order] = table[len(starts) - 1 - cell][:, ::-1]
+    return out
+
+
+def _misfit(system: System, values: np.ndarray) -> np.ndarray:
+    """Translation (3,) by which a centreline misses the ends at which it is held, left end first."""
+    f = system.fields
+    x = f.coordinates(f.discretization.degree)
+    found = np.zeros((2, 3))
+    here = np.zeros((2, 3), dtype=bool)
+    for side, s in enumerate(system.scene.interval):
+        at_end = np.isclose(x, s, rtol=0, atol=1e-9 * system.scene.length)
+        for number, value in zip(f.number[f.dofs["r"][at_end]], values[at_end], strict=True):
+            here[side], found[side] = number < 0, np.where(number < 0, value, 0.0)
+    both = system.comm.allgather((here, found))
+    shift = np.zeros(3)
+    for side in (1, 0):  # the left end has the last word
+        for held, value in both:
+            shift = np.where(held[side], value[side], shift)
+    return shift
+
+
+def generic_state(system: System, like: PETSc.Vec, amplitude: float, seed: int) -> PETSc.Vec:
+    """Add to a state smooth changes of all fields that no symmetry leaves alone; clamps are kept."""
+    f, u = system.fields, system.fields.u.x.array
+    rng = np.random.default_rng(seed)
+    system.bring(like)
+    held = f.number < 0
+    clamped = u[held]
+    a, b = system.scene.interval
+    for block in f.blocks:
+        x = (f.coordinates(block.degree) - a) / (b - a)
+        for i in range(block.size):
+            u[f.dofs[block.name][:, :, i]] += amplitude * sum(
+                c * np.sin(k * np.pi * x + p) for k, (c, p) in enumerate(rng.uniform(0.3, 1.0, (3, 2)), start=1)
+            )
+    for position in range(len(f.forces)):
+        u[f.copies[:, position]] += amplitude * rng.uniform(0.3, 1.0)
+    u[held] = clamped
+    out = system.take()
+    u[held] = clamped
+    return out
+
+
+def mirrors(system: System, x: PETSc.Vec) -> list[Mirror]:
+    """Discrete symmetries of the equations at the load of ``x``, the identity left out."""
+    system.set_phase(None)
+    base = generic_state(system, x, 0.2, 1)
+    beside = generic_state(system, base, 0.2, 2)
+    reference, scale = _work(system, base, beside)
+    found = []
+    for s1, s2, s3 in product((1, -1), repeat=3):
+        mirror = Mirror((s1, s2, s3), reversal=s3 < 0)
+        if (s1, s2, s3) != (1, 1, 1):
+            work, _ = _work(system, mirror(system, base), mirror(system, beside))
+            if abs(work - reference) < ACCURACY * scale:
+                found.append(mirror)
+    return found
+
+
+def _work(system: System, x: PETSc.Vec, y: PETSc.Vec) -> tuple[float, float]:
+    """``F(x) . (y - x)`` and the product of the norms."""
+    equations, change = system.new_vector(), y.copy()
+    change.axpy(-1.0, x)
+    system.residual(x, equations)
+    return float(equations.dot(change)), float(equations.norm() * change.norm())

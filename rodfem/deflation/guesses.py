@@ -1,0 +1,55 @@
+"""First guesses: known states turned by smooth rotations that respect the clamps."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.fem.system import System
+
+
+def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[int]) -> PETSc.Vec:
+    """Known state turned by a smooth rotation that respects clamps, its vector of that root mean square size.
+
+    The vector is a random combination of the lowest four waves along the rod that vanish where directors are
+    clamped.  It depends on the nodes and the seed only, not on how the rod is shared among ranks.
+    """
+    f = system.fields
+    rng = np.random.default_rng(seed)
+    weights = rng.normal(size=(4, 3)) / np.arange(1, 5)[:, None]
+    a, b = system.scene.interval
+    x = (f.coordinates(f.discretization.degree) - a) / (b - a)
+    left, right = _clamped(system)
+    waves = _waves(x, left, right)
+    dense = _waves(np.linspace(0.0, 1.0, 401), left, right)
+    size = float(np.sqrt(np.mean(np.sum((dense @ weights) ** 2, axis=-1))))
+    system.bring(base)
+    u, dofs = f.u.x.array, f.dofs[f.turning.name]
+    held = f.number < 0
+    clamped = u[held]
+    u[dofs] = f.turning.turned(u[dofs], waves @ weights * (amplitude / size))
+    out = system.take()
+    u[held] = clamped
+    return out
+
+
+def _clamped(system: System) -> list[bool]:
+    """Whether the directors are held at the left and at the right end."""
+    f = system.fields
+    x = f.coordinates(f.discretization.degree)
+    here = []
+    for s in system.scene.interval:
+        at_end = np.isclose(x, s, rtol=0, atol=1e-9 * system.scene.length)
+        here.append(bool((f.number[f.dofs[f.turning.name][at_end]] < 0).any()))
+    return [any(side) for side in zip(*system.comm.allgather(here), strict=True)]
+
+
+def _waves(x: np.ndarray, left: bool, right: bool) -> np.ndarray:
+    """Four waves at ``x`` in [0, 1], (..., 4), that vanish at clamped ends; periodic where none is clamped."""
+    k = np.arange(1, 5)
+    x = x[..., None]
+    if left and right:
+        return np.sin(np.pi * k * x)
+    if left or right:
+        return np.sin(np.pi * (k - 0.5) * (x if left else 1 - x))
+    return np.where(k % 2, np.sin(2 * np.pi * ((k + 1) // 2) * x), np.cos(2 * np.pi * ((k + 1) // 2) * x))

@@ -1,0 +1,259 @@
+r"""Deflation: further equilibria at one load, whether or not a branch connects them to those that are known.
+
+Each try starts from a smooth seeded guess (:mod:`rodfem.deflation.guesses`) and iterates by Newton's method on
+equations from which the known equilibria are divided out (:mod:`rodfem.deflation.deflated_newton`).  What a symmetry
+makes of a known equilibrium is known too: a continuous symmetry makes it a circle
+(:mod:`rodfem.deflation.group_orbit`), discrete ones a few isolated images
+(:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain Newton method, and kept if it is
+new and admissible.  It is the start of branches (:func:`starts`), and states of known branches are found by
+:func:`states_at`.
+
+A search can show that there are more equilibria, and never that there are no more.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.continuation.branch import Branch, Point
+from rodfem.continuation.observer import Observer
+from rodfem.continuation.solvers import Follower, hermite
+from rodfem.deflation.deflated_newton import FLOW, MOST, DeflatedNewton
+from rodfem.deflation.discrete_symmetries import Mirror, mirrors
+from rodfem.deflation.guesses import turned_state
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.newton import correct
+from rodfem.fem.system import combine
+
+IMAGE = 1e-12
+"""Relative difference of stored energies above which a state is no mirror image of another."""
+SAME = 1e-5
+"""Equilibria nearer to each other than this, in the metric, are one."""
+LEAST, GREATEST = 0.3, 3.0
+"""Root mean square rotation, in radian, of the first and of the last guess from the state that it starts from."""
+DRIFT = 1e-6
+"""Largest drift scalar of an equilibrium, over the rod's lowest bending eigenvalue."""
+
+NEW, KNOWN, FAILED, INADMISSIBLE = "new", "known", "without convergence", "not admissible"
+
+
+@dataclass
+class Try:
+    """How one try ended: the ``amplitude`` of its guess, its number of ``steps``, and one of the outcomes above."""
+
+    amplitude: float
+    steps: int
+    outcome: str
+
+
+@dataclass
+class Tally:
+    """What a search did: the load in words, all tries in order, and the mirrors that the scene turned out to have.
+
+    ``nearly`` counts equilibria that are nearly mirror images of others, which an imperfection makes different ones.
+    """
+
+    load: str
+    tries: list[Try] = field(default_factory=list)
+    mirrors: list[str] = field(default_factory=list)
+    nearly: int = 0
+
+    def count(self, outcome: str) -> int:
+        """Number of tries that ended so."""
+        return sum(t.outcome == outcome for t in self.tries)
+
+    def __str__(self) -> str:
+        """Return the counts, and what they do not prove, in a few lines."""
+        counts = Counter(t.outcome for t in self.tries)
+        words = ", ".join(f"{counts[outcome]} {outcome}" for outcome in (NEW, KNOWN, INADMISSIBLE, FAILED))
+        images = "; ".join(self.mirrors) or "none"
+        nearly = f"  {self.nearly} new: nearly, but not exactly, mirror images of others\n" if self.nearly else ""
+        return (
+            f"Further equilibria at {self.load} by deflation, {len(self.tries)} tries: {words}\n{nearly}"
+            f"  states that a symmetry carries into each other count as one (mirror images: {images})\n"
+            "  no proof that there are no others: more tries or another seed may find some"
+        )
+
+
+class Deflation(DeflatedNewton):
+    """Search for equilibria of a :class:`~rodfem.continuation.solvers.Follower`'s scene at one load.
+
+    Attributes
+    ----------
+    found
+        New equilibria, one of each set that the symmetries carry into each other.
+    tally
+        How the tries ended.
+    mirrors
+        Discrete symmetries of the scene at this load.
+    """
+
+    def __init__(self, follower: Follower, load: float, known: Sequence[Point] = (), seed: int = 0) -> None:
+        """Deflate the known equilibria and their images; :class:`SceneError` where one is at another load."""
+        super().__init__(follower)
+        self.load, self.seed = load, seed
+        scene, fields = self.system.scene, self.system.fields
+        scene.parameters[scene.load].check(scene.load, load)
+        for point in known:
+            if abs(point.load - load) > 1e-9 * abs(scene.span[1] - scene.span[0]):
+                raise SceneError(
+                    f"A known equilibrium is at {scene.load} = {point.load:.8g}, not {load:.8g}: "
+                    "give equilibria at the load of the search (diagram.at(load) computes them)."
+                )
+        fields.u.x.array[fields.number >= 0] = 0.0  # multipliers of the state that was there before are no guess
+        self.start = follower.start(load)
+        self.mirrors = mirrors(self.system, self.start)
+        self.bases: list[PETSc.Vec] = []
+        self.found: list[Point] = []
+        self.energies: list[float] = []
+        self.slides = any(
+            s.along for s in self.system.symmetries
+        )  # then states shifted along the rod are one, and known by their energy
+        self.tally = Tally(f"{scene.load} = {load:.10g}", mirrors=[str(m) for m in self.mirrors])
+        for point in known:
+            self._deflate(point.x)
+
+    def run(self, tries: int) -> list[Point]:
+        """Make ``tries`` tries, the first from the scene's start if nothing is known; all that was found so far.
+
+        Guesses start in turn from the known and the found states, and grow from ``LEAST`` to ``GREATEST``; half of them
+        flow twice as long.  The tries of a second call are others.
+        """
+        before = len(self.tally.tries)
+        for number in range(before, before + tries):
+            x, amplitude = self.start.copy(), 0.0
+            if number or self.known.states:
+                amplitude = LEAST * (GREATEST / LEAST) ** ((number - before) / max(tries - 1, 1))
+                base = self.bases[number % len(self.bases)] if self.bases else self.start
+                x = turned_state(self.system, base, amplitude, [self.seed, number])
+                self.flow(x, FLOW * (1 + number // 2 % 2))
+            steps = self.approach(x)
+            point, outcome = self._judge(x) if steps < MOST else (None, FAILED)
+            self.tally.tries.append(Try(amplitude, steps, outcome))
+            if point is not None:
+                self.found.append(point)
+                self._deflate(point.x)
+        return self.found
+
+    def nearest_known(self, x: PETSc.Vec) -> float:
+        """Distance of a state from all that is known, images by symmetries included; infinite if that is nothing."""
+        return min((d for d, _ in self.known.nearest(x)), default=float("inf"))
+
+    def _deflate(self, x: PETSc.Vec) -> None:
+        """Add a state and its images to what is known."""
+        self.bases.append(x)
+        self.energies.append(self.follower.energy(x))
+        if self.nearest_known(x) > SAME:
+            self.known.add(x)
+        for mirror in list(self.mirrors):
+            image = mirror(self.system, x)
+            if mirror in self.mirrors and self.nearest_known(image) > SAME:
+                self._deflate_image(image, self.energies[-1], mirror)
+
+    def _deflate_image(self, image: PETSc.Vec, energy: float, mirror: Mirror) -> None:
+        """Add the mirror image of an equilibrium to what is known; without it, if it is none, the mirror goes.
+
+        An imperfection below what the test of the mirrors sees makes the image another equilibrium, with another
+        energy: a pole beside its root would hide it from Newton's method.
+        """
+        point, _ = self._judge(image)
+        scale = max(abs(energy), self.follower.inertia.scale)
+        if point is not None and abs(point.energy - energy) > IMAGE * scale:
+            self.found.append(point)
+            self.tally.nearly += 1
+            self.mirrors.remove(mirror)
+            self.tally.mirrors.remove(str(mirror))
+            self._deflate(point.x)
+        else:
+            self.known.add(image)
+
+    def _judge(self, x: PETSc.Vec) -> tuple[Point | None, str]:
+        """Polish a candidate by the plain Newton method; the point, if it is a new equilibrium, and the outcome."""
+        system, follower = self.system, self.follower
+        system.set_phase(x)
+        outcome = correct(system, x, follower.axis, reach=0.1)
+        system.set_load(x, self.load)  # steps at fixed load may have moved it by round-off
+        if not outcome.converged:
+            return None, FAILED
+        if self.nearest_known(x) < SAME:
+            return None, KNOWN
+        system.set_phase(x)
+        try:
+            point = follower.point(x, 0.0, follower.load_tangent(x, True), outcome)
+        except ConvergenceError:  # an index that cannot be counted
+            return None, FAILED
+        if self.slides and any(abs(point.energy - e) <= 1e-6 * max(abs(e), 1e-12) for e in self.energies):
+            return None, KNOWN
+        if point.drift > DRIFT * follower.inertia.scale or not point.stretch > 0:
+            return None, INADMISSIBLE
+        return point, NEW
+
+
+def further(
+    follower: Follower,
+    load: float,
+    known: Sequence[Point] = (),
+    tries: int = 24,
+    seed: int = 0,
+    observer: Observer | None = None,
+) -> list[Point]:
+    """Equilibria at ``load`` beside the ``known`` ones, from ``tries`` deflated Newton iterations.
+
+    Each stands for all that the scene's symmetries make of it, and carries its index, energy, ordinate and a tangent in
+    the direction of increasing load.  How the tries ended goes to the ``observer``; :class:`Deflation` has the numbers.
+    Raises :class:`SceneError` for a load that is not admissible, or known equilibria at another one.
+    """
+    search = Deflation(follower, load, known, seed)
+    found = search.run(tries)
+    if observer is not None:
+        observer.note(str(search.tally))
+    return found
+
+
+def states_at(follower: Follower, branches: Sequence[Branch], load: float) -> list[Point]:
+    """Equilibria of traced branches at exactly ``load``: what a search for further ones should know.
+
+    Raises :class:`ConvergenceError` where there is none between two points on either side of the load.
+    """
+    found = []
+    for branch in branches:
+        for a, b in pairwise(branch.points):
+            if (
+                (a.load - load) * (b.load - load) > 0
+                or a.load == b.load
+                or (b.load == load and b is not branch.points[-1])
+            ):
+                continue
+            t = (load - a.load) / (b.load - a.load)
+            s = a.arclength + t * (b.arclength - a.arclength)
+            smooth = a.tangent is not None and b.tangent is not None and b.arclength > a.arclength
+            guess = hermite(a, b, s)[0] if smooth else combine([a.x, b.x], np.array([1 - t, t]))
+            follower.system.set_phase(guess)
+            x, outcome = follower.at_load(guess, load, reach=1.0)
+            if not outcome.converged:
+                raise ConvergenceError(f"No equilibrium at load {load:g} between two points of {branch.name}.")
+            found.append(follower.point(x, s, follower.load_tangent(x, True), outcome))
+    return found
+
+
+def starts(point: Point, name: str) -> list[Branch]:
+    """Branches of one point each that set out from a found one to higher and to lower loads.
+
+    :meth:`rodfem.diagram.explorer.Explorer.trace` follows them, and :func:`rodfem.continuation.solvers.follow` their
+    ``points``.
+    """
+    if point.tangent is None:
+        raise ValueError("A point without a tangent is no start of a branch.")
+    out = []
+    for sign, words in ((1.0, "up"), (-1.0, "down")):
+        tangent = point.tangent.copy()
+        tangent.scale(sign if point.slope >= 0 else -sign)
+        first = replace(point, tangent=tangent, arclength=0.0, slope=sign * abs(point.slope))
+        out.append(Branch(f"{name} {words}", None, 0, [first]))
+    return out

@@ -1,0 +1,254 @@
+"""The whole picture: branches of equilibria with the solvers of their meshes, and all that can be asked of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rodfem.continuation.branch import END, USER, Branch, Point, Special
+from rodfem.continuation.solvers import Equilibria, Follower, Steps
+from rodfem.deflation.search import states_at
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import Solver
+from rodfem.errors import SceneError
+from rodfem.fem.fields import Discretization
+from rodfem.modes.modes import Modes
+from rodfem.output.files import as_data, save_json, save_states
+from rodfem.problem.scene import Scene
+from rodfem.stability.assessment import Verdict
+from rodfem.timing import Clock
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rodfem.codim2.locus import Locus
+    from rodfem.output.snapshot import Snapshot
+
+
+class Diagram:
+    """A bifurcation diagram: what :func:`rodfem.trace` returns, and :func:`rodfem.load` reads.
+
+    It is a sequence of branches, in the order in which they were found, which are also found by name.  All methods that
+    compute are collective over the ranks that share the rod.
+
+    Attributes
+    ----------
+    scene, plan
+        What was traced.
+    branches
+        All branches.
+    solvers
+        What computes on each mesh, by the number that a point has in ``mesh``.
+    warnings, notes
+        Sentences on what went wrong without stopping the computation, and on what is worth knowing.
+    clock
+        Where the time went.
+    """
+
+    def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[Equilibria]) -> None:
+        """Keep what was traced; ``solvers`` may grow."""
+        self.scene, self.plan, self.branches, self.solvers = scene, plan, branches, solvers
+        self.warnings: list[str] = []
+        self.notes: list[str] = []
+        self._asked: dict[int, Solver] = {}
+
+    # --- what there is ---------------------------------------------------------------------------------------------
+
+    @property
+    def clock(self) -> Clock:
+        """Seconds by purpose, of the computation and of what was asked since."""
+        return self.solvers[0].system.clock
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Range of the load, its start first."""
+        return self.plan.over(self.scene)
+
+    def __len__(self) -> int:
+        """Number of branches."""
+        return len(self.branches)
+
+    def __iter__(self) -> Iterator[Branch]:
+        """Branches in the order in which they were found."""
+        return iter(self.branches)
+
+    def __getitem__(self, key: str | int) -> Branch:
+        """Branch by name or number; raises :class:`KeyError` or :class:`IndexError`."""
+        if isinstance(key, int):
+            return self.branches[key]
+        for branch in self.branches:
+            if branch.name == key:
+                return branch
+        raise KeyError(f"no branch {key!r}: there are {', '.join(repr(b.name) for b in self.branches)}")
+
+    def special(self, kind: str | None = None, branch: str | None = None) -> list[Special]:
+        """Special points, of one kind ("fold", "branch point", "flutter", "divergence", ...) or one branch if named.
+
+        Without a kind those at which something happens: loads asked for and ends are left out.
+        """
+        chosen = self.branches if branch is None else [self[branch]]
+        every = [s for b in chosen for s in b.special]
+        return [s for s in every if (s.kind == kind if kind is not None else s.kind not in (USER, END))]
+
+    def at(self, load: float) -> list[Point]:
+        """All equilibria of the diagram at exactly ``load``, computed there, each with its own index.
+
+        In the order of their branches.  Raises :class:`~rodfem.errors.SceneError` for a load outside the range.
+        """
+        low, high = sorted(self.span)
+        if not low <= load <= high:
+            raise SceneError(
+                f"The load {load:g} is outside the range {low:g} to {high:g} of this diagram: trace a wider one, as in "
+                "diagram.again(span=...)."
+            )
+        finest = self._finest()
+        solver = self.solvers[finest]
+        if not isinstance(solver, Follower):
+            guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
+            return [self.solver(guess).equilibrium(load, guess)]
+        return states_at(solver, [replace(b, points=[self._on(p, finest) for p in b.points]) for b in self], load)
+
+    def solver(self, point: Point | Special) -> Solver:
+        """Return the solver of the mesh that a point belongs to."""
+        mesh = point.point.mesh if isinstance(point, Special) else point.mesh
+        if mesh not in self._asked:
+            self._asked[mesh] = Solver.of(self.solvers[mesh])
+        return self._asked[mesh]
+
+    # --- what it can be asked ------------------------------------------------------------------------------------
+
+    def assess(self, point: Point | Special, method: str = "auto", number: int = 4) -> Verdict:
+        """Decide the stability of a point with a given method: see :meth:`rodfem.Solver.assess`."""
+        return self.solver(point).assess(point, method, number)
+
+    def modes(self, point: Point | Special, number: int = 3, method: str = "auto") -> Modes:
+        """Left-most modes of a point: see :meth:`rodfem.Solver.modes`."""
+        return self.solver(point).modes(point, number, method)
+
+    def locus(
+        self,
+        special: Special,
+        parameter: str,
+        interval: tuple[float, float],
+        load: tuple[float, float] | None = None,
+        steps: Steps | None = None,
+    ) -> Locus:
+        """Follow a special point in the plane of the load and a second parameter.
+
+        Parameters
+        ----------
+        special
+            A fold, a branch point, a flutter load or a divergence load of this diagram.
+        parameter
+            Name of the second parameter of the scene.
+        interval
+            Least and greatest value of that parameter.
+        load
+            Least and greatest load, by default those of the diagram.
+        steps
+            Control of the step, by default :data:`rodfem.codim2.locus.STEPS`.
+
+        Raises :class:`~rodfem.errors.SceneError` for a parameter, bounds or a kind of special point that make no sense,
+        and :class:`~rodfem.errors.ConvergenceError` where the special point is not found again.
+        """
+        from rodfem.codim2.locus import STEPS, locus
+
+        low, high = sorted(load or self.span)
+        return locus(self.solvers[special.point.mesh], special, parameter, ((low, high), interval), steps or STEPS)
+
+    def search(self, load: float, tries: int = 24, seed: int = 0) -> list[Point]:
+        """Equilibria at ``load`` that are on no branch, by ``tries`` deflated Newton iterations; none twice."""
+        return Solver.of(self.solvers[self._finest()]).search(load, self.at(load), tries, seed)
+
+    def again(self, discretization: Discretization | None = None, **changes: Any) -> Diagram:
+        """Trace once more with another discretisation or plan: ``again(span=(60, 4))``, ``again(accuracy=1e-8)``.
+
+        ``changes`` are fields of :class:`~rodfem.Plan`.  The mesh stays unless one is given.
+        """
+        from rodfem.diagram.trace import trace
+
+        system = self.solvers[0].system
+        mesh = discretization or system.fields.discretization
+        return trace(self.scene, mesh, replace(self.plan, **changes), comm=system.comm)
+
+    def _finest(self) -> int:
+        """Number of the mesh with most unknowns."""
+        return max(range(len(self.solvers)), key=lambda i: self.solvers[i].system.fields.unknowns)
+
+    def _on(self, point: Point, mesh: int) -> Point:
+        """Point interpolated on another mesh, to start from; itself if it is on that."""
+        if point.mesh == mesh:
+            return point
+        x = self.solvers[mesh].shape.restore(self.solvers[point.mesh].shape.sample(point.x))
+        return replace(point, x=x, tangent=None, mesh=mesh)
+
+    # --- how it is kept and shown ------------------------------------------------------------------------------------
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Contents of ``diagram.json``: see docs/files.md."""
+        systems = [solver.system for solver in self.solvers]
+        return as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy)
+
+    def save(self, folder: Path | str) -> Path:
+        """Write ``diagram.json`` and ``states.h5`` into a folder, which is made; returns it."""
+        folder, comm = Path(folder), self.solvers[0].system.comm
+        if comm.rank == 0:
+            folder.mkdir(parents=True, exist_ok=True)
+            save_json(self.data, folder / "diagram.json")
+        for i, branch in enumerate(self.branches):
+            save_states(branch, self.solvers, folder / "states.h5", first=i == 0)
+        comm.barrier()
+        return folder
+
+    def plot(self, path: Path | str | None = None) -> Figure:
+        """Draw the diagram with stability and special points; also into a file, if a ``path`` is given."""
+        if self.scene.conservative:
+            from rodfem.output.plot_diagram import figure_of
+        else:
+            from rodfem.output.plot_frequencies import figure_of
+        figure = figure_of(self.data)
+        if path is not None and self.solvers[0].system.comm.rank == 0:
+            figure.savefig(Path(path))
+        return figure
+
+    def show(self, point: Point | Special, path: Path | str | None = None, caption: str | None = None) -> Snapshot:
+        """Draw the rod at a point, with its supports and loads; also into a file, if a ``path`` is given.
+
+        A notebook shows what is returned.  Raises :class:`ImportError` where PyVista is missing.
+        """
+        from rodfem.output.snapshot import snapshot
+
+        return snapshot(self, point.point if isinstance(point, Special) else point, path, caption)
+
+    def __repr__(self) -> str:
+        """Scene, size and range."""
+        low, high = self.span
+        points = sum(len(b.points) for b in self.branches)
+        return (
+            f"<Diagram of {self.scene.name!r}: {len(self)} branches, {points} points, {len(self.special())} special "
+            f"points, {self.scene.load} from {low:g} to {high:g}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """Table of special points for notebooks."""
+        from rodfem.output.digits import index_in_words, number
+
+        rows = []
+        for branch in self.branches:
+            for s in branch.special:
+                cells = (
+                    branch.name,
+                    s.kind,
+                    number(s.point.load, s.error_estimate, s.resolved),
+                    number(s.point.ordinate, s.ordinate_error, s.resolved),
+                    index_in_words(s),
+                )
+                rows.append("".join(f"<td>{escape(cell)}</td>" for cell in cells))
+        head = ("branch", "kind", self.scene.load, self.scene.ordinate.name, "index")
+        title = "".join(f"<th>{escape(name)}</th>" for name in head)
+        body = "".join(f"<tr>{row}</tr>" for row in rows)
+        return f"<p>{escape(repr(self)[1:-1])}</p><table><thead><tr>{title}</tr></thead><tbody>{body}</tbody></table>"

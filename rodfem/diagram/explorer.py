@@ -1,0 +1,280 @@
+"""The whole diagram: the branch of the start state, and what leaves from its special points, to a set depth."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.adaptivity.gaps import Gap, arms
+from rodfem.continuation.branch import BRANCH_POINT, Branch, Point, Special
+from rodfem.continuation.normal_form import law_of, origin_of
+from rodfem.continuation.solvers import ON_BOUND
+from rodfem.continuation.special_points import COUPLED, coupling_of, directions, start_branch
+from rodfem.deflation.group_orbit import Orbits
+from rodfem.deflation.search import SAME, further, states_at
+from rodfem.diagram.tracer import Tracer, equivalent, near
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.link import link
+from rodfem.problem.ends import Ring
+from rodfem.stability.blocks import Blocks
+from rodfem.stability.bordered import Bordered
+from rodfem.stability.rank import rank_of
+
+TAIL = 8
+"""Rows before the end of a side branch among which its mirror image is recognised."""
+COLLAPSED = 1e-6
+"""A first state whose smallest stretch is below this is no rod."""
+
+
+class Explorer(Tracer):
+    """Explores the equilibria of a scene from its start state: what to trace, and in which order."""
+
+    _crossed = 0
+    """Number of gaps whose other side was looked at."""
+
+    def run(self) -> list[Branch]:
+        """Trace the start state's branch, then what leaves each branch point, breadth first."""
+        if self.meshes.accuracy != self.plan.accuracy:
+            self.observer.note(
+                f"  computed to {self.meshes.accuracy:g}: a coarser mesh would break the ring's symmetry along itself"
+            )
+        self.trace(self._primary())
+        self._branch_off(0)
+        for load in self.plan.at if self.plan.tries else ():
+            self._search(load)
+        return self.branches
+
+    def _search(self, load: float) -> None:
+        """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
+        self.observer.note("")
+        with self.follower.system.clock.purpose("search"):
+            self.use(max(self.meshes.followers, key=lambda f: f.system.fields.unknowns).mesh)
+            here = [replace(b, points=[self.here(p) for p in b.points]) for b in self.branches]
+            known = states_at(self.follower, here, load)
+            found = further(self.follower, load, known, self.plan.tries, observer=self.observer)
+        before = len(self.branches)
+        for i, point in enumerate(found):
+            if not self._on_branch(point, before):
+                self.trace_whole(point, f"found {i + 1} at {load:g}", 0)
+        self._branch_off(before)
+
+    def _on_branch(self, point: Point, first: int = 0) -> bool:
+        """Whether a point is on one of the branches traced, from number ``first`` on."""
+        self.use(point.mesh)
+        here = [replace(b, points=[self.here(p) for p in b.points]) for b in self.branches[first:]]
+        known = Orbits(self.follower.system)
+        for other in states_at(self.follower, here, point.load):
+            known.add(other.x)
+        return any(apart < SAME for apart, _ in known.nearest(point.x))
+
+    def _detached(self, gap: Gap, depth: int) -> None:
+        """Trace the branch on the other side of a gap: what no step from this side reaches."""
+        self.use(gap.point.mesh)
+        for point in arms(self.follower, gap):
+            if self.low < point.load < self.high and not self._on_branch(point):
+                number = 1 + sum(b.name.startswith("detached") for b in self.branches)
+                self.trace_whole(point, f"detached {number}", depth)
+
+    def _branch_off(self, first: int) -> None:
+        """Trace what leaves the branch points of the branches from number ``first`` on, breadth first."""
+        for branch in itertools.islice(self.branches, first, None):  # grows while it is walked
+            if branch.depth < self.plan.depth:
+                while self._crossed < len(self.gaps.known):
+                    self._crossed += 1
+                    self._detached(self.gaps.known[self._crossed - 1], branch.depth + 1)
+                for i, special in enumerate(branch.special):
+                    if special.kind == BRANCH_POINT and not special.switched:
+                        self._switch(branch, i, special)
+
+    def _primary(self) -> Branch:
+        """First branch: its first state.  Where none is found constraints that repeat each other are named."""
+        start = self.span[0]
+        try:
+            point = self._first()
+        except ConvergenceError:
+            self._check_rank(self.follower.start(start))
+            raise
+        if point.stretch < COLLAPSED:
+            raise SceneError(
+                f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
+                f"{start:g}: write the energy of stretch in v[2] - 1 (zero in the undeformed rod), or push less."
+            )
+        if isinstance(self.scene.ends, Ring):
+            number, Tw, Wr = link(self.follower.shape.sample(point.x))
+            self.observer.note(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
+        if point.negative:
+            self.observer.note(
+                f"  the first state is unstable already (index {point.negative}): stability was lost outside the range"
+            )
+        return Branch(self.scene.states, None, 0, [point])
+
+    def _first(self) -> Point:
+        start, stop = self.span
+        follower = self.follower
+        x, outcome = follower.first(start)
+        if not outcome.converged:
+            raise ConvergenceError(
+                f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: start at another "
+                "load, give the scene a start nearer to one, or see whether constraints repeat each other or what an "
+                "end holds."
+            )
+        if follower.convexity is not None and follower.convexity.lowest(x) <= 0:
+            raise SceneError(
+                f"The stored energy is not convex somewhere along the first state, at {self.scene.load} = {start:g}: "
+                "choose constants that make it so."
+            )
+        follower.system.set_phase(x)
+        point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
+        family = point.zero - follower.system.active_drifts()
+        if family > 0:
+            self._leave_family(point, family, stop > start)
+        return point
+
+    def _leave_family(self, point: Point, freedoms: int, increasing: bool) -> None:
+        """Give a first point that may move freely at its load the tangent along which the load changes.
+
+        With the null vectors ``phi`` of ``S`` as borders, ``S w = -F_lam`` is solvable where ``phi . F_lam = 0``: the
+        load does no work on the free motion, and the branch goes on with the tangent ``(w, 1)``, across the family.
+        """
+        follower, system = self.follower, self.follower.system
+        follower.inertia.count(point.x)
+        vectors = [v.copy() for v in follower.inertia.nearest(freedoms, accuracy=1e-8)[1]]
+        if max(coupling_of(follower, point.x, v) for v in vectors) > COUPLED:
+            raise SceneError(
+                f"The first state, at {self.scene.load} = {point.load:g}, may move freely at this load, and is not the "
+                f"state that a small {self.scene.load} leads on from: start the range at another load, or give the "
+                "scene a start that is in equilibrium under the load, too."
+            )
+        follower.inertia.assemble(point.x)
+        bordered = Bordered(system, follower.inertia.matrix, freedoms, follower.inertia.constraints)
+        bordered.factor([follower.inertia.metric * v for v in vectors])
+        right = follower.inertia.border.copy()
+        right.scale(-1.0)
+        tangent, _ = bordered.solve(right, np.zeros(freedoms))
+        system.set_load(tangent, 1.0)
+        tangent.scale((1.0 if increasing else -1.0) / system.norm(tangent))
+        point.tangent, point.slope = tangent, system.scalar(tangent)
+
+    def _check_rank(self, x: PETSc.Vec) -> None:
+        """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others."""
+        words = {
+            "n": "position of the ends along e{}",
+            "m": "rotation of an end, direction {}",
+            "g": "constraint {} of the scene",
+            "t": "closing of the ring's rotation, component {}",
+            "f": "closing of the ring along e{}",
+        }
+        scalars = [u for u in self.follower.system.fields.unknown_scalars if u.multiplier]
+        names = [words[u.group[0]].format(u.component + 1) for u in scalars]
+        rank_of(Blocks(self.follower.system, "full").assemble(x), names)
+
+    def _switch(self, parent: Branch, i: int, special: Special) -> None:
+        special.switched = True
+        self.use(special.point.mesh)
+        self.follower.damp(special.point.zero - self.follower.system.active_drifts() - special.multiplicity)
+        try:
+            ways = directions(self.follower, special)
+        except ConvergenceError as trouble:
+            self.observer.warn(f"No branch could be followed from {parent.name} at {special.point.load:.8g}: {trouble}")
+            return
+        before = len(self.branches)
+        for direction in ways:
+            self.use(special.point.mesh)
+            self._law(special, direction)
+            first: Point | None = None
+            for sign in (1.0, -1.0):
+                self.use(special.point.mesh)
+                way = direction.copy()
+                way.scale(sign)
+                name = self._name(parent)
+                origin = parent.name, i
+                branch = start_branch(
+                    special, way, name, origin, parent.depth + 1, self.follower, len(ways), self._bounds()
+                )
+                if branch is None:
+                    self.observer.warn(
+                        f"No branch was found along a null vector of {parent.name} at {special.point.load:.8g}."
+                    )
+                    continue
+                if not self._bounds()[0] <= branch.points[1].load <= self._bounds()[1]:
+                    self.observer.note(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
+                    continue
+                if first is not None and self._mirrored(special, first, branch.points[1]):
+                    continue  # the mirror image of the branch just traced
+                first = branch.points[1]
+                if special.meets is None and self._traced_already(branch, special):
+                    continue
+                if self._came_from(parent, special, first):
+                    continue
+                self.trace(branch)
+        self._judge_from_the_side(special, self.branches[before:])
+
+    def _bounds(self) -> tuple[float, float]:
+        """Least and greatest load, with room for round-off."""
+        margin = ON_BOUND * (self.high - self.low)
+        return self.low - margin, self.high + margin
+
+    def _law(self, special: Special, direction: PETSc.Vec) -> None:
+        """Find the local law at a branch point: of what leaves, or of this branch where it ends on another."""
+        if special.law is not None:
+            return
+        from_the_side = special.zero_of == "slope"
+        with self.follower.system.clock.purpose("location"):
+            way = special.null_vectors[0] if from_the_side else direction
+            special.law = law_of(self.follower, origin_of(self.follower, special), way)
+        if special.law is not None and isfinite(special.error_estimate):
+            with self.follower.system.clock.purpose("error bars"):
+                self.meshes.richer(special.point.mesh).law(special, way, special.law)
+        if special.law is not None and not from_the_side:
+            indices = special.negative_before, special.negative_after
+            special.law.judge(*(indices if special.point.slope > 0 else reversed(indices)))
+            self.observer.law(special)
+
+    def _judge_from_the_side(self, special: Special, trunk: Sequence[Branch]) -> None:
+        """Name a pitchfork that was reached along its side branch, from the branch that it ends on, now traced."""
+        index = {branch.points[1].load > special.point.load: branch.points[1].negative for branch in trunk}
+        if special.law is not None and special.zero_of == "slope" and len(index) == 2:
+            special.law.judge(index[False], index[True])
+            self.observer.law(special)
+
+    def _name(self, parent: Branch) -> str:
+        siblings = sum(b.parent is not None and b.parent[0] == parent.name for b in self.branches)
+        return f"{parent.name + '.' if parent.depth else 'branch '}{siblings + 1}"
+
+    def _mirrored(self, special: Special, a: Point, b: Point) -> bool:
+        """Whether first points of the two branches that leave in opposite ways are of mirror images, at one load.
+
+        The metric need not share the symmetry: points at one distance in it need not be mirror images themselves.
+        """
+        if equivalent(a, b):
+            return True
+        inner, outer = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
+        piece = Branch("", None, 0, [self.here(replace(special.point, arclength=0.0)), self.here(outer)])
+        try:
+            there = states_at(self.follower, [piece], inner.load)
+        except ConvergenceError:  # nothing of the one branch is at the other's load
+            return False
+        return any(self.alike(self.here(inner), p, 1e-7) for p in there)
+
+    def _came_from(self, parent: Branch, special: Special, point: Point) -> bool:
+        """Whether what leaves the end of a side branch is that branch again, or its mirror image."""
+        if special.zero_of != "slope":
+            return False
+        tail = replace(parent, points=[self.here(p) for p in parent.points[-TAIL:]])
+        return any(equivalent(point, other, 1e-7) for other in states_at(self.follower, [tail], point.load))
+
+    def _traced_already(self, branch: Branch, special: Special) -> bool:
+        """Whether another branch ended at this branch point coming along the same way."""
+        a, b = branch.points[1], special.point
+        for other in self.branches:
+            for end in other.special:
+                if end.meets is not None and self.alike(end.point, b, 1e-6):
+                    before = other.points[max(end.row - 2, 0) : end.row]
+                    if any(near(a, p) for p in before):
+                        return True
+        return False

@@ -1,0 +1,78 @@
+"""A mesh on which the frequencies of a rod that is swept are as accurate as asked for.
+
+Equilibria are traced on meshes that are raised on the way (:mod:`rodfem.adaptivity.mesh_sequence`).  What a sweep
+computes, a few frequencies at every load, asks for the richest mesh where its load is greatest, and costs little: one
+mesh is chosen before, on which the frequencies wanted do not change by more than the accuracy when it is refined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil
+
+import numpy as np
+from mpi4py import MPI
+
+from rodfem.adaptivity.mesh_sequence import start_mesh
+from rodfem.continuation.solvers import Equilibria
+from rodfem.diagram.sweep import at_load
+from rodfem.errors import ConvergenceError
+from rodfem.fem.fields import Discretization
+from rodfem.fem.system import System
+from rodfem.problem.scene import Scene
+from rodfem.stability.nonsymmetric import Vibration
+
+MARGIN = 10.0
+"""Frequencies are to be better than asked for by this factor: flutter loads depend on two that are near each other."""
+REFINED = 1.5
+"""Ratio of the numbers of elements of one mesh and the next."""
+MOST = 8
+"""Number of refinements."""
+
+
+def frequency_mesh(
+    scene: Scene, formulation: str, accuracy: float, span: Sequence[float], number: int, comm: MPI.Comm
+) -> tuple[Discretization, float]:
+    """Discretisation for ``number`` frequencies at loads of a span, and by how much they change on the next one.
+
+    The change is relative (to one, for values mu = omega^2 smaller than that).  Where refinement stops to help, at
+    round-off, the best one is returned: its change says that it is worse than asked for.
+    """
+    loads = np.linspace(span[0], span[1], 3)
+    mesh = replace(start_mesh(scene, formulation, accuracy, comm), vertices=None)
+    first = System(scene, mesh, comm)
+    values = _frequencies(first, loads, number)
+    best, least = mesh, np.inf
+    for _ in range(MOST):
+        finer = replace(mesh, elements=ceil(REFINED * mesh.elements))
+        richer = _frequencies(System(scene, finer, comm, symmetries=first.symmetries), loads, number)
+        change = max(_change(v[:number], w) for v, w in zip(values, richer, strict=True))
+        if change >= least:
+            break
+        best, least = mesh, change
+        if change < accuracy / MARGIN:
+            break
+        mesh, values = finer, richer
+    return best, least
+
+
+def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndarray]:
+    """Eigenvalues mu nearest the origin at each of the loads, two more than ``number``."""
+    solver = Equilibria(system)
+    vibration = Vibration(solver.system)
+    x, _ = solver.first(float(loads[0]))
+    found = []
+    for load in loads:
+        x = at_load(solver, x, float(load))
+        vibration.assemble(x)
+        values = vibration.near(number + 2, -1e-3).values
+        found.append(values[np.argsort(abs(values))][: number + 2])
+    if min(map(len, found)) < number:
+        raise ConvergenceError(f"The coarsest mesh has fewer than {number} frequencies: ask for fewer (--spectrum).")
+    return found
+
+
+def _change(values: np.ndarray, richer: np.ndarray) -> float:
+    """Largest relative distance of values from the nearest of the richer ones."""
+    return max(float(abs(richer - v).min() / max(1.0, abs(v))) for v in values)

@@ -1,0 +1,110 @@
+"""What to explore of a scene: range, loads to stop at, depth, steps, and what is wanted besides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from rodfem.adaptivity.mesh_sequence import check_accuracy
+from rodfem.continuation.solvers import Steps
+from rodfem.errors import SceneError
+from rodfem.problem.kinds import real, reals, whole
+from rodfem.problem.scene import Scene
+from rodfem.problem.user_functions import asked_for
+from rodfem.problem.validation import check_load
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars.
+
+    Without a ``span`` the range is that of the scene.  Branches are followed from branch points of branches of a depth
+    less than ``depth``; the first branch has depth 0.
+    ``spectrum`` left-most eigenvalues of every state are found besides its index; at the loads ``at`` states are judged
+    by ``method`` (where one is named), and their ``modes`` left-most modes are found; ``tries`` deflated iterations at
+    each of these loads look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
+    special point in the plane of the load and that parameter.  With an ``accuracy`` meshes are chosen and raised on the
+    way such that every row's load and ordinate, and those of every special point, are in error by less than that
+    (relative to values greater than one).
+    """
+
+    span: tuple[float, float] | None = None
+    at: tuple[float, ...] = ()
+    depth: int = 2
+    steps: Steps = field(default_factory=Steps)
+    error_bars: bool = True
+    spectrum: int = 0
+    tries: int = 0
+    locus: tuple[str, float, float] | None = None
+    method: str = ""
+    modes: int = 0
+    accuracy: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check that all is of the right kind; raises :class:`SceneError`."""
+        if self.span is not None:
+            object.__setattr__(self, "span", reals("span", self.span, (0.0, 1.0), 2))
+        object.__setattr__(self, "at", reals("at", self.at, (0.5, 1.0)))
+        for name, example in (("depth", 2), ("spectrum", 4), ("tries", 24), ("modes", 3)):
+            object.__setattr__(self, name, whole(name, getattr(self, name), example))
+        if not isinstance(self.steps, Steps):
+            raise SceneError(f"steps is {self.steps!r}: give Steps, as in steps=Steps(largest=0.02).")
+        if not isinstance(self.method, str):
+            raise SceneError(f"method is {self.method!r}: give the name of one, as in method='auto'.")
+        if self.accuracy is not None:
+            real("accuracy", self.accuracy, 1e-8)
+        if self.locus is not None:
+            parts = tuple(self.locus) if isinstance(self.locus, (tuple, list)) else ()
+            if len(parts) != 3 or not isinstance(parts[0], str):
+                raise SceneError(f"locus is {self.locus!r}: give a name and an interval, as in locus=('A', -3.0, 0.0).")
+            reals("locus[1:]", parts[1:], (-3.0, 0.0))
+
+    def over(self, scene: Scene) -> tuple[float, float]:
+        """Range of the load: that of the plan, or that of the scene."""
+        return scene.span if self.span is None else self.span
+
+    def check(self, scene: Scene) -> None:
+        """Raise :class:`SceneError` for a range that the scene does not admit, or a load outside the range."""
+        span = self.over(scene)
+        scene.check_span(span)
+        check_load(scene)
+        if self.accuracy is not None:
+            check_accuracy(self.accuracy)
+        low, high = sorted(span)
+        for load in self.at:
+            if not low <= load <= high:
+                raise SceneError(
+                    f"The load {load:g} asked for is outside the range {low:g} to {high:g}: "
+                    "widen the range or leave it out."
+                )
+        if self.locus is not None:
+            name, a, b = self.locus
+            if name == scene.load or name not in scene.parameters:
+                others = ", ".join(n for n in scene.parameters if n != scene.load)
+                choose = f"choose one of {others}" if others else "the scene has none beside its load, so add one"
+                raise SceneError(f"{name!r} is no second parameter: {choose}.")
+            if name not in asked_for(scene):
+                raise SceneError(f"Nothing in the scene depends on {name!r}: choose another parameter for the locus.")
+            if not a <= scene.parameters[name].value <= b or a == b:
+                raise SceneError(
+                    f"The interval of {name} from {a:g} to {b:g} does not hold its value "
+                    f"{scene.parameters[name].value:g}: choose one that does."
+                )
+            for value in (a, b):
+                try:
+                    scene.varying(scene.load, scene.span, **{name: value})
+                except SceneError as trouble:
+                    raise SceneError(f"The locus cannot reach {name} = {value:g}. {trouble}") from None
+        if self.depth < 0:
+            raise SceneError(f"{self.depth} is not a depth: give 0 (the first branch alone) or more to --depth.")
+        if self.tries < 0:
+            raise SceneError(f"{self.tries} is not a number of tries: give 0 or more to --search.")
+        if self.tries and not self.at:
+            raise SceneError("A search needs loads to search at: give them with --at.")
+        if self.modes < 0:
+            raise SceneError(f"{self.modes} is not a number of modes: give 0 or more to --modes.")
+        if (self.modes or self.method) and not self.at:
+            raise SceneError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at: give them with --at.")
+        if self.modes and self.method == "count":
+            raise SceneError("Counting alone finds no modes: leave out --modes, or name another --method.")
+        if self.spectrum < 0:
+            raise SceneError(f"{self.spectrum} is not a number of eigenvalues: give 0 or more to --spectrum.")

@@ -1,0 +1,158 @@
+"""Saved diagrams read again, as diagrams that can be asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch, Law, Point, Special
+from rodfem.continuation.solvers import Equilibria, Follower
+from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import Solver
+from rodfem.errors import SceneError
+from rodfem.fem.fields import Discretization
+from rodfem.file_format import DIAGRAM
+from rodfem.output.files import COLUMNS, load_json, load_state
+from rodfem.problem.scene import Scene
+
+NEEDED = ("range", "accuracy", "constants", "discretization", "meshes")
+"""Entries of a diagram, beside those that all of its readers need."""
+OF_BRANCH = ("name", "parent", "ended", "columns", "special")
+OF_SPECIAL = (
+    *("kind", "row", "negative_before", "negative_after", "located_to", "coupling", "multiplicity", "error_estimate"),
+    *("ordinate_error_estimate", "followed", "unfolding", "note", "omega2", "meets", "law"),
+)
+SAME = 1e-12
+"""Relative difference of two values of a constant that are the same."""
+
+
+def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Diagram:
+    """Read a diagram that :meth:`Diagram.save` or :func:`rodfem.run` has written; collective.
+
+    States are those of the file, on the meshes that they were computed on.  Tangents and null vectors are computed
+    anew.
+
+    Parameters
+    ----------
+    folder
+        Where ``diagram.json`` and ``states.h5`` are.
+    scene
+        The rod: a file holds numbers, not the functions that state a scene.
+    comm
+        Ranks that share the rod: as many as there are, whatever number wrote the file.
+
+    Raises :class:`~rodfem.errors.SceneError` where the files are missing, are those of another scene or of a newer
+    format, or lack something.
+    """
+    folder = Path(folder)
+    data = load_json(folder / "diagram.json")
+    _check_entries(data, folder / "diagram.json")
+    _check(data, scene, folder)
+    solvers = [_solver(scene, data["discretization"]["formulation"], mesh, comm) for mesh in data["meshes"]]
+    branches = [_branch(entry, solvers, folder / "states.h5") for entry in data["branches"]]
+    plan = Plan(tuple(data["range"]), accuracy=data["accuracy"])
+    diagram = Diagram(scene, plan, branches, solvers)
+    diagram.notes.append(f"read from {folder}")
+    return diagram
+
+
+def _check_entries(data: dict[str, Any], path: Path) -> None:
+    """Raise :class:`SceneError` where a file without a version lacks what a diagram is made of."""
+    DIAGRAM.check(data, path, NEEDED)
+    for branch in data["branches"]:
+        where = f"{path}, branch {branch.get('name')!r},"
+        DIAGRAM.check(branch, where, OF_BRANCH)
+        DIAGRAM.check(branch["columns"], where, COLUMNS)
+        for special in branch["special"]:
+            DIAGRAM.check(special, where, OF_SPECIAL)
+
+
+def _check(data: dict[str, Any], scene: Scene, folder: Path) -> None:
+    """Raise :class:`SceneError` where a scene is not the one that was saved, as far as numbers tell."""
+    name, load = data["scene"], data["parameter"]
+    if (name, load) != (scene.name, scene.load):
+        raise SceneError(
+            f"{folder} holds the scene {name!r} with the load {load}, not {scene.name!r} with {scene.load}: give the "
+            "scene that was run."
+        )
+    for constant, value in data["constants"].items():
+        known = scene.parameters.get(constant)
+        if known is None or abs(known.value - value) > SAME * max(1.0, abs(value)):
+            there = "has no such parameter" if known is None else f"has {known.value:.12g}"
+            raise SceneError(
+                f"{folder} was computed with {constant} = {value:.12g}, and the scene {there}: give the scene that was "
+                "run."
+            )
+
+
+def _solver(scene: Scene, formulation: str, mesh: dict[str, Any], comm: MPI.Comm) -> Equilibria:
+    vertices = None if mesh["vertices"] is None else tuple(mesh["vertices"])
+    made = Discretization(formulation, mesh["elements"], mesh["degree"], vertices)
+    return Solver(scene, made, comm).equilibria
+
+
+def _branch(entry: dict[str, Any], solvers: Sequence[Equilibria], states: Path) -> Branch:
+    columns, parent = entry["columns"], entry["parent"]
+    points = [_point(columns, row, entry["name"], solvers, states) for row in range(len(columns["load"]))]
+    for before, point, after in zip([*points[:1], *points[:-1]], points, [*points[1:], *points[-1:]], strict=True):
+        solver = solvers[point.mesh]
+        if isinstance(solver, Follower) and before.mesh == point.mesh == after.mesh and len(points) > 1:
+            point.tangent = _chord(solver, before.x, after.x)
+    branch = Branch(entry["name"], (parent[0], parent[1]) if parent else None, 0, points, ended=entry["ended"])
+    branch.depth = len(entry["name"].split(".")) if parent else 0
+    branch.special = [_special(s, points, solvers) for s in entry["special"]]
+    branch.singular_start = entry.get("singular_start", 0)
+    return branch
+
+
+def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[Equilibria], states: Path) -> Point:
+    values = {name: columns[name][row] for name in COLUMNS}
+    values = {name: float("nan") if value is None else value for name, value in values.items()}
+    solver = solvers[values["mesh"]]
+    more = ("spectrum", "omega2", "motion", "curve", "negative_in_space")
+    values |= {name: columns[name][row] for name in more if name in columns}
+    if "estimate" in columns and columns["estimate"][row] is not None:
+        values["estimate"] = columns["estimate"][row]
+    return Point(x=load_state(states, branch, row, solver), tangent=None, **values)
+
+
+def _chord(solver: Follower, before: PETSc.Vec, after: PETSc.Vec) -> PETSc.Vec:
+    """Unit chord from the row before to the row after, which is the tangent to second order of the step."""
+    chord = after.copy()
+    chord.axpy(-1.0, before)
+    chord.scale(1.0 / solver.system.norm(chord))
+    return chord
+
+
+def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[Equilibria]) -> Special:
+    """Special point of a row; its null vectors are those of the eigenvalues nearest zero there."""
+    point = points[entry["row"]]
+    solver = solvers[point.mesh]
+    special = Special(
+        entry["kind"], point, entry["negative_before"], entry["negative_after"], entry["located_to"],
+        coupling=entry["coupling"], error_estimate=_number(entry["error_estimate"]),
+        ordinate_error=_number(entry["ordinate_error_estimate"]), resolved=entry.get("resolved"), row=entry["row"],
+        switched=entry["followed"], unfolding=_number(entry["unfolding"]), note=entry["note"],
+        omega2=_number(entry["omega2"]),
+    )  # fmt: skip
+    if entry["meets"]:
+        special.meets = (entry["meets"][0], entry["meets"][1])
+    if entry["law"]:
+        known = {f.name for f in fields(Law)}
+        special.law = Law(**{name: _number(v) for name, v in entry["law"].items() if name in known})
+    if isinstance(solver, Follower) and special.kind in (FOLD, BRANCH_POINT) and entry["multiplicity"]:
+        solver.system.set_phase(point.x)
+        solver.inertia.count(point.x)
+        special.null_vectors = [v.copy() for v in solver.inertia.nearest(entry["multiplicity"], accuracy=1e-8)[1]]
+    return special
+
+
+def _number(value: Any) -> Any:
+    """Value of a file, in which null stands for what is not finite."""
+    return float("nan") if value is None else value

@@ -1,0 +1,185 @@
+"""A scene on a mesh: equilibria at given loads, one by one, and what can be asked of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem import compat
+from rodfem.continuation.branch import Point, Special
+from rodfem.continuation.observer import Observer
+from rodfem.continuation.solvers import Equilibria, Follower
+from rodfem.deflation.search import further
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.sweep import Sweep
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.fields import Discretization
+from rodfem.fem.system import System
+from rodfem.modes.finder import ModeFinder
+from rodfem.modes.modes import Modes
+from rodfem.output.files import load_state
+from rodfem.problem.scene import Scene
+from rodfem.stability.assessment import Verdict, judge
+from rodfem.timing import Clock
+
+
+class Solver:
+    """Computes single equilibria of a scene on one mesh, with their index; collective over the ranks of ``comm``.
+
+    Attributes
+    ----------
+    equilibria
+        What the numerics work with: a :class:`~rodfem.continuation.solvers.Follower`, or an
+        :class:`~rodfem.continuation.solvers.Equilibria` where a load has no potential.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        discretization: Discretization | None = None,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        *,
+        spectrum: int = 0,
+        clock: Clock | None = None,
+    ) -> None:
+        """Set up the discrete rod.
+
+        Parameters
+        ----------
+        scene
+            The rod.
+        discretization
+            Elements and degree, by default 8 elements of degree 6.
+        comm
+            Ranks that share the rod.
+        spectrum
+            Number of left-most eigenvalues that are recorded of each state (conservative scenes).
+        clock
+            Where times are noted.
+
+        Raises :class:`~rodfem.errors.SceneError` for a discretisation that does not fit the scene.
+        """
+        if scene.conservative:
+            compat.require_real_petsc()
+        system = System(scene, discretization or Discretization(), comm, clock)
+        self.equilibria = Follower(system, spectrum) if scene.conservative else Equilibria(system)
+
+    @classmethod
+    def of(cls, equilibria: Equilibria) -> Solver:
+        """Solver that shares what another computation has set up."""
+        solver = cls.__new__(cls)
+        solver.equilibria = equilibria
+        return solver
+
+    def __repr__(self) -> str:
+        """Scene and discretisation."""
+        fields = self.equilibria.system.fields
+        d = fields.discretization
+        return (
+            f"<Solver of {self.scene.name!r}: {d.elements} elements of degree {d.degree}, {fields.unknowns} unknowns>"
+        )
+
+    @property
+    def scene(self) -> Scene:
+        """The rod."""
+        return self.equilibria.system.scene
+
+    @cached_property
+    def _finder(self) -> ModeFinder:
+        return ModeFinder(self.equilibria)
+
+    @cached_property
+    def _sweep(self) -> Sweep:
+        return Sweep(self.equilibria, Plan(self.scene.span), Observer(), lambda: None)
+
+    def point(self, x: PETSc.Vec) -> Point:
+        """Evaluate the records of the equilibrium ``x``: ordinate, energy, index; frequencies without a potential."""
+        if not isinstance(self.equilibria, Follower):
+            return self._sweep.at(x)
+        self.equilibria.system.set_phase(x)
+        return self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True))
+
+    def equilibrium(self, load: float, guess: Point | PETSc.Vec | None = None) -> Point:
+        """Equilibrium at exactly ``load``.
+
+        Parameters
+        ----------
+        load
+            Value of the scene's load.
+        guess
+            A state nearby to start Newton's method from: on the same mesh, at another load perhaps.  Without one the
+            scene's own start is taken, as for the first state of a diagram.
+
+        Raises :class:`~rodfem.errors.SceneError` for a load that is not admissible, and
+        :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found.
+        """
+        scene, found = self.scene, self.equilibria
+        scene.parameters[scene.load].check(scene.load, load)
+        if guess is None:
+            x, outcome = found.first(load)
+        else:
+            known = guess.x if isinstance(guess, Point) else guess
+            found.system.set_phase(known)
+            x, outcome = found.at_load(known, load)
+        if not outcome.converged:
+            raise ConvergenceError(
+                f"No equilibrium was found at {scene.load} = {load:g}: go there in steps of the load, each from the "
+                "state before."
+            )
+        return self.point(x)
+
+    def assess(self, point: Point | Special | PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
+        """Decide the stability of an equilibrium on this mesh by a given method.
+
+        Parameters
+        ----------
+        point
+            The equilibrium.
+        method
+            ``count``, ``shift-invert``, ``cayley``, ``slicing``, ``reduction``, ``dense``, or ``auto``: see
+            :class:`rodfem.stability.assessment.Judge`.
+        number
+            How many eigenvalues are computed.
+
+        Raises :class:`~rodfem.errors.SceneError` for a method that does not exist or apply, and
+        :class:`~rodfem.errors.ConvergenceError` where an eigensolver fails.
+        """
+        return judge(self.equilibria, state_of(point), method, number)
+
+    def modes(self, point: Point | Special | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
+        """Left-most modes of an equilibrium on this mesh, each with its value, motion and error."""
+        if isinstance(number, bool) or not isinstance(number, int) or number < 1:
+            raise SceneError(f"{number!r} modes cannot be computed: ask for 1 or more, as in modes(point, 3).")
+        return self._finder(state_of(point), number, method)[1]
+
+    def restore(self, states: Path | str, branch: str, row: int) -> Point:
+        """Equilibrium of a saved row; it is solved anew, as the mesh may be another one.
+
+        Raises :class:`~rodfem.errors.SceneError` where the file ``states`` has no such row.
+        """
+        x = load_state(Path(states), branch, row, self.equilibria)
+        return self.equilibrium(self.equilibria.system.scalar(x), x)
+
+    def search(self, load: float, known: Sequence[Point] = (), tries: int = 24, seed: int = 0) -> list[Point]:
+        """Equilibria at ``load`` beside the ``known`` ones, by ``tries`` deflated Newton iterations.
+
+        Raises :class:`~rodfem.errors.SceneError` for a load that is not admissible, for known equilibria at another
+        one, and where a load has no potential.
+        """
+        if not isinstance(self.equilibria, Follower):
+            raise SceneError(
+                "A search by deflation needs a scene whose loads all have a potential: "
+                f"{', '.join(self.scene.without_potential())} has none."
+            )
+        return further(self.equilibria, load, known, tries, seed)
+
+
+def state_of(point: Point | Special | PETSc.Vec) -> PETSc.Vec:
+    """State vector of a point, of a special point, or itself."""
+    if isinstance(point, Special):
+        return point.point.x
+    return point.x if isinstance(point, Point) else point

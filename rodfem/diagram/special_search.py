@@ -1,0 +1,198 @@
+"""Search for the special points of one branch between its rows, as they are computed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from math import inf
+
+from rodfem.adaptivity.gaps import Gaps
+from rodfem.adaptivity.mesh_sequence import Meshes
+from rodfem.continuation.branch import BRANCH_POINT, FOLD, IMPERFECT, Point, Special
+from rodfem.continuation.index_chain import Row, chained
+from rodfem.continuation.observer import Observer
+from rodfem.continuation.special_points import COUPLED, find_special, midpoint, renew
+from rodfem.continuation.touching import Touching
+from rodfem.errors import ConvergenceError
+from rodfem.stability.round_off import resolve
+
+HALVINGS = 4
+"""How many times a piece of a branch is halved until its special points explain the indices of its ends."""
+SHORTER = 2
+"""How many times steps are made eight times shorter where the indices are not explained."""
+PATIENCE = 4
+"""Rows with an eigenvalue near zero after which it is asked whether it stays zero."""
+
+
+class Unresolved(Exception):
+    """The special points found in a step do not explain the indices at its ends."""
+
+
+class SpecialSearch:
+    """Special points between the rows of one branch, and bounds of its steps where they are hard to tell apart.
+
+    Attributes
+    ----------
+    level
+        Number of eigenvalues that are zero at both ends of the piece looked at: those stay zero along the branch.
+    """
+
+    def __init__(self, meshes: Meshes, gaps: Gaps, observer: Observer) -> None:
+        """Nothing is known about a branch before :meth:`begin`."""
+        self.meshes, self.gaps, self.observer = meshes, gaps, observer
+        self.follower = meshes.followers[0]
+        self.level = 0
+        self._open: list[Point] = []
+        self._before: Point | None = None
+        self._touching = Touching()
+        self._short = (-inf, inf, 0)
+
+    def begin(self, first: Point, short: float = 0.0, until: float = -inf) -> None:
+        """Begin a branch at its last row so far, with steps of at most ``short`` up to the arclength ``until``."""
+        self._short = (until, short or inf, 0)
+        self.level = first.zero
+
+    def resume(self, last: Point) -> None:
+        """Go on from a row, up to which everything has been found."""
+        self._open, self._before = [last], None
+        self._touching.restart(last)
+
+    def after(self, a: Point, b: Point) -> list[Special]:
+        """Special points that the row ``b`` after ``a`` tells of, in order of arclength.
+
+        An eigenvalue within the tolerance of zero has no sign yet: rows with one wait until it has.  One that stays
+        zero to working accuracy belongs to a family of equilibria at one load, and is not waited for.
+
+        Raises
+        ------
+        Gap
+            For one that an imperfection takes apart, unless it is known.
+        Unresolved
+            If shorter steps are to be tried.
+        """
+        self._on(b)
+        rows = [self._here(p) for p in self._open]
+        self.level = min(rows[0].zero, b.zero)
+        if b.zero > self.level:
+            self._open.append(b)
+            if len(self._open) <= PATIENCE or self.row(b).decided:
+                return []
+        changed = len(rows) > 1 or a.negative != b.negative or a.slope * b.slope < 0
+        if changed:
+            was = rows[0].negative, rows[0].slope > 0
+            for point in (*rows, b):
+                renew(self.follower, point, turning=len(rows) > 1 or a.slope * b.slope < 0)
+            if was != (rows[0].negative, rows[0].slope > 0) and self._before is not None:
+                rows.insert(0, self._here(self._before))  # what changes does so before that row
+        self._before, self._open = rows[-1], [b]
+        between = [] if changed else self._touching.between(self.follower, a, b)
+        self._touching.add(b)
+        return self._examined(self._among([*rows, *between, b]))
+
+    def rest(self) -> list[Special]:
+        """Special points among the last rows of a branch, where they have an eigenvalue near zero.
+
+        The branch has ended: nothing is tried with shorter steps.
+        """
+        if len(self._open) < 2:
+            return []
+        self._on(self._open[-1])
+        return self._examined(self._among([self._here(p) for p in self._open], ended=True), ended=True)
+
+    def beyond(self, a: Point, b: Point) -> list[Special]:
+        """Special points between a row and a point past the end of its branch, as they are found on one piece."""
+        self._on(b)
+        self.level = min(a.zero, b.zero)
+        return find_special(self.follower, a, b, self.row(a).crossing(self.row(b)), self._persistent())
+
+    def reach(self, point: Point) -> float:
+        """Largest step from a point: near gaps, and where the indices are not explained, short ones."""
+        until, largest, _ = self._short
+        near = self.gaps.reach(self.meshes.followers[point.mesh], point)
+        return min(near, largest) if point.arclength < until else near
+
+    def row(self, point: Point) -> Row:
+        """Index of a point, small eigenvalues by their Rayleigh quotients."""
+        if point.zero <= self.level:
+            return Row(point, point.negative, point.negative)
+        self.follower.system.set_phase(point.x)
+        return Row(point, *resolve(self.follower.inertia, point.x))
+
+    def _on(self, point: Point) -> None:
+        self.follower = self.meshes.followers[point.mesh]
+
+    def _here(self, point: Point) -> Point:
+        return self.meshes.here(point, self.follower)
+
+    def _persistent(self) -> int:
+        """Number of eigenvalues that stay zero without a symmetry."""
+        return max(self.level - self.follower.system.active_drifts(), 0)
+
+    def _among(self, points: Sequence[Point], ended: bool = False) -> list[Special]:
+        """Special points among rows, all but the first and the last of which have an eigenvalue near zero.
+
+        Raises :class:`Unresolved` where they do not explain the indices, and shorter steps have not been tried, unless
+        the branch has ``ended``.
+        """
+        rows, found = [self.row(p) for p in points], []
+        why: list[str] = []
+        sure = [rows[0], *(row for row in rows[1:-1] if row.decided), rows[-1]]
+        for p, q in pairwise(sure):
+            specials = self._between(p, q, why)
+            found += specials
+            if not ended and not chained(p.low, p.high, specials, q.low, q.high):
+                self._shorten(p.point, q.point)
+        for trouble in why:
+            self.observer.warn(trouble)
+        return found
+
+    def _shorten(self, a: Point, b: Point) -> None:
+        """Shorten steps from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are short already."""
+        until, _, tries = self._short
+        tries = tries + 1 if a.arclength < until else 1
+        if tries <= SHORTER:
+            length = b.arclength - a.arclength
+            self._short = b.arclength + length, length / 8, tries
+            raise Unresolved
+
+    def _examined(self, specials: list[Special], ended: bool = False) -> list[Special]:
+        """Branch points with the size of their unfolding parameters; raises :class:`Gap` where they are not one.
+
+        One on a branch that has ``ended`` is marked as imperfect instead.
+
+        Steps that jump a gap may meet a change of slope there: a fold whose null vector is nearly orthogonal to the
+        load derivative is asked, too, and is one if the equations of a branch point have no solution.
+        """
+        for special in specials:
+            weak = special.kind == FOLD and special.coupling <= COUPLED
+            if weak or special.kind == BRANCH_POINT or special.negative_before == special.negative_after:
+                gap = self.gaps.examine(self.follower, special)
+                if gap is not None and not ended and self.gaps.open(gap, self.follower):
+                    raise gap
+                if weak and gap is None and special.unfolding >= 0:  # nan: no such point near by
+                    special.kind = BRANCH_POINT
+                if (ended or not weak) and gap is not None:
+                    special.kind, special.note = IMPERFECT, str(gap)
+        return specials
+
+    def _between(self, p: Row, q: Row, troubles: list[str], halvings: int = HALVINGS) -> list[Special]:
+        """Folds and branch points between two rows, on halves of the piece where a whole one is not resolved.
+
+        It is where they explain the indices of both rows.  ``troubles`` gets sentences on pieces that are not.
+        """
+        found, why = [], ""
+        try:
+            found = find_special(self.follower, p.point, q.point, p.crossing(q), self._persistent())
+        except ConvergenceError as trouble:
+            why = str(trouble)
+        if not why and chained(p.low, p.high, found, q.low, q.high):
+            return found
+        middle = midpoint(self.follower, p.point, q.point) if halvings else None
+        if middle is None:
+            if why:
+                loads = f"{p.point.load:.8g} and {q.point.load:.8g}"
+                troubles.append(f"A special point between loads {loads} is missing: {why}")
+            return found
+        row = self.row(middle)
+        first = self._between(p, row, troubles, halvings - 1)
+        return first + self._between(row, q, troubles, halvings - 1)

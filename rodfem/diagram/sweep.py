@@ -1,0 +1,419 @@
+"""Frequencies against the load for a rod under loads without a potential, and the loads at which they become unstable.
+
+At each load the equilibrium is solved for, and the left-most eigenvalues ``mu = omega^2`` of its pencil are
+found.  Where two real ones collide and become a complex pair, the square of half their difference ``D = ((mu1 -
+mu2)/2)^2`` passes through zero.  Unlike the eigenvalues, which have a square root there, ``D`` is a smooth
+function of the load: the discriminant of the pencil projected on the two of them.  Its zero is found by Chebyshev
+interpolation, at spectral accuracy and without ever solving at the double eigenvalue.  Where a single real one
+passes through zero the rod diverges: the eigenvalue itself is smooth there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from petsc4py import PETSc
+from scipy.optimize import brentq, newton
+
+from rodfem.adaptivity.error_estimate import bound, halved
+from rodfem.continuation.branch import DIVERGENCE, END, FLUTTER, USER, Branch, Point, Special
+from rodfem.continuation.eigenvalue_curves import Curves
+from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
+from rodfem.continuation.locate import real_root, zero_uncertainty
+from rodfem.continuation.normal_form import ROUND_OFF
+from rodfem.continuation.observer import Observer
+from rodfem.continuation.solvers import Equilibria
+from rodfem.diagram.plan import Plan
+from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.transfer import Transfer, richer_system
+from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
+from rodfem.stability.nonsymmetric import EPS, MULTIPLE, NEAR_ZERO, REAL, Frequencies, Vibration
+
+LOADS = 101
+"""Number of loads at which a range is sampled."""
+FREQUENCIES = 6
+"""Number of frequencies recorded at each load where nobody asks for another."""
+SEEN = 0.5
+"""A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
+SAME = 1e-9
+"""Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
+DRIVEN = 1e-7
+"""Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
+MEAN = 10.0
+"""Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
+SHIFT = -1e-3
+"""Eigenvalues are sought next to this one: beside zero, where the tangent matrix is singular."""
+MANY = 100.0
+"""Round-off of the inverse eigenvalues, in units of the largest and of eps.
+
+Measured up to 50 for Greenhill's rod, but 1e6 and more for some eigenvalues: those are not covered.
+"""
+AROUND = 1e-4
+"""Half width, relative to a divergence load, over which its eigenvalues are sampled."""
+TOGETHER = 1e-6
+"""Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
+NONE = Frequencies(np.zeros(0, dtype=complex), np.zeros(0))
+
+
+@dataclass
+class _Event:
+    """A special point between two loads, before it is evaluated: by how much ``change`` of the unstable eigenvalues."""
+
+    kind: str
+    load: float
+    change: int
+    uncertainty: float
+    omega2: float
+    cluster: Cluster | None = None
+    note: str = ""
+
+
+class Sweep:
+    """Sweeps the load of a scene over a range from its start state; used like the explorer of conservative scenes."""
+
+    def __init__(self, solver: Equilibria, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
+        """Allocate the pencil; the plan must have passed its check."""
+        self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
+        self.span = plan.over(solver.system.scene)
+        self.vibration = Vibration(solver.system)
+        self.number = plan.spectrum or FREQUENCIES
+        self.curves, self.last = Curves(self.vibration), NONE
+        self.branches: list[Branch] = []
+        self._load = solver.system.scene.load
+
+    @property
+    def solvers(self) -> Sequence[Equilibria]:
+        """The one solver, as the points' mesh number 0 names it."""
+        return [self.solver]
+
+    def run(self) -> list[Branch]:
+        """Sweep, locate flutter, estimate errors."""
+        scene = self.solver.system.scene
+        branch = Branch(scene.states, None, 0)
+        self.branches.append(branch)
+        self.observer.branch(branch)
+        a, b = self.span
+        loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
+        x, _ = self.solver.first(a)
+        grid: list[Point] = []
+        for motion in self.solver.system.free_motions():
+            self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
+        for load in loads if a < b else loads[::-1]:
+            x = self._state(x, float(load))
+            before = self.last
+            point = self._point(x)
+            for notice in self.solver.system.verification.read():
+                self.observer.warn(notice)
+            if grid:
+                self._between(branch, grid[-1], point, before, self.last)
+            branch.points.append(point)
+            grid.append(point)
+            if load in self.plan.at:
+                self._special(branch, Special(USER, point, point.negative, point.negative, 1e-12 * max(1.0, abs(load))))
+            self.observer.progress(branch, point)
+        branch.ended = "end of range"
+        last = branch.points[-1]
+        branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
+        branch.renumber()
+        if self.plan.error_bars:
+            self._error_bars(branch)
+        self.observer.finished(branch)
+        rank, size = self.vibration.asymmetry()
+        self.observer.note(
+            f"  the load makes the tangent matrix non-symmetric by a matrix of rank {rank} "
+            f"(largest entry {size:.1e} of |S|):\n"
+            f"  factors of the symmetric part and {rank} more solves would do for it (Sherman-Morrison-Woodbury)"
+        )
+        self.finished()
+        return self.branches
+
+    def at(self, x: PETSc.Vec) -> Point:
+        """Evaluate the records of an equilibrium that is not on the way of the sweep."""
+        self.solver.system.set_phase(x)
+        return self._point(x, on_the_way=False)
+
+    def _state(self, guess: PETSc.Vec, load: float) -> PETSc.Vec:
+        return at_load(self.solver, guess, load)
+
+    def _point(self, x: PETSc.Vec, *, on_the_way: bool = True) -> Point:
+        """Evaluate the records of the equilibrium ``x``; a special point is not ``on_the_way`` of the curves."""
+        solver, system = self.solver, self.solver.system
+        found = self._leftmost(x)
+        curves = self.curves.numbers(found, keep=on_the_way)
+        if on_the_way:
+            self.last = found
+        values = found.values
+        load = system.scalar(x)
+        return Point(
+            x=x,
+            tangent=None,
+            arclength=abs(load - self.span[0]),
+            load=load,
+            ordinate=solver.shape.ordinate(x),
+            energy=solver.energy(x),
+            stretch=solver.shape.stretch(x),
+            negative=found.unstable(found.noise),
+            zero=int((abs(values) < REAL).sum()) + system.active_drifts(),
+            slope=float("nan"),
+            drift=0.0,
+            error=0.0,
+            omega2=[[float(v.real), float(v.imag)] for v in values[: self.number]],
+            motion=list(found.kinds[: self.number]),
+            curve=curves[: self.number],
+        )
+
+    def _leftmost(self, x: PETSc.Vec) -> Frequencies:
+        """Left-most eigenvalues: those near the origin, and what became of the complex ones before.
+
+        A complex shift looks for a pair that may be farther from the origin than all that the real shift found.
+        """
+        self.vibration.assemble(x)
+        near = self.vibration.near(max(self.number, FREQUENCIES) + 6, SHIFT)
+        reach = SEEN * abs(near.values).max()
+        found = list(zip(_without_round_off(near.values), near.errors, near.kinds, near.vectors.T, strict=True))
+        for pair in (v for v in self.last.values if v.imag > 0 and abs(v) > reach):
+            beside = self.vibration.near(2, pair * (1 + 1e-4))
+            for value, error, kind, vector in zip(
+                beside.values, beside.errors, beside.kinds, beside.vectors.T, strict=True
+            ):
+                both = [(value, vector), (value.conjugate(), vector.conj())]
+                for v, x_v in both if abs(value.imag) > REAL * abs(value) else both[:1]:
+                    if all(abs(v - other) > 1e-7 * max(1.0, abs(v)) for other, *_ in found):
+                        found.append((v, error, kind, x_v))
+        real = [(complex(v.real) if abs(v.imag) < REAL * abs(v) else complex(v), *rest) for v, *rest in found]
+        order = sorted(real, key=lambda f: (round(f[0].real, 6), f[0].imag))
+        values, errors, kinds, vectors = zip(*order, strict=True)
+        return Frequencies(np.array(values), np.array(errors), kinds, np.stack(vectors, axis=1))
+
+    def _between(self, branch: Branch, a: Point, b: Point, before: Frequencies, after: Frequencies) -> None:
+        """Locate what happens between two loads: eigenvalues that collide, and real ones that pass through zero."""
+        with self.solver.system.clock.purpose("location"):
+            events = self._collisions(a, b, before, after)
+            real = [f.diverged() for f in (before, after)]
+            for event in events:
+                if event.omega2 < 0:  # both are unstable before and after, but fewer are real
+                    real[0] -= event.change
+                    event.change = 0
+            events += self._diverging(a, b, *real)
+        events.sort(key=lambda e: abs(e.load - a.load))
+        negative = a.negative
+        for i, event in enumerate(events):
+            point = a if event.load == a.load else b if event.load == b.load else None
+            point = point or self._point(self._state(a.x, event.load), on_the_way=False)
+            after_it = negative + event.change
+            if i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
+                after_it = b.negative  # of all eigenvalues that are recorded
+            if event.cluster is not None:
+                self._name(point, event.cluster)
+            special = Special(event.kind, point, negative, after_it, event.uncertainty, omega2=event.omega2)
+            special.cluster, special.note = event.cluster, event.note
+            if point is not a and point is not b:
+                branch.points.append(point)
+            self._special(branch, special)
+            negative = after_it
+
+    def _name(self, point: Point, cluster: Cluster) -> None:
+        """Name the motions of the eigenvalues that collide at a point by all that they do: their vectors are one."""
+        name = self.vibration.motion(cluster.basis)
+        distance = [abs(complex(*value) - cluster.mean) for value in point.omega2]
+        for i in np.argsort(distance, kind="stable")[: cluster.size]:
+            point.motion[i] = name
+
+    def _collisions(self, a: Point, b: Point, before: Frequencies, after: Frequencies) -> list[_Event]:
+        """Collisions between two loads, those at one and the same load together."""
+        events: list[_Event] = []
+        for here, there, found, others, sign in ((b, a, after, before, 1), (a, b, before, after, -1)):
+            for chosen in unmatched(found, others.values):
+                try:
+                    event = self._collision(here, there, found, chosen)
+                except ConvergenceError as trouble:
+                    value = found.values[chosen[0]]
+                    self.observer.warn(
+                        f"The eigenvalue {value:.6g} at {self._load} = {here.load:.6g} was not "
+                        f"followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
+                    )
+                    continue
+                if event is None:
+                    continue
+                event.change *= sign
+                same = [e for e in events if abs(e.load - event.load) < SAME * max(1.0, abs(e.load))]
+                if same:
+                    same[0].change += event.change
+                    if abs(event.omega2) < abs(same[0].omega2):
+                        same[0].omega2, same[0].cluster = event.omega2, event.cluster
+                else:
+                    events.append(event)
+        return events
+
+    def _collision(self, here: Point, there: Point, found: Frequencies, chosen: list[int]) -> _Event | None:
+        """Collision, on the way ``there``, of eigenvalues complex ``here``; None where they are complex there too."""
+        x, vibration = here.x, self.vibration
+        vibration.assemble(x)
+        cluster = cluster_of(vibration, found, chosen)
+        vibration.assemble(there.x)
+        other = measure(vibration, cluster)
+        scale = abs(other.values).max()
+        if abs(other.discriminant) < (MULTIPLE * scale) ** 2:
+            side = ">" if here.load > there.load else "<"
+            note = (
+                f"the frequencies are double at {self._load} = {there.load:.6g} and become complex at once: "
+                f"flutter at every {self._load} {side} {there.load:.6g} next to it"
+            )
+            floor = 1e-12 * max(1.0, abs(there.load))
+            return _Event(FLUTTER, there.load, cluster.size, floor, other.cluster.mean, other.cluster, note)
+        if other.discriminant < 0:
+            return None
+        located = locate_flutter(
+            self._measured(self.solver, vibration, here.x),
+            cluster,
+            (there.load + here.load) / 2,
+            abs(here.load - there.load),
+        )
+        return _Event(FLUTTER, located.load, cluster.size, located.uncertainty, located.cluster.mean, located.cluster)
+
+    @staticmethod
+    def _measured(solver: Equilibria, vibration: Vibration, guess: PETSc.Vec) -> AtLoad:
+        """How a cluster is measured at a load: at the equilibrium near ``guess``."""
+
+        def measured(load: float, cluster: Cluster) -> Measured:
+            vibration.assemble(at_load(solver, guess, load))
+            return measure(vibration, cluster)
+
+        return measured
+
+    def _diverging(self, a: Point, b: Point, first: int, last: int) -> list[_Event]:
+        """Locate the loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``."""
+        loads = sorted((a.load, b.load))
+        found: list[float] = []
+        for number in range(min(first, last), max(first, last)):
+
+            def mu(load: float, number: int = number) -> float:
+                return self._real(a.x, load)[number]
+
+            try:
+                found.append(float(brentq(mu, *loads, xtol=1e-12 * max(map(abs, loads)))))
+            except (ConvergenceError, IndexError, ValueError):
+                self.observer.warn(
+                    f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
+                )
+                return []
+        together: list[list[float]] = []
+        for load in sorted(found):
+            if together and abs(load - together[-1][0]) < TOGETHER * max(1.0, abs(load)):
+                together[-1].append(load)
+            else:
+                together.append([load])
+        return [self._divergence(a.x, group, 1 if last > first else -1) for group in together]
+
+    def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> _Event:
+        """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
+        vibration, number = self.vibration, len(loads)
+        vibration.assemble(self._state(guess, loads[0]))
+        found = vibration.near(number + 2, -1e-3)
+        cluster = cluster_of(vibration, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
+        load, uncertainty = _zero_between(self._measured(self.solver, vibration, guess), cluster, loads[0])
+        uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), 1e-11 * max(1.0, abs(load)))
+        return _Event(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
+
+    def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
+        """Real eigenvalues at a load near the origin, in ascending order."""
+        return sorted(v.real for v in self._leftmost(self._state(guess, load)).values if v.imag == 0)
+
+    def _special(self, branch: Branch, special: Special) -> None:
+        branch.special.append(special)
+        self.observer.special(branch, special)
+
+    def _error_bars(self, branch: Branch) -> None:
+        with self.solver.system.clock.purpose("error bars"):
+            system = self.solver.system
+            richer = Equilibria(richer_system(system))
+            vibration, transfer = Vibration(richer.system), Transfer(system, richer.system)
+            rho = halved(system.fields.discretization.degree)
+            for s in branch.special:
+                point = s.point
+                guess = transfer(point.x, state=True)
+                x = at_load(richer, guess, point.load)
+                left = ROUND_OFF * max(1.0, abs(point.ordinate))
+                s.ordinate_error = s.error_estimate = bound(point.ordinate, richer.shape.ordinate(x), left, rho)
+                if s.kind == FLUTTER:
+                    load, left, mu = self._richer_flutter(richer, vibration, transfer, guess, s)
+                    s.error_estimate = max(bound(point.load, load, left, rho), s.located_to)
+                    relative = left / max(abs(load), abs(self.span[1] - self.span[0]) * ROUND_OFF)
+                    s.omega2_error = bound(s.omega2, mu, MEAN * abs(mu) * max(relative, ROUND_OFF), rho)
+                elif s.kind == DIVERGENCE:
+                    measured, cluster = self._measured(richer, vibration, x), self._transferred(transfer, s)
+                    load = _zero(measured, cluster, point.load)
+                    s.error_estimate = max(bound(point.load, load, s.located_to, rho), s.located_to)
+                asked = self.plan.accuracy
+                if asked is not None and s.error_estimate > asked * max(1.0, abs(s.point.load)):
+                    s.note = s.note or f"accuracy {asked:g} not reached"
+
+    def _transferred(self, transfer: Transfer, s: Special) -> Cluster:
+        """The cluster of a special point on another discretisation."""
+        assert s.cluster is not None
+        columns = [transfer(v, state=False).array_r.real for v in as_vectors(self.solver.system, s.cluster.basis)]
+        return Cluster(np.stack(columns, axis=1), s.cluster.mean)
+
+    def _richer_flutter(
+        self, richer: Equilibria, vibration: Vibration, transfer: Transfer, guess: PETSc.Vec, s: Special
+    ) -> tuple[float, float, float]:
+        """Flutter load on the richer discretisation, its uncertainty there, and the double eigenvalue."""
+        measured, cluster = self._measured(richer, vibration, guess), self._transferred(transfer, s)
+        if s.note:  # double there, whatever the mesh
+            return s.point.load, 0.0, measured(s.point.load, cluster).cluster.mean
+        width = max(0.05 * abs(s.point.load), 0.01 * abs(self.span[1] - self.span[0]))
+        located = locate_flutter(measured, cluster, s.point.load, width)
+        return located.load, located.uncertainty, located.cluster.mean
+
+
+def at_load(solver: Equilibria, guess: PETSc.Vec, load: float) -> PETSc.Vec:
+    """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none."""
+    system, name = solver.system, solver.system.scene.load
+    system.set_phase(guess)
+    x, outcome = solver.at_load(guess, load)
+    if not outcome.converged:
+        raise ConvergenceError(f"No equilibrium at {name} = {load:g}: use a smaller range.")
+    if system.drift(x) > DRIVEN * system.stiffness_scale:
+        raise SceneError(
+            f"There is no equilibrium at {name} = {load:g}: nothing holds the rod against the "
+            f"{' or the '.join(system.free_motions())}, and the loads drive it; hold that motion at one end, or "
+            "balance the loads."
+        )
+    return x
+
+
+def _without_round_off(values: np.ndarray) -> np.ndarray:
+    """Eigenvalues next to :data:`SHIFT`, imaginary parts that are round-off of real ones dropped: (k,).
+
+    The solver has ``1 / (mu - shift)`` to round-off of the largest of them: ``mu`` to ``eps |mu - shift|^2 / min |mu -
+    shift|``, and one near zero to that of the matrix.
+    """
+    apart, least = abs(values - SHIFT), NEAR_ZERO * abs(values).max()
+    doubt = np.maximum(REAL * np.maximum(abs(values), least), MANY * EPS * apart**2 / apart.min())
+    return np.where(abs(values.imag) < doubt, values.real, values)
+
+
+def _zero_between(measured: AtLoad, cluster: Cluster, load: float) -> tuple[float, float]:
+    """Load near ``load`` at which the mean of a cluster vanishes, and what round-off of the mean leaves open.
+
+    The mean is sampled over :data:`AROUND`, and interpolated: its scatter shows in the last coefficients.
+    """
+    half = AROUND * max(1.0, abs(load))
+    nodes = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
+    series = chebyshev.chebfit(nodes, [measured(load + half * t, cluster).cluster.mean for t in nodes.tolist()], 5)
+    root = real_root(series, 0.0)
+    if root is None:
+        raise ConvergenceError(f"The divergence load near {load:.6g} could not be located: use a smaller range.")
+    return load + half * root, half * zero_uncertainty(series, root)
+
+
+def _zero(measured: AtLoad, cluster: Cluster, load: float) -> float:
+    """Load near ``load`` at which the mean of the eigenvalues of a cluster vanishes."""
+
+    def mean(load: float) -> float:
+        return measured(load, cluster).cluster.mean
+
+    return float(newton(mean, load, x1=load + 1e-4 * max(1.0, abs(load)), tol=1e-12 * max(1.0, abs(load))))

@@ -1,0 +1,93 @@
+"""Tracing a scene: from its statement to its diagram, without a file or a line of output."""
+
+from __future__ import annotations
+
+from mpi4py import MPI
+
+from rodfem import compat
+from rodfem.adaptivity.mesh_sequence import start_mesh
+from rodfem.continuation.observer import Observer, Recorder
+from rodfem.continuation.solvers import Follower
+from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.explorer import Explorer
+from rodfem.diagram.frequency_mesh import frequency_mesh
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import Solver
+from rodfem.diagram.sweep import FREQUENCIES, Sweep
+from rodfem.fem.fields import Discretization
+from rodfem.problem.scene import Scene
+from rodfem.timing import Clock
+
+
+def trace(
+    scene: Scene,
+    discretization: Discretization | None = None,
+    plan: Plan | None = None,
+    observer: Observer | None = None,
+    *,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> Diagram:
+    """Trace the equilibria of a scene and decide the stability of each; collective over the ranks of ``comm``.
+
+    Conservative scenes are followed by continuation, from branch to branch; of loads without a potential the range is
+    swept, and frequencies are computed.
+
+    Parameters
+    ----------
+    scene
+        The rod.
+    discretization
+        Elements and degree, by default 8 elements of degree 6; where the plan has an accuracy few elements to start
+        with.
+    plan
+        What is explored, by default the scene's range to a depth of 2.
+    observer
+        What hears of the progress; by default nothing does.
+    comm
+        Ranks that share the rod.
+
+    Returns
+    -------
+    diagram
+        Branches, special points and solvers; its ``warnings`` say what could not be decided.
+
+    Raises
+    ------
+    SceneError
+        For bad input, before any computation.
+    ConvergenceError
+        Where not even a first equilibrium is found.
+    """
+    plan = plan or Plan()
+    if scene.conservative:
+        compat.require_real_petsc()
+    plan.check(scene)
+    recorder, clock = Recorder(observer or Observer()), Clock()
+    with compat.announce_compilation(recorder.compiling):
+        with clock("setup"):
+            mesh = _mesh(scene, discretization or Discretization(), plan, recorder, comm)
+            found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
+        recorder.system(found.system, plan.accuracy)
+        tracer: Explorer | Sweep
+        if isinstance(found, Follower):
+            tracer = Explorer(found, plan, recorder, lambda: recorder.complete(diagram))
+        else:
+            tracer = Sweep(found, plan, recorder, lambda: recorder.complete(diagram))
+        diagram = Diagram(scene, plan, tracer.branches, tracer.solvers)
+        diagram.warnings, diagram.notes = recorder.warnings, recorder.notes
+        tracer.run()
+    return diagram
+
+
+def _mesh(
+    scene: Scene, discretization: Discretization, plan: Plan, observer: Observer, comm: MPI.Comm
+) -> Discretization:
+    """Discretisation as given, or for the accuracy of the plan: to start with, or of a whole sweep."""
+    if plan.accuracy is None or discretization.vertices is not None:
+        return discretization
+    if scene.conservative:
+        return start_mesh(scene, discretization.formulation, plan.accuracy, comm)
+    number = plan.spectrum or FREQUENCIES
+    mesh, change = frequency_mesh(scene, discretization.formulation, plan.accuracy, plan.over(scene), number, comm)
+    observer.frequency_mesh(mesh, number, change, plan.accuracy)
+    return mesh

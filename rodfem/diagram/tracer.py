@@ -1,0 +1,485 @@
+"""Tracing one branch: its points, its special points and loads asked for, where and why it ends, error bars."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from math import isnan
+
+from petsc4py import PETSc
+from scipy.optimize import brentq
+
+from rodfem.adaptivity.accuracy_control import Watch
+from rodfem.adaptivity.gaps import Gap, Gaps
+from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
+from rodfem.adaptivity.zero_stretch import zero_stretch
+from rodfem.continuation.branch import BRANCH_POINT, END, NOT_TRACED, USER, Branch, Point, Special
+from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
+from rodfem.continuation.locate import solve_at
+from rodfem.continuation.observer import Observer
+from rodfem.continuation.solvers import VERTICAL, Follower, distance, follow, hermite
+from rodfem.continuation.special_points import FIRST
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.special_search import SpecialSearch, Unresolved
+from rodfem.errors import ConvergenceError
+from rodfem.stability.round_off import resolve
+
+BEYOND = 0.02
+"""How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
+
+NEAR_START = 8
+"""Steps of a branch that begins near another special point are as short as its first for so many times their length."""
+
+
+class Tracer:
+    """Traces branches one by one, each knowing those before it.
+
+    ``branches`` grows as the run goes; ``finished`` is called after each branch that is complete, so that nothing
+    is lost.
+    """
+
+    def __init__(self, follower: Follower, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
+        """Start with no branch; the plan must have passed its :meth:`Plan.check`."""
+        self.follower, self.plan, self.observer, self.finished = follower, plan, observer, finished
+        self.scene = follower.system.scene
+        self.span = plan.over(self.scene)
+        self.low, self.high = sorted(self.span)
+        self.branches: list[Branch] = []
+        self.meshes = Meshes(follower, plan.accuracy)
+        self.gaps = Gaps(self.meshes)
+        self.warned = False
+        self.specials = SpecialSearch(self.meshes, self.gaps, observer)
+
+    @property
+    def solvers(self) -> Sequence[Follower]:
+        """Followers by the number of their mesh."""
+        return self.meshes.followers
+
+    def use(self, mesh: int) -> None:
+        """Go on with the follower of that mesh."""
+        self.follower = self.meshes.followers[mesh]
+
+    def here(self, point: Point) -> Point:
+        """Point on the mesh in use."""
+        return self.meshes.here(point, self.follower)
+
+    def trace(self, branch: Branch) -> None:
+        """Follow a branch to its end, insert its special points, estimate errors, hand it on as finished."""
+        self.branches.append(branch)
+        if branch.ended == NOT_TRACED:
+            self.observer.branch(branch)
+        self.use(branch.points[-1].mesh)
+        self.watch = Watch(self.meshes, (self.low, self.high))
+        self.follower.system.set_phase(branch.points[-1].x)
+        self.follower.damp(self._extra(branch.points[-1]) if branch.parent else 0)
+        try:
+            self._follow(branch)
+        except ConvergenceError as trouble:
+            branch.ended = f"no convergence: {trouble}"
+            self.observer.warn(str(trouble))
+        self._finish(branch)
+
+    def trace_whole(self, point: Point, name: str, depth: int) -> None:
+        """Follow a branch through a point in both directions, as one."""
+        if point.tangent is None:
+            raise ValueError("A point without a tangent is no start of a branch.")
+        back = Branch(name, None, depth, [reversed_point(point, 0.0)])
+        self.use(point.mesh)
+        self.observer.branch(back)
+        self.watch = Watch(self.meshes, (self.low, self.high))
+        self.follower.damp(0)
+        try:
+            self._follow(back)
+        except ConvergenceError as trouble:
+            back.ended = f"no convergence: {trouble}"
+            self.observer.warn(str(trouble))
+        branch = reversed_branch(back)
+        branch.ended = back.ended
+        if back.ended == "closed loop":
+            self.branches.append(back)
+            self._finish(back)
+            return
+        first = branch.points[0]
+        branch.special.append(Special(END, first, first.negative, first.negative, 1e-12 * max(1.0, abs(first.load))))
+        branch.special[-1].note = f"begins here: {back.ended}"
+        branch.renumber()
+        self.trace(branch)
+
+    def _follow(self, branch: Branch) -> None:
+        """Follow a branch to its end; where its mesh is too coarse, from there on with another."""
+        special = {id(s.point) for s in branch.special}
+        history, begun = [p for p in branch.points if id(p) not in special], False
+        first = history[-1].arclength
+        if branch.parent and 0 < first < FIRST / 2:  # it begins near something: see start_branch
+            self.specials.begin(history[-1], short=first, until=NEAR_START * first)
+        else:
+            self.specials.begin(history[-1])
+        while True:
+            try:
+                self.watch.row(history[-1], self.follower)
+                if not begun:
+                    self._first_users(branch)
+                    begun = True
+                self._advance(branch, history)
+                return
+            except TooCoarse as trouble:
+                history = self._remesh(branch, history, trouble)
+
+    def _remesh(self, branch: Branch, history: list[Point], trouble: TooCoarse) -> list[Point]:
+        """Points to go on from, carried to a mesh that resolves what was too coarse; what lies beyond is dropped.
+
+        Rows before the trouble stay what they are on the mesh that was made for them.
+        """
+        follower = self.watch.another(trouble, self.observer)
+        if follower is not None:
+            follower.damp(self.follower.system.damping > 0)
+            with self.follower.system.clock.purpose("location"):
+                pairs = self.meshes.carry(history, follower, branch.parent is not None)
+            moved = {id(old): new for old, new in pairs if old is trouble.point}
+            branch.points = [moved.get(id(p), p) for p in branch.points]
+            history = [new for _, new in pairs]
+            self.follower = follower
+            self.observer.mesh(follower.system, trouble.point.load, str(trouble))
+        last = history[-1].arclength
+        branch.points = [p for p in branch.points if p.arclength <= last]
+        branch.special = [s for s in branch.special if s.point.arclength <= last]
+        return history
+
+    def _advance(self, branch: Branch, history: list[Point]) -> None:
+        """Append points until the branch ends, which :attr:`Branch.ended` then says."""
+        self.specials.resume(history[-1])
+        for item in follow(self.follower, history, self.plan.steps, (self.low, self.high), self.specials.reach):
+            if isinstance(item, str):
+                branch.ended = item
+                with self.follower.system.clock.purpose("location"):
+                    for special in self.specials.rest():
+                        branch.insert(special)
+                        self.observer.special(branch, special)
+                return
+            previous = history[-1]
+            self._check_symmetry(item)
+            self.watch.row(item, self.follower)
+            self._check_zeros(history, item)
+            if item.stretch <= 0:
+                self._end_at_zero_stretch(branch, previous, item)
+                return
+            if self.follower.convexity is not None and self.follower.convexity.lowest(item.x) <= 0:
+                branch.ended = f"the stored energy is not convex any more at {self.scene.load} = {item.load:.6g}"
+                return
+            try:
+                reason = self._between(branch, previous, item)
+            except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
+                self._advance(branch, history)
+                return
+            if reason:
+                branch.ended = reason
+                return
+            history.append(item)
+            branch.points.append(item)
+            self.observer.progress(branch, item)
+            if self._closes(branch, previous, item):
+                branch.ended = "closed loop"
+                return
+
+    def _between(self, branch: Branch, a: Point, b: Point) -> str:
+        """Insert folds, branch points and user points between two points; a reason if the branch ends there."""
+        with self.follower.system.clock.purpose("location"):
+            return self._between_points(branch, a, b)
+
+    def _between_points(self, branch: Branch, a: Point, b: Point) -> str:
+        specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b)
+        pieces = [a, *(s.point for s in specials if s.point.arclength > a.arclength), b]
+        users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
+        for special in specials + users:
+            self.watch.special(special)
+        for special in sorted(specials + users, key=lambda s: s.point.arclength):
+            if special.kind == BRANCH_POINT:
+                reason = self._meeting(branch, special)
+                branch.insert(special)
+                self.observer.special(branch, special)
+                if reason:  # it ends before a row that was taken for one of it
+                    branch.points = [p for p in branch.points if p.arclength <= special.point.arclength]
+                    return reason
+            else:
+                branch.insert(special)
+                self.observer.special(branch, special)
+        return ""
+
+    def _users(self, branch: Branch, p: Point, q: Point, a: Point, b: Point) -> list[Special]:
+        """User points between two neighbours among which the load is monotone."""
+        found = []
+        for load in self.plan.at:
+            if (
+                (p.load - load) * (q.load - load) < 0
+                or (load == p.load and p is branch.points[0])
+                or (load == q.load and q is b)
+            ):
+                s = p.arclength + (load - p.load) / (q.load - p.load) * (q.arclength - p.arclength)
+                for _ in range(3):
+                    x, direction = hermite(a, b, s)
+                    slope = self.follower.system.scalar(direction)
+                    if slope:
+                        s = min(max(s + (load - self.follower.system.scalar(x)) / slope, p.arclength), q.arclength)
+                point = self._user_between(a, b, load, (p, q), s)
+                found.append(Special(USER, point, p.negative, q.negative, 1e-12 * max(1.0, abs(load))))
+                found[-1].negative_before = found[-1].negative_after = point.negative
+        return found
+
+    def _first_users(self, branch: Branch) -> None:
+        """User points between the special point that a branch leaves and its first point, if they are on the branch."""
+        if len(branch.points) != 2 or branch.parent is None:
+            return
+        a, b = map(self.here, branch.points)
+        for special in self._users(branch, a, b, a, b):
+            self.watch.special(special)
+            branch.insert(special)
+            self.observer.special(branch, special)
+
+    def _user_between(self, a: Point, b: Point, load: float, rows: tuple[Point, Point], s: float) -> Point:
+        """Point at exactly ``load`` between two ``rows`` of the piece from ``a`` to ``b``, expected at arclength ``s``.
+
+        Close to a branch point Newton's method at a fixed load fails, or ends on the other branch.  On planes across
+        the branch it does not, and the load is a function of arclength there, whose zero is found.
+        """
+        system, (p, q), guess = self.follower.system, rows, hermite(a, b, s)[0]
+        system.set_phase(guess)
+        x, outcome = self.follower.at_load(guess, load, reach=1.0)
+        on_branch = outcome.converged and (
+            a.x is not p.x or distance(system, guess, x) < 0.5 * distance(system, a.x, x) or p.load == load
+        )
+        if not on_branch:
+            if (p.load - load) * (q.load - load) >= 0:
+                raise ConvergenceError(self._no_equilibrium(load))
+
+            def beyond(s: float) -> float:
+                return system.scalar(solve_at(self.follower, lambda t: hermite(a, b, t), s)) - load
+
+            margin = 1e-9 * (q.arclength - p.arclength)
+            s = brentq(beyond, p.arclength + margin, q.arclength - margin, xtol=1e-15)
+            x = solve_at(self.follower, lambda t: hermite(a, b, t), s)
+            system.set_load(x, load)
+        return self.follower.point(x, s, self.follower.load_tangent(x, q.load > p.load), outcome)
+
+    def _no_equilibrium(self, load: float) -> str:
+        return f"No equilibrium at {self.scene.load} = {load:g} between two points of the branch: use another load."
+
+    def user(self, guess: PETSc.Vec, load: float, s: float, increasing: bool) -> Point:
+        """Point at exactly ``load`` from a guess; raises :class:`ConvergenceError`."""
+        self.follower.system.set_phase(guess)
+        x, outcome = self.follower.at_load(guess, load, reach=1.0)
+        if not outcome.converged:
+            raise ConvergenceError(self._no_equilibrium(load))
+        return self.follower.point(x, s, self.follower.load_tangent(x, increasing), outcome)
+
+    def _meeting(self, branch: Branch, special: Special) -> str:
+        """Recognise a branch point that is known already; a reason if the branch ends there."""
+        for other in self.branches:
+            for i, known in enumerate(other.special):
+                if other is branch and special.point.arclength - known.point.arclength < 0.5:
+                    continue  # a neighbour on this branch: a nearly double eigenvalue
+                if known.kind == BRANCH_POINT and self.alike(known.point, special.point, 1e-6):
+                    special.meets = (other.name, i)
+                    special.switched = known.switched = True
+                    if branch.parent == special.meets:
+                        return "closed loop"
+                    if special.zero_of == "mu" and known.zero_of == "slope":
+                        return ""  # the branch on which the known one ended: it goes on
+                    return f"meets {other.name} at {self.scene.load} = {special.point.load:.8g}"
+        if special.zero_of == "slope":
+            return f"meets another branch at {self.scene.load} = {special.point.load:.8g}"
+        return ""
+
+    def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> None:
+        """Add the last admissible point, where the smallest stretch vanishes, and say so."""
+        shape = self.follower.shape
+        branch.ended = "stretch reaches zero"
+
+        def stretch(s: float) -> float:
+            return shape.stretch(solve_at(self.follower, lambda t: hermite(a, b, t), s))
+
+        h = b.arclength - a.arclength
+        s = brentq(stretch, a.arclength + 1e-9 * h, b.arclength, xtol=1e-11)
+        x = solve_at(self.follower, lambda t: hermite(a, b, t), s)
+        row = self.follower.row(hermite(a, b, s)[1])
+        last = self.follower.point(x, s, self.follower.tangent(row))
+        if self._between(branch, a, last):
+            return
+        special = Special(END, last, last.negative, last.negative, 1e-10, zero_of="stretch")
+        if self.plan.error_bars:
+            try:
+                with self.follower.system.clock.purpose("error bars"):
+                    special = zero_stretch(self.follower, last)
+            except ConvergenceError as trouble:
+                special.note = f"no error estimate: {trouble}"
+            else:
+                self.watch.judge(special)
+        branch.points.append(special.point)
+        branch.special.append(special)
+
+    def _singular_start(self, branch: Branch) -> None:
+        """Record that a range begins at a singular state: a branch point there is not located, and not followed."""
+        first = branch.points[0]
+        extra = first.zero - persistent_zeros(branch.points)
+        located = any(s.point is first and s.kind == BRANCH_POINT for s in branch.special)
+        if branch.parent is None and extra > 0 and not located:
+            branch.singular_start = extra
+            self.observer.warn(branch.start_in_words(self.scene.load))
+
+    def _singular_end(self, branch: Branch, last: Point) -> None:
+        """Report a branch point on the very end of the range, located on a piece of the branch that goes past it."""
+        parameter, load = self.scene.parameters[self.scene.load], last.load
+        beyond = load + BEYOND * (load - sum(self.span) / 2)
+        previous = self.here(branch.points[-2])
+        if not parameter.admissible[0] < beyond < parameter.admissible[1] or previous.x is last.x:
+            return
+        try:
+            with self.follower.system.clock.purpose("location"):
+                guess = hermite(previous, last, last.arclength)[0]
+                point = self.user(guess, beyond, 2 * last.arclength - previous.arclength, beyond > load)
+                point.arclength = last.arclength + distance(self.follower.system, last.x, point.x)
+                found = [s for s in self.specials.beyond(previous, point) if s.kind == BRANCH_POINT]
+        except ConvergenceError as trouble:
+            self.observer.warn(
+                f"The last state, at {self.scene.load} = {load:g}, is singular, and was not resolved: {trouble}"
+            )
+            return
+        for special in found:
+            if abs(special.point.load - load) < 1e-6 * abs(self.high - self.low):
+                branch.points[-1] = special.point
+                branch.special.append(special)
+                branch.renumber()
+                self.observer.special(branch, special)
+                return
+
+    def _closes(self, branch: Branch, a: Point, b: Point) -> bool:
+        """Whether the branch passes its own beginning again between two points."""
+        if len(branch.points) < 12:
+            return False
+        first = branch.points[1]
+        if max(abs(a.slope), abs(b.slope)) < VERTICAL * (self.high - self.low):  # equal loads: compare the states
+            return distance(self.follower.system, b.x, self.here(branch.points[0]).x) < b.arclength - a.arclength
+        if (a.load - first.load) * (b.load - first.load) > 0 or not near(first, a, 4) or a.slope * first.slope <= 0:
+            return False
+        s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
+        guess = hermite(a, b, s)[0]
+        self.follower.system.set_phase(guess)
+        x, outcome = self.follower.at_load(guess, first.load, reach=1.0)
+        if not outcome.converged:  # beside a fold, say: not there
+            return False
+        return self.alike(self.follower.point(x, s, None, outcome), first, 1e-7)
+
+    def alike(self, a: Point, b: Point, tolerance: float) -> bool:
+        """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
+        across = 0.0 if a.mesh == b.mesh or self.meshes.accuracy is None else 30 * self.meshes.accuracy
+        return equivalent(a, b, max(tolerance, across), across**0.5)
+
+    def _check_symmetry(self, point: Point) -> None:
+        for notice in self.follower.system.verification.read():
+            self.observer.warn(notice)
+        if point.drift > 1e-6 * self.follower.inertia.scale:
+            self.watch.drifting(point)
+            raise ConvergenceError(
+                f"The mesh does not resolve a symmetry of the scene any more: the drift is {point.drift:.2g} at "
+                f"{self.scene.load} = {point.load:.6g} where it should vanish; use more elements, or ask for an "
+                "accuracy."
+            )
+
+    def _check_zeros(self, history: list[Point], point: Point) -> None:
+        """Say once where eigenvalues stay zero without a symmetry: the state is one of a family at the same load."""
+        extra = self._extra(point)
+        recent = [p for p in history[-4:] if p.arclength > 0.0]  # a branch point has zeros of its own
+        stay = extra > 0 and bool(recent) and all(p.zero == point.zero for p in recent)
+        self.follower.damp(extra if stay else 0)
+        if stay and len(recent) == 4 and point.zero <= self.specials.level and not self.warned:
+            self.warned = True
+            self._say_zeros(recent[0], point, extra)
+
+    def _say_zeros(self, before: Point, point: Point, extra: int) -> None:
+        """Say of eigenvalues that count as zero at two rows whether round-off tells them from zero, or they are it."""
+        system, inertia, still = self.follower.system, self.follower.inertia, 0
+        own = point.zero - system.active_drifts() - extra
+        for p in (before, point):
+            system.set_phase(p.x)
+            low, high = resolve(inertia, p.x)
+            still = min(max(still, high - low - own), extra)
+        if still:
+            self.observer.note(
+                f"  {still} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
+                "move freely at one and the same load"
+            )
+        if extra > still:
+            self.observer.note(
+                f"  {extra - still} eigenvalue(s) are within {inertia.tolerance / inertia.scale:.0e} of zero, relative "
+                "to the lowest bending eigenvalue, without being zero: a critical load is close to "
+                f"{self.scene.load} = {before.load:.8g}"
+            )
+
+    def _extra(self, point: Point) -> int:
+        """Zero eigenvalues, beside symmetries' and the branch's own, of the point at which phases were last set."""
+        vertical = abs(point.slope) < VERTICAL * (self.high - self.low)  # the branch itself is a family at one load
+        return point.zero - self.follower.system.active_drifts() - vertical
+
+    def _finish(self, branch: Branch) -> None:
+        branch.renumber()
+        explain(branch)
+        self._singular_start(branch)
+        last = branch.points[-1]
+        if branch.ended == "end of range" and last.zero > self.follower.system.active_drifts():
+            self._singular_end(branch, last)
+            last = branch.points[-1]
+        if not any(s.point is last for s in branch.special):
+            branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
+            branch.renumber()
+        if self.plan.error_bars or self.plan.accuracy:
+            self._error_bars(branch)
+            merge_doubles(branch)
+        for unexplained in branch.unexplained:
+            self.observer.warn(str(unexplained))
+        self.observer.finished(branch)
+        self.watch.summary(branch, self.observer)
+        self.finished()
+
+    def _error_bars(self, branch: Branch) -> None:
+        with self.follower.system.clock.purpose("error bars"):
+            for special in branch.special:
+                if isnan(special.error_estimate):
+                    self.meshes.richer(special.point.mesh).estimate(special)
+                self.watch.label(special)
+
+
+def equivalent(a: Point, b: Point, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:
+    """Whether two points agree in all that a symmetry leaves alone: load, energy and stretch."""
+    strain = max(tolerance, of_strain)
+    pairs = ((a.load, b.load, tolerance), (a.energy, b.energy, tolerance), (a.stretch, b.stretch, strain))
+    return all(abs(p - q) <= allowed * max(1.0, abs(p), abs(q)) for p, q, allowed in pairs)
+
+
+def reversed_point(point: Point, total: float) -> Point:
+    """The same equilibrium on the branch of length ``total`` followed the other way."""
+    tangent = None
+    if point.tangent is not None:
+        tangent = point.tangent.copy()
+        tangent.scale(-1.0)
+    return replace(point, arclength=total - point.arclength, tangent=tangent, slope=-point.slope)
+
+
+def reversed_branch(branch: Branch) -> Branch:
+    """The same branch followed the other way, from its end."""
+    total = branch.points[-1].arclength
+    points = {id(p): reversed_point(p, total) for p in branch.points}
+    special = [
+        replace(s, point=points[id(s.point)], negative_before=s.negative_after, negative_after=s.negative_before)
+        for s in branch.special
+    ]
+    out = Branch(branch.name, branch.parent, branch.depth, list(points.values()), special)
+    out.renumber()
+    return out
+
+
+def near(a: Point, b: Point, steps: float = 2.0) -> bool:
+    """Whether two points could be neighbours on one branch, seen through load and energy."""
+    reach = 0.05 * steps
+    return abs(a.load - b.load) <= reach * max(1.0, abs(a.load)) and abs(a.energy - b.energy) <= reach * max(
+        1.0, abs(a.energy)
+    )

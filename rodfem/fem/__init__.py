@@ -1,0 +1,5 @@
+"""The discrete rod: unknowns, weak form, symmetries, the bordered saddle point, Newton's method."""
+
+from rodfem.lazy import attributes
+
+__getattr__ = attributes("rodfem.fem")

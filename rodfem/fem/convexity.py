@@ -1,0 +1,60 @@
+"""Convexity of the stored energy along the states of a branch.
+
+The second derivative of ``W`` in the free strains and curvatures must be positive definite (the Legendre-Hadamard
+condition of a rod; Antman, Nonlinear Problems of Elasticity, 2005, chapter 8): where it is not, neither are equilibria
+regular functions of the load nor does the index mean stability.  For a quadratic energy the undeformed state tells all.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+from petsc4py import PETSc
+from ufl.algorithms.analysis import extract_coefficients, extract_type
+from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+from ufl.algorithms.apply_derivatives import apply_derivatives
+
+from forms.kinematics import curvature, strain
+from rodfem import compat
+from rodfem.fem.system import System
+
+
+class Convexity:
+    """Evaluates the least eigenvalue of the second derivative of ``W`` along a state.
+
+    At the Gauss points of each element and at its ends: strains are largest at a clamp or a joint more often than not.
+    """
+
+    def __init__(self, system: System) -> None:
+        """Compile the second derivative."""
+        self.system = system
+        e, f, scene = system.equations, system.fields, system.scene
+        u = e._named(ufl.split(f.u))
+        free = scene.free_strains
+        values = e._components(u.v, len(free))
+        k = curvature(u.q, u.q.dx(0))
+        x = ufl.variable(ufl.as_vector([*values, *(k[i] for i in range(3))]))
+        v = strain(free, [x[i] for i in range(len(free))])
+        W = scene.energy(v, ufl.as_vector([x[len(free) + i] for i in range(3)]), e.constants)
+        hessian = ufl.diff(ufl.diff(W, x), x)
+        self.size = len(free) + 3
+        entries = [hessian[i, j] for i in range(self.size) for j in range(self.size)]
+        expression = apply_derivatives(apply_algebra_lowering(ufl.as_vector(entries)))
+        places = [*extract_coefficients(expression), *extract_type(expression, ufl.SpatialCoordinate)]
+        self.evaluate = None
+        if not places:  # the same everywhere: checked with the scene
+            return
+        inside = (np.polynomial.legendre.leggauss(f.discretization.degree + 1)[0] + 1) / 2
+        points = np.array([0.0, *inside, 1.0])
+        self.evaluate = compat.expression(ufl.as_vector(entries), points.reshape(-1, 1), f.mesh, f.owned_cells)
+
+    def lowest(self, x: PETSc.Vec) -> float:
+        """Least eigenvalue over the whole rod at the state ``x``, relative to the largest one; 1 if it is constant."""
+        if self.evaluate is None:
+            return 1.0
+        self.system.bring(x)
+        matrices = self.evaluate().reshape(-1, self.size, self.size)
+        values = np.linalg.eigvalsh((matrices + matrices.transpose(0, 2, 1)) / 2)
+        mine = (values[:, 0] / abs(values).max(axis=1)).min() if len(values) else 1.0
+        return float(self.system.comm.allreduce(float(mine), op=MPI.MIN))

@@ -1,0 +1,401 @@
+"""Unknowns of a discretised rod: mesh, mixed space, scalars, clamps, and one global numbering of what is free.
+
+The fields live in one mixed finite element space.  A *scalar* unknown (a component of a constant contact force, the
+load) is a field that is constant over the rod: it enters the mixed space as one value in each cell, and all cells share
+one global number, so that UFL differentiates and dolfinx assembles it like any field.  Clamped degrees of freedom have
+no number at all: PETSc drops what is added to number -1, and no Dirichlet row ever disturbs an eigenproblem.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from rodfem import compat
+from rodfem.errors import SceneError
+from rodfem.fem.rotation_field import ByAngle, ByQuaternion, Turning
+from rodfem.problem.ends import Ring
+from rodfem.problem.kinds import reals, whole
+from rodfem.problem.local_state import needs_centreline
+from rodfem.problem.scene import Scene
+
+FORMULATIONS = ("auto", "reduced", "pointwise")
+LOAD = "load"
+HIGHEST = 12
+"""Highest degree of elements."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """One field: its name, number of components, degree, continuity, and whether it is a multiplier."""
+
+    name: str
+    size: int
+    degree: int
+    continuous: bool
+    multiplier: bool
+
+
+@dataclass(frozen=True)
+class Discretization:
+    """How a scene is discretised: ``formulation``, number of ``elements`` and polynomial ``degree``.
+
+    ``reduced`` has no centreline, and the contact force as scalars; ``pointwise`` has all fields; ``auto`` is the first
+    where the scene allows it.  ``vertices`` are the arclengths at which elements meet, both ends included; without
+    them all elements are of nearly equal size.
+    """
+
+    formulation: str = "auto"
+    elements: int = 8
+    degree: int = 6
+    vertices: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the values; raises :class:`SceneError`."""
+        for name, example in (("elements", 8), ("degree", 6)):
+            object.__setattr__(self, name, whole(name, getattr(self, name), example))
+        if self.vertices is not None:
+            object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
+        if self.formulation not in FORMULATIONS:
+            raise SceneError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(FORMULATIONS)}.")
+        if self.elements < 1:
+            raise SceneError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
+        if not 1 <= self.degree <= HIGHEST:
+            raise SceneError(f"Degree {self.degree} is not available: choose 1 to {HIGHEST}.")
+        if self.vertices is not None:
+            if len(self.vertices) != self.elements + 1:
+                raise SceneError(
+                    f"{len(self.vertices)} vertices do not bound {self.elements} elements: give {self.elements + 1}."
+                )
+            if not all(a < b for a, b in pairwise(self.vertices)):
+                raise SceneError("The vertices of a mesh must ascend along the rod: sort them, each once.")
+
+    def finer(self, factor: int, richer: int = 0) -> Discretization:
+        """Each element cut into ``factor`` equal ones, of a degree higher by ``richer``."""
+        vertices = self.vertices
+        if vertices is not None:
+            at = np.arange(factor * self.elements + 1) / factor
+            vertices = tuple(float(s) for s in np.interp(at, np.arange(self.elements + 1), vertices))
+        return replace(self, elements=factor * self.elements, degree=self.degree + richer, vertices=vertices)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One scalar unknown: its name, its group and place there, and whether it is a multiplier."""
+
+    name: str
+    group: str
+    component: int
+    multiplier: bool
+
+
+def turning_of(scene: Scene) -> Turning:
+    """How the rotation of a scene's rod is described."""
+    return ByQuaternion() if scene.normal is None else ByAngle(scene.normal)
+
+
+def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:
+    """Fields: ``q`` and ``eta``, in a plane ``angle``; ``v`` where strains are free; ``r`` and ``n`` if pointwise.
+
+    Multipliers ``p0``.. belong to constraints that hold all along the rod.
+    """
+    k = discretization.degree
+    turning = turning_of(scene)
+    blocks = [Block(turning.name, turning.size, k, True, False)]
+    if turning.name == "q":
+        blocks.append(Block("eta", 1, k, True, True))
+    if scene.free_strains:
+        blocks.append(Block("v", len(scene.free_strains), k - 1, False, False))
+    if discretization.formulation == "pointwise":
+        blocks += [Block("r", 3, k, True, False), Block("n", 3, k - 1, False, True)]
+    for i, constraint in enumerate(c for c in scene.constraints if c.kind == "pointwise"):
+        blocks.append(Block(f"p{i}", 1, k if constraint.continuous else k - 1, constraint.continuous, True))
+    return blocks
+
+
+def scalars_of(scene: Scene, discretization: Discretization) -> list[Unknown]:
+    """Scalar unknowns of a scene, without the load.
+
+    Reduced: components ``n1``.. of a constant contact force, positions ``a1``.., ``b1``.. of the left and right end
+    where other than dead forces act on it.  Always: moments ``m`` of moving clamps and hinges, multipliers ``g`` of
+    integral and point constraints, forces ``f`` and moments ``t`` that close a ring.
+    """
+    out, c = [], scene.constants()
+    inside = [i for i in range(3) if i != scene.normal]
+    if discretization.formulation == "reduced":
+        out += [Unknown(f"n{i + 1}", "n", i, True) for i in inside if scene.known_force(i, c) is None]
+        for side, (letter, end) in enumerate(zip("ab", scene.sides, strict=True)):
+            if not scene.plain(side):
+                free = [i for i in inside if end.held(c)[i] is None]
+                out += [Unknown(f"{letter}{i + 1}", letter, i, False) for i in free]
+    for letter, end in zip("ab", scene.sides, strict=True):
+        if end.turned is not None:
+            size = len(across(end.hinge, scene.normal))
+            out += [Unknown(f"m{letter}{i + 1}", f"m{letter}", i, True) for i in range(size)]
+    count = sum(x.kind != "pointwise" for x in scene.constraints)
+    out += [Unknown(f"g{i + 1}", "g", i, True) for i in range(count)]
+    if isinstance(scene.ends, Ring):
+        out += [Unknown(f"t{i + 1}", "t", i, True) for i in range(turning_of(scene).size)]
+        if discretization.formulation == "pointwise":
+            out += [Unknown(f"f{i + 1}", "f", i, True) for i in inside]
+    return out
+
+
+def across(axis: tuple[float, float, float] | None, normal: int | None = None) -> list[list[float]]:
+    """Unit vectors across ``axis``, all three without one: the directions about which an end does not turn.
+
+    In a plane that is its normal, or nothing where the axis is along it.
+    """
+    if normal is not None:
+        unit = [float(i == normal) for i in range(3)]
+        along = axis is not None and abs(axis[normal]) > 0.999 * float(np.linalg.norm(axis))
+        return [] if along else [unit]
+    if axis is None:
+        return [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    return [[float(x) for x in row] for row in np.linalg.svd(np.array([axis], dtype=float))[2][1:]]
+
+
+class Fields:
+    """Mesh, mixed space, the unknown ``u`` as a dolfinx Function, and the numbering of free unknowns.
+
+    Attributes
+    ----------
+    dofs
+        For each field the local degrees of freedom, (cells incl. ghosts, nodes per cell, components).
+    number
+        Global number of each local degree of freedom, -1 where clamped; (local size,) int32.
+    unknown_scalars, forces
+        Scalar unknowns without load and drifts; components of the contact force among them (reduced formulation).
+    scalars
+        Global number of each scalar: ``n1``.. for ``forces``, ``load``, and ``drift0``.. one for each symmetry.
+    """
+
+    def __init__(
+        self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD, mesh: Any = None
+    ) -> None:
+        """Make the mesh (unless given), number the unknowns; :class:`SceneError` for more ranks than elements."""
+        if comm.size > discretization.elements:
+            raise SceneError(
+                f"{discretization.elements} elements cannot be shared by {comm.size} ranks: "
+                "use more elements or fewer ranks."
+            )
+        reason = needs_centreline(scene)
+        if discretization.formulation == "auto":
+            discretization = replace(discretization, formulation="pointwise" if reason else "reduced")
+        if discretization.formulation == "reduced" and reason:
+            raise SceneError(
+                f"The reduced formulation has no centreline, which {reason} needs: use --formulation pointwise."
+            )
+        self.scene, self.discretization, self.comm = scene, discretization, comm
+        self.turning = turning_of(scene)
+        self.blocks = blocks_of(scene, discretization)
+        self.unknown_scalars = scalars_of(scene, discretization)
+        self.forces = [x.component for x in self.unknown_scalars if x.group == "n"]
+        names = [x.name for x in self.unknown_scalars] + [LOAD]
+        self.mesh = mesh or self._mesh()
+        parts = [(b.continuous, b.degree, b.size) for b in self.blocks] + [(False, 0, len(names))]
+        self.space = compat.mixed_space(self.mesh, parts)
+        self.u = fem.Function(self.space, dtype=compat.REAL)
+        cells = self.mesh.topology.index_map(1)
+        self.owned_cells, local_cells = cells.size_local, cells.size_local + cells.num_ghosts
+        self.vertices = compat.cell_vertices(self.mesh, local_cells)
+        self.dofs = {b.name: self._block_dofs(i, b.size, local_cells) for i, b in enumerate(self.blocks)}
+        copies = self._block_dofs(len(self.blocks), len(names), local_cells)[:, 0, :]
+        self._number(copies, names)
+
+    def _mesh(self) -> Any:
+        """Mesh with the vertices that the discretisation gives, or of elements of nearly equal size; each at joints."""
+        scene, elements, given = self.scene, self.discretization.elements, self.discretization.vertices
+        pieces = np.array([scene.interval[0], *scene.joints, scene.interval[1]])
+        mesh = compat.interval_mesh(self.comm, elements, *scene.interval)
+        uniform = np.linspace(*scene.interval, elements + 1)
+        if given is not None:
+            ends = (given[0], given[-1]) == tuple(scene.interval)
+            if not ends or any(abs(np.subtract(given, s)).min() > 1e-9 * scene.length for s in scene.joints):
+                raise SceneError(
+                    f"The vertices of the mesh must begin and end at {scene.interval[0]:g} and {scene.interval[1]:g} "
+                    "and hold every joint of the scene: add what is missing."
+                )
+            compat.move_vertices(mesh, uniform, np.array(given))
+            return mesh
+        if elements < len(pieces) - 1:
+            raise SceneError(
+                f"The rod has {len(pieces) - 1} pieces between joints, and needs an element for each: use more than "
+                f"{elements} elements."
+            )
+        shares = np.diff(pieces) / scene.length * elements
+        counts = np.maximum(np.floor(shares).astype(int), 1)
+        while counts.sum() > elements:
+            counts[np.argmax(np.where(counts > 1, counts / shares, 0))] -= 1
+        while counts.sum() < elements:
+            counts[np.argmax(shares / counts)] += 1
+        vertices = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
+        if len(pieces) > 2:
+            compat.move_vertices(mesh, uniform, np.append(np.concatenate(vertices), pieces[-1]))
+        return mesh
+
+    def _block_dofs(self, part: int, size: int, cells: int) -> np.ndarray:
+        sub = self.space.sub(part)
+        components = [sub.sub(i) for i in range(size)] if size > 1 else [sub]
+        return np.stack([compat.cell_dofs(component, cells) for component in components], axis=-1)
+
+    def _clamped(self) -> np.ndarray:
+        """Local degrees of freedom that an end holds: ``q`` and ``eta`` at clamped directors, ``r`` where held.
+
+        Of a planar rod also all that would leave the plane.
+        """
+        found = [dofs.ravel() for dofs in self.out_of_plane().values()]
+        ring = isinstance(self.scene.ends, Ring)
+        for end, s in zip(self.scene.sides, self.scene.interval, strict=True):
+            for block in self.blocks:
+                if not block.continuous:
+                    continue
+                x = self.coordinates(block.degree)
+                at_end = self.dofs[block.name][np.isclose(x, s, rtol=0, atol=1e-9 * self.scene.length)]
+                if block.name == "r":
+                    held = [x is not None for x in end.held(self.scene.constants())]
+                    found.append(at_end[:, held].ravel())
+                elif block.name.startswith("p"):  # what holds the end fulfils the constraint there
+                    if end.rotation is not None or any(x is not None for x in end.held(self.scene.constants())):
+                        found.append(at_end.ravel())
+                elif end.fixed_rotation is not None:
+                    found.append(at_end.ravel())
+                elif ring and block.name == "eta" and s == self.scene.interval[1]:
+                    found.append(at_end.ravel())  # the norm of q(l) = +-q(0) is that of q(0)
+        return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
+
+    def out_of_plane(self) -> dict[str, np.ndarray]:
+        """Degrees of freedom of each field that vanish for a planar rod; empty for a rod in space."""
+        normal = self.scene.normal
+        if normal is None:
+            return {}
+        components = {
+            "r": [normal],
+            "n": [normal],
+            "v": [place for place, i in enumerate(self.scene.free_strains) if i == normal],
+        }
+        return {name: self.dofs[name][..., chosen] for name, chosen in components.items() if name in self.dofs}
+
+    def _number(self, copies: np.ndarray, names: list[str]) -> None:
+        """Number free unknowns rank by rank; scalars come last and belong to the last rank."""
+        index_map = self.space.dofmap.index_map
+        owned, local = index_map.size_local, index_map.size_local + index_map.num_ghosts
+        free = np.ones(local, dtype=bool)
+        free[self._clamped()] = False
+        free[copies.ravel()] = False
+        self.free_owned = np.flatnonzero(free[:owned])
+        count = len(self.free_owned)
+        self.offset = sum(self.comm.allgather(count)[: self.comm.rank])
+        self.field_unknowns = self.comm.allreduce(count)
+        numbers = fem.Function(self.space, dtype=compat.REAL)
+        numbers.x.array[:] = -1.0
+        numbers.x.array[self.free_owned] = self.offset + np.arange(count)
+        numbers.x.scatter_forward()
+        self.number = np.rint(numbers.x.array).astype(np.int32)
+        self.scalars: dict[str, int] = {}
+        self.unknowns, self.local_unknowns = self.field_unknowns, count
+        self._append(names)
+        for i, name in enumerate(names):
+            self.number[copies[:, i]] = self.scalars[name]
+        self.copies = copies
+
+    def _append(self, names: list[str]) -> None:
+        """Give scalars the next numbers; all are on the last rank."""
+        self.scalars |= {name: self.unknowns + i for i, name in enumerate(names)}
+        self.unknowns += len(names)
+        self.local_unknowns += len(names) if self.comm.rank == self.comm.size - 1 else 0
+
+    def all_vertices(self) -> np.ndarray:
+        """Arclengths at which elements meet, of all ranks in ascending order, (E + 1,)."""
+        mine = self.vertices[: self.owned_cells, 0]
+        return np.append(np.sort(np.concatenate(self.comm.allgather(mine))), self.scene.interval[1])
+
+    @property
+    def dense_rows(self) -> int:
+        """Number of scalars: the last rows of a system couple to all others."""
+        return self.unknowns - self.field_unknowns
+
+    def add_drifts(self, count: int) -> None:
+        """Add a drift scalar for each symmetry; before any matrix is made."""
+        self._append([f"drift{i}" for i in range(count)])
+
+    def lift(self, s: np.ndarray, load: float) -> np.ndarray:
+        """Linear function of the ends' positions that the centreline field is measured from, (..., 3) for (...,)."""
+        start, stop = self.scene.interval
+        x = ((np.asarray(s) - start) / (stop - start))[..., None]
+        c = self.scene.constants(load)
+        left, right = ([None if p is None else float(p) for p in end.held(c)] for end in self.scene.sides)
+        a = np.array([p if p is not None else q or 0.0 for p, q in zip(left, right, strict=True)])
+        b = np.array([q if q is not None else p or 0.0 for p, q in zip(left, right, strict=True)])
+        return np.asarray((1 - x) * a + x * b)
+
+    def rotations(self) -> np.ndarray:
+        """Quaternions at the nodes of the state that ``u`` holds, (cells, nodes, 4)."""
+        return self.turning.quaternion(self.u.x.array[self.dofs[self.turning.name]])
+
+    def coordinates(self, degree: int) -> np.ndarray:
+        """Arclengths of the nodes of a field of that degree in each local cell, (cells, degree + 1)."""
+        a, b = self.vertices[:, :1], self.vertices[:, 1:]
+        return a + (b - a) * compat.nodes(degree)
+
+    def constraints(self) -> int:
+        """Number of constraint equations: free multipliers, fields and scalars (drift scalars not counted)."""
+        multipliers = [self.dofs[b.name].ravel() for b in self.blocks if b.multiplier]
+        mine = np.unique(np.concatenate([np.array([], dtype=int), *multipliers]))
+        owned = mine[(mine < self.space.dofmap.index_map.size_local) & (self.number[mine] >= 0)]
+        return self.comm.allreduce(len(owned)) + sum(x.multiplier for x in self.unknown_scalars)
+
+    def describe(self) -> str:
+        """Fields and scalars in words, for the terminal."""
+        names = {
+            "q": "rotation q",
+            "angle": "angle of rotation",
+            "eta": "unit-norm multiplier eta",
+            "v": "strain v",
+            "r": "centreline r",
+            "n": "contact force n",
+        }
+        words = [f"{names.get(b.name, f'multiplier {b.name}')} (P{b.degree})" for b in self.blocks]
+        groups = {
+            "n": "contact force",
+            "a": "position of the left end",
+            "b": "position of the right end",
+            "ma": "moment at the left end",
+            "mb": "moment at the right end",
+            "g": "multipliers of constraints",
+            "t": "closing moment",
+            "f": "closing force",
+        }
+        for group, name in groups.items():
+            members = [x.name for x in self.unknown_scalars if x.group == group]
+            words += [f"{name} {', '.join(members)} (scalar)"] if members else []
+        return ", ".join(words)
+
+    def left_out(self) -> list[str]:
+        """Fields and strains that are not unknowns of this scene, each with the reason."""
+        scene, c = self.scene, self.scene.constants()
+        fixed = [i for i in range(3) if i not in scene.free_strains]
+        lines = []
+        if scene.normal is not None:
+            lines.append(
+                f"rotations, displacement, force and strain out of the plane across {scene.planar}: "
+                "one angle is left of the rotation"
+            )
+            if scene.conservative and (loads := scene.without_potential(in_space=True)):
+                lines.append(f"the index in space: no potential there has the {loads[0]}")
+        if fixed:
+            lines.append(f"strain {', '.join(f'v{i + 1}' for i in fixed)}: the rod is {scene.rod}")
+        if self.discretization.formulation == "reduced":
+            lines.append(
+                "centreline r and the field of contact force: no force acts along the rod, "
+                "so that the contact force is constant"
+            )
+            known = [f"n{i + 1}" for i in range(3) if scene.known_force(i, c) is not None]
+            if known:
+                lines.append(f"contact force {', '.join(known)}: a dead force at an end that is free to move there")
+        return lines

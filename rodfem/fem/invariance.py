@@ -1,0 +1,234 @@
+r"""Detection of the continuous symmetries of a scene: invariance of its equations at generic states.
+
+With a potential a combination ``g = sum_j a_j g_j`` of the generators of :mod:`rodfem.fem.symmetries` is a symmetry
+where it leaves the functional ``L`` invariant, at every state and load; without one where the equations ``F`` of
+equilibrium are equivariant, so that it carries equilibria into equilibria, for ``g(x) = A x + c`` ::
+
+    sum_j a_j dL(x)[g_j(x)] = 0,      or      dF(x)[g(x)] + A^t F(x) = 0,
+
+for all ``x``; and where it moves nothing that an end holds.  The space of such ``a`` is the null space of a matrix with
+rows for each of a number of generic states.
+
+The motion of a closed rod along itself is a symmetry where no equation has the arclength in it.  Where one has, it may
+still be one together with a rotation (a ring under a dead radial load): the same condition, ``g`` with the state's
+derivative in it, is asked on a fine mesh, which has such a symmetry up to its small error.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from rodfem import compat
+from rodfem.fem.equations import Equations
+from rodfem.fem.fields import LOAD, Block, Fields
+from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
+from rodfem.problem.ends import Ring
+
+EXACT = 1e-10
+"""Round-off of the change of the functional, relative to the sum of magnitudes of its terms."""
+SLIDING = 1e-8
+"""The same for the motion of a closed rod along itself: the error of a fine mesh."""
+STATES = 3
+"""Number of states at which equations are asked: each gives as many conditions as there are unknowns."""
+SLIDES = 8
+"""Number of states at which that is asked."""
+WILD = 1e4
+"""States whose forces exceed the least by this factor are left out: their round-off hides that of all others."""
+DECAY = 0.6
+"""Ratio of one Fourier coefficient of a generic state to the next."""
+SMOOTH = 0.35
+"""The same of a state that a fine mesh resolves to round-off, nearly."""
+
+
+def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
+    """Find a basis of all exact symmetries; leaves the state that ``fields.u`` holds as it was."""
+    parts = elementary_generators(fields)
+    u, kept = fields.u.x.array, fields.u.x.array.copy()
+    single = [Symmetry(row, parts) for row in np.eye(len(parts))]
+    moved = np.zeros((len(parts),) * 2)
+    rows, sizes, held = [], [], [np.zeros((1, len(parts)))]
+    for seed in range(len(parts) + 6 if fields.scene.conservative else STATES):
+        generic_state(fields, kept, seed)
+        changes = np.array([s.change(fields) for s in single])
+        asked = _change_of_functional if fields.scene.conservative else _change_of_equations
+        row, size = asked(fields, equations, single, changes)
+        rows.append(row)
+        sizes.append(size)
+        held.append(changes[:, _held(fields)].T)
+        free = changes[:, fields.number >= 0]
+        moved += fields.comm.allreduce(free @ free.T, op=MPI.SUM)
+    u[:] = kept
+    free = _null_space(np.vstack(fields.comm.allgather(np.linalg.qr(np.vstack(held), mode="r"))))
+    greatest = np.nan_to_num(np.max(sizes, axis=1), nan=np.inf)
+    asked_at = np.flatnonzero(greatest <= WILD * greatest.min())
+    terms = abs(free.T) @ np.max([sizes[i] for i in asked_at], axis=0)
+    terms = np.where(terms > 0, terms, 1.0)
+    null = free @ (_null_space(np.vstack([rows[i] for i in asked_at]) @ free / terms) / terms[:, None])
+    if null.shape[1] == 0:
+        return []
+    null = np.linalg.qr(null)[0]
+    scale = np.diag(moved).max(initial=1e-300)
+    squares, combinations = np.linalg.eigh(null.T @ (moved / scale) @ null)
+    basis = simplest(null @ combinations[:, squares > EXACT])
+    return [Symmetry(w, parts) for w in basis.T]
+
+
+def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
+    """Find the motion of a closed rod along itself, with what has to go with it; None where that is no symmetry.
+
+    For a scene whose equations have the arclength in them the mesh must be fine.
+    """
+    parts = elementary_generators(fields)
+    none = np.zeros(len(parts))
+    if equations.uniform:
+        return Symmetry(none, parts, along=1.0)
+    if not fields.scene.conservative:
+        return None
+    single, kept = [Symmetry(row, parts) for row in np.eye(len(parts))], fields.u.x.array.copy()
+    rows, held = [], []
+    for seed in range(len(parts) + SLIDES):
+        generic_state(fields, kept, seed, SMOOTH)
+        changes = np.array([*(s.change(fields) for s in single), derivative(fields)])
+        row, terms = _change_of_functional(fields, equations, single, changes)
+        rows.append(row[0] / terms.max())
+        held.append(changes[:-1, _held(fields)].T)
+    fields.u.x.array[:] = kept
+    free = _null_space(np.vstack(held))
+    exact, along = np.array(rows)[:, :-1] @ free, np.array(rows)[:, -1]
+    weights = np.linalg.lstsq(exact, -along, rcond=SLIDING)[0]
+    if abs(exact @ weights + along).max() > SLIDING:
+        return None
+    weights = free @ weights
+    return Symmetry(np.where(abs(weights) > SLIDING, weights, 0.0), parts, along=1.0)
+
+
+def _null_space(rows: np.ndarray) -> np.ndarray:
+    """Orthonormal null vectors of conditions (..., m) of size one, (m, number)."""
+    if rows.shape[1] == 0:
+        return np.zeros((0, 0))
+    _, singular, vectors = np.linalg.svd(np.linalg.qr(np.vstack([rows, np.zeros((rows.shape[1],) * 2)]), mode="r"))
+    return np.asarray(vectors[singular < EXACT * max(singular[0], 1.0)].T)
+
+
+def _change_of_functional(
+    fields: Fields, equations: Equations, single: list[Symmetry], changes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """``dL(x)[g]`` of the ``changes`` (m, local size) by each generator, (1, m), and the sums of magnitudes, (m,)."""
+    residual = np.zeros(len(fields.u.x.array))
+    fem.assemble_vector(residual, equations.residual)
+    sums = fields.comm.allreduce(np.array([changes @ residual, abs(changes) @ abs(residual)]), op=MPI.SUM)
+    return sums[:1], sums[1]
+
+
+def _change_of_equations(
+    fields: Fields, equations: Equations, single: list[Symmetry], changes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), and sums of magnitudes, (m,); for one rank alone."""
+    residual = np.zeros(len(fields.u.x.array))
+    fem.assemble_vector(residual, equations.residual)
+    whole = residual.copy()  # a scalar has a copy in each cell: all of its equation
+    whole[fields.copies] = residual[fields.copies].sum(axis=0)
+    tangent, back = compat.local_table(equations.jacobian), [s.linear(fields).T for s in single]
+    table = _summed(fields, np.array([tangent @ g for g in changes]), copies=True)
+    table += _summed(fields, np.array([A @ whole for A in back]))
+    sizes = _summed(fields, np.array([abs(tangent) @ abs(g) for g in changes]), copies=True)
+    sizes += _summed(fields, np.array([abs(A) @ abs(whole) for A in back]))
+    return np.asarray(np.linalg.qr(table, mode="r")), np.linalg.norm(sizes, axis=0)
+
+
+def _summed(fields: Fields, table: np.ndarray, *, copies: bool = False) -> np.ndarray:
+    """Components of covectors (m, local size) along the free unknowns, (unknowns, m): without that along the load.
+
+    A scalar has a copy in each cell; with ``copies`` each has a share of its component, else each has all of it.
+    """
+    free = np.flatnonzero(fields.number >= 0)
+    out = np.zeros((fields.unknowns, len(table)))
+    if copies:
+        np.add.at(out, fields.number[free], table[:, free].T)
+    else:
+        out[fields.number[free]] = table[:, free].T
+        out[fields.number[fields.copies[0]]] = table[:, fields.copies[0]].T
+    return np.delete(out, fields.scalars[LOAD], axis=0)
+
+
+def simplest(basis: np.ndarray) -> np.ndarray:
+    """Basis of the same space, columns with a one where all others have a zero: plain rotations and translations."""
+    rows = basis.T.copy()
+    for i in range(len(rows)):
+        column = int(np.argmax(abs(rows[i:]).max(axis=0) > 0.5 * abs(rows[i:]).max()))
+        pivot = i + int(np.argmax(abs(rows[i:, column])))
+        rows[[i, pivot]] = rows[[pivot, i]]
+        rows[i] /= rows[i, column]
+        others = np.arange(len(rows)) != i
+        rows[others] -= np.outer(rows[others, column], rows[i])
+    return np.where(abs(rows) > 1e-9, rows, 0.0).T
+
+
+def _held(fields: Fields) -> np.ndarray:
+    """Local degrees of freedom that an end holds, or that a planar rod does without."""
+    dofs = [d.ravel() for d in fields.dofs.values()]
+    used = np.unique(np.concatenate(dofs))
+    return used[fields.number[used] < 0]
+
+
+def generic_state(fields: Fields, kept: np.ndarray, seed: int, decay: float = DECAY) -> None:
+    """Put a generic state with a random load into ``fields.u``: the same on any number of ranks, ends held.
+
+    Values are functions of the place along the rod, not of the numbering, with all Fourier coefficients: whatever
+    function of the arclength a load is, it does work.  Those of a ring are closed: whether a pressure is felt by a
+    translation, say, only shows there.
+    """
+    rng = np.random.default_rng(seed)
+    u, scene = fields.u.x.array, fields.scene
+    for block in fields.blocks:
+        x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
+        u[fields.dofs[block.name]] = _generic(fields, block, x[..., None], rng, decay)
+    u[fields.number < 0] = kept[fields.number < 0]
+    for i in range(len(fields.unknown_scalars)):
+        u[fields.copies[:, i]] = rng.normal()
+    low, high = sorted(scene.span)
+    u[fields.copies[:, -1]] = low + (high - low) * rng.uniform(0.1, 0.9)
+
+
+def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generator, decay: float) -> np.ndarray:
+    """Values of a field at places ``x`` (..., 1) in [0, 1]: periodic for a ring, but for what its closure asks for."""
+    ends = fields.scene.ends
+    scene, closed = fields.scene, isinstance(ends, Ring)
+
+    def wave() -> np.ndarray:
+        a, b, w, p = rng.normal(size=(4, block.size))
+        turn = (2 * np.pi if closed else 2.1) * (x - p)
+        kernel = (np.cos(turn) - decay) / (1 - 2 * decay * np.cos(turn) + decay**2)
+        return np.asarray(0.5 * (a + b * kernel + w * np.sin(turn)) + (0.0 if closed else 0.3 * p * x**2))
+
+    values = wave()
+    if block.name == "q":
+        u, v = np.linalg.qr(rng.normal(size=(4, 2)))[0].T
+        clamps = [end.fixed_rotation for end in scene.sides if end.fixed_rotation is not None]
+        u = np.array(clamps[0]) if clamps else u  # far from a clamp a rotation would come to it in a jump
+        if isinstance(ends, Ring) and ends.odd:  # of one sign at the start and of the other at the end
+            half = np.pi * x
+            values = (u + 0.3 * values) * np.cos(half) + (v + 0.3 * wave()) * np.sin(half)
+        else:
+            values = u + 0.3 * values
+        values = fields.turning.normalised(values)
+    if block.name == fields.turning.name and not closed:
+        values = _toward_clamps(fields, values, x)
+    if block.name == "angle" and closed:
+        first, last = fields.turning.start(scene.start, np.array(scene.interval), scene.interval)
+        values = values + (last - first) * x
+    if block.name == "v":
+        values = 0.1 * values + [1.0 if i == 2 else 0.0 for i in scene.free_strains]
+    return values
+
+
+def _toward_clamps(fields: Fields, values: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Rotations (..., size) that are those of clamps at the ends: a jump there would be a curvature without bound."""
+    scene, turning = fields.scene, fields.turning
+    for end, s, at_end in zip(scene.sides, scene.interval, ((1 - x) ** 3, x**3), strict=True):
+        if end.fixed_rotation is not None:
+            clamp = turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)
+            values = (1 - at_end) * values + at_end * clamp
+    return turning.normalised(values) if turning.name == "q" else values

@@ -1,0 +1,125 @@
+"""Newton's method on the bordered system, with chord steps where they converge fast enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+
+from petsc4py import PETSc
+
+from rodfem.fem.system import System
+
+TOLERANCE = 1e-10
+"""Size of the last correction of a converged state: rotations in radian, load over its span, all else relative."""
+ROUND_OFF = 1e-6
+"""Below this a correction that no longer shrinks is round-off, not divergence; it is reported as the error."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a Newton iteration ended.
+
+    ``error`` is what the observed rate of convergence leaves after the last correction (that one's size, if the factors
+    were new), ``moved`` the size of all corrections together.
+    """
+
+    converged: bool
+    iterations: int
+    error: float
+    moved: float
+
+
+def correct(
+    system: System,
+    x: PETSc.Vec,
+    row: PETSc.Vec,
+    most: int = 12,
+    reach: float = 1e3,
+) -> Outcome:
+    """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place, with LU factors.
+
+    As :func:`iterate`; fails at a singular matrix, too.
+    """
+    step = system.new_vector()
+
+    def solve(equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
+        if fresh:
+            system.factor(row)
+        return step if system.solve(equations, step) else None
+
+    return iterate(system, x, solve, most, reach)
+
+
+def iterate(
+    system: System,
+    x: PETSc.Vec,
+    solve: Callable[[PETSc.Vec, bool], PETSc.Vec | None],
+    most: int,
+    reach: float,
+    tolerance: float = 0.0,
+) -> Outcome:
+    """Newton's method with chord steps, in place; ``solve(equations, fresh)`` returns what is to be subtracted from x.
+
+    A Jacobian is factored first (``fresh``), and again only while corrections do not shrink tenfold from one to the
+    next: near a solution the old factors cost one solve where new ones cost five.  Done when a correction, or what the
+    observed rate of convergence leaves after it, is small enough.  Fails, leaving ``x`` where it got to, after ``most``
+    iterations, where there is nothing to subtract (None), or when ``x`` moves further than ``reach`` in the metric.
+
+    With damping ``d`` a correction of size c along a family of equilibria is that by a force ``d c``, which no mesh
+    makes exactly zero: one that no longer shrinks is accepted where that force is within the tolerance.
+    """
+    equations, origin = system.new_vector(), x.copy()
+    still = max(ROUND_OFF, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else ROUND_OFF
+    previous, size, refactor = float("inf"), float("inf"), True
+    iteration = 0
+    for iteration in range(1, most + 1):
+        system.residual(x, equations)
+        if not isfinite(equations.norm()):  # outside of where the stored energy is defined
+            break
+        fresh = refactor
+        step = solve(equations, fresh)
+        if step is None:
+            break
+        x.axpy(-1.0, step)
+        distance = system.norm(step)
+        size = max(distance, step.norm() / (1.0 + x.norm()))
+        if not isfinite(size) or distance > reach:
+            break
+        left = size if fresh else min(2.0 * size / previous, 1.0) * size
+        if size < TOLERANCE or left < tolerance or (fresh and still > size > 0.5 * previous):
+            origin.aypx(-1.0, x)
+            return Outcome(True, iteration, left, system.norm(origin))
+        refactor = size > 0.02 or size > 0.1 * previous
+        previous = size
+    origin.aypx(-1.0, x)
+    return Outcome(False, iteration, size, float("inf"))
+
+
+def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Outcome:
+    """Solve from a guess that is too far for Newton's method, in place, by pseudo-transient continuation.
+
+    The overdamped motion ``M x' = -F(x)`` on the constraints is integrated by implicit Euler steps, ``(S + M/tau) dx =
+    -F``, with ``M`` the metric: it goes downhill, to a state that is stable if one can be reached.  The time step grows
+    while the steps are small, and Newton's method takes over near the end (Kelley & Keyes, SIAM J. Numer. Anal. 35
+    (1998) 508-523).
+    """
+    equations, step = system.new_vector(), system.new_vector()
+    tau, trial = 1e-2 / system.stiffness_scale, x.copy()
+    for iteration in range(most):
+        system.residual(x, equations)
+        system.factor(row, damping=1.0 / tau)
+        if not isfinite(equations.norm()) or not system.solve(equations, step):
+            break
+        size = system.norm(step)
+        if not isfinite(size):
+            break
+        x.axpy(-min(1.0, 0.4 / size), step)  # a step that mends constraints is long whatever the time step
+        tau *= 2.0 if size < 0.2 else 0.5 if size > 0.4 else 1.0
+        if (iteration % 5 == 4 and size < 0.1) or size < 1e-3:  # not earlier: it might jump to a state uphill
+            x.copy(trial)
+            outcome = correct(system, trial, row, reach=0.3)
+            if outcome.converged:
+                trial.copy(x)
+                return outcome
+    return Outcome(False, most, float("inf"), float("inf"))

@@ -1,0 +1,218 @@
+r"""The continuous symmetries of a scene: infinitesimal motions of its state.
+
+A rigid motion of space or of the cross-sections changes each field and group of scalars by one of a few elementary
+generators ``g_j`` (:mod:`forms.symmetry`), linear or constant in its values; the motion of a closed rod along itself
+changes each field by its derivative in arclength.  A symmetry is a combination of them that carries equilibria into
+equilibria (:mod:`rodfem.fem.invariance` finds those of a scene, :mod:`rodfem.fem.verification` verifies them at each
+state).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from mpi4py import MPI
+
+from forms.symmetry import AXES, Matrix, cross, left, right
+from rodfem import compat
+from rodfem.fem.fields import Block, Fields
+from rodfem.problem.ends import Ring
+from rodfem.problem.scene import Scene
+
+
+@dataclass(frozen=True)
+class Elementary:
+    """A generator of one target (a field or a group of scalars): ``change = matrix value + constant``."""
+
+    target: str
+    matrix: Matrix
+    constant: tuple[float, ...]
+    name: str
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """A combination of elementary generators, and ``along`` times the motion of a closed rod along itself.
+
+    A mesh has a symmetry with the latter only up to its error: what is a zero eigenvalue of the rod is a very small one
+    of the mesh.
+    """
+
+    weights: np.ndarray
+    parts: tuple[Elementary, ...]
+    along: float = 0.0
+
+    def change(self, fields: Fields) -> np.ndarray:
+        """Change of the state that ``fields.u`` holds: local values, consistent on all ranks; zero for the load."""
+        out = self.along * derivative(fields) if self.along else np.zeros(len(fields.u.x.array))
+        for target, (matrix, constant) in self._targets.items():
+            add_change(fields, target, matrix, constant, out)
+        return out
+
+    def linear(self, fields: Fields) -> sp.csr_matrix:
+        """``A`` of the change ``A x + c`` (without ``along``) between local degrees of freedom, scalars once."""
+        rows, columns, values = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
+        for target, (matrix, _) in self._targets.items():
+            if target in fields.dofs:
+                dofs = np.unique(fields.dofs[target].reshape(-1, len(matrix)), axis=0)
+                places = list(enumerate(dofs.T))
+            else:
+                members = [(i, x.component) for i, x in enumerate(fields.unknown_scalars) if x.group == target]
+                places = [(component, fields.copies[:1, i]) for i, component in members]
+            for i, row in places:
+                for j, column in places:
+                    if matrix[i, j]:
+                        rows.append(row)
+                        columns.append(column)
+                        values.append(np.full(len(row), matrix[i, j]))
+        where = (np.concatenate(rows), np.concatenate(columns))
+        return sp.csr_matrix((np.concatenate(values), where), shape=(len(fields.number),) * 2)
+
+    def __str__(self) -> str:
+        """In words what moves: the names of the parts, the rotations and translations of other fields left out."""
+        parts = [p for p, w in zip(self.parts, self.weights, strict=True) if abs(w) > 1e-3 * abs(self.weights).max()]
+        names = list(dict.fromkeys(p.name for p in parts if p.name))
+        if self.along:
+            names.insert(0, "motion along itself")
+        return " with ".join(names) or "change of multipliers"
+
+    @cached_property
+    def _targets(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Sum of all parts with a weight, for each target."""
+        out: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        for weight, part in zip(self.weights, self.parts, strict=True):
+            if weight:
+                matrix, constant = out.get(part.target, (0.0, 0.0))
+                out[part.target] = (
+                    matrix + weight * np.array(part.matrix),
+                    constant + weight * np.array(part.constant),
+                )
+        return out
+
+
+# --- the motion of a closed rod along itself ------------------------------------------------------------------------
+
+
+def derivative(fields: Fields) -> np.ndarray:
+    """Derivative in arclength of the state that ``fields.u`` holds, the mean of elements at nodes; zero for scalars."""
+    u, kept = fields.u, fields.u.x.array.copy()
+    out, count = np.zeros(len(kept)), np.ones(len(kept))
+    for block in fields.blocks:
+        dofs, slopes = fields.dofs[block.name].ravel(), _slopes(fields, block).ravel()
+        out += np.bincount(dofs, slopes, minlength=len(kept))
+        count = np.maximum(count, np.bincount(dofs, minlength=len(kept)))
+    out /= count
+    if fields.comm.size > 1:
+        u.x.array[:] = out
+        u.x.scatter_forward()
+        out = u.x.array.copy()
+        u.x.array[:] = kept
+    out[fields.number < 0] = 0.0
+    return out
+
+
+def mismatch(fields: Fields) -> float:
+    """Greatest jump between elements of the derivative of rotation or centreline.
+
+    It tells how far the mesh is from moving along itself.
+    """
+    worst = 0.0
+    for block in (b for b in fields.blocks if b.name in (fields.turning.name, "r")):
+        dofs, slopes = fields.dofs[block.name].ravel(), _slopes(fields, block).ravel()
+        low, high = np.full(len(fields.number), np.inf), np.full(len(fields.number), -np.inf)
+        np.minimum.at(low, dofs, slopes)
+        np.maximum.at(high, dofs, slopes)
+        worst = max(worst, float((high - low)[dofs].max()))
+    return float(fields.comm.allreduce(worst, op=MPI.MAX))
+
+
+def _slopes(fields: Fields, block: Block) -> np.ndarray:
+    """Derivative in arclength of a field at the nodes of each cell, (cells, nodes, components)."""
+    size = (fields.vertices[:, 1] - fields.vertices[:, 0])[:, None, None]
+    values = fields.u.x.array[fields.dofs[block.name]].real
+    return np.asarray(np.matmul(differentiation(block.degree), values) / size)
+
+
+@cache
+def differentiation(degree: int) -> np.ndarray:
+    """Matrix of the derivative of the polynomial through values at the nodes of an element, at the nodes: (m, m)."""
+    nodes = compat.nodes(degree)
+    powers = np.vander(2 * nodes - 1, increasing=True)
+    slopes = np.zeros_like(powers)
+    slopes[:, 1:] = 2 * powers[:, :-1] * np.arange(1, len(nodes))
+    return np.asarray(slopes @ np.linalg.inv(powers))
+
+
+def may_slide(scene: Scene) -> bool:
+    """Whether nothing but functions of the arclength can keep a closed rod from moving along itself."""
+    at_points = scene.attachments or any(x.s is not None for x in scene.constraints)
+    return isinstance(scene.ends, Ring) and not at_points
+
+
+# --- elementary generators ------------------------------------------------------------------------------------------
+
+
+def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
+    """All elementary generators of the fields and groups of scalars that a scene has."""
+    vectors = {"n", "a", "b", "ma", "mb"} & {x.group for x in fields.unknown_scalars}
+    blocks = {b.name for b in fields.blocks}
+    out = []
+    sizes = {g: sum(x.group == g for x in fields.unknown_scalars) for g in vectors}
+    for i, axis in enumerate(AXES, start=1):
+        turn = f"rotation about e{i}"
+        if fields.scene.normal is None:
+            out.append(Elementary("q", left(axis), (0.0,) * 4, turn))
+            out.append(Elementary("q", right(axis), (0.0,) * 4, f"turning of the cross-sections about d{i}"))
+        elif axis == AXES[fields.scene.normal]:
+            out.append(Elementary("angle", ((0.0,),), (1.0,), turn))
+        for target in sorted(vectors | ({"r", "n"} & blocks)):
+            if target in ("ma", "mb") and sizes[target] == 2:
+                continue
+            out.append(Elementary(target, cross(axis), (0.0,) * 3, ""))
+            if target in ("r", "a", "b"):
+                out.append(Elementary(target, ((0.0,) * 3,) * 3, axis, f"translation along e{i}"))
+    count = sum(x.group == "g" for x in fields.unknown_scalars)
+    for i in range(count):  # multipliers of constraints may turn into each other
+        for j in range(i):
+            turned = np.zeros((count, count))
+            turned[i, j], turned[j, i] = 1.0, -1.0
+            out.append(Elementary("g", tuple(map(tuple, turned)), (0.0,) * count, ""))
+    for target in sorted(g for g in vectors if g in ("ma", "mb") and sizes[g] == 2):
+        out.append(Elementary(target, ((0.0, -1.0), (1.0, 0.0)), (0.0, 0.0), ""))
+    return tuple(out)
+
+
+def add_change(fields: Fields, target: str, matrix: np.ndarray, constant: np.ndarray, out: np.ndarray) -> None:
+    """Add the change ``matrix value + constant`` of one target, at the state that ``fields.u`` holds."""
+    u = fields.u.x.array
+    load = float(u[fields.copies[0, -1]])
+    if target in fields.dofs:
+        dofs = fields.dofs[target]
+        values = u[dofs]
+        if target == "r":
+            values = values + fields.lift(fields.coordinates(fields.discretization.degree), load)
+        out[dofs] += values @ matrix.T + constant  # of dofs that cells share, once: the sum is buffered
+        return
+    members = [(i, x.component) for i, x in enumerate(fields.unknown_scalars) if x.group == target]
+    values = np.zeros(len(constant)) if len(members) == len(constant) else _known(fields, target, load, len(constant))
+    for i, component in members:
+        values[component] = u[fields.copies[0, i]]
+    change = matrix @ values + constant
+    for i, component in members:
+        out[fields.copies[:, i]] += change[component]
+
+
+def _known(fields: Fields, group: str, load: float, size: int) -> np.ndarray:
+    """Values of the components of a group that are not unknowns (known forces, held positions), else zero."""
+    scene, values = fields.scene, np.zeros(size)
+    c = scene.constants(load)
+    if group == "n":
+        known = [scene.known_force(i, c) for i in range(3)]
+    elif group in ("a", "b"):
+        known = scene.sides["ab".index(group)].held(c)
+    else:
+        return values
+    return np.array([0.0 if x is None else float(x) for x in known])

@@ -1,0 +1,59 @@
+"""A richer discretisation of a rod, and the interpolation of states and directions on it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem import compat
+from rodfem.fem.fields import HIGHEST
+from rodfem.fem.system import System
+
+
+def richer_system(system: System) -> System:
+    """Return the system of the same rod on halves of its elements, of one degree more (but of the highest one)."""
+    d = system.fields.discretization
+    halves = replace(d, vertices=tuple(map(float, system.fields.all_vertices())))
+    finer = halves.finer(2, richer=int(d.degree < HIGHEST))
+    return System(system.scene, finer, system.comm, system.clock, symmetries=system.symmetries)
+
+
+class Transfer:
+    """Interpolates vectors of one system to another whose elements are those of the first, or parts of them."""
+
+    def __init__(self, source: System, target: System) -> None:
+        """Tabulate the bases of the source at the nodes of the target."""
+        self.source, self.target = source, target
+        old, new = source.fields, target.fields
+        vertices = old.all_vertices()
+        self._owned = slice(0, old.owned_cells)
+        self._order = np.argsort(np.concatenate(source.comm.allgather(old.vertices[self._owned, 0])))
+        self._parents = np.searchsorted(vertices, new.vertices.mean(axis=1)) - 1
+        first, size = vertices[self._parents, None], np.diff(vertices)[self._parents, None]
+        places, which = np.unique(np.round((new.vertices - first) / size, 9), axis=0, return_inverse=True)
+        self._members = [np.flatnonzero(which.ravel() == i) for i in range(len(places))]
+        degrees = {b.name: b.degree for b in old.blocks}
+        self._bases = {
+            b.name: [compat.lagrange_basis(degrees[b.name], a + (z - a) * compat.nodes(b.degree)) for a, z in places]
+            for b in new.blocks
+        }
+
+    def __call__(self, vector: PETSc.Vec, *, state: bool) -> PETSc.Vec:
+        """Interpolate a state, or (``state=False``) a direction, which is zero where a state is clamped."""
+        old, new = self.source.fields, self.target.fields
+        clamped = new.u.x.array.copy()
+        self.source.bring(vector)
+        values = old.u.x.array.copy()
+        if not state:
+            values[old.number < 0] = 0.0
+        for name, bases in self._bases.items():
+            every = np.concatenate(self.source.comm.allgather(values[old.dofs[name][self._owned]]))[self._order]
+            for members, basis in zip(self._members, bases, strict=True):
+                new.u.x.array[new.dofs[name][members]] = np.einsum("pn,cni->cpi", basis, every[self._parents[members]])
+        new.u.x.array[new.copies] = values[old.copies[0]]
+        out = self.target.take()
+        fixed = new.number < 0
+        new.u.x.array[fixed] = clamped[fixed]
+        return out

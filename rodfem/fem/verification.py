@@ -1,0 +1,218 @@
+r"""Symmetries verified at each state: a generator must be a null vector of the second variation.
+
+Where the equations are equivariant their derivative along a generator ``g(x) = A x + c`` is known, at any state ``x``,
+
+    S(x) g(x) + A^t F(x) = 0,
+
+at an equilibrium ``S g = 0``.  One generator is tried whenever ``S`` is assembled, a random combination of all: it
+costs one product with ``S``.  What is left must be round-off, relative to ``|S| |g|``, and so must the quotient
+``g.(S g + A^t F) / g.M g``, which is the eigenvalue that the symmetry explains.  A ring is closed by multipliers that
+are no part of a generator: what is left is taken across their columns.  The motion of a closed rod along itself is one
+of its mesh up to the mesh's error: of that the quotient alone is asked, with ``F`` along the change of ``g``.
+
+A symmetry that fails is dropped, with a notice.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.fem.symmetries import Symmetry, mismatch
+
+if TYPE_CHECKING:
+    from rodfem.fem.system import System
+
+EPS = 100 * float(np.finfo(float).eps)
+ROUND_OFF = 1e-8
+"""Residual ``S g`` of a symmetry, relative to ``|S| |g|``."""
+ZERO = 1e-5
+"""Eigenvalue that a symmetry may have, over the rod's lowest bending eigenvalue, beside round-off."""
+TINY = 0.01
+"""A generator (of unit rotations and translations) of this size is small: the state has the symmetry itself, nearly."""
+OF_THE_MESH = 100.0
+"""Eigenvalue that a mesh makes of a motion along itself, at most, over the lowest bending one and its mismatch."""
+FAR = 1e-4
+"""Error that a mesh makes of the equations' part in it, at most, relative."""
+
+
+class Verification:
+    """Verifies the symmetries of one :class:`~rodfem.fem.system.System` at states where ``S`` is assembled.
+
+    Attributes
+    ----------
+    dropped
+        Places of the symmetries that were found to be none.
+    notices
+        A sentence on each of them that nobody has read yet.
+    """
+
+    def __init__(self, system: System) -> None:
+        """Nothing is dropped."""
+        self.system = system
+        self.dropped: set[int] = set()
+        self.notices: list[str] = []
+        self._generators: dict[tuple[int, ...], Generator] = {}
+        self._norm = 0.0
+        self._closing: list[PETSc.Vec] | None = None
+        self._left, self._none = system.new_vector(), np.zeros(len(system.drifts))
+
+    def __call__(self, matrix: PETSc.Mat, x: PETSc.Vec, equations: PETSc.Vec | None = None) -> bool:
+        """Try the symmetries at the state ``x``, whose ``S`` is given; False where one of them was dropped.
+
+        ``equations`` are those at ``x``, zero at an equilibrium (None).  The state must be the one last brought.
+        """
+        failed = self._failing(matrix, equations)
+        if failed and equations is None:  # the state may be no equilibrium: one that was carried over from another mesh
+            equations = self.system.new_vector()
+            self.system.residual(x, equations)
+            failed = self._failing(matrix, equations)
+        for i in failed:
+            self.drop(i, x)
+        return not failed
+
+    def _failing(self, matrix: PETSc.Mat, equations: PETSc.Vec | None) -> list[int]:
+        """Symmetries, by number, whose generators are no null vectors of ``S`` at the state last brought."""
+        candidates = [i for i in range(len(self.system.symmetries)) if i not in self.dropped]
+        if not candidates:
+            return []
+        self._norm = self._norm or matrix.norm(PETSc.NormType.INFINITY)
+        exact = [i for i in candidates if not self.system.symmetries[i].along]
+        suspects = [i for i in candidates if i not in exact]
+        if exact and not self._holds(matrix, self._mixture(tuple(exact)), equations):
+            suspects += exact
+        return [i for i in suspects if not self._holds(matrix, self._mixture((i,)), equations)]
+
+    def drop(self, i: int, x: PETSc.Vec) -> None:
+        """Drop a symmetry, in words."""
+        load = self.system.scene.load
+        self.dropped.add(i)
+        self.notices.append(
+            f"No symmetry is the {self.system.symmetries[i]}: it was taken for one, but is no null vector of the "
+            f"second variation at {load} = {self.system.scalar(x):.6g}; it is left out from there on."
+        )
+
+    def read(self) -> list[str]:
+        """Notices that nobody has read."""
+        out, self.notices = self.notices, []
+        return out
+
+    def _mixture(self, chosen: tuple[int, ...]) -> Generator:
+        """Generic combination of symmetries."""
+        if chosen not in self._generators:
+            symmetries = [self.system.symmetries[i] for i in chosen]
+            weights = np.random.default_rng(0).uniform(0.5, 1.0, len(chosen)) * (-1.0) ** np.arange(len(chosen))
+            sums = sum((w * s.weights for w, s in zip(weights, symmetries, strict=True)), 0.0 * weights[:1])
+            mixed = symmetries[0] if len(chosen) == 1 else Symmetry(sums, symmetries[0].parts)
+            self._generators[chosen] = Generator(self.system, mixed)
+        return self._generators[chosen]
+
+    def _holds(self, matrix: PETSc.Mat, generator: Generator, equations: PETSc.Vec | None) -> bool:
+        """Whether a generator is a null vector of ``S`` at the state last brought."""
+        system, left = self.system, self._left
+        g = generator.change()
+        matrix.mult(g, left)
+        if system.has_scalars:
+            left.setValues(system.drifts, self._none)  # phase conditions, no part of S
+        left.assemble()
+        size, length = system.norm(g) ** 2, g.norm()
+        zero = ZERO * system.stiffness_scale * max(size, TINY) + EPS * self._norm * length**2
+        quotient = float(np.real(left.dot(g)))
+        if generator.symmetry.along:
+            return abs(quotient) <= zero or self._of_the_mesh(generator.symmetry, g, quotient, zero, equations)
+        small = ROUND_OFF * self._norm * (length + TINY)
+        if equations is not None:
+            left.axpy(1.0, generator.pulled_back(self._unloaded(equations)))
+            quotient = float(np.real(left.dot(g)))
+        if left.norm() > small:
+            self._across_closing(matrix, left)
+        return left.norm() <= small and abs(quotient) <= zero
+
+    def _of_the_mesh(
+        self, symmetry: Symmetry, g: PETSc.Vec, quotient: float, zero: float, equations: PETSc.Vec | None
+    ) -> bool:
+        """Whether a ``quotient`` that is not zero is the error of the mesh, or of a state that is no equilibrium."""
+        system, u = self.system, self.system.fields.u.x.array
+        state = u.copy()
+        zero += OF_THE_MESH * system.stiffness_scale * mismatch(system.fields) * system.norm(g)
+        if equations is not None:
+            change = self._change_of(symmetry, g)
+            quotient += float(np.real(equations.dot(change)))
+            zero += FAR * equations.norm() * change.norm()
+            u[:] = state
+        return abs(quotient) <= zero
+
+    def _change_of(self, symmetry: Symmetry, g: PETSc.Vec) -> PETSc.Vec:
+        """``A g`` for the generator ``A x + c``; the state that the dolfinx function holds is lost."""
+        fields, system = self.system.fields, self.system
+        fields.u.x.array[:] = 0.0
+        constant = symmetry.change(fields)
+        system.bring(g)
+        fields.u.x.array[:] = symmetry.change(fields) - constant
+        return system.take()
+
+    def _unloaded(self, equations: PETSc.Vec) -> PETSc.Vec:
+        """The equations without the forces of the drift scalars."""
+        if not self.system.drifting.any():
+            return equations
+        out = equations.copy()
+        for drift, phase in zip(self.system.drifting, self.system.phases, strict=True):
+            if phase is not None and drift:
+                out.axpy(-drift, phase)
+        return out
+
+    def _across_closing(self, matrix: PETSc.Mat, left: PETSc.Vec) -> None:
+        """Take from ``left`` what multipliers that close a ring make up for, in place."""
+        if self._closing is None:
+            fields, self._closing = self.system.fields, []
+            for unknown in fields.unknown_scalars:
+                if unknown.group in ("t", "f"):
+                    column = self.system.new_vector()
+                    matrix.getColumnVector(fields.scalars[unknown.name], column)
+                    column.normalize()
+                    self._closing.append(column)
+        for column in self._closing:
+            left.axpy(-column.dot(left), column)
+
+
+class Generator:
+    """Change ``A x + c`` of the state last brought by a symmetry, and ``A^t y``, by sparse matrices."""
+
+    def __init__(self, system: System, symmetry: Symmetry) -> None:
+        """Make the matrices."""
+        fields = system.fields
+        self.system, self.symmetry = system, symmetry
+        scalars = fields.copies[0] if system.has_scalars else np.zeros(0, int)
+        rows, columns = np.concatenate([fields.free_owned, scalars]), np.flatnonzero(fields.number >= 0)
+        A = symmetry.linear(fields)
+        self._forth, self._back = A[rows][:, columns], A.T.tocsr()[rows][:, columns]
+        self._change, self._pulled = system.new_vector(), system.new_vector()
+        self._size, (low, high), u = len(rows), system.scene.span, fields.u.x.array
+        kept, u[fields.number >= 0] = u.copy(), 0.0
+        constants = []
+        for load in (low, 0.62 * low + 0.38 * high, high):
+            u[fields.copies[:, -1]] = load
+            constants.append(symmetry.change(fields)[rows])
+        u[:] = kept
+        self._constant = constants[0]
+        varies = any(np.any(c != self._constant) for c in constants)  # with ends that are held, and known forces
+        self._varies = bool(symmetry.along) or bool(system.comm.allreduce(varies, op=MPI.LOR))
+
+    def change(self) -> PETSc.Vec:
+        """Change of the state last brought."""
+        if self._varies:
+            u = self.system.fields.u.x.array
+            state, u[:] = u.copy(), self.symmetry.change(self.system.fields)
+            change = self.system.take()
+            u[:] = state
+            return change
+        self._change.array[: self._size] = self._forth @ self.system.x_local.array_r.real + self._constant
+        return self._change
+
+    def pulled_back(self, covector: PETSc.Vec) -> PETSc.Vec:
+        """``A^t`` times a covector."""
+        self._pulled.array[: self._size] = self._back @ self.system.gathered(covector)
+        return self._pulled

@@ -1,0 +1,5 @@
+"""What a rod does in a perturbation, and its left-most modes."""
+
+from rodfem.lazy import attributes
+
+__getattr__ = attributes("rodfem.modes")

@@ -1,0 +1,171 @@
+r"""Modes as one wants them: what the rod does in its left-most eigenvectors, and how to find them in what it does.
+
+A mode is a motion ``(u, w)`` of the rod: displacement and infinitesimal rotation along it, in the space frame, with its
+eigenvalue ``mu``.  It has unit kinetic energy, ``int rhoA u.u + w.(rhoI) w ds = 1`` (a symmetry that moves nothing with
+inertia: unit size in the metric of rotations), so that its amplitude ``a(t)`` in a small motion of the rod obeys ::
+
+    a'' + mu a = f(t),        f = sum (force . u + moment . w),
+
+whatever the scene's inertia is.  For feedback one needs ``a`` and the gain ``f``: the *weights* of a mode are the
+mass times its left eigenvector, one vector for displacements and one for rotations at each node, such that ::
+
+    a = sum over nodes of (weight_displacement . displacement + weight_rotation . rotation)
+
+for every small motion, and nothing of the other modes.  Without potential (follower loads) the pencil has left
+eigenvectors of its own: ``f`` is taken with ``left_displacement``, ``left_rotation``; else these are ``u, w``.  A
+complex pair of eigenvalues is one complex mode, of the one with positive imaginary part; the other is its conjugate.
+
+Symmetry modes, whose eigenvalue is zero for a reason, come after the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rodfem.errors import SceneError
+from rodfem.file_format import MODES
+from rodfem.problem.setting import Setting, read
+
+if TYPE_CHECKING:
+    from rodfem.problem.scene import Scene
+
+SYMMETRY = "symmetry"
+"""Name of the motion in a symmetry mode."""
+FIELDS = ("value", "residual", "error", "displacement", "rotation", "rotation_body")
+LEFT = ("left_displacement", "left_rotation", "weight_displacement", "weight_rotation")
+
+
+@dataclass(frozen=True, repr=False)
+class Modes:
+    """Modes of one state, K of them, at the m nodes of the mesh; nondimensional, or in the units of the scene.
+
+    Attributes
+    ----------
+    s, r, q, load
+        The state: arclength (m,), centreline (m, 3), unit quaternions (m, 4), and the load.
+    value
+        Eigenvalues ``mu = omega^2`` (K,); those of symmetries, zero, come last.  Complex under non-conservative loads.
+    residual, error
+        Backward errors of the eigenpairs, and estimated errors of the discretisation (K,); nan where not estimated, and
+        for symmetries.
+    motion
+        What each does: :data:`SYMMETRY`, bending about a director, torsion, or a mixture.
+    displacement, rotation
+        In the space frame, (K, m, 3).
+    left_displacement, left_rotation, weight_displacement, weight_rotation
+        What takes forces to the mode's amplitude, and motions to it, (K, m, 3).
+    """
+
+    load: float
+    s: np.ndarray
+    r: np.ndarray
+    q: np.ndarray
+    value: np.ndarray
+    residual: np.ndarray
+    error: np.ndarray
+    motion: tuple[str, ...]
+    displacement: np.ndarray
+    rotation: np.ndarray
+    left_displacement: np.ndarray
+    left_rotation: np.ndarray
+    weight_displacement: np.ndarray
+    weight_rotation: np.ndarray
+
+    def __repr__(self) -> str:
+        """Load, and each eigenvalue with its motion."""
+        each = ", ".join(f"{v:.6g} ({m})" for v, m in zip(self.value, self.motion, strict=True))
+        return f"<Modes at load {self.load:.10g}: mu = {each}>"
+
+    @property
+    def rotation_body(self) -> np.ndarray:
+        """Rotations by their components along the directors, (K, m, 3)."""
+        frames = Rotation.from_quat(self.q[:, [1, 2, 3, 0]]).as_matrix()
+        return np.einsum("mji,kmj->kmi", frames, self.rotation)
+
+    def amplitude(self, displacement: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        """Amplitudes (K,) of the modes in a small motion (m, 3), (m, 3) of the rod."""
+        return np.asarray(
+            np.tensordot(self.weight_displacement, displacement) + np.tensordot(self.weight_rotation, rotation)
+        )
+
+
+def save_modes(
+    modes: Modes,
+    path: Path,
+    branch: str,
+    row: int,
+    about: Mapping[str, Any],
+    *,
+    first: bool,
+    scene: Scene | None = None,
+) -> None:
+    """Append the modes of one state to an HDF5 file (``first``: a new one), to be called on one rank.
+
+    ``about`` says in the file's attributes what rod it is.  Group ``/branches/<branch>/<row>``, named as in
+    ``states.h5``, has the state's ``load``, ``s``, ``r``, ``q`` and the arrays of :class:`Modes`; a complex number is a
+    compound of ``r`` and ``i``.  Of a ``scene``, if given, what holds and loads it is written for pictures, as in
+    ``states.h5`` (see :func:`rodfem.problem.supports.write`).
+    """
+    with h5py.File(path, "w" if first else "a") as file:
+        if first:
+            file.attrs.update(MODES.mark_attributes())
+        MODES.check_hdf5(file)
+        file.attrs.update(about, normalisation="kinetic energy: mode . M mode = 1")
+        group = file.create_group(f"branches/{branch}/{row}")
+        for name in ("load", "s", "r", "q", *FIELDS, *LEFT):
+            group[name] = getattr(modes, name)
+        group["motion"] = np.array(modes.motion, dtype=h5py.string_dtype())
+        if scene is not None:
+            from rodfem.problem.supports import write, write_section  # they need UFL, which pictures do not
+
+            if first:
+                write_section(file, scene)
+            write(group, scene, [{name: getattr(modes, name) for name in ("load", "s", "r", "q")}])
+
+
+def load_modes(path: Path, branch: str, row: int) -> Modes:
+    """Modes of a saved state; raises :class:`SceneError` where the file has none, or has another or a newer format."""
+    try:
+        with h5py.File(path, "r") as file:
+            MODES.check_hdf5(file, ("branches",))
+            group = file[f"branches/{branch}/{row}"]
+            missing = [name for name in Modes.__dataclass_fields__ if name not in group]
+            if missing:
+                raise SceneError(
+                    f"{path} has modes of row {row} of the branch {branch!r} without {', '.join(missing)}: another "
+                    "version of rodfem wrote it; run the scene again."
+                )
+            arrays = {name: group[name][()] for name in Modes.__dataclass_fields__ if name != "motion"}
+            motion = tuple(group["motion"].asstr()[()])
+    except (OSError, KeyError) as trouble:
+        raise SceneError(f"{path} has no modes of row {row} of a branch {branch!r}: {_contents(path)}.") from trouble
+    arrays["load"] = float(arrays["load"])
+    return Modes(motion=motion, **arrays)
+
+
+def load_setting(path: Path, branch: str, row: int) -> Setting:
+    """What holds and loads the rod whose modes a file has, as far as it says so."""
+    with h5py.File(path, "r") as file:
+        return read(file[f"branches/{branch}/{row}"])
+
+
+def heading(path: Path) -> str:
+    """Title of the rod whose modes a file has, to begin a caption with."""
+    with h5py.File(path, "r") as file:
+        return f"{file.attrs['title']}, " if "title" in file.attrs else ""
+
+
+def _contents(path: Path) -> str:
+    """What a file of modes has, in words."""
+    try:
+        with h5py.File(path, "r") as file:
+            return "it has " + "; ".join(f"{name}, row {', '.join(rows)}" for name, rows in file["branches"].items())
+    except (OSError, KeyError):
+        return "run a scene with --modes and --at"

@@ -1,0 +1,37 @@
+"""Numbers in words: with the digits that their error supports, and its bar."""
+
+from __future__ import annotations
+
+from math import ceil, floor, isfinite, log10
+
+from rodfem.continuation.branch import Special
+
+
+def rounded_up(error: float) -> float:
+    """Return an error with one digit, never smaller than it is (but for round-off)."""
+    if not (isfinite(error) and error > 0):
+        return error
+    power = floor(log10(error))
+    return float(f"{ceil(error / 10.0**power * (1 - 1e-12))}e{power}")
+
+
+def number(value: float, error: float, resolved: bool | None = True) -> str:
+    """Write a number with the digits that its error supports, and its bar: ``0.3216501 (3e-07)``.
+
+    The bar is rounded up; to the error it adds what the digits left out amount to.  ``(at least 3e-02)`` where the mesh
+    has not ``resolved`` what the number is of.
+    """
+    if not isfinite(error):
+        return f"{value:.8g} (no estimate)"
+    digits = min(max(-floor(log10(rounded_up(error)) + 1e-9), 0), 13) if error > 0 else 13
+    shown = round(value, digits) + 0.0
+    least = "at least " if resolved is False else ""
+    return f"{shown:.{digits}f} ({least}{rounded_up(error + abs(value - shown)):.0e})"
+
+
+def index_in_words(special: Special) -> str:
+    """Index at a special point in words: before and after if it changes."""
+    before, after = special.negative_before, special.negative_after
+    index = f"{before}->{after}" if before != after else f"{special.point.negative}"
+    space = special.point.negative_in_space
+    return index if space is None else f"{index} (in space {space})"

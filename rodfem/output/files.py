@@ -1,0 +1,274 @@
+"""A bifurcation diagram as plain columnar data: made from branches, saved to ``diagram.json`` and ``states.h5``.
+
+``diagram.json`` holds for each branch its columns (one entry a row, a row being an equilibrium; ``meaning`` has each in
+words) and its special points, each of which is a row too.  ``states.h5`` holds the same rows as shapes and fields in
+natural order along the rod, whatever the number of ranks: to draw them, or to start again from one with
+:func:`load_state`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.continuation.branch import Branch, Special, not_followed
+from rodfem.continuation.solvers import Equilibria
+from rodfem.errors import SceneError
+from rodfem.fem.fields import Fields
+from rodfem.fem.system import System
+from rodfem.file_format import DIAGRAM, STATES, read_json
+from rodfem.modes.perturbation import Motions
+from rodfem.problem.supports import write as write_supports
+from rodfem.problem.supports import write_section
+from rodfem.timing import Clock
+
+COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error", "mesh")
+
+MEANING = {
+    "load": "value of the parameter",
+    "ordinate": "the scene's ordinate",
+    "energy": "stored energy int W ds of the rod, without the potential of the loads, springs and foundations",
+    "negative": "number of negative eigenvalues of the constrained second variation (the index): 0 is stable",
+    "zero": "number of eigenvalues that vanish, those of symmetries included",
+    "stretch": "least stretch v3 along the rod",
+    "slope": "the load's component of the unit tangent",
+    "drift": "largest drift scalar: the error with which the mesh has the symmetries",
+    "arclength": "length along the branch, in the metric of rotations and load",
+    "error": "size of the last Newton correction",
+    "mesh": "number of the discretisation in meshes",
+}
+"""Columns in words, as they stand in the file."""
+UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
+"""What ``negative`` counts where loads have no potential."""
+
+
+def as_data(
+    branches: Sequence[Branch],
+    systems: Sequence[System],
+    clock: Clock,
+    span: tuple[float, float],
+    accuracy: float | None = None,
+) -> dict[str, Any]:
+    """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene).
+
+    ``systems`` are those of the meshes that the points name by their number; ``discretization`` is the one with most
+    unknowns, and ``meshes`` has all.
+    """
+    system = max(systems, key=lambda s: s.fields.unknowns)
+    scene, d = system.scene, system.fields.discretization
+    s = clock.seconds
+    points = sum(len(b.points) for b in branches)
+    work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
+    return {
+        "format": DIAGRAM.mark(),
+        "scene": scene.name,
+        "title": scene.title or scene.name,
+        "parameter": scene.load,
+        "parameter_label": scene.parameters[scene.load].label or scene.load,
+        "ordinate": scene.ordinate.name,
+        "ordinate_label": scene.ordinate.label or scene.ordinate.name,
+        "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
+        "range": list(span),
+        "discretization": {
+            "formulation": d.formulation,
+            "elements": d.elements,
+            "degree": d.degree,
+            "unknowns": system.fields.unknowns,
+        },
+        "accuracy": accuracy,
+        "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
+        "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE}),
+        "branch_points_not_followed": not_followed(branches),
+        "meshes": [_mesh_data(s.fields) for s in systems],
+        "branches": [_branch_data(b) for b in branches],
+        "timing": {
+            "assembly_s": s.get("assembly", 0.0),
+            "solve_s": s.get("solve", 0.0),
+            "stability_s": s.get("stability", 0.0),
+            "location_s": s.get("location", 0.0),
+            "error_bars_s": s.get("error bars", 0.0),
+            "setup_s": s.get("setup", 0.0),
+            "total_s": clock.total(),
+            "points": points,
+            "ms_per_point": 1e3 * work / max(points, 1),
+            "ranks": system.comm.size,
+        },
+    }
+
+
+def _mesh_data(fields: Fields) -> dict[str, Any]:
+    d = fields.discretization
+    return {
+        "elements": d.elements,
+        "degree": d.degree,
+        "unknowns": fields.unknowns,
+        "vertices": None if d.vertices is None else list(d.vertices),
+    }
+
+
+def _branch_data(branch: Branch) -> dict[str, Any]:
+    rows = {id(p): i for i, p in enumerate(branch.points)}
+    columns: dict[str, list[Any]] = {name: [_plain(getattr(p, name)) for p in branch.points] for name in COLUMNS}
+    if any(np.isfinite(p.estimate) for p in branch.points):
+        columns["estimate"] = [_plain(p.estimate) for p in branch.points]
+    if any(p.spectrum for p in branch.points):
+        columns["spectrum"] = [p.spectrum for p in branch.points]
+    if any(p.negative_in_space is not None for p in branch.points):
+        columns["negative_in_space"] = [p.negative_in_space for p in branch.points]
+    if any(p.omega2 for p in branch.points):
+        columns["omega2"] = [p.omega2 for p in branch.points]
+        columns["motion"] = [p.motion for p in branch.points]
+        columns["curve"] = [p.curve for p in branch.points]
+        columns["unstable"] = [p.negative for p in branch.points]
+    return {
+        "name": branch.name,
+        "parent": list(branch.parent) if branch.parent else None,
+        "ended": branch.ended,
+        "columns": columns,
+        "special": [_special_data(s) for s in branch.special],
+        "singular_start": branch.singular_start,
+        "unexplained": [{"row": rows[id(u.a)], "before": u.before, "after": u.after} for u in branch.unexplained],
+    }
+
+
+def _special_data(s: Special) -> dict[str, Any]:
+    return {
+        "kind": s.kind,
+        "load": s.point.load,
+        "ordinate": s.point.ordinate,
+        "energy": s.point.energy,
+        "row": s.row,
+        "negative_before": s.negative_before,
+        "negative_after": s.negative_after,
+        "zero": s.point.zero,
+        "multiplicity": s.multiplicity,
+        "error_estimate": _plain(s.error_estimate),
+        "ordinate_error_estimate": _plain(s.ordinate_error),
+        "resolved": s.resolved,
+        "located_to": s.located_to,
+        "coupling": s.coupling,
+        "meets": list(s.meets) if s.meets else None,
+        "followed": s.switched,
+        "omega2": _plain(s.omega2),
+        "law": None if s.law is None else asdict(s.law) | {"uncertainty": _plain(s.law.uncertainty)},
+        "unfolding": _plain(s.unfolding),
+        "note": s.note,
+    }
+
+
+def _plain(value: float) -> float | int | None:
+    """Number that JSON can hold; what is not finite becomes null."""
+    if isinstance(value, int):
+        return value
+    return float(value) if np.isfinite(value) else None
+
+
+def save_json(data: dict[str, Any], path: Path) -> None:
+    """Write a diagram whole or not at all, so that an interrupted run leaves the last good file."""
+    draft = path.with_suffix(".json.part")
+    draft.write_text(json.dumps(data, indent=1) + "\n")
+    os.replace(draft, path)
+
+
+def load_json(path: Path) -> dict[str, Any]:
+    """Read a diagram; raises :class:`SceneError` where there is none, or one of a newer format."""
+    return read_json(path, DIAGRAM, ("scene", "parameter", "branches"))
+
+
+def save_states(branch: Branch, solvers: Sequence[Equilibria], path: Path, first: bool) -> None:
+    """Append the states of a branch to an HDF5 file; collective, written on rank 0.
+
+    Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
+    every further field and scalar with P rows, and under ``special/<i>`` the null vectors of its special points:
+    displacement ``r``, ``rotation`` in the space frame, and the change of ``q``.  Below it are the groups of
+    :func:`rodfem.problem.supports.write`, for pictures; the file has the name of the ``first`` branch and the bending
+    stiffness under ``section``.  ``solvers`` are those of the meshes that points name; the rows of a mesh with fewer
+    nodes end in nan.
+    """
+    import h5py
+
+    samples = [solvers[p.mesh].shape.sample(p.x) for p in branch.points]
+    used = {s.point.mesh for s in branch.special}
+    motions = {i: Motions(solvers[i].system) for i in sorted(used)}
+    modes = [[motions[s.point.mesh].at(s.point.x, v) for v in s.null_vectors] for s in branch.special]
+    system = solvers[0].system
+    if system.comm.rank:
+        return
+    with h5py.File(path, "w" if first else "a") as file:
+        file.attrs.update(
+            scene=system.scene.name,
+            parameter=system.scene.load,
+            formulation=system.fields.discretization.formulation,
+        )
+        if first:
+            file.attrs.update(STATES.mark_attributes(), first=branch.name)
+            write_section(file, system.scene)
+        group = file.create_group(f"branches/{branch.name}")
+        for name in samples[0]:
+            group[name] = _stacked([np.asarray(s[name]) for s in samples])
+        write_supports(group, system.scene, samples)
+        for i, vectors in enumerate(modes):
+            for j, mode in enumerate(vectors):
+                target = group.create_group(f"special/{i}/null_vector_{j}")
+                target["r"], target["q"], target["rotation"] = mode.r, mode.q, mode.w
+
+
+def _stacked(rows: list[np.ndarray]) -> np.ndarray:
+    """Arrays of equal or different shapes as the rows of one, filled up with nan."""
+    shape = tuple(np.max([row.shape for row in rows], axis=0).astype(int))
+    if all(row.shape == shape for row in rows):
+        return np.array(rows)
+    out = np.full((len(rows), *shape), np.nan)
+    for place, row in zip(out, rows, strict=True):
+        place[tuple(map(slice, row.shape))] = row
+    return out
+
+
+def _trimmed(row: Any) -> Any:
+    """Array without the slices at the ends of its axes that hold nothing but nan."""
+    for axis in range(np.ndim(row)):
+        others = tuple(i for i in range(np.ndim(row)) if i != axis)
+        row = np.compress(~np.isnan(row).all(axis=others), row, axis=axis)
+    return row
+
+
+def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc.Vec:
+    """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
+
+    Raises :class:`SceneError` where the file has another or a newer format, or no such row, has it in the other
+    formulation, or lacks an unknown of the follower's scene.
+    """
+    import h5py
+
+    wanted = follower.system.fields.discretization.formulation
+    try:
+        with h5py.File(path, "r") as file:
+            STATES.check_hdf5(file, ("formulation", "branches"))
+            if file.attrs["formulation"] != wanted:
+                raise SceneError(
+                    f"{path} holds states of the {file.attrs['formulation']} formulation: choose that, not {wanted}."
+                )
+            group = file[f"branches/{branch}"]
+            sample = {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
+    except (OSError, KeyError, IndexError, ValueError) as trouble:
+        if isinstance(trouble, SceneError):
+            raise
+        raise SceneError(
+            f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it."
+        ) from trouble
+    system = follower.system
+    wanted_names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]
+    missing = [name for name in ("s", "elements", *wanted_names) if name not in sample]
+    if missing:
+        raise SceneError(
+            f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
+            "another scene, or by another version of rodfem; run the scene again."
+        )
+    return follower.shape.restore(sample)

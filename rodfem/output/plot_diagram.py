@@ -1,0 +1,306 @@
+"""Bifurcation diagrams, drawn from ``diagram.json`` alone."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from itertools import cycle, product
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.mathtext import MathTextParser
+from matplotlib.patheffects import withStroke
+from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
+
+from rodfem.errors import SceneError
+from rodfem.file_format import DIAGRAM, read_json
+from rodfem.output.plot_pieces import COUNTED, IMPERFECT, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
+
+__all__ = ["draw_diagram", "main"]
+
+Floats = NDArray[np.float64]
+
+DPI, SIZE, FONT = 200, (7.5, 5.0), 11.0  # 1500 x 1000 pixels
+STYLE = {"font.size": FONT, "font.family": "DejaVu Sans", "axes.grid": True, "grid.color": "0.92"}
+PALETTE = (  # after Okabe and Ito: hues safe for the colour-blind, then the same once more and darker
+    *("#303030", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"),
+    *("#003F62", "#753400", "#00573F", "#70435C", "#2F6380", "#7E5700"),
+)
+UNEXPLAINED = "index change unexplained"
+SINGULAR = "singular first state, not located"
+MARKERS: dict[str, dict[str, Any]] = {
+    "branch point": {"marker": "o", "ms": 7.5, "mfc": "white", "mec": "black", "mew": 1.5},
+    "fold": {"marker": "D", "ms": 6.0, "mfc": "black", "mec": "black"},
+    IMPERFECT: {"marker": "P", "ms": 9.5, "mfc": "white", "mec": "black", "mew": 1.3},
+    "flutter": {"marker": "*", "ms": 13.0, "mfc": "#F0E442", "mec": "black", "mew": 1.1},
+    "user": {"marker": "x", "ms": 6.5, "mec": "black", "mew": 1.6, "label": "requested load"},
+    UNEXPLAINED: {"marker": "^", "ms": 10.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
+    SINGULAR: {"marker": "s", "ms": 8.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
+}
+HALO = [withStroke(linewidth=3.2, foreground="white")]
+
+
+def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
+    """Draw every branch as ordinate against load, with its stability and its special points.
+
+    Stable parts are solid, unstable ones dotted, each with the number of negative eigenvalues beside it; those of a
+    planar rod that are stable in its plane but not in space are dashed.  Where a stable and another part lie on each
+    other, the other one is drawn inside the stable one.  A segment in which the index changes without a special point
+    that says so has a mark of warning, and so has a first state that is singular.
+
+    Parameters
+    ----------
+    diagram
+        Contents of ``diagram.json``; loads and ordinates are nondimensional.
+    path
+        Picture to write, 7.5 in by 5 in at 200 dpi; the suffix decides the format (.png, .pdf, .svg).
+
+    Returns
+    -------
+    path
+        The picture written; its folder is created where it is missing.
+
+    Raises
+    ------
+    SceneError
+        If these are contents of another or a newer format.
+    ValueError
+        If there are no branches, if columns of one differ in length, or if the format is unknown.
+    KeyError
+        If an entry of ``diagram.json`` is missing.
+    """
+    path, figure = Path(path), figure_of(diagram)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(path, dpi=DPI, format=path.suffix[1:] or "png")
+    return path
+
+
+def figure_of(diagram: Mapping[str, Any]) -> Figure:
+    """Figure of a diagram, as :func:`draw_diagram` writes it; raises as that does."""
+    DIAGRAM.check(diagram, "The diagram")
+    branches = diagram.get("branches")
+    if not branches:
+        raise ValueError("the diagram has no branches: expected those of a diagram.json; try that of a scene")
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=SIZE, dpi=DPI)
+        figure.set_layout_engine("constrained", rect=(0.006, 0.04, 0.984, 0.95))
+        axes = figure.add_subplot(axisbelow=True)
+        handles, pieces, points = _draw_branches(axes, branches)
+        axes.margins(0.05, 0.08)
+        if not any(np.ptp(piece.curve[:, 1]) for piece in pieces):  # no more than the straight rod
+            axes.set_ylim(-1.0, 1.0)
+        axes.set_xlabel(_tex(diagram["parameter_label"], always=True), fontsize=FONT + 3)
+        axes.set_ylabel(_tex(diagram.get("ordinate_label") or diagram["ordinate"]))
+        title = figure.suptitle(_tex(diagram["title"]), fontsize=FONT + 2)
+        footer = figure.text(0.012, 0.013, _footer(diagram), color="0.4", fontsize=FONT - 3)
+        for text in (title, footer):  # one line each: shrink what is too long
+            width = text.get_window_extent().width / figure.bbox.width
+            text.set_fontsize(text.get_fontsize() * min(1.0, 0.97 / max(width, 1e-9)))
+        legend, obstacles = _place_legend(axes, handles, pieces, points, len(branches) <= 8)
+        _uncover(axes, pieces)
+        _place_labels(axes, pieces, legend, obstacles)
+    return figure
+
+
+def _draw_branches(
+    axes: Axes, branches: Sequence[Mapping[str, Any]]
+) -> tuple[list[Line2D], list[Piece], dict[str, Floats]]:
+    """Draw all curves and special points; return the legend's handles, the pieces and the points per kind."""
+    handles: list[Line2D] = []
+    pieces: list[Piece] = []
+    found: dict[str, list[tuple[float, float]]] = {}
+    for branch, colour in zip(branches, cycle(PALETTE), strict=False):
+        new = list(pieces_of(branch, colour))
+        pieces += new
+        handles.append(Line2D([], [], ls="", marker="s", ms=8, color=colour, label=branch["name"]))
+        if not new:
+            axes.plot(branch["columns"]["load"], branch["columns"]["ordinate"], ".", color=colour, markersize=9)
+        for point in branch.get("special", []):
+            found.setdefault(point["kind"], []).append((point["load"], point["ordinate"]))
+        found.setdefault(UNEXPLAINED, []).extend(_unexplained(branch))
+        if branch.get("singular_start"):
+            found.setdefault(SINGULAR, []).append(tuple(branch["columns"][key][0] for key in ("load", "ordinate")))
+    for piece in sorted(pieces, key=lambda piece: -piece.negative):  # the stable ones on top: see _uncover
+        axes.plot(*piece.curve.T, color=piece.colour, **STYLES[piece.kind])
+    kinds = {piece.kind for piece in pieces} | {STABLE, UNSTABLE}
+    handles += [Line2D([], [], color="0.45", label=kind, **style) for kind, style in STYLES.items() if kind in kinds]
+    in_space = any(piece.in_space is not None for piece in pieces)
+    text = "negative eigenvalues" + (" in the plane (in space)" if in_space else "")
+    handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=text))
+    points = {kind: np.unique(np.array(found[kind], float), axis=0) for kind in MARKERS if found.get(kind)}
+    for kind, places in points.items():
+        style = {"linestyle": "none", "zorder": 5, "label": _kind_label(kind, branches), **MARKERS[kind]}
+        handles += axes.plot(*places.T, path_effects=HALO, **style)
+    return handles, pieces, points
+
+
+def _unexplained(branch: Mapping[str, Any]) -> list[tuple[float, float]]:
+    """Middles of the segments in which the index changes without a special point that says so."""
+    load, ordinate = (branch["columns"][key] for key in ("load", "ordinate"))
+    rows = [int(change["row"]) for change in branch.get("unexplained") or ()]
+    return [((load[i] + load[i + 1]) / 2, (ordinate[i] + ordinate[i + 1]) / 2) for i in rows]
+
+
+def _kind_label(kind: str, branches: Sequence[Mapping[str, Any]]) -> str:
+    """Return the legend's words for a kind of special point; of imperfect bifurcations with their unfolding."""
+    values = [
+        abs(point["unfolding"])
+        for branch in branches
+        for point in branch.get("special", [])
+        if point["kind"] == kind == IMPERFECT and point.get("unfolding") is not None
+    ]
+    if not values:
+        return str(MARKERS[kind].get("label", kind))
+    words = dict.fromkeys(f"{value:.0e}" for value in (min(values), max(values)))
+    return f"{kind}, unfolding {' to '.join(words)}"
+
+
+def _uncover(axes: Axes, pieces: Sequence[Piece]) -> bool:
+    """Draw what is not stable once more, within stable lines that lie on it; return whether there is any such place."""
+    stable = [_dense(axes, piece.curve)[0] for piece in pieces if piece.kind == STABLE]
+    found = False
+    for piece in pieces:
+        for part in hidden(_dense(axes, piece.curve)[0], stable) if piece.kind != STABLE else ():
+            line = axes.transData.inverted().transform(part)
+            axes.plot(*line.T, color="white", linewidth=2.0, solid_capstyle="butt", zorder=2.5)
+            axes.plot(*line.T, color=piece.colour, **STYLES[piece.kind] | {"linewidth": 1.5}, zorder=2.6)
+            found = True
+    return found
+
+
+def _tex(text: str, always: bool = False) -> str:
+    """Return text that matplotlib can set: TeX between dollars where it parses, else without its signs."""
+    text = f"${text}$" if "$" not in text and (always or "\\" in text) else text
+    try:
+        MathTextParser("path").parse(text)
+    except ValueError:
+        return text.replace("$", "").replace("\\", "")
+    return text
+
+
+def at_most(error: float) -> str:
+    """Return a bound with two digits, never smaller than it is."""
+    step = 10.0 ** (math.floor(math.log10(error)) - 1) if error > 0 else 1.0
+    return f"{math.ceil(error / step * (1 - 1e-12)) * step:.1e}".replace("e-0", "e-")
+
+
+def _footer(diagram: Mapping[str, Any]) -> str:
+    """Return the line that names the discretisation and the accuracy of the special points."""
+    phrase = "{formulation} formulation, {elements} elements of degree {degree}, {unknowns} unknowns"
+    if diagram.get("accuracy"):
+        phrase = f"{{formulation}} formulation, {len(diagram['meshes'])} meshes of up to {{unknowns}} unknowns"
+    parts = [phrase.format(**diagram["discretization"])] if diagram.get("discretization") else []
+    special = [point for branch in diagram["branches"] for point in branch.get("special", [])]
+    counted = [point for point in special if point["kind"] in COUNTED]
+    coarse = sum(point.get("resolved") is False for point in counted)
+    errors = [None if point.get("resolved") is False else point.get("error_estimate") for point in counted]
+    known = [abs(error) for error in errors if error is not None and math.isfinite(error)]
+    if known:
+        share = f" (of {len(known)} out of {len(errors)})" if len(known) < len(errors) else ""
+        parts.append(f"error of the loads of special points at most {at_most(max(known))}{share}")
+    if coarse:
+        parts.append(f"{coarse} of {len(counted)} special points not resolved by the mesh")
+    return "; ".join(parts)
+
+
+def _dense(axes: Axes, curve: Floats) -> tuple[Floats, float]:
+    """Return points (k, 2) on a curve at equal distances of about two pixels, and its length, in pixels."""
+    pixels = axes.transData.transform(curve)
+    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))])
+    along = np.linspace(0.0, lengths[-1], max(2, int(lengths[-1] / 2.0) + 1))
+    return np.column_stack([np.interp(along, lengths, pixels[:, k]) for k in (0, 1)]), float(lengths[-1])
+
+
+def _inside(box: Bbox, points: Floats) -> int:
+    """Return how many of the points (k, 2) lie in the box."""
+    return int(np.count_nonzero(np.all((points > box.min) & (points < box.max), axis=1)))
+
+
+def _place_legend(
+    axes: Axes, handles: list[Line2D], pieces: list[Piece], points: dict[str, Floats], inside: bool
+) -> tuple[Bbox, Floats]:
+    """Put the legend into an empty corner or to the right; return its box and all covered pixels (k, 2)."""
+    around = np.array(list(product((-14.0, -7.0, 0.0, 7.0, 14.0), repeat=2)))
+    corners = ("upper left", "upper right", "lower left", "lower right") if inside else ()
+    beside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.015, 1.0), "borderaxespad": 0.0}
+    for style in (*({"loc": corner} for corner in corners), beside):
+        legend = axes.legend(handles=handles, fontsize=min(8.5, 195.0 / len(handles)), **style)
+        axes.figure.draw_without_rendering()
+        box = legend.get_window_extent().padded(8.0)
+        lines = [_dense(axes, curve)[0] for curve in (piece.curve for piece in pieces)]
+        marks = [axes.transData.transform(at) + around for places in points.values() for at in places]
+        obstacles = np.concatenate([np.empty((0, 2)), *lines, *marks])
+        if not _inside(box, obstacles):
+            break
+    return box, obstacles
+
+
+def _place_labels(axes: Axes, pieces: list[Piece], legend: Bbox, obstacles: Floats) -> None:
+    """Write the index beside each piece, near its middle and off everything else."""
+    height, taken, seen = FONT * DPI / 72.0, [legend], set()
+    curves = [(*_dense(axes, piece.curve), piece) for piece in pieces]
+    for curve, length, piece in sorted(curves, key=lambda item: -item[1]):
+        needed = (piece.branch, piece.label) not in seen
+        seen.add((piece.branch, piece.label))
+        half = np.array([0.33 * height * len(piece.label) + 6.0, 0.38 * height + 6.0])
+        best, chosen = math.inf, legend
+        for share, gap, side in product(np.linspace(0.1, 0.9, 13), (2.0, 8.0, 16.0), (1.0, -1.0)):
+            middle = round(share * (len(curve) - 1))
+            tangent = curve[min(middle + 4, len(curve) - 1)] - curve[max(middle - 4, 0)]
+            normal = side * np.array([-tangent[1], tangent[0]]) / max(math.hypot(*tangent), 1e-9)
+            centre = curve[middle] + normal * (np.abs(normal) @ half + gap)
+            box = Bbox([centre - half, centre + half])
+            cost = 40.0 * abs(share - 0.5) + 0.3 * gap + 2.0 * (normal[1] < 0.0)
+            cost += 10.0 * _inside(box, obstacles) + 1e3 * sum(box.overlaps(label) for label in taken)
+            cost += 1e4 * (_inside(axes.bbox, box.get_points()) < 2)
+            best, chosen = min((best, chosen), (cost, box), key=lambda choice: choice[0])
+        if needed or (best < 100.0 and length > 1.6 * height):  # else no room
+            taken.append(chosen)
+            x, y = axes.transData.inverted().transform((chosen.min + chosen.max) / 2.0)
+            text = axes.text(x, y, piece.label, color=piece.colour, weight="bold", ha="center", va="center")
+            text.set(zorder=6, in_layout=False, path_effects=HALO)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Draw the diagram named on the command line.
+
+    Parameters
+    ----------
+    arguments
+        Command line without the program's name; that of the process when omitted.
+
+    Returns
+    -------
+    status
+        0, or 2 after one sentence on standard error about bad input.
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m rodfem.output.plot_diagram", description="Draw a bifurcation diagram."
+    )
+    parser.add_argument("diagram", type=Path, help="diagram.json of a scene")
+    parser.add_argument("--output", type=Path, help="picture to write (default: the same name with .png)")
+    options = parser.parse_args(arguments)
+    try:
+        diagram = read_json(options.diagram, DIAGRAM, ("title", "parameter_label", "ordinate", "branches"))
+        print(draw_diagram(diagram, options.output or options.diagram.with_suffix(".png")))
+    except SceneError as error:
+        print(error, file=sys.stderr)
+        return 2
+    except (KeyError, OSError, ValueError) as error:
+        reason = f"it has no {error}; try the diagram.json of a scene" if isinstance(error, KeyError) else error
+        print(f"cannot draw {options.diagram}: {reason}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

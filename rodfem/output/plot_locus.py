@@ -1,0 +1,106 @@
+"""Stability boundaries in a plane of two parameters, drawn from the saved data of loci alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from rodfem.file_format import LOCUS
+from rodfem.output.plot_diagram import DPI, FONT, HALO, MARKERS, PALETTE, SIZE, STYLE, _tex
+
+COLORS = {"branch point": PALETTE[1], "fold": PALETTE[2], "flutter": PALETTE[3], "divergence": PALETTE[4]}
+STYLES = {
+    "branch point": "-",
+    "fold": (0, (5.0, 1.5)),
+    "flutter": (0, (5.0, 1.2, 1.0, 1.2)),
+    "divergence": (0, (2.0, 1.0)),
+}
+POINTS: dict[str, dict[str, Any]] = {
+    "start": {**MARKERS["user"], "label": "start"},
+    "turns": {"marker": "|", "ms": 9.0, "mec": "black", "mew": 1.4, "label": "turning point"},
+    "cusp": {"marker": "^", "ms": 7.5, "mfc": "white", "mec": "black", "mew": 1.4, "label": "cusp"},
+    "ends": {"marker": "o", "ms": 6.5, "mfc": "white", "mec": "black", "mew": 1.4, "label": "fold meets branch point"},
+}
+"""Markers of rows by how what is said of them begins, or for the fold's end how it reads."""
+
+
+def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
+    """Draw loci of one scene in the plane of its two parameters, one over the other.
+
+    The first parameter, the load, is upwards.  Beside each curve stand the indices of the equilibria on its two sides
+    where they were counted, as ``0|1``.
+
+    Parameters
+    ----------
+    loci
+        Contents of files written by :meth:`rodfem.codim2.locus.Locus.save`, of the same two parameters.
+    path
+        Picture to write, 7.5 in by 5 in at 200 dpi; the suffix decides the format.
+
+    Returns
+    -------
+    path
+        The picture written; its folder is created where it is missing.
+
+    Raises
+    ------
+    SceneError
+        For contents of another or a newer format.
+    ValueError
+        Without any locus, or if they are not of the same parameters.
+    """
+    if not loci:
+        raise ValueError("There is no locus to draw: give the contents of at least one file.")
+    for one in loci:
+        LOCUS.check(one, "The locus", ("parameters", "columns", "marks", "start", "labels", "discretization"))
+    names = loci[0]["parameters"]
+    if any(one["parameters"] != names for one in loci):
+        raise ValueError("The loci are of different parameters: draw them one by one.")
+    path = Path(path)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+        axes = figure.subplots()
+        axes.set_axisbelow(True)
+        for one in loci:
+            kind, columns = one["kind"], one["columns"]
+            x, y = (np.asarray(columns[name], dtype=float) for name in reversed(names))
+            axes.plot(x, y, color=COLORS[kind], linestyle=STYLES[kind], linewidth=2.2, label=kind)
+            for row, what in [(one["start"], "start"), *((m["row"], m["kind"]) for m in one["marks"])]:
+                style = POINTS.get("ends" if "branch point" in what else what.split()[0])
+                if style:
+                    axes.plot(x[row], y[row], linestyle="none", zorder=5, path_effects=HALO, **style)
+            low, high = columns["index"][len(x) // 2]
+            if low >= 0:
+                place = (x[len(x) // 2], y[len(x) // 2])
+                text = axes.annotate(f"{low}|{high}", place, (6, 6), textcoords="offset points", color=COLORS[kind])
+                text.set(weight="bold", path_effects=HALO)
+        axes.set_xlabel(_tex(loci[0]["labels"][1], always=True), fontsize=FONT + 3)
+        axes.set_ylabel(_tex(loci[0]["labels"][0], always=True), fontsize=FONT + 3)
+        axes.set_title(_tex(loci[0]["title"]))
+        handles = {handle.get_label(): handle for handle in axes.get_lines()}
+        axes.legend(handles=list(handles.values()), fontsize=8.5)
+        figure.supxlabel(_footer(loci), fontsize=FONT - 3, color="0.4", x=0.012, ha="left")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=DPI, format=path.suffix[1:] or "png")
+    return path
+
+
+def _footer(loci: Sequence[Mapping[str, Any]]) -> str:
+    """Return the line that names the discretisation and the estimated error, and at how many points it was."""
+    d = loci[0]["discretization"]
+    errors = [max(e) for one in loci for e in one["columns"]["error"] if e[0] is not None]
+    text = f"{d['formulation']} formulation, {d['elements']} elements of degree {d['degree']}, {d['unknowns']} unknowns"
+    points = sum(len(one["columns"]["error"]) for one in loci)
+    failed = sum(len(one.get("without_estimate", [])) for one in loci)
+    if errors:
+        worst = f"{max(errors):.1e}".replace("e-0", "e-")
+        text += f"; curves accurate to {worst} (estimated at {len(errors)} of {points} points"
+        text += f", without success at {failed} more)" if failed else ")"
+    elif failed:
+        text += f"; the error could not be estimated at any of {failed} points"
+    return text

@@ -1,0 +1,332 @@
+"""Pictures of a rod in space, drawn off screen from ``states.h5`` alone."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from rodfem.file_format import STATES
+from rodfem.output.glyphs import DARK, LOAD, glyphs_of
+from rodfem.output.solids import Solid, profile_of, rod, straight_arrow
+from rodfem.output.view import view_of
+from rodfem.problem.setting import Setting
+from rodfem.problem.setting import read as read_setting
+
+__all__ = ["draw_shape", "draw_shape_safely", "main"]
+
+Floats = NDArray[np.float64]
+SIZE, ROOM = (1600, 1000), 0.84  # pixels, share of the height above the caption
+ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
+TRIAD, SUBSCRIPTS = np.array([0.085, 0.86]), "₁₂₃"  # place of the triad, as a share of width and height
+FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+MPI_VARIABLES = ("OMPI_", "PMI", "MPI_LOCAL")  # the beginnings of their names, PMI_ and PMIX_ alike
+LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
+
+
+def draw_shape(
+    states: Path, branch: str, row: int, path: Path,
+    *, caption: str | None = None, radius: float | None = None,
+) -> Path:  # fmt: skip
+    """Draw one equilibrium: the rod with a stripe along d1, arrows along d1 and d2, what holds it and what loads it.
+
+    Cross-sections lie in the plane of d1 and d2, so that shear shows, and have the proportion of the bending
+    stiffnesses (:func:`rodfem.output.solids.profile_of`).  What a file does not record is not drawn: of one without
+    supports the rod alone, round.  See :func:`rodfem.output.view.view_of` for the direction of view.
+
+    Parameters
+    ----------
+    states
+        The file ``states.h5``; lengths in it are nondimensional.
+    branch, row
+        Name of the branch, and row of the state in it, counted from 0.
+    path
+        Picture to write, 1600 by 1000 pixels; the suffix decides the format (.png, .jpg, .bmp, .tif).
+    caption
+        Line at the foot of the picture: scene, branch and load when None, nothing when empty.
+    radius
+        Mean radius of the rod, nondimensional; about 1/90 of its length when None.
+
+    Returns
+    -------
+    path
+        The picture written; its folder is created where it is missing.
+
+    Raises
+    ------
+    ValueError
+        If the file, the branch or the row does not exist, an argument has no meaning, or (:class:`SceneError`) the
+        file has another or a newer format.
+    ImportError
+        If PyVista or one of the libraries it needs is missing.
+    RuntimeError
+        If the picture comes out blank.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in FORMATS:
+        raise ValueError(f"picture {path} has an unknown format: expected one of {FORMATS}, try shape.png")
+    if radius is not None and not radius > 0.0:
+        raise ValueError(f"radius={radius} is not positive: expected a length, try 0.01 or leave it out")
+    state = _read(Path(states), branch, row)
+    length = np.linalg.norm(np.diff(state.centres, axis=0), axis=1).sum()
+    thickness = float(radius or min(length / 90.0, np.linalg.norm(np.ptp(state.centres, axis=0)) / 40.0))
+    text = state.caption if caption is None else caption
+    view = state.view()
+    solids = state.solids(thickness, view)
+    pyvista = _import_pyvista()
+    font = str(Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf"))
+    plotter = pyvista.Plotter(off_screen=True, window_size=list(SIZE), lighting="light kit")
+    plotter.set_background("white")
+    for solid in solids:
+        _add(pyvista, plotter, solid)
+    _add_directors(pyvista, plotter, state.centres, state.directors, thickness)
+    corner, scale = _look(plotter, np.concatenate([solid.points for solid in solids]), view, 5.0 * thickness)
+    arrows, names = triad(view, corner, 0.14 * scale)
+    for solid in arrows:
+        _add(pyvista, plotter, solid)
+    labels = [(text, 0.5, 0.03, "black"), ("d₁", 0.935, 0.93, FIRST), ("d₂", 0.97, 0.93, SECOND)]
+    labels += [("load", 0.885, 0.93, LOAD)] if any(solid.color == LOAD for solid in solids) else []
+    share = 0.07 / np.array([SIZE[0] / SIZE[1], 1.0])
+    labels += [(name, *(TRIAD - (0.0, 0.015) + share * at), DARK) for name, at in names]
+    labels += [("not drawn: " + ", ".join(notes), 0.5, 0.095, DARK)] if (notes := state.setting.notes) else []
+    for label, x, y, colour in filter(lambda item: item[0], labels):
+        style = {"font_size": min(20, 1400 // len(label)), "color": colour, "font_file": font}
+        actor = plotter.add_text(label, position=(x, y), viewport=True, **style)
+        actor.GetTextProperty().SetJustificationToCentered()
+    plotter.enable_anti_aliasing("ssaa")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    picture = plotter.screenshot(str(path), return_img=True)
+    plotter.close()
+    if np.ptp(picture) == 0:
+        raise RuntimeError(f"the picture {path} came out blank: {LIBRARIES}")
+    return path
+
+
+@dataclass(frozen=True)
+class State:
+    """A state as a picture needs it, at n places along the rod.
+
+    Attributes
+    ----------
+    s, centres, directors
+        Arclengths (n,), centreline (n, 3), and rotations (n, 3, 3) with columns d1, d2, d3.
+    reference
+        Centreline (n, 3) of the state that it has left: of the first branch, at the nearest load.
+    setting
+        What holds and loads the rod.
+    caption
+        Scene, branch and load.
+    """
+
+    s: Floats
+    centres: Floats
+    directors: Floats
+    reference: Floats
+    setting: Setting
+    caption: str
+
+    def view(self) -> Floats:
+        """Axes of the picture, (3, 3)."""
+        held, moved = self.setting, self.centres - self.reference
+        side = held.widest(self.directors[0])
+        return view_of(self.reference, moved, down=held.down, load=held.force, side=side)
+
+    def solids(self, radius: float, view: Floats) -> list[Solid]:
+        """The rod, its stripe, what holds it and what loads it."""
+        around = [np.linspace(-np.pi, np.pi, 49)[:-1], np.linspace(-0.3, 0.3, 9)]
+        profiles = [radius * profile_of(self.s, self.setting.section, angles) for angles in around]
+        out = [
+            rod(self.centres, self.directors, profiles[0], ROD),
+            rod(self.centres, self.directors, 1.02 * profiles[1], STRIPE),
+        ]
+        return out + glyphs_of(self.setting, self.s, self.centres, self.directors, radius, view)
+
+
+def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
+    """Read a state of a file, interpolated at ``count`` places; raises ValueError where there is none."""
+    import h5py
+
+    try:
+        with h5py.File(states, "r") as file:
+            STATES.check_hdf5(file, ("branches", "parameter", "scene"))
+            branches = file["branches"]
+            if branch not in branches:
+                raise ValueError(f"{states} has no branch {branch!r}: try one of {sorted(branches)}")
+            if not 0 <= row <= (last := len(branches[branch]["r"]) - 1):
+                raise ValueError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
+            load = float(branches[branch]["load"][row])
+            symbol = {"lam": "λ"}.get(file.attrs["parameter"], file.attrs["parameter"])
+            caption = f"{file.attrs['scene']} rod, {branch}, {symbol} = {load:.4g}"
+            first = file.attrs.get("first", branch)
+            left = 0 if branch == first else int(np.argmin(abs(branches[first]["load"][:] - load)))
+            s, centres, directors = _curve(branches[branch], row, count)
+            reference = _curve(branches[first], left, count)[1]
+            setting = read_setting(branches[branch], row)
+    except (KeyError, OSError) as error:
+        reason = "expected HDF5 with s and branches" if states.exists() else "no such file"
+        raise ValueError(f"cannot read {states}, {reason}: try the states.h5 of a scene") from error
+    return State(s, centres, directors, reference, setting, caption)
+
+
+def _curve(group: Any, row: int, count: int) -> tuple[Floats, Floats, Floats]:
+    """Arclengths (count,), centres (count, 3) and directors (count, 3, 3) of a row of a branch."""
+    s, r, q = (group[key][row] for key in ("s", "r", "q"))
+    s, r, q = (values[np.isfinite(s)] for values in (s, r, q))
+    opposite = np.sum(q[1:] * q[:-1], axis=1, keepdims=True) < 0.0  # q and -q are the same rotation
+    q[1:] *= np.cumprod(np.where(opposite, -1.0, 1.0), axis=0)
+    at = np.linspace(s[0], s[-1], count)
+    return at, CubicSpline(s, r)(at), Rotation.from_quat(CubicSpline(s, q)(at)[:, [1, 2, 3, 0]]).as_matrix()
+
+
+def _import_pyvista() -> Any:
+    """Return the module pyvista, prepared for a machine without display."""
+    os.environ.setdefault("MPLBACKEND", "Agg")
+    os.environ.setdefault("PYVISTA_OFF_SCREEN", "true")
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    try:
+        import pyvista
+    except ImportError as error:
+        advice = 'try pip install "rodfem[viz]"' if isinstance(error, ModuleNotFoundError) else LIBRARIES
+        raise ImportError(f"pyvista cannot be loaded ({error}): {advice}") from error
+    return pyvista
+
+
+STYLE = {"smooth_shading": True, "ambient": 0.25, "specular": 0.3, "specular_power": 25.0}
+
+
+def _add(pyvista: Any, plotter: Any, solid: Solid) -> None:
+    """Add a solid, smooth but for its edges."""
+    faces = np.column_stack([np.full(len(solid.triangles), 3), solid.triangles]).ravel()
+    surface = pyvista.PolyData(solid.points, faces)
+    surface = surface.compute_normals(feature_angle=40.0, split_vertices=True, auto_orient_normals=False)
+    plotter.add_mesh(surface, color=solid.color, **STYLE)
+
+
+def _add_directors(pyvista: Any, plotter: Any, centres: Floats, directors: Floats, radius: float) -> None:
+    """Add arrows along d1 and d2."""
+    stations = np.linspace(0, len(centres) - 1, 27).round().astype(int)[1:-1]
+    geometry = pyvista.Arrow(tip_length=0.22, tip_radius=0.075, shaft_radius=0.026, tip_resolution=24)
+    for index, colour in ((0, FIRST), (1, SECOND)):
+        points = pyvista.PolyData(centres[stations])
+        points["director"] = directors[stations, :, index]
+        arrows = points.glyph(orient="director", scale=False, factor=4.5 * radius, geom=geometry)
+        plotter.add_mesh(arrows, color=colour, **STYLE)
+
+
+def triad(view: Floats, corner: Floats, size: float) -> tuple[list[Solid], list[tuple[str, Floats]]]:
+    """Arrows along e1, e2, e3 from a point, and their names with places (2,) in units of ``size`` from there.
+
+    The name of a direction nearly along the line of sight goes opposite to the two others, those of two directions that
+    look alike are put together.
+    """
+    arrows = [straight_arrow(corner, corner + size * e, 0.03 * size, DARK) for e in np.eye(3)]
+    seen = view[:2].T
+    length = np.linalg.norm(seen, axis=1)
+    places = seen * (1.0 + 0.35 / np.maximum(length, 1e-9))[:, None]
+    last = int(np.argmin(length))
+    if length[last] < 0.5:
+        opposite = -np.delete(seen, last, axis=0).sum(axis=0)
+        places[last] = 0.6 * opposite / np.linalg.norm(opposite)
+    names: list[tuple[str, Floats]] = []
+    for i, at in enumerate(places):
+        alike = [j for j, (_, other) in enumerate(names) if np.linalg.norm(at - other) < 0.4]
+        if alike:
+            names[alike[0]] = f"{names[alike[0]][0]}, e{SUBSCRIPTS[i]}", names[alike[0]][1]
+        else:
+            names.append((f"e{SUBSCRIPTS[i]}", at))
+    return arrows, names
+
+
+def _look(plotter: Any, points: Floats, view: Floats, margin: float) -> tuple[Floats, float]:
+    """Set a camera without perspective that sees all points (n, 3), above the caption.
+
+    Returns the place of the triad in space, and half the height of the picture there.
+    """
+    seen = points @ view.T
+    low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
+    middle, half = (low + high) / 2, (high - low) / 2
+    scale = max(half[1] / ROOM, half[0] * SIZE[1] / SIZE[0])
+    middle[1] -= (1.0 - ROOM) * scale / 2  # the caption's line
+    focus = middle @ view
+    plotter.camera_position = [tuple(focus + 4 * (half[2] + scale) * view[2]), tuple(focus), tuple(view[1])]
+    plotter.camera.enable_parallel_projection()
+    plotter.camera.parallel_scale = scale
+    plotter.renderer.ResetCameraClippingRange()
+    shift = (2 * TRIAD - 1) * scale * np.array([SIZE[0] / SIZE[1], 1.0])
+    return focus + shift @ view[:2], scale
+
+
+def draw_shape_safely(
+    states: Path, branch: str, row: int, path: Path, *, limit: float = 120.0, **options: str | float | None
+) -> str | None:
+    """Draw as `draw_shape` does, but in a process of its own, which may crash without harm.
+
+    Parameters
+    ----------
+    states, branch, row, path, **options
+        As for `draw_shape`; the options are caption and radius.
+    limit
+        Time that drawing may take, in seconds.
+
+    Returns
+    -------
+    trouble
+        None where the picture was written, else a sentence that says what failed and what to do.
+    """
+    command = [sys.executable, "-m", "rodfem.output.render", str(states), f"--branch={branch}", f"--row={row}"]
+    command += [f"--{key}={value}" for key, value in {"output": path, **options}.items() if value is not None]
+    home = str(Path(__file__).resolve().parents[1])
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(MPI_VARIABLES)}
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH")]))
+    try:
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return f"drawing {path} did not end within {limit:g} s ({type(error).__name__}): {LIBRARIES}"
+    if done.returncode < 0:
+        return f"drawing {path} crashed with signal {-done.returncode}: {LIBRARIES}"
+    reason = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
+    return f"drawing {path} failed: {reason}" if done.returncode else None
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Draw the shape named on the command line.
+
+    Parameters
+    ----------
+    arguments
+        Command line without the program's name; that of the process when omitted.
+
+    Returns
+    -------
+    status
+        0, or 2 after one sentence on standard error.
+    """
+    parser = argparse.ArgumentParser(prog="python -m rodfem.output.render", description="Draw a rod in space.")
+    parser.add_argument("states", type=Path, help="states.h5 of a scene")
+    parser.add_argument("--branch", required=True, help="name of the branch")
+    parser.add_argument("--row", required=True, type=int, help="row of the state, counted from 0")
+    parser.add_argument("--output", type=Path, default=Path("shape.png"), help="picture to write")
+    parser.add_argument("--caption", help="line at the foot of the picture")
+    parser.add_argument("--radius", type=float, help="mean radius of the rod, nondimensional")
+    options = vars(parser.parse_args(arguments))
+    try:
+        print(draw_shape(path=options.pop("output"), **options))
+    except (ImportError, OSError, RuntimeError, ValueError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,58 @@
+"""Picture of one state, which a notebook shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from rodfem.continuation.branch import Branch, Point
+from rodfem.output.files import save_states
+
+if TYPE_CHECKING:
+    from rodfem.diagram.diagram import Diagram
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A picture as PNG; empty on all ranks but the first."""
+
+    png: bytes
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+    def __repr__(self) -> str:
+        """Size."""
+        return f"<Snapshot: PNG of {len(self.png)} bytes>"
+
+    def save(self, path: Path | str) -> Path:
+        """Write it; its folder is made."""
+        path = Path(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(self.png)
+        return path
+
+
+def snapshot(diagram: Diagram, point: Point, path: Path | str | None, caption: str | None) -> Snapshot:
+    """Draw a point of a diagram: pictures are made from files, so that its state is written to a temporary one."""
+    from rodfem.output.render import draw_shape
+
+    comm = diagram.solvers[0].system.comm
+    with TemporaryDirectory() as folder:
+        states, picture = Path(folder) / "states.h5", Path(folder) / "shape.png"
+        home = next((b.name for b in diagram.branches if any(p is point for p in b.points)), "state")
+        first = diagram.branches[0]
+        save_states(replace(first, special=[]), diagram.solvers, states, first=True)
+        row = next((i for i, p in enumerate(first.points) if p is point), -1)
+        if row < 0:
+            save_states(Branch(home, None, 0, [point]), diagram.solvers, states, first=False)
+        png = b""
+        if comm.rank == 0:
+            draw_shape(states, first.name if row >= 0 else home, max(row, 0), picture, caption=caption)
+            png = picture.read_bytes()
+    found = Snapshot(png)
+    if path is not None and comm.rank == 0:
+        found.save(path)
+    return found

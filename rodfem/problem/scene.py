@@ -1,0 +1,368 @@
+"""What a person states: a rod, its ends, its loads, and what to record.
+
+A :class:`Scene` is plain immutable data without meshes or matrices.  Functions in it receive a namespace ``c`` of
+named constants (``c.lam``, ``c.C``, ...; ``c.s`` is the arclength) and work on UFL expressions and on numbers alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+import ufl
+from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+from ufl.algorithms.apply_derivatives import apply_derivatives
+from ufl.utils.stacks import StackDict
+
+from forms.kinematics import RODS, UNDEFORMED
+from rodfem.errors import SceneError
+from rodfem.problem.ends import Attachment, Constants, Constraint, End, OfConstants, OfPlace, Ring, Vector
+from rodfem.problem.guard import guarded
+from rodfem.problem.roles import Role, changes
+from rodfem.problem.validation import check_kinds, check_scene
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A named constant of a scene.
+
+    ``value`` is where it starts, ``label`` its TeX name without dollars, ``admissible`` the open interval that makes
+    sense for it.  Any parameter can be the one that a continuation varies.
+    """
+
+    value: float
+    label: str = ""
+    admissible: tuple[float, float] = (-inf, inf)
+
+    def check(self, name: str, value: float) -> None:
+        """Raise :class:`SceneError` unless ``value`` is a finite number inside the admissible interval."""
+        low, high = self.admissible
+        if not low < high:
+            raise SceneError(f"No {name} is admissible between {low:g} and {high:g}: give the lower bound first.")
+        if not isfinite(value):
+            raise SceneError(f"{name} = {value:g} is not a finite number: give one.")
+        if not low < value < high:
+            raise SceneError(f"{name} = {value:g} is outside its admissible range: choose {low:g} < {name} < {high:g}.")
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Mass ``rho_A(c)`` and rotary inertia ``rho_I(c)`` about the directors, both per unit length.
+
+    Only frequencies need them, and the stability of states under loads without a potential.
+    """
+
+    rho_A: Callable[[Constants], Any] = field(
+        default=lambda c: 0.0, metadata={"role": Role("mass per length", "f(c)", 0)}
+    )
+    rho_I: Callable[[Constants], Vector] = field(
+        default=lambda c: (1.0, 1.0, 1.0), metadata={"role": Role("rotary inertia per length", "f(c)", 3)}
+    )
+
+
+def _role_of_ordinate(ordinate: Ordinate) -> Role:
+    """Role of an ordinate's function: of numbers at a point, of UFL expressions along the rod."""
+    if ordinate.places:
+        return Role("ordinate", "of(r, q)")
+    return Role("ordinate along the rod", "of(x, c)", along=True)
+
+
+@dataclass(frozen=True)
+class Ordinate:
+    """The number that a bifurcation diagram shows against the load: at a point, or an integral over the rod.
+
+    Parameters
+    ----------
+    name
+        The number in words.
+    s
+        Arclength at which it is taken; None: it is an integral over the rod.
+    of
+        With ``s``: ``of(r, q)`` of the centreline ``r`` (3,) and the unit quaternion ``q`` (4,) there, numpy arrays.
+        Without: the integrand ``of(x, c)``, a UFL expression of the state along the rod as in a scene's ``potential``
+        (see :mod:`rodfem.problem.ends`): its energy, ``lambda x, c: W(x.v, x.k, c)``, or its twist, ``x.k[2] / (2 *
+        pi)``.
+    label
+        The number in TeX, for the axis of a figure.
+    """
+
+    name: str
+    s: float | None
+    of: Callable[[Any, Any], Any] = field(metadata={"role": _role_of_ordinate})
+    label: str = ""
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """Arclengths at which the state is evaluated for it."""
+        return () if self.s is None else (self.s,)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A boundary value problem for one rod, as a person states it.
+
+    Parameters
+    ----------
+    name, title
+        Used for folders and headings.
+    interval
+        Arclength of the two ends in the reference state.
+    rod
+        One of the keys of :data:`forms.kinematics.RODS`: which strains are free.
+    energy
+        Stored energy ``W(v, k, c)`` per unit length.  Strains that the kind of rod keeps undeformed count for nothing
+        in it, which the terminal says.
+    parameters
+        Named constants, each a :class:`Parameter` or a number; ``load`` names the one that is varied.
+    ends
+        Left and right :class:`~rodfem.problem.ends.End`, or a :class:`~rodfem.problem.ends.Ring`.
+    ordinate
+        What to record beside the load.
+    inertia
+        Kinetic metric of the spectrum; unit rotary inertia by default, which serves to count.
+    distributed
+        ``distributed(c)``, dead force per unit length (3,), a function of ``c.s`` if wanted; gravity, say.
+    follower
+        ``follower(c)``, force per unit length by its components along the directors.  Not conservative.
+    potential
+        ``potential(x, c)``, potential energy per unit length of what else acts along the rod: an elastic foundation, a
+        pressure.
+    attachments, constraints
+        What is attached along the rod, and equations that it must fulfil: see :mod:`rodfem.problem.ends`.
+    breaks
+        Arclengths at which the material or the loads jump: element boundaries are put there.
+    planar
+        ``"e1"`` or ``"e2"``: the rod moves only in the plane across that axis.  Rotations about it, two displacements,
+        two forces and two strains are all that is left; the index in space is recorded besides that in the plane.
+    start
+        Quaternion(s) of a first guess, ``start(s)`` of shape (m,) -> (m, 4); by default the identity (a straight rod).
+    span
+        Default range of the load, from where the continuation starts to where it ends.
+    """
+
+    name: str
+    interval: tuple[float, float]
+    rod: str
+    energy: Callable[[Any, Any, Constants], Any] = field(metadata={"role": Role("stored energy", "W(v, k, c)")})
+    parameters: Mapping[str, Any]  # Parameter or float as given, Parameter as kept: dataclasses have one type for both
+    load: str
+    ends: tuple[End, End] | Ring = field(metadata={"places": ("left", "right")})
+    ordinate: Ordinate
+    span: tuple[float, float]
+    title: str = ""
+    inertia: Inertia = Inertia()
+    distributed: OfConstants | None = field(default=None, metadata={"role": Role("distributed force", "f(c)", 3)})
+    follower: OfConstants | None = field(default=None, metadata={"role": Role("distributed follower force", "f(c)", 3)})
+    potential: OfPlace | None = field(
+        default=None, metadata={"role": Role("potential along the rod", "f(x, c)", 0, along=True)}
+    )
+    attachments: tuple[Attachment, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
+    breaks: tuple[float, ...] = ()
+    planar: str | None = None
+    start: Callable[[np.ndarray], np.ndarray] | None = field(default=None, metadata={"role": Role("start", "start(s)")})
+    states: str = field(default="straight")
+
+    def __post_init__(self) -> None:
+        """Check all that can be checked before any computation; raises :class:`SceneError`."""
+        check_kinds(self)
+        for field_name, value in changes(self, guarded).items():
+            object.__setattr__(self, field_name, value)
+        named = {n: p if isinstance(p, Parameter) else Parameter(float(p)) for n, p in self.parameters.items()}
+        object.__setattr__(self, "parameters", named)
+        a, b = self.interval
+        if not (isfinite(a) and isfinite(b) and a < b):
+            raise SceneError(
+                f"The rod's interval ({a:g}, {b:g}) is empty: give two finite ends with the left one first."
+            )
+        if self.rod not in RODS:
+            raise SceneError(f"Unknown kind of rod {self.rod!r}: choose one of {', '.join(map(repr, RODS))}.")
+        if self.load not in self.parameters:
+            raise SceneError(f"The load {self.load!r} is not a parameter: choose one of {', '.join(self.parameters)}.")
+        for name, parameter in self.parameters.items():
+            parameter.check(name, parameter.value)
+        for s in self.ordinate.places:
+            if not a <= s <= b:
+                raise SceneError(f"The ordinate's arclength {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
+        self.check_span(self.span)
+        check_scene(self)
+
+    @property
+    def sides(self) -> tuple[End, End]:
+        """The two ends; those of a ring hold nothing."""
+        return (End(), End()) if isinstance(self.ends, Ring) else self.ends
+
+    @property
+    def normal(self) -> int | None:
+        """Component (0 or 1) across the plane of a planar rod, None for a rod in space."""
+        return None if self.planar is None else int(self.planar[1]) - 1
+
+    @property
+    def joints(self) -> tuple[float, ...]:
+        """Arclengths inside the rod that must be element boundaries, in ascending order."""
+        places = {*self.breaks, *(x.s for x in self.attachments)}
+        places |= {x.s for x in self.constraints if x.s is not None}
+        close = 1e-9 * self.length
+        return tuple(sorted(s for s in places if self.interval[0] + close < s < self.interval[1] - close))
+
+    def samples(self) -> list[float]:
+        """Arclengths at which the material is checked: nine from end to end, and both sides of all breaks."""
+        a, b = self.interval
+        eps = 1e-6 * self.length
+        return sorted({*np.linspace(a + eps, b - eps, 9).tolist(), *(s + d for s in self.joints for d in (-eps, eps))})
+
+    def varying(self, load: str, span: tuple[float, float], **values: float) -> Scene:
+        """Return the same scene with another parameter as its load, over ``span``, and other constants."""
+        unknown = [name for name in values if name not in self.parameters]
+        if unknown:
+            raise SceneError(f"{unknown[0]!r} is not a parameter: choose one of {', '.join(self.parameters)}.")
+        parameters = {n: replace(p, value=values.get(n, p.value)) for n, p in self.parameters.items()}
+        return replace(self, load=load, span=span, parameters=parameters)
+
+    @property
+    def length(self) -> float:
+        """Reference length of the rod."""
+        return self.interval[1] - self.interval[0]
+
+    @property
+    def conservative(self) -> bool:
+        """Whether all loads have a potential, so that stability is a matter of the second variation alone."""
+        return not self.without_potential()
+
+    def in_space(self) -> Scene:
+        """Return the same rod, free to leave its plane."""
+        return replace(self, planar=None)
+
+    def without_potential(self, *, in_space: bool = False) -> list[str]:
+        """Loads that have no potential, in words; for a planar rod those that have none while it stays in its plane."""
+        found = []
+        for side, end in zip(("left", "right"), self.sides, strict=True):
+            kinds = {"follower force": end.follower}
+            if (
+                self.planar is None or in_space
+            ):  # in a plane all moments are about its normal: their potential is -M times the angle
+                kinds |= {"moment": end.moment, "follower moment": end.follower_moment}
+            found += [f"{kind} on the {side} end" for kind, load in kinds.items() if load is not None]
+        if self.follower is not None:
+            found.append("distributed follower force")
+        return found + [f"follower force at s = {x.s:g}" for x in self.attachments if x.follower is not None]
+
+    @property
+    def has_inertia(self) -> bool:
+        """Whether the scene states masses or inertias of its own, beside the unit rotary inertia that counts by."""
+        return self.inertia != Inertia() or any(x.mass or x.rotary_inertia for x in self.attachments)
+
+    @cached_property
+    def ignored_strains(self) -> tuple[int, ...]:
+        """Components of ``v`` that the stored energy depends on, but that the kind of rod keeps undeformed."""
+        rng = np.random.default_rng(1)
+        v, k = 0.05 * rng.uniform(0.5, 1, size=(2, 3))
+        stiff = [i for i in range(3) if i not in self.free_strains]
+        free = np.where(np.isin(np.arange(3), self.free_strains), v, 0.0)
+        found = []
+        for i in stiff:
+            pairs = [
+                [self._energy_at(free + d * v[i] * np.eye(3)[i], k, self.constants(s=s)) for d in (0.0, -1.0, 1.0)]
+                for s in self.samples()
+            ]
+            if any(abs(b - a) > 1e-12 * max(abs(a), abs(b)) for a, *others in pairs for b in others):
+                found.append(i)
+        return tuple(found)
+
+    @property
+    def free_strains(self) -> tuple[int, ...]:
+        """Components of ``v`` that are unknowns."""
+        return RODS[self.rod]
+
+    def constants(self, load: float | None = None, s: float | None = None) -> Constants:
+        """Namespace of all parameters as numbers, at ``load`` and at the arclength ``s`` (default: the mid-point)."""
+        values = {name: p.value for name, p in self.parameters.items()}
+        if load is not None:
+            values[self.load] = load
+        return Constants(s=sum(self.interval) / 2 if s is None else s, **values)
+
+    def check_span(self, span: tuple[float, float]) -> None:
+        """Raise :class:`SceneError` unless both ends of a range of loads are admissible and differ."""
+        for value in span:
+            self.parameters[self.load].check(self.load, value)
+        if span[0] == span[1]:
+            raise SceneError(
+                f"The range of {self.load} from {span[0]:g} to {span[1]:g} is empty: give two different loads."
+            )
+
+    def plain(self, side: int) -> bool:
+        """Whether dead forces are all that loads an end (0: left, 1: right): they are the contact force there."""
+        at_end = [x.s for x in self.attachments] + [x.s for x in self.constraints if x.s is not None]
+        return self.sides[side].energy is None and not any(
+            abs(s - self.interval[side]) < 1e-9 * self.length for s in at_end
+        )
+
+    def known_force(self, component: int, c: Constants) -> Any | None:
+        """Component of the contact force that a dead end force prescribes, or None where it is an unknown.
+
+        Free at the right end the contact force is the applied one, free at the left end it is minus the applied one.
+        """
+        if isinstance(self.ends, Ring):
+            return None
+        left, right = self.ends
+        if self.plain(1) and right.held(c)[component] is None:
+            return right.applied(c)[component]
+        if self.plain(0) and left.held(c)[component] is None:
+            return -left.applied(c)[component]
+        return None
+
+    def depends_on_s(self) -> bool:
+        """Whether the stored energy is a function of the arclength too."""
+        asked: list[bool] = []
+
+        class Watched(Constants):
+            def __getattribute__(self, name: str) -> Any:
+                if name == "s":
+                    asked.append(True)
+                return super().__getattribute__(name)
+
+        self._energy_at(np.zeros(3), np.zeros(3), Watched(**vars(self.constants())))
+        return bool(asked)
+
+    def _energy_at(self, v: np.ndarray, k: np.ndarray, c: Constants) -> float:
+        strains = [UNDEFORMED[i] + float(v[i]) for i in range(3)]
+        W = self.energy(ufl.as_vector(strains), ufl.as_vector([float(x) for x in k]), c)
+        return float(ufl.as_ufl(W)(()))
+
+    def is_quadratic(self) -> bool:
+        """Whether the stored energy is a quadratic function of the strains, by third differences along lines."""
+        rng = np.random.default_rng(1)
+        free = np.isin(np.arange(3), self.free_strains)
+        for _ in range(2):
+            v, k = 0.05 * rng.uniform(-1, 1, size=(2, 3))
+            values = [self._energy_at(t * v * free, t * k, self.constants()) for t in (0.0, 1.0, 2.0, 3.0)]
+            if abs(np.diff(values, 3)[0]) > 1e-9 * max(map(abs, values)):
+                return False
+        return True
+
+    def stiffness(self, s: float | None = None) -> np.ndarray:
+        """Second derivative of ``W`` in the m free strains and ``k`` at the undeformed state, (m + 3, m + 3)."""
+        return self._stiffness if s is None else self._stiffness_at(s)
+
+    @cached_property
+    def _stiffness(self) -> np.ndarray:
+        """Stiffness at the middle, differentiated once: systems and their companions ask for it."""
+        return self._stiffness_at(None)
+
+    def _stiffness_at(self, s: float | None) -> np.ndarray:
+        free_v = self.free_strains
+        x = ufl.variable(ufl.as_vector([UNDEFORMED[i] for i in free_v] + [0.0] * 3))
+        v = [ufl.as_ufl(value) for value in UNDEFORMED]
+        for position, component in enumerate(free_v):
+            v[component] = x[position]
+        k = ufl.as_vector([x[len(free_v) + i] for i in range(3)])
+        W = ufl.as_ufl(self.energy(ufl.as_vector(v), k, self.constants(s=s)))
+        hessian = apply_derivatives(apply_algebra_lowering(ufl.diff(ufl.diff(W, x), x)))
+        out = np.zeros((len(free_v) + 3,) * 2)
+        for i, j in zip(*np.tril_indices(len(out)), strict=True):  # not hessian(...): it differentiates every time
+            out[i, j] = out[j, i] = float(hessian.evaluate((), {}, (int(i), int(j)), StackDict()))
+        return out

@@ -1,0 +1,187 @@
+"""Supports and loads of a rod in one state, as a file records them: plain arrays, for pictures.
+
+:mod:`rodfem.problem.supports` makes and writes it from a scene.
+
+Cross-sections are not part of a scene.  A picture gives them the proportion of the bending stiffnesses: with ``B`` (2,
+2) that of the curvatures ``k1, k2`` the second moments of area about the centre are proportional to ::
+
+    J = (B22, -B12; -B12, B11),        J_ab = int x_a x_b dA,   x_1 along d1, x_2 along d2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodfem.errors import SceneError
+
+Floats = NDArray[np.float64]
+T = TypeVar("T")
+
+SUPPORTS, DISTRIBUTED, SECTION, FOUNDATION, TIES = "supports", "distributed", "section", "foundation", "constraints"
+"""Groups below that of a branch or a state, and of the file."""
+HELD, AXIS, TURNS = "held", "axis", "free"
+"""What directors may do: nothing, turn about one axis, turn freely."""
+
+
+@dataclass(frozen=True)
+class Support:
+    """What holds and loads a rod at one place, in one state.
+
+    Attributes
+    ----------
+    s
+        Arclength of the place.
+    kind
+        ``clamp``, ``slide``, ``hinge``, ``pin``, ``spring`` or ``free``: see :func:`kind_of`.
+    held
+        Which components of the position along e1, e2, e3 are held, (3,) of bool.
+    turning
+        What the directors may do: :data:`HELD`, :data:`AXIS` or :data:`TURNS`.
+    axis
+        That axis along the directors, (3,); zero without one.
+    frame
+        Unit quaternion of what holds the directors, of the scene's start where nothing does, (4,).
+    translation_stiffness, rotation_stiffness
+        Of springs, along e1, e2, e3 and about axes along them, (3, 3); zero without one.
+    mass
+        Attached there.
+    force, moment
+        In the frame of space, felt in the free directions, (3,); those of potentials that are no springs among them.
+    follower, follower_moment
+        Along the directors, (3,).
+    """
+
+    s: float
+    kind: str
+    held: NDArray[np.bool_]
+    turning: str
+    axis: Floats
+    frame: Floats
+    translation_stiffness: Floats
+    rotation_stiffness: Floats
+    mass: float
+    force: Floats
+    moment: Floats
+    follower: Floats
+    follower_moment: Floats
+
+    def loads(self, R: Floats) -> tuple[Floats, Floats]:
+        """Force and moment (3,) in the frame of space where the directors are the columns of ``R`` (3, 3)."""
+        return self.force + R @ self.follower, self.moment + R @ self.follower_moment
+
+
+def kind_of(held: int, turning: str, sprung: bool) -> str:
+    """Name of what holds ``held`` components of the position and leaves the directors ``turning``."""
+    if turning == HELD:
+        return "clamp" if held == 3 else "slide"
+    if turning == AXIS:
+        return "hinge"
+    return "pin" if held else "spring" if sprung else "free"
+
+
+@dataclass(frozen=True)
+class Tie:
+    """What a constraint keeps, in one state.
+
+    Attributes
+    ----------
+    s
+        Arclength of the point that it keeps; nan for the two ends, or for the whole rod.
+    line
+        The two points (2, 3) whose distance it keeps: a fixed one and that of the rod, or the two ends; nan without.
+    normal
+        Unit normal (3,) of the surface on which it keeps the point; nan without.
+    note
+        The constraint in words where it has no place in a picture, else empty.
+    """
+
+    s: float
+    line: Floats
+    normal: Floats
+    note: str
+
+
+@dataclass(frozen=True)
+class Setting:
+    """All that a file says of what holds and loads a rod in one state; empty for a file that says nothing.
+
+    ``section`` has arclengths (n,) and second moments of area (n, 2, 2) up to a factor; ``distributed`` arclengths (n,)
+    and forces per length (n, 3) in the frame of space and along the directors; ``foundation`` arclengths (n,) and
+    stiffnesses per length (n, 3, 3) along e1, e2, e3.  ``notes`` names in words what acts and has no place in a
+    picture.
+    """
+
+    supports: tuple[Support, ...] = ()
+    section: tuple[Floats, Floats] | None = None
+    distributed: tuple[Floats, Floats, Floats] | None = None
+    foundation: tuple[Floats, Floats] | None = None
+    ties: tuple[Tie, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def axis(self) -> Floats | None:
+        """Direction d3 of the first support that holds it (3,); None without one."""
+        for q in (x.frame for x in self.supports if x.turning != TURNS):
+            a, b, c, d = q
+            return np.array([2 * (b * d + a * c), 2 * (c * d - a * b), a * a - b * b - c * c + d * d])
+        return None
+
+    @property
+    def force(self) -> Floats | None:
+        """Sum of the dead forces at the supports (3,), None where there is none."""
+        total = np.sum([np.zeros(3), *(x.force for x in self.supports)], axis=0)
+        return total if total.any() else None
+
+    @property
+    def down(self) -> Floats | None:
+        """Direction of the dead force along the rod (3,), of gravity, say; None where there is none."""
+        total = np.zeros(3) if self.distributed is None else self.distributed[1].sum(axis=0)
+        return total if total.any() else None
+
+    def widest(self, R: Floats) -> Floats | None:
+        """Direction (3,) in which the cross-sections are wide, where the directors are the columns of ``R`` (3, 3)."""
+        return None if self.section is None else R[:, :2] @ np.linalg.eigh(self.section[1].mean(axis=0))[1][:, -1]
+
+
+def read(group: Any, row: int | None = None) -> Setting:
+    """Read what was written below a group of a file, with the section of the file; what is not there is left out.
+
+    ``row`` is that of the state; None where the group has one state only.  Raises :class:`SceneError` where a support
+    or a constraint is not whole.
+    """
+    row, section, distributed, foundation = row or 0, None, None, None
+    supports, ties = (
+        [{name: value[row] for name, value in here.items()} | dict(here.attrs) for here in group[kind].values()]
+        if kind in group
+        else []
+        for kind in (SUPPORTS, TIES)
+    )
+    if SECTION in group.file:
+        s, B = (group.file[SECTION][name][:] for name in ("s", "stiffness"))
+        section = s, B[:, ::-1, ::-1] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    if DISTRIBUTED in group:
+        along = group[DISTRIBUTED]
+        distributed = along["s"][:], along["force"][row], along["follower"][row]
+    held, kept = tuple(_made(Support, x, group) for x in supports), tuple(_made(Tie, x, group) for x in ties)
+    notes = [tie.note for tie in kept if tie.note]
+    if FOUNDATION in group:
+        along = group[FOUNDATION]
+        foundation = (along["s"][:], along["stiffness"][:]) if "stiffness" in along else None
+        notes += [along.attrs["note"]] if foundation is None else []
+    return Setting(held, section, distributed, foundation, kept, tuple(notes))
+
+
+def _made(kind: type[T], entries: dict[str, Any], group: Any) -> T:
+    """A support or a constraint from the entries of a file, of which it needs some."""
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    missing = [name for name in names if name not in entries]
+    if missing:
+        raise SceneError(
+            f"{group.file.filename} has a {kind.__name__.lower()} without {', '.join(missing)} in {group.name}: "
+            "another version of rodfem wrote it; run the scene again."
+        )
+    return kind(**{name: entries[name] for name in names})

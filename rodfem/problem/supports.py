@@ -1,0 +1,372 @@
+r"""Supports and loads of a rod: derived from a scene, and written to a file.
+
+An end is described by its properties, and named after them by one rule (:func:`~rodfem.problem.setting.kind_of`): how
+many components of its position are held, what its directors are free to do, and whether springs hold it.  A potential
+of an end is a *spring* in translation (in rotation) where its second derivative at the reference is positive
+semidefinite and not zero.  Minus its derivative at the state is a load where it is none, and where it is one in the
+directions in which the position moves without stiffness.  A load along a stiff direction is no other thing than an
+anchor elsewhere.
+
+A constraint ``g = 0`` of a point keeps it on a surface with the normal ``n`` along the derivative of ``g`` in the
+position.  With the second derivative ``H`` the principal curvatures are those of ``H/|g'|`` across ``n``; where they
+are one, ``k``, the point keeps its distance from the centre ``r - n/k``.  An integral of ``a . r'`` joins the two ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+from ufl.algorithms.apply_derivatives import apply_derivatives
+from ufl.utils.stacks import StackDict
+
+from forms.kinematics import UNDEFORMED
+from forms.rotation import IDENTITY, product, rotation
+from rodfem.errors import SceneError
+from rodfem.problem.ends import Constants, Constraint, End, OfPlace, Ring
+from rodfem.problem.local_state import place
+from rodfem.problem.scene import Scene
+from rodfem.problem.setting import (
+    AXIS,
+    DISTRIBUTED,
+    FOUNDATION,
+    HELD,
+    SECTION,
+    SUPPORTS,
+    TIES,
+    TURNS,
+    Support,
+    Tie,
+    kind_of,
+)
+from rodfem.problem.user_functions import asks_where
+
+Floats = NDArray[np.float64]
+
+STATIONS = 9
+"""Places along the rod at which distributed forces are recorded."""
+STEP, SMALL = 1e-3, 1e-6
+"""Of differences of potentials (relative to the rod's length; in radian), and what is zero beside the greatest."""
+BENT = 1e-2
+"""Angle by which the rod is bent in differences of its energy."""
+FLAT = 1e-3
+"""Curvature times the rod's length, or difference of two curvatures relative to them, that is taken for zero."""
+Sample = dict[str, Any]
+
+
+def supports_of(scene: Scene, sample: Sample) -> dict[str, Support]:
+    """Supports of a rod by the names of their places, in a state given by :meth:`~rodfem.fem.shape.Shape.sample`.
+
+    A ring has none at its ends.
+    """
+    load, out = float(sample["load"]), {}
+    for name, (s, end, mass) in _places(scene).items():
+        c, start = scene.constants(load, s), _start(scene, s)
+        held = np.array([p is not None for p in end.held(c)])
+        turning = TURNS if end.rotation is None else HELD if end.hinge is None else AXIS
+        springs = np.zeros((2, 3, 3))
+        if end.energy is not None:
+            springs = stiffness_of(end.energy, c, s, scene.length, _state(sample, s)[0], start)
+        out[name] = Support(
+            s=s,
+            kind=kind_of(int(held.sum()), turning, bool(springs.any())),
+            held=held,
+            turning=turning,
+            axis=np.zeros(3) if end.hinge is None else np.asarray(end.hinge, dtype=float),
+            translation_stiffness=springs[0],
+            rotation_stiffness=springs[1],
+            mass=0.0 if mass is None else _number(mass(c)),
+            **_changing(scene, s, end, sample, springs),
+        )
+    return out
+
+
+def _places(scene: Scene) -> dict[str, tuple[float, End, Callable[[Constants], Any] | None]]:
+    """Where something may hold or load the rod: arclength, the end or what is like one, and the mass attached."""
+    out: dict[str, tuple[float, End, Callable[[Constants], Any] | None]] = {}
+    if not isinstance(scene.ends, Ring):
+        for name, s, end in zip(("left end", "right end"), scene.interval, scene.sides, strict=True):
+            out[name] = s, end, None
+    for i, x in enumerate(scene.attachments):
+        out[f"attachment {i + 1}"] = x.s, End(force=x.force, follower=x.follower, energy=x.energy), x.mass
+    return out
+
+
+def _start(scene: Scene, s: float) -> Floats:
+    q = np.array(IDENTITY) if scene.start is None else np.asarray(scene.start(np.array([s])), dtype=float)[0]
+    return np.asarray(q / np.linalg.norm(q))
+
+
+def _state(sample: Sample, s: float) -> tuple[Floats, Floats]:
+    """Position (3,) and unit quaternion (4,) of the node at an arclength."""
+    node = int(np.argmin(abs(np.asarray(sample["s"]) - s)))
+    r, q = (np.asarray(sample[name][node], dtype=float) for name in ("r", "q"))
+    return r, q / np.linalg.norm(q)
+
+
+def _changing(scene: Scene, s: float, end: End, sample: Sample, springs: Floats) -> dict[str, Floats]:
+    """Attributes of a support that depend on the state: its frame, forces and moments by their names."""
+    c = scene.constants(float(sample["load"]), s)
+    frame, loads = _start(scene, s), np.zeros((2, 3))
+    if end.energy is not None:
+        loads = load_of(end.energy, c, s, scene.length, *_state(sample, s), springs)
+        loads[1] *= end.rotation is None or end.hinge is not None
+    if end.rotation is not None:
+        frame = _vector(end.rotation, c) if callable(end.rotation) else np.asarray(end.rotation, dtype=float)
+    return {
+        "frame": frame / np.linalg.norm(frame),
+        "force": np.where([p is not None for p in end.held(c)], 0.0, _vector(end.force, c) + loads[0]),
+        "moment": _vector(end.moment, c) + loads[1],
+        "follower": _vector(end.follower, c),
+        "follower_moment": _vector(end.follower_moment, c),
+    }
+
+
+def stiffness_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floats, q: Floats) -> Floats:
+    """Stiffness of springs with the potential ``energy(x, c)`` at ``s``, in translation and rotation, (2, 3, 3).
+
+    By differences about the position ``r`` (3,) and the unit quaternion ``q`` (4,); of translation, or of rotation,
+    zero where the second derivative is not positive semidefinite, so that the potential is no spring's.
+    """
+    out = np.zeros((2, 3, 3))
+    for which in (0, 1):
+        if which == 0 and not asks_where(energy, c):
+            continue
+
+        def value(change: Floats, which: int = which) -> float:
+            moved, turned = (r + change, q) if which == 0 else (r, turn(q, change))
+            return _number(energy(_point(moved, turned, s, length), c))
+
+        out[which] = _spring(*_second(value, STEP * (length if which == 0 else 1.0)))
+    return out
+
+
+def _spring(second: Floats, noise: float) -> Floats:
+    """Second derivative (3, 3) where it is a spring's, else zero; it is zero where it is not above ``noise``."""
+    greatest = float(abs(second).max())
+    return second * bool(np.linalg.eigvalsh(second).min() > -1e2 * STEP * greatest and greatest > SMALL * noise)
+
+
+def _second(value: Callable[[Floats], float], h: float) -> tuple[Floats, float]:
+    """Second derivative (3, 3) of a function of a vector (3,) at zero, and the greatest of the values met."""
+    basis, out = h * np.eye(3), np.zeros((3, 3))
+    here, ahead, behind = value(np.zeros(3)), [value(e) for e in basis], [value(-e) for e in basis]
+    for i in range(3):
+        out[i, i] = (ahead[i] - 2 * here + behind[i]) / h**2
+        for j in range(i):
+            out[i, j] = out[j, i] = (value(basis[i] + basis[j]) - ahead[i] - ahead[j] + here) / h**2
+    return out, max(map(abs, (here, *ahead, *behind)))
+
+
+def _point(r: Floats, q: Floats, s: float, length: float) -> Any:
+    """Place of a position (3,) and a quaternion (4,), numbers."""
+    turned = ufl.as_vector(q.tolist())
+    return place(turned, rotation(turned), s, ufl.as_vector(r.tolist()), length=length)
+
+
+def load_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floats, q: Floats, springs: Floats) -> Floats:
+    """Force and moment (2, 3) of a potential at ``s``, in the frame of space, where it is no spring's.
+
+    Of springs of translation, with the stiffness ``springs[0]``, what is across all their directions; of springs of
+    rotation, with ``springs[1]``, nothing.
+    """
+    out = -derivative_of(energy, c, s, length, r, q)
+    if springs[0].any():
+        values, axes = np.linalg.eigh(springs[0])
+        loose = axes[:, values < FLAT * values.max()]
+        across = loose @ loose.T @ out[0]
+        out[0] = across * bool(np.linalg.norm(across) > FLAT * np.linalg.norm(out[0]))
+    out[1] *= not springs[1].any()
+    return out
+
+
+def derivative_of(function: OfPlace, c: Constants, s: float, length: float, r: Floats, q: Floats) -> Floats:
+    """Derivative (2, 3) of ``function(x, c)`` in the position and in the spin, both in the frame of space.
+
+    At the position ``r`` (3,) and the unit quaternion ``q`` (4,); by UFL.
+    """
+    x = ufl.variable(ufl.as_vector([*r.tolist(), 0.0, 0.0, 0.0]))
+    spin = ufl.as_vector([x[3], x[4], x[5]])
+    directors = [ufl.as_vector(d) for d in Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix().T.tolist()]
+    turned = [d + ufl.cross(spin, d) for d in directors]  # to first order, which is enough
+    R = ufl.as_matrix([[d[i] for d in turned] for i in range(3)])
+    rotated = product(ufl.as_vector([1.0, x[3] / 2, x[4] / 2, x[5] / 2]), ufl.as_vector(q.tolist()))
+    value = ufl.as_ufl(function(place(rotated, R, s, ufl.as_vector([x[0], x[1], x[2]]), length=length), c))
+    slope = apply_derivatives(apply_algebra_lowering(ufl.diff(value, x)))
+    return np.array([float(slope.evaluate((), {}, (i,), StackDict())) for i in range(6)]).reshape(2, 3)
+
+
+def turn(q: Floats, change: Floats) -> Floats:
+    """Unit quaternion (4,) turned by a rotation vector (3,) in the frame of space."""
+    angle = float(np.linalg.norm(change))
+    a, v = np.cos(angle / 2), change * np.sinc(angle / (2 * np.pi)) / 2
+    return np.append(a * q[0] - v @ q[1:], a * q[1:] + q[0] * v + np.cross(v, q[1:]))
+
+
+def section_of(scene: Scene) -> tuple[Floats, Floats]:
+    """Bending stiffness (n, 2, 2) in ``k1, k2`` of the undeformed rod at n arclengths (n,), one where it is uniform."""
+    places = scene.samples() if scene.depends_on_s() else [scene.interval[0]]
+    return np.array(places), np.array([_bending(scene, s) for s in places])
+
+
+def _bending(scene: Scene, s: float) -> Floats:
+    """Second derivative (2, 2) of the stored energy in ``k1, k2`` at zero, by differences: pictures need no more."""
+    c, h = scene.constants(s=s), BENT / scene.length
+
+    def W(k1: float, k2: float) -> float:
+        return _number(scene.energy(ufl.as_vector(UNDEFORMED), ufl.as_vector([h * k1, h * k2, 0.0]), c))
+
+    here, ahead, aside = W(0, 0), W(1, 0), W(0, 1)
+    mixed = W(1, 1) - ahead - aside + here
+    return np.array([[ahead - 2 * here + W(-1, 0), mixed], [mixed, aside - 2 * here + W(0, -1)]]) / h**2
+
+
+def distributed_on(scene: Scene, load: float) -> tuple[Floats, Floats, Floats]:
+    """Arclengths (n,), dead force per length in the frame of space and follower force along the directors, (n, 3)."""
+    s = _stations(scene)
+    values = [[_vector(f, scene.constants(load, x)) for x in s.tolist()] for f in (scene.distributed, scene.follower)]
+    return s, np.array(values[0]), np.array(values[1])
+
+
+def foundation_of(scene: Scene, sample: Sample) -> tuple[Floats, Floats] | None:
+    """Stiffness per length (n, 3, 3) of an elastic foundation at arclengths (n,), None where the potential is none's.
+
+    It is one's where it is a spring's everywhere, and no function of the strains.
+    """
+    potential, load = scene.potential, float(sample["load"])
+    if potential is None:
+        return None
+    s, found = _stations(scene), []
+    for at in s.tolist():
+        c, (r, q) = scene.constants(load, at), _state(sample, at)
+
+        def value(change: Floats, at: float = at, c: Constants = c, r: Floats = r, q: Floats = q) -> float:
+            return _number(potential(_point(r + change, q, at, scene.length), c))
+
+        try:
+            found.append(_spring(*_second(value, STEP * scene.length)))
+        except SceneError:  # it asks for strains, which a point does not have
+            return None
+    return (s, np.array(found)) if np.any(found) else None
+
+
+def ties_of(scene: Scene, samples: Sequence[Sample]) -> list[list[Tie]]:
+    """What each constraint of a scene keeps, in states given by :meth:`~rodfem.fem.shape.Shape.sample`."""
+    load = float(samples[0]["load"])
+    whole = [_of_the_ends(scene, x, load) if x.kind == "integral" else None for x in scene.constraints]
+    return [[_tie(scene, x, a, sample) for sample in samples] for x, a in zip(scene.constraints, whole, strict=True)]
+
+
+def _tie(scene: Scene, constraint: Constraint, a: Floats | None, sample: Sample) -> Tie:
+    none = np.full((2, 3), np.nan)
+    if constraint.s is not None:
+        line, normal = _surface(scene, constraint.of, constraint.s, sample)
+        note = "" if np.isfinite([line[0], normal]).any() else f"constraint of the directors at s = {constraint.s:g}"
+        return Tie(constraint.s, line, normal, note)
+    if a is not None:
+        start, end = np.asarray(sample["r"][0]), np.asarray(sample["r"][-1])
+        return Tie(np.nan, np.array([start, start + a * (a @ (end - start)) / (a @ a)]), none[0], "")
+    words = "integral constraint" if constraint.kind == "integral" else "constraint all along the rod"
+    return Tie(np.nan, none, none[0], words)
+
+
+def _surface(scene: Scene, of: OfPlace, s: float, sample: Sample) -> tuple[Floats, Floats]:
+    """Line (2, 3) from the centre of a surface to the point on it, or its unit normal (3,); nan for what it is not."""
+    c, (r, q), none = scene.constants(float(sample["load"]), s), _state(sample, s), np.full((2, 3), np.nan)
+    slope = derivative_of(of, c, s, scene.length, r, q)[0]
+    size = float(np.linalg.norm(slope))
+    if size == 0.0:
+        return none, none[0]
+    normal = slope / size
+    second, _ = _second(lambda change: _number(of(_point(r + change, q, s, scene.length), c)), STEP * scene.length)
+    tangents = np.linalg.svd(normal[None])[2][1:]
+    first, last = np.linalg.eigvalsh(tangents @ second @ tangents.T / size)
+    if max(abs(first), abs(last)) * scene.length > FLAT and abs(last - first) < FLAT * abs(first + last):
+        return np.array([r - 2 * normal / (first + last), r]), none[0]
+    return none, normal
+
+
+def _of_the_ends(scene: Scene, constraint: Constraint, load: float) -> Floats | None:
+    """Vector ``a`` (3,) where an integrand is ``a . r'`` and a constant, None where it is not, or the rod is closed.
+
+    By least squares at random rotations, positions and free strains.
+    """
+    rng = np.random.default_rng(1)
+    strained = np.isin(np.arange(3), scene.free_strains)
+    rows, values = [], []
+    for s in _stations(scene).tolist():
+        q = rng.normal(size=4)
+        v = np.array(UNDEFORMED) + 0.3 * rng.normal(size=3) * strained
+        turned, r = ufl.as_vector(q.tolist()), ufl.as_vector(rng.normal(size=3).tolist())
+        R, strains = rotation(turned), ufl.as_vector(v.tolist())
+        known = {"dr": ufl.dot(R, strains), "v": strains, "k": ufl.as_vector(rng.normal(size=3).tolist())}
+        x = place(turned, R, s, r, length=scene.length, **known)
+        values.append(_number(constraint.of(x, scene.constants(load, s))))
+        rows.append([*(Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix() @ v), 1.0])
+    matrix, value = np.array(rows), np.array(values)
+    a = np.linalg.lstsq(matrix, value, rcond=None)[0]
+    fits = np.linalg.norm(matrix @ a - value) < SMALL * np.linalg.norm(value)
+    return a[:3] if fits and np.linalg.norm(a[:3]) > SMALL and not isinstance(scene.ends, Ring) else None
+
+
+def _stations(scene: Scene) -> Floats:
+    a, b = scene.interval
+    return np.asarray(a + (b - a) * (np.arange(STATIONS) + 0.5) / STATIONS)
+
+
+def write(group: Any, scene: Scene, samples: Sequence[Sample]) -> None:
+    """Write what holds and loads P states into groups below an HDF5 group.
+
+    ``supports`` has a group for each place, ``left end``, ``right end``, ``attachment 1`` ...: attributes ``s``,
+    ``kind``, ``held``, ``turning``, ``axis``, ``translation_stiffness``, ``rotation_stiffness``, ``mass`` and, with P
+    rows, ``frame``, ``force``, ``moment``, ``follower``, ``follower_moment``, as in
+    :class:`~rodfem.problem.setting.Support`; of a ring it is empty.  ``distributed``, where there is such a load, has
+    ``s`` (n,), ``force`` and ``follower`` (P, n, 3); ``foundation``, where there is a potential along the rod, ``s``
+    (n,) and ``stiffness`` (n, 3, 3), or an attribute ``note`` where it is no foundation's.  ``constraints``, where
+    there are some, has ``constraint 1`` ... with ``line`` (P, 2, 3), ``normal`` (P, 3) and the attributes ``s`` and
+    ``note``, as in :class:`~rodfem.problem.setting.Tie`.
+    """
+    rows = [float(sample["load"]) for sample in samples]
+    out, places = group.create_group(SUPPORTS), _places(scene)
+    for name, support in supports_of(scene, samples[0]).items():
+        here = out.create_group(name)
+        springs = np.array([support.translation_stiffness, support.rotation_stiffness])
+        changing = [_changing(scene, *places[name][:2], sample, springs) for sample in samples]
+        for key, value in vars(support).items():
+            if key in changing[0]:
+                here[key] = np.array([row[key] for row in changing])
+            else:
+                here.attrs[key] = value
+    if scene.distributed is not None or scene.follower is not None:
+        along = group.create_group(DISTRIBUTED)
+        found = [distributed_on(scene, load) for load in rows]
+        along["s"] = found[0][0]
+        along["force"], along["follower"] = (np.array([f[i] for f in found]) for i in (1, 2))
+    if scene.potential is not None:
+        along, foundation = group.create_group(FOUNDATION), foundation_of(scene, samples[0])
+        along.attrs["note"] = "" if foundation else "load by a potential along the rod"
+        if foundation:
+            along["s"], along["stiffness"] = foundation
+    for number, ties in enumerate(ties_of(scene, samples)):
+        here = group.create_group(f"{TIES}/constraint {number + 1}")
+        here.attrs.update(s=ties[0].s, note=ties[0].note)
+        for key in ("line", "normal"):
+            here[key] = np.array([getattr(tie, key) for tie in ties])
+
+
+def write_section(file: Any, scene: Scene) -> None:
+    """Write the bending stiffness of a rod into a group ``section`` of an HDF5 file: ``s`` (n,), ``stiffness``."""
+    file[f"{SECTION}/s"], file[f"{SECTION}/stiffness"] = section_of(scene)
+
+
+def _number(value: Any) -> float:
+    return float(value if isinstance(value, (int, float)) else ufl.as_ufl(value)(()))  # most are plain numbers
+
+
+def _vector(function: Callable[[Constants], Any] | None, c: Constants) -> Floats:
+    return np.zeros(3) if function is None else np.array([_number(x) for x in function(c)])

@@ -1,0 +1,274 @@
+"""Validation of a scene before any computation: each check raises one sentence."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import ufl
+
+from forms.kinematics import UNDEFORMED
+from rodfem.errors import SceneError
+from rodfem.problem.ends import Attachment, Constraint, End, Ring, check_vector
+from rodfem.problem.user_functions import asked_for, asks_where, functions_of, functions_of_places, some_places
+
+if TYPE_CHECKING:
+    from rodfem.problem.scene import Scene
+
+
+def check_kinds(scene: Scene) -> None:
+    """Check that what a scene is made of is of the right kind."""
+    if not isinstance(scene.ends, Ring) and not (
+        isinstance(scene.ends, (tuple, list)) and len(scene.ends) == 2 and all(isinstance(e, End) for e in scene.ends)
+    ):
+        raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
+    for what, given, kind, example in (
+        ("attachments", scene.attachments, Attachment, "(Attachment(0.5, force=...),)"),
+        ("constraints", scene.constraints, Constraint, "(at(1.0, lambda x, c: x.r[0]),)"),
+        ("breaks", scene.breaks, Real, "(0.5,)"),
+    ):
+        if not (isinstance(given, (tuple, list)) and all(isinstance(x, kind) for x in given)):
+            raise SceneError(f"The {what} are {given!r}: give a tuple of them, as in {what}={example}.")
+    if not isinstance(scene.parameters, Mapping):
+        raise SceneError(f"The parameters are {scene.parameters!r}: give a dictionary, as in {{'P': Parameter(0.0)}}.")
+    for what, pair in (("interval", scene.interval), ("span", scene.span)):
+        if not (isinstance(pair, Sequence) and len(pair) == 2 and all(isinstance(x, Real) for x in pair)):
+            raise SceneError(f"The {what} is {pair!r}: give two numbers.")
+    for name, parameter in scene.parameters.items():
+        if not str(name).isidentifier() or name == "s":
+            raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
+        if not isinstance(getattr(parameter, "value", parameter), Real):
+            raise SceneError(f"The parameter {name} is {parameter!r}: give a number or a Parameter.")
+    if not (hasattr(scene.inertia, "rho_A") and hasattr(scene.inertia, "rho_I")):
+        raise SceneError(f"The inertia is {scene.inertia!r}: give one, as in Inertia(rho_A=lambda c: 1.0).")
+    if not hasattr(scene.ordinate, "places"):
+        raise SceneError(f"The ordinate is {scene.ordinate!r}: give an Ordinate(name, s, of).")
+    for what, function, role in functions_of(scene):
+        if not callable(function):
+            raise SceneError(f"The {what} is {function!r}: give a function {role.call}.")
+        try:
+            inspect.signature(function).bind(*range(role.arguments))
+        except TypeError:
+            raise SceneError(f"The {what} is no function of {role.arguments} argument(s): give {role.call}.") from None
+
+
+def check_shapes(scene: Scene) -> None:
+    """Check that forces and moments are vectors, and energies and constraints scalars."""
+    c = scene.constants()
+    for what, function, role in functions_of(scene):
+        if role.call == "f(c)" and role.size is not None:
+            if role.size:
+                check_vector(what, function(c), role.size)
+            else:
+                check_scalar(what, function(c))
+    for what, function, known in functions_of_places(scene):
+        check_scalar(what, function(known, c))
+
+
+def check_plane(scene: Scene) -> None:
+    """Check that the ends of a planar rod and the forces on it are in one plane, and moments about the normal."""
+    normal = scene.normal
+    if normal is None:
+        return
+    for load in scene.span:
+        left, right = (end.held(scene.constants(load))[normal] for end in scene.sides)
+        if left is not None and right is not None and float(left) != float(right):
+            raise SceneError(
+                f"The ends are held at {float(left):g} and {float(right):g} along {scene.planar}, across which the rod "
+                "is planar: hold both at the same, or leave planar out."
+            )
+    for what, function, role in functions_of(scene):
+        if role.call != "f(c)" or not ("force" in what or "moment" in what):
+            continue
+        out = [i for i in range(3) if (i == normal) != ("moment" in what)]
+        for s in scene.samples():
+            values = [float(x) for x in function(scene.constants(max(scene.span, key=abs), s))]
+            if any(values[i] for i in out):
+                raise SceneError(
+                    f"The {what} pushes the rod out of its plane across {scene.planar}, with {values}: "
+                    "leave that component out, or planar out of the scene."
+                )
+
+
+def check_load(scene: Scene) -> None:
+    """Raise where nothing in the scene depends on its load, so that there is nothing to trace."""
+    if scene.load not in asked_for(scene):
+        raise SceneError(
+            f"Nothing in the scene depends on its load {scene.load!r}: use c.{scene.load} in an end, a load or the "
+            "energy, or choose another load."
+        )
+
+
+def check_ordinate(scene: Scene) -> None:
+    """Raise where the ordinate is no number, for a state where it need not be defined but of the right type."""
+    if not scene.ordinate.places:
+        check_scalar("ordinate along the rod", scene.ordinate.of(some_places(scene)[1], scene.constants()))
+        return
+    try:
+        scene.ordinate.of(np.array([0.2, 0.3, 0.4]), np.array([0.5, 0.1, 0.7, 0.5]))
+    except SceneError as trouble:
+        if isinstance(trouble.__cause__, (TypeError, LookupError, AttributeError, NameError)):
+            raise
+
+
+def check_scalar(what: str, value: Any) -> None:
+    """Raise :class:`SceneError` unless ``value`` is a scalar, a number or an expression."""
+    try:
+        shape = ufl.as_ufl(value).ufl_shape
+    except Exception:  # of UFL's own, which differ from release to release
+        raise SceneError(f"The {what} is {value!r}: return a number or a UFL expression.") from None
+    if shape != ():
+        raise SceneError(f"The {what} has the shape {shape}: return a scalar.")
+
+
+def check_start(scene: Scene) -> None:
+    """Check that the start returns quaternions, and that of a ring closes."""
+    ring = isinstance(scene.ends, Ring)
+    if scene.start is None:
+        if ring:
+            raise SceneError("A ring has no straight start: give its rotation as a function start(s).")
+        return
+    s = np.linspace(*scene.interval, 5)
+    q = np.asarray(scene.start(s), dtype=float)
+    if q.shape != (5, 4):
+        raise SceneError(f"The start has the shape {q.shape} at 5 arclengths: return a quaternion for each, (5, 4).")
+    if not (np.linalg.norm(q, axis=1) > 0).all():
+        raise SceneError("The start is no rotation everywhere: return quaternions of unit norm.")
+    if scene.normal is not None and abs(np.delete(q[:, 1:], scene.normal, axis=1)).max() > 1e-12:
+        raise SceneError(f"The start leaves the plane across {scene.planar}: turn about that axis only.")
+    if isinstance(scene.ends, Ring) and scene.ends.sign * (q[0] @ q[-1]) <= 0:
+        raise SceneError(
+            f"The start of the ring does not end as it begins: make q(l) = {scene.ends.sign:+g} q(0), or choose "
+            f"Ring(odd={not scene.ends.odd})."
+        )
+
+
+def check_energy(scene: Scene) -> None:
+    """Check that the stored energy is a scalar."""
+    v, k = ufl.as_vector(UNDEFORMED), ufl.as_vector([0.0, 0.0, 0.0])
+    check_scalar("stored energy", scene.energy(v, k, scene.constants()))
+
+
+def check_inertia(scene: Scene) -> None:
+    """Check that no inertia is negative, and that a scene whose stability is a matter of motion has one."""
+    c = scene.constants()
+    masses = [float(scene.inertia.rho_A(c)), *(float(x.mass(c)) for x in scene.attachments if x.mass)]
+    rotary = [float(x) for x in scene.inertia.rho_I(c)]
+    rotary += [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
+    if min(masses + rotary) < 0:
+        raise SceneError(f"A mass or rotary inertia of {min(masses + rotary):g} is negative: give zero or more.")
+    if not scene.conservative and max(masses) == 0 and scene.inertia == type(scene.inertia)():
+        raise SceneError(
+            f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter of "
+            "motion, so give it an inertia, as in inertia=Inertia(rho_A=lambda c: 1.0)."
+        )
+
+
+def check_scene(scene: Scene) -> None:
+    """Check supports, places and the stored energy; raises :class:`~rodfem.errors.SceneError`."""
+    if scene.planar not in (None, "e1", "e2"):
+        raise SceneError(f"A rod cannot be planar across {scene.planar!r}: choose 'e1' or 'e2', or None for space.")
+    check_energy(scene)
+    check_places(scene)
+    check_shapes(scene)
+    check_supports(scene)
+    check_plane(scene)
+    check_start(scene)
+    check_convexity(scene)
+    check_inertia(scene)
+    check_ordinate(scene)
+
+
+def check_convexity(scene: Scene) -> None:
+    """Raise where the stored energy is not strictly convex at the undeformed state."""
+    for s in scene.samples() if scene.depends_on_s() else [None]:
+        stiffness = scene.stiffness(s)
+        lowest = np.linalg.eigvalsh(stiffness)[0] if stiffness.size else 1.0
+        if lowest <= 1e-12 * abs(stiffness).max(initial=0.0):
+            where = "" if s is None else f" at s = {s:g}"
+            raise SceneError(
+                f"The stored energy is not convex{where}: its second derivative at the undeformed state has the "
+                f"eigenvalue {lowest:.3g}; choose constants for which all are positive."
+            )
+
+
+def check_supports(scene: Scene) -> None:
+    """Check shapes, whether anything holds the rod, and whether the ends can be where they are asked to be."""
+    for side, end in zip(("left", "right"), scene.sides, strict=True):
+        for load in scene.span:
+            c = scene.constants(load)
+            if end.position is not None:
+                check_vector(f"position of the {side} end", end.position(c), 3)
+            rotation = end.rotation(c) if callable(end.rotation) else end.rotation
+            if rotation is not None:
+                check_vector(f"rotation of the {side} end", rotation, 4)
+                if scene.normal is not None and any(rotation[i + 1] != 0 for i in range(3) if i != scene.normal):
+                    raise SceneError(
+                        f"The rotation of the {side} end leaves the plane across {scene.planar}: "
+                        "turn about that axis only."
+                    )
+                if not sum(float(x) ** 2 for x in rotation) > 0:
+                    raise SceneError(f"The rotation of the {side} end is the zero quaternion: give one of unit norm.")
+        if end.hinge is not None and end.rotation is None:
+            raise SceneError(f"The {side} end has a hinge but no rotation: say which directors the hinge holds.")
+        if end.hinge is not None:
+            check_vector(f"hinge of the {side} end", end.hinge, 3)
+        if end.hinge is not None and not np.linalg.norm(end.hinge) > 0:
+            raise SceneError(f"The hinge of the {side} end has no axis: give three components, not all zero.")
+        if end.follower is not None and all(x is not None for x in end.held(scene.constants())):
+            raise SceneError(
+                f"A follower force acts on the {side} end, whose position is held: leave it free in one direction."
+            )
+        if end.force is not None and all(x is not None for x in end.held(scene.constants())):
+            raise SceneError(
+                f"A dead force acts on the {side} end, whose position is held: it has no effect there; leave it out, "
+                "or leave the position free in one direction."
+            )
+        if end.fixed_rotation is not None and (end.moment or end.follower_moment):
+            raise SceneError(
+                f"A moment acts on the {side} end, whose directors are held: leave its rotation free, or use a hinge."
+            )
+    check_drift(scene)
+    check_reach(scene)
+
+
+def check_drift(scene: Scene) -> None:
+    """Raise unless something holds the rod, or what acts on it is in balance whatever its shape."""
+    c = scene.constants()
+    if isinstance(scene.ends, Ring) or any(asks_where(f, c) for _, f, _ in functions_of_places(scene)):
+        return
+    held = [[x is not None for x in end.held(c)] for end in scene.sides]
+    for i, (left, right) in enumerate(zip(*held, strict=True)):
+        if not (left or right):
+            raise SceneError(
+                f"The rod can drift away along e{i + 1}: hold that component of the position at one end at least, "
+                "or attach a spring."
+            )
+
+
+def check_reach(scene: Scene) -> None:
+    """Raise where a rod that cannot stretch is held at ends that are farther apart than it is long."""
+    if 2 in scene.free_strains or 0 in scene.free_strains:
+        return
+    for load in np.linspace(*scene.span, 9):
+        left, right = (end.held(scene.constants(load)) for end in scene.sides)
+        if None not in left and None not in right:
+            distance = sum((float(b) - float(a)) ** 2 for a, b in zip(left, right, strict=True)) ** 0.5
+            if distance > scene.length * (1 + 1e-12):
+                raise SceneError(
+                    f"At {scene.load} = {load:g} the ends are {distance:.6g} apart, but the rod is inextensible "
+                    f"and only {scene.length:.6g} long: let it stretch, or move the ends together."
+                )
+
+
+def check_places(scene: Scene) -> None:
+    """Raise for attachments, constraints and breaks that are not on the rod."""
+    a, b = scene.interval
+    places = [("attachment", x.s) for x in scene.attachments] + [("break", s) for s in scene.breaks]
+    places += [("constraint", x.s) for x in scene.constraints if x.s is not None]
+    for what, s in places:
+        if not a <= s <= b:
+            raise SceneError(f"The {what} at s = {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")

@@ -1,0 +1,66 @@
+"""Two-sided eigenproblem of a rod under loads without a potential: biorthonormal right and left eigenvectors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rodfem.errors import ConvergenceError
+from rodfem.stability.nonsymmetric import Vibration
+
+SAME = 1e-6
+"""Relative difference below which a left and a right eigenvalue are paired."""
+
+ROUND_OFF = 1e-10
+"""Relative imaginary part below which an eigenvalue counts as real."""
+
+
+@dataclass(frozen=True)
+class BothSides:
+    """Eigenvalues nearest zero with non-negative imaginary part, by real part (k,), their errors and motions.
+
+    ``right`` X and ``left`` Z (n, k) on this rank's n unknowns: ``X^* M X = 1`` for each, ``X^t M X`` real and
+    positive, ``Z^t M X`` the unit matrix.  ``weighed`` is ``M Z``.
+    """
+
+    values: np.ndarray
+    errors: np.ndarray
+    kinds: tuple[str, ...]
+    right: np.ndarray
+    left: np.ndarray
+    weighed: np.ndarray
+
+
+def both_sides(vibration: Vibration, number: int) -> BothSides:
+    """Compute ``number`` biorthonormal left/right eigenpairs nearest zero, at the state last assembled.
+
+    Raises :class:`ConvergenceError` if a right eigenvalue has no left partner.
+    """
+    right, left = (find(2 * number + 2, 0.0) for find in (vibration.near, vibration.left))
+    upper = right.values.imag > -SAME * abs(right.values)  # one of each pair
+    nearest = [i for i in np.argsort(abs(right.values), kind="stable") if upper[i]][:number]
+    chosen = sorted(nearest, key=lambda i: right.values[i].real)
+    partners: list[int] = []
+    for value in right.values[chosen]:
+        distance = abs(left.values - value)
+        distance[partners] = np.inf
+        partners.append(int(np.argmin(distance)))
+        if distance[partners[-1]] > SAME * abs(value):
+            raise ConvergenceError(
+                f"The left mode of the eigenvalue {value:.6g} was not found: ask for fewer modes, or change the load."
+            )
+    comm = vibration.system.comm
+    X, Z = right.vectors[:, chosen], left.vectors[:, partners]
+    X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * vibration.weighed(X), axis=0)).real)
+    X = X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * vibration.weighed(X), axis=0))))
+    Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ vibration.weighed(X)).T)
+    values = right.values[chosen]
+    return BothSides(
+        np.where(abs(values.imag) < ROUND_OFF * abs(values), values.real, values),
+        right.errors[chosen],
+        tuple(right.kinds[i] for i in chosen),
+        X,
+        Z,
+        vibration.weighed(Z),
+    )

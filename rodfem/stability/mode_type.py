@@ -1,0 +1,57 @@
+"""Type of a mode of vibration: bending about one director or the other, torsion, or mixed."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.fem.system import System
+
+PURE = 0.99
+"""Share of the mean square rotation above which a mode is named after one kind of motion."""
+KINDS = ("bending about d1", "bending about d2", "torsion")
+
+
+def shares(system: System, turned: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
+    """Shares of the rotations about the three directors in a mode, (3,), summing to one; collective.
+
+    ``turned`` and ``parts``, the real and the imaginary part of the mode, as in :func:`squares`.
+    """
+    square = squares(system, turned, np.stack(parts, axis=1)).sum(axis=0)
+    return np.asarray(square / max(square.sum(), 1e-300))
+
+
+def squares(system: System, turned: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Integrals of the squared rotations about the three directors in each of some perturbations, (k, 3); collective.
+
+    ``turned`` (cells, nodes, components) is the rotation field of the state, ``columns`` (n, k) are the perturbations
+    as values of this rank's unknowns.  The rotation is the spin ``w = 2 vec(conj(q) dq)`` at the nodes.
+    """
+    f = system.fields
+    cells = slice(0, f.owned_cells)
+    size = (f.vertices[cells, 1] - f.vertices[cells, 0])[:, None, None]
+    dofs, vector = f.dofs[f.turning.name][cells], system.new_vector()
+    free, change = f.number[dofs] >= 0, []
+    for column in columns.T:
+        vector.array[:] = column
+        system.bring(vector)
+        change.append(np.where(free, f.u.x.array[dofs], 0.0))
+    q, dq = f.turning.quaternion(turned[cells]), f.turning.change(turned[cells], np.array(change))
+    scalar, v, dv = q[..., :1], q[..., 1:], dq[..., 1:]
+    across = v[..., [1, 2, 0]] * dv[..., [2, 0, 1]] - v[..., [2, 0, 1]] * dv[..., [1, 2, 0]]  # v x dv
+    w = scalar * dv - dq[..., :1] * v - across
+    return np.asarray(system.comm.allreduce((w**2 * size).sum(axis=(1, 2))))
+
+
+def name(share: np.ndarray) -> str:
+    """Name of a motion by its shares: one of :data:`KINDS`, ``bending`` (about both), or ``mixed``."""
+    for kind, part in zip(KINDS, share, strict=True):
+        if part > PURE:
+            return kind
+    return "bending" if share[0] + share[1] > PURE else "mixed"
+
+
+def halves(vector: PETSc.Vec) -> list[np.ndarray]:
+    """Real and imaginary part of this rank's values of a vector of a complex PETSc; the one part of a real one."""
+    values = vector.array_r
+    return [values.real.copy(), values.imag.copy()] if np.iscomplexobj(values) else [values.copy()]

@@ -1,0 +1,394 @@
+r"""Eigenvalues ``mu = omega^2`` of a rod under loads without a potential: a non-symmetric pencil ``S x = mu M x``.
+
+A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low rank (the linearised end load
+couples the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real
+axis: flutter.
+
+Eigenvalues are found by shift-invert.  A complex PETSc takes a complex shift ``a + i b`` as it is, and is used where
+it is what is installed.  A real one needs no more than twice the size: with vectors written as pairs of their real and
+imaginary parts, ``S - (a + i b) M`` is the real matrix ::
+
+    ( S - a M     b M   )
+    (  -b M     S - a M )
+
+whose pencil with ``diag(M, M)`` has the eigenvalues ``mu - (a + i b)`` and their conjugates; those with vectors
+of the form ``(x, -i x)`` belong to the first kind.
+
+A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``M g`` on both sides: an eigenvector
+``x`` of ``mu`` becomes ``x - g (g.Mx)`` with the multiplier ``-mu (g.Mx)``, and all of the spectrum is left but a zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+from slepc4py import SLEPc
+
+from rodfem import compat
+from rodfem.errors import ConvergenceError
+from rodfem.fem.system import System
+from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, Mumps, is_cut
+from rodfem.linalg.replicated import Copy
+from rodfem.linalg.selection import factors_of
+from rodfem.linalg.substructured import Condensed
+from rodfem.stability import mode_type as character
+from rodfem.stability.dense import finite_eigenpairs
+from rodfem.stability.pencil import (
+    LARGE,
+    Inverse,
+    assemble_pencil,
+    exclude_modes,
+    shift_invert,
+    symmetry_modes,
+    weighed_modes,
+    with_factors,
+)
+
+FAR = 1e5
+"""How many times farther from the shift than the third nearest an eigenvalue may be.
+
+The pencil has infinite eigenvalues with Jordan blocks of size two, one for each pair of constraint and multiplier,
+which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than the nearest: those are not kept.
+"""
+DENSE = 3
+"""A pencil smaller than this many Krylov spaces is solved by dense reductions: it may have few finite eigenvalues."""
+REAL = 1e-7
+"""An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
+MULTIPLE = 1e-8
+"""Eigenvalues that differ by less than this, relative, are one that is multiple."""
+ALIKE = 1e-6
+"""Eigenvalues that differ by less than this, relative, have one name: where another is near the shift, digits go."""
+NEAR_ZERO = 1e-2
+"""Share of the farthest eigenvalue below which differences of others are relative to this share."""
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Frequencies:
+    """Eigenvalues ``mu = omega^2`` in ascending order of their real parts, and their backward errors.
+
+    ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors`` (n, k) are complex, with the
+    n unknowns of this rank.
+    """
+
+    values: np.ndarray
+    errors: np.ndarray
+    kinds: tuple[str, ...] = ()
+    vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+
+    @property
+    def noise(self) -> float:
+        """What tells an eigenvalue from zero."""
+        return REAL * max(1.0, float(abs(self.values).min(initial=np.inf)))
+
+    def diverged(self) -> int:
+        """Number of negative real eigenvalues."""
+        return int(((self.values.imag == 0) & (self.values.real < -self.noise)).sum())
+
+    def unstable(self, tolerance: float) -> int:
+        """Number of eigenvalues with a negative real part or a non-zero imaginary part."""
+        return int(((self.values.real < -tolerance) | (abs(self.values.imag) > tolerance)).sum())
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """An eigenvalue, the real and imaginary part of its vector on this rank, and its backward error."""
+
+    value: complex
+    parts: list[np.ndarray]
+    error: float
+
+    @property
+    def vector(self) -> np.ndarray:
+        """The vector on this rank, complex."""
+        return np.asarray(self.parts[0] + 1j * (0.0 if len(self.parts) < 2 else self.parts[1]))
+
+
+class Vibration:
+    """Computes eigenvalues near a shift, at states of one :class:`~rodfem.fem.system.System`."""
+
+    def __init__(self, system: System) -> None:
+        """Allocate the matrices of the pencil once."""
+        self.system = system
+        self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
+        self.turned = np.zeros((0, 0, 4))
+        self._copies: list[Copy] = []
+        self._own = slice(None)
+        self._free: dict[int, PETSc.Vec] = {}
+
+    def assemble(self, x: PETSc.Vec) -> None:
+        """Assemble the pencil at the state ``x``, at which the phase conditions must be set.
+
+        Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
+        """
+        with self.system.clock("assembly"):
+            assemble_pencil(self.system, x, self.matrix, self.mass)
+            self.system.verify(self.matrix, x)
+            free = symmetry_modes(self.system, x)
+            if free:
+                exclude_modes(self.system, free, self.matrix, self.mass)
+            self._free = {i: mode for i, (mode, _) in weighed_modes(self.system, free, self.mass).items()}
+            self.system.bring(x)
+            f = self.system.fields
+            self.turned = f.u.x.array[f.dofs[f.turning.name]]
+
+    def asymmetry(self) -> tuple[int, float]:
+        """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
+        transposed = self.matrix.copy()
+        transposed.transpose()
+        transposed.axpy(-1.0, self.matrix, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        begin, end = transposed.getOwnershipRange()
+        rows = [(i, *transposed.getRow(i)) for i in range(begin, end)]
+        size = self.matrix.norm(PETSc.NormType.INFINITY)
+        mine = [
+            (i, j, v)
+            for i, columns, values in rows
+            for j, v in zip(columns, values, strict=True)
+            if abs(v) > 1e-12 * size
+        ]
+        entries = [e for part in self.system.comm.allgather(mine) for e in part]
+        used = sorted({i for i, _, _ in entries})
+        small = np.zeros((len(used), len(used)))
+        for i, j, v in entries:
+            small[used.index(i), used.index(j)] = v
+        return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if used else (0, 0.0)
+
+    def near(self, number: int, target: complex) -> Frequencies:
+        """Return eigenvalues nearest to ``target`` at the state last assembled: ``number``, or more where they come.
+
+        Fewer are returned only where the discretisation has no more finite ones.  A pencil hardly larger than the
+        Krylov space for ``number`` of them is solved by dense reductions.
+        """
+        return self._near(number, target, *self._whole())
+
+    def left(self, number: int, target: complex) -> Frequencies:
+        """Return the same of the transposed pencil: ``vectors`` are left ones, ``z.S = mu z.M`` without conjugation."""
+        matrix, mass = self._whole()
+        transposed = matrix.copy()
+        transposed.transpose()
+        try:
+            return self._near(number, target, transposed, mass)
+        finally:
+            transposed.destroy()
+
+    def _whole(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """The pencil; of a rod that is not long all of it on each rank, which solves alone."""
+        pencil = self.matrix, self.mass
+        comm = self.system.comm
+        if comm.size == 1 or is_cut(comm, self.matrix.getSize()[0]):
+            return pencil
+        if not self._copies:
+            self._copies = [Copy(matrix) for matrix in pencil]
+            self._own = self._copies[0].own
+        whole, mass = (copy.update(matrix) for copy, matrix in zip(self._copies, pencil, strict=True))
+        return whole, mass
+
+    def _near(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> Frequencies:
+        with self.system.clock("stability"):
+            if matrix.getSize()[0] < DENSE * (2 * number + 20):
+                found = self._dense(matrix, mass)
+            elif target.imag == 0 or compat.COMPLEX:
+                found = self._shifted(number, target, matrix, mass)
+            else:
+                found = self._doubled(number, target, matrix, mass)
+            found = sorted(found, key=lambda p: abs(p.value - target))[: number + 2]
+            third = abs(found[min(2, len(found) - 1)].value - target)
+            found = [p for p in found if abs(p.value - target) <= FAR * third]
+            for pair in found:
+                self._complete(pair)
+            kinds = self._kinds(found)
+        order = sorted(range(len(found)), key=lambda i: (round(found[i].value.real, 9), found[i].value.imag))
+        return Frequencies(
+            np.array([found[i].value for i in order]),
+            np.array([found[i].error for i in order]),
+            tuple(kinds[i] for i in order),
+            np.stack([found[i].vector for i in order], 1),
+        )
+
+    def _kinds(self, found: list[_Pair]) -> list[str]:
+        """Names of the motions; those of a multiple eigenvalue are the name of all that it does.
+
+        Its vectors are any in its invariant subspace: bending about d1 in one state and about d2 in the next.
+        """
+        together, columns = groups(np.array([p.value for p in found]), ALIKE), []
+        for group in together:
+            if len(group) == 1:
+                columns.append(np.stack(found[group[0]].parts, axis=1))
+            else:
+                basis = self.orthonormal(np.stack([found[j].vector for j in group], axis=1))
+                columns.append(np.concatenate([basis.real, basis.imag], axis=1))
+        squares = character.squares(self.system, self.turned, np.concatenate(columns, axis=1))
+        kinds, begin = [""] * len(found), 0
+        for group, part in zip(together, columns, strict=True):
+            square = squares[begin : begin + part.shape[1]].sum(axis=0)
+            begin += part.shape[1]
+            for j in group:
+                kinds[j] = character.name(square / max(square.sum(), 1e-300))
+        return kinds
+
+    def motion(self, basis: np.ndarray) -> str:
+        """Name of all that the vectors of a ``basis`` (n, k) do, at the state last assembled."""
+        return character.name(character.shares(self.system, self.turned, [*basis.real.T, *basis.imag.T]))
+
+    def weighed(self, vectors: np.ndarray) -> np.ndarray:
+        """``M X`` for real or complex vectors (n, k), with any PETSc."""
+        if self.system.comm.size == 1:
+            start, columns, values = self.mass.getValuesCSR()
+            return np.asarray(sp.csr_matrix((values.real, columns, start), shape=self.mass.size) @ vectors)
+        if np.iscomplexobj(vectors):
+            return np.asarray(self.weighed(vectors.real) + 1j * self.weighed(vectors.imag))
+        out, x = np.empty_like(vectors), self.system.new_vector()
+        for i, column in enumerate(vectors.T):
+            x.array[:] = column
+            out[:, i] = (self.mass * x).array_r.real
+        return out
+
+    def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """``a^* b`` of all ranks' rows."""
+        return np.asarray(self.system.comm.allreduce(a.conj().T @ b))
+
+    def squares(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Products of each column of ``a`` with the same of ``b``, real parts."""
+        return np.asarray(self.system.comm.allreduce(np.sum(a.conj() * b, axis=0).real))
+
+    def orthonormal(self, vectors: np.ndarray) -> np.ndarray:
+        """Basis of the span of complex vectors (n, k), orthonormal in the mass."""
+        squares, turn = np.linalg.eigh(self.product(vectors, self.weighed(vectors)))
+        return np.asarray(vectors @ (turn / np.sqrt(np.maximum(squares, EPS * squares[-1]))))
+
+    def _complete(self, pair: _Pair) -> None:
+        """Add to a vector, in place, the part of it along free motions, which its multipliers tell."""
+        begin, end = self.matrix.getOwnershipRange()
+        for index, mode in self._free.items():
+            mine = [part[index - begin] if begin <= index < end else 0.0 for part in pair.parts]
+            multiplier = complex(*self.system.comm.allreduce(np.array([*mine, 0.0][:2])))
+            if abs(pair.value) > 0:
+                share = -multiplier / pair.value
+                for part, along in zip(pair.parts, (share.real, share.imag), strict=False):
+                    part += along * mode.array_r.real
+
+    def _dense(self, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
+        """All finite eigenvalues of a pencil that is small enough for dense matrices."""
+        values, vectors = finite_eigenpairs(*(dense(A) for A in (matrix, mass)))
+        if len(values) == 0:
+            raise ConvergenceError("The rod has no inertia: give it a mass, or a rotary inertia.")
+        own = vectors[self._own]
+        return [_Pair(complex(w), [x.real.copy(), x.imag.copy()], EPS) for w, x in zip(values, own.T, strict=True)]
+
+    def _shifted(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
+        """Solve with a shift that this PETSc's numbers can express."""
+        solver = self._solve(matrix, mass, number, target if compat.COMPLEX else target.real)
+        re, im = matrix.createVecRight(), matrix.createVecRight()
+        out = []
+        for i in range(solver.getConverged()):
+            value = solver.getEigenpair(i, re, im)
+            parts = character.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
+            error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
+            out.append(_Pair(complex(value), [part[self._own].copy() for part in parts], error))
+        solver.destroy()
+        return out
+
+    def _doubled(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
+        """Solve with a complex shift by the real matrix of twice the size."""
+        a, b, comm = target.real, target.imag, matrix.comm
+        shifted, upper = matrix.copy(), mass.copy()
+        shifted.axpy(-a, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        upper.scale(b)
+        lower = upper.copy()
+        lower.scale(-1.0)
+        pencil = PETSc.Mat().createNest([[shifted, upper], [lower, shifted]], comm=comm).convert("aij")
+        masses = PETSc.Mat().createNest([[mass, None], [None, mass]], comm=comm).convert("aij")
+        solver = self._solve(pencil, masses, 2 * number, 0.0)
+        re, im = pencil.createVecRight(), pencil.createVecRight()
+        out = []
+        for i in range(solver.getConverged()):
+            shift = solver.getEigenpair(i, re, im)
+            n = re.getLocalSize() // 2  # each rank holds its part of x, then its part of y
+            x, y = re.array_r[:n] + 1j * im.array_r[:n], re.array_r[n:] + 1j * im.array_r[n:]
+            first, second = comm.tompi4py().allreduce(
+                np.array([np.linalg.norm(x + 1j * y) ** 2, np.linalg.norm(x - 1j * y) ** 2])
+            )
+            if first >= second:
+                vector = (x + 1j * y)[self._own]
+                error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
+                out.append(_Pair(target + shift, [vector.real.copy(), vector.imag.copy()], error))
+        solver.destroy()
+        for made in (shifted, upper, lower, pencil, masses):
+            made.destroy()
+        return out[:number]
+
+    def _solve(self, matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex) -> SLEPc.EPS:
+        """Run SLEPc; raises :class:`ConvergenceError` where it finds nothing at all, or has no factors to do so.
+
+        A small pencil has few finite eigenvalues, and a Krylov space that holds all of them breaks down on the Jordan
+        blocks of the infinite ones: it is then made smaller.
+        """
+        inverse = self._inverse(matrix, mass, target)
+        while number:
+            if inverse is None:
+                solver = shift_invert(matrix, mass, number, target, symmetric=False)
+            else:
+                solver = with_factors(matrix, mass, number, target, inverse, symmetric=False)
+            try:
+                solver.setUp()
+            except PETSc.Error as trouble:
+                raise ConvergenceError(_singular(target)) from trouble
+            try:
+                solver.solve()
+            except PETSc.Error as trouble:
+                if trouble.ierr != PETSC_ERR_LIB:
+                    raise
+            else:
+                if solver.getConverged():
+                    return solver
+            solver.destroy()
+            number //= 2
+        raise ConvergenceError(f"SLEPc found no eigenvalue near {target:.6g}: use a richer discretisation.")
+
+    def _inverse(self, matrix: PETSc.Mat, mass: PETSc.Mat, target: complex) -> Inverse | None:
+        """Inverse of ``matrix - target mass`` for a large pencil, piece by piece on several ranks; None: SLEPc's own.
+
+        MUMPS, SLEPc's choice on several ranks, gives up on a long rod: the zero block of the multipliers delays more
+        pivots than its analysis has made room for.  KLU's factors fill in where the pencil is of twice the size.
+        """
+        rows, comm = matrix.size[0], matrix.comm.tompi4py()
+        doubled = rows > self.matrix.size[0]
+        if rows < LARGE or (doubled and comm.size == 1):
+            return None
+        shifted = matrix.copy()
+        shifted.axpy(-target, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        dense_rows, prefix = self.system.fields.dense_rows, "rodfem_st_"
+        if doubled:
+            factors: Factors = Condensed(dense_rows, Mumps("lu", {8: 0}, prefix=prefix))
+        else:
+            factors = factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=prefix)
+        factors(shifted)
+        if not factors.regular:
+            raise ConvergenceError(_singular(target))
+        return Inverse(factors, shifted if comm.size > 1 else None)
+
+
+def groups(values: np.ndarray, tolerance: float = MULTIPLE) -> list[list[int]]:
+    """Places of eigenvalues in groups of equal ones, in the order of the first of each."""
+    out: list[list[int]] = []
+    least = NEAR_ZERO * abs(values).max(initial=0.0)
+    for i, value in enumerate(values):
+        for group in out:
+            if abs(value - values[group[0]]) < tolerance * max(abs(value), least):
+                group.append(i)
+                break
+        else:
+            out.append([i])
+    return out
+
+
+def _singular(target: complex) -> str:
+    return f"The pencil is singular at the shift {target:.6g}: choose another load, or another discretisation."
+
+
+def dense(matrix: PETSc.Mat) -> np.ndarray:
+    """A matrix on this rank as a dense array, real."""
+    return np.array(matrix.copy().convert("dense").getDenseArray().real)

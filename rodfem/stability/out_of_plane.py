@@ -1,0 +1,106 @@
+"""Stability in space of the states of a planar rod."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.errors import SceneError
+from rodfem.fem.fields import across
+from rodfem.fem.newton import correct
+from rodfem.fem.system import System
+from rodfem.stability.inertia import Index, Inertia
+
+PUSHED = 1e-8
+"""Force or moment out of the plane, over bending stiffness by length, below which it is round-off."""
+NEAR = 1e-2
+"""Distance, in the metric, within which the state in space that belongs to a planar one is sought."""
+
+
+class InSpace:
+    """Counts the index of planar states among all perturbations in space.
+
+    The rod in space has the same mesh, but quaternions in the place of the angle: to them, rotations of space and of
+    the cross-sections are exact symmetries of the discrete rod, so that zero eigenvalues are zero.
+    """
+
+    def __init__(self, planar: System) -> None:
+        """Allocate the system of the same rod in space."""
+        self.planar = planar
+        fields = planar.fields
+        self.system = System(planar.scene.in_space(), fields.discretization, planar.comm, planar.clock, fields.mesh)
+        self.inertia = Inertia(self.system)
+        self._out = self._out_of_plane()
+
+    def lift(self, x: PETSc.Vec) -> PETSc.Vec:
+        """State in space of the planar state ``x``, as accurate an equilibrium as the discretisation is."""
+        self.planar.bring(x)
+        old, new = self.planar.fields, self.system.fields
+        u = new.u.x.array
+        clamped = u[new.number < 0]
+        u[:] = 0.0
+        u[new.dofs["q"]] = old.rotations()
+        for name, dofs in old.dofs.items():
+            if name in new.dofs:
+                u[new.dofs[name]] = old.u.x.array[dofs]
+        u[new.number < 0] = clamped
+        values = {x.name: float(old.u.x.array[old.copies[0, i]]) for i, x in enumerate(old.unknown_scalars)}
+        values |= self._moments(values)
+        for i, unknown in enumerate(new.unknown_scalars):
+            u[new.copies[:, i]] = values.get(unknown.name, 0.0)
+        u[new.copies[:, -1]] = old.u.x.array[old.copies[:, -1]]
+        return self.system.take()
+
+    def count(self, x: PETSc.Vec) -> Index:
+        """Index in space of the planar equilibrium ``x``; raises :class:`SceneError` where it is none in space."""
+        state = self.lift(x)
+        self.system.set_phase(state)
+        residual = self.system.new_vector()
+        self.system.residual(state, residual)
+        out = self.system.comm.allreduce(float(np.sum(residual.array_r[self._out] ** 2)), op=MPI.SUM) ** 0.5
+        if out > PUSHED * self.system.stiffness_scale:
+            raise SceneError(
+                f"A force or moment pushes the rod out of its plane across {self.planar.scene.planar}: "
+                "leave planar out of the scene."
+            )
+        settled = state.copy()
+        if correct(self.system, settled, self.system.load_axis(), most=6, reach=NEAR).converged:
+            state = settled  # else the state is so near a singular one that its own error decides as well
+        return self.inertia.count(state)
+
+    def _moments(self, values: dict[str, float]) -> dict[str, float]:
+        """Moments that hold or close the rod in space, from the one about the normal."""
+        scene, new = self.planar.scene, self.system.fields
+        normal = scene.normal
+        assert normal is not None
+        out: dict[str, float] = {}
+        for letter, end in zip("ab", scene.sides, strict=True):
+            if f"m{letter}1" in values:
+                directions = np.array(across(end.hinge))
+                moments = directions[:, normal] * values[f"m{letter}1"]
+                out |= {f"m{letter}{i + 1}": float(m) for i, m in enumerate(moments)}
+        if "t1" in values:
+            old = self.planar.fields
+            dofs = old.dofs["angle"]
+            at_end = np.isclose(
+                old.coordinates(old.discretization.degree), scene.interval[1], rtol=0, atol=1e-9 * scene.length
+            )
+            mine = old.u.x.array[dofs[at_end]].max(initial=-np.inf)
+            last = np.array([new.comm.allreduce(float(mine), op=MPI.MAX)])
+            closing = 4 * values["t1"] * old.turning.change(last, np.ones(1))
+            out |= {f"t{i + 1}": float(t) for i, t in enumerate(closing)}
+        return out
+
+    def _out_of_plane(self) -> np.ndarray:
+        """Places in this rank's part of a vector of the equations that a planar rod does without."""
+        f, normal = self.system.fields, self.planar.scene.normal
+        assert normal is not None
+        numbers = [f.number[f.dofs["q"][..., [i + 1 for i in range(3) if i != normal]]].ravel()]
+        for name in ("r", "n"):
+            if name in f.dofs:
+                numbers.append(f.number[f.dofs[name][..., normal]].ravel())
+        if normal in f.scene.free_strains:
+            numbers.append(f.number[f.dofs["v"][..., f.scene.free_strains.index(normal)]].ravel())
+        places = np.unique(np.concatenate(numbers)) - f.offset
+        return places[(places >= 0) & (places < len(f.free_owned))]

@@ -1,0 +1,242 @@
+"""Left-most eigenvalues of an equilibrium by SLEPc, on the singular pencil of its saddle matrix.
+
+    (K C; C^t 0) x = mu (M 0; 0 0) x
+
+with ``M`` the kinetic metric: stable where all ``mu = omega^2`` are positive (Kumar & Healey 2010, (21) and
+(45)).  ``M`` is singular, so that only shift-invert is free of spurious eigenvalues: its image ``(S - sigma M)^-1
+M`` is zero on all that has no inertia.  No Dirichlet row exists that could bring one in.  A symmetry mode, whose
+eigenvalue is known to be zero, is kept out by the constraint ``g.Mx = 0`` and by deflation (``EPSSetDeflationSpace``),
+and is not among those returned.
+
+The shift is put below the spectrum: the nearest eigenvalues to it are then the left-most ones.  A count just above the
+last of them proves that none is missing, wherever the shift was.  Along a branch the shift, the symbolic factorisations
+and a first vector, the sum of the modes, are those of the point before: two numeric factorisations a point, one to
+solve with and one to count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.errors import ConvergenceError
+from rodfem.fem.system import dense_columns
+from rodfem.linalg.factorization import Factors
+from rodfem.linalg.selection import solving
+from rodfem.stability.inertia import Inertia, inertia_factors
+from rodfem.stability.pencil import Inverse, assemble_pencil, exclude_modes, symmetry_modes, with_factors
+
+HIT = 1e-8
+"""A shift nearer to an eigenvalue than this, relative to the farthest one found, spoils the others by round-off."""
+
+
+EXTRA = (1, 4, 14)
+"""How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
+
+CONVERGED = 1e-7
+"""Residual, relative to the stiffness, above which a pair is rejected: the Krylov space broke down."""
+NOISE = 1e-6
+"""Weight of a generic vector added to the previous modes, which may span an invariant space without the lowest."""
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Left-most eigenvalues in ascending order (symmetry modes left out), their vectors, and their backward errors."""
+
+    values: np.ndarray
+    vectors: list[PETSc.Vec]
+    errors: np.ndarray
+    certified: bool
+
+    def negative(self, tolerance: float) -> int:
+        """Number of eigenvalues below ``-tolerance``."""
+        return int((self.values < -tolerance).sum())
+
+
+NOTHING = Modes(np.zeros(0), [], np.zeros(0), False)
+
+
+@dataclass
+class _Shifted:
+    """Factors of ``S - sigma M``, that matrix, and ``sigma`` (nan: none of this state)."""
+
+    factors: Factors
+    matrix: PETSc.Mat
+    at: float = np.nan
+
+
+class Spectrum:
+    """Computes left-most eigenvalues at states of the system of an :class:`~rodfem.stability.inertia.Inertia`.
+
+    Attributes
+    ----------
+    shift
+        Where the next computation starts; the first one, and one whose count finds any missing, moves it to the left
+        until no eigenvalue is below it.
+    factorisations
+        Number of numeric factorisations made so far.
+    """
+
+    def __init__(self, inertia: Inertia) -> None:
+        """Allocate the matrices of the pencil once."""
+        self.inertia, self.system = inertia, inertia.system
+        self.matrix = self.system.state_matrix()
+        self.mass = self.system.metric_matrix()
+        system, sizes = self.system, (self.system.fields.unknowns, self.system.fields.dense_rows)
+        counting = inertia_factors(system.comm, *sizes)
+        self._counting = self._solving = _Shifted(counting, system.state_matrix())
+        solver = solving(counting, system.comm, *sizes)
+        if solver is not counting:
+            self._solving = _Shifted(solver, system.state_matrix())
+        self.shift = -inertia.scale
+        self.factorisations = 0
+        self._last = np.zeros(0)
+        self._deflated: list[PETSc.Vec] = []
+
+    def assemble(self, x: PETSc.Vec) -> None:
+        """Assemble the pencil of the state ``x``, at which the phase conditions must be set."""
+        system = self.system
+        with system.clock("assembly"):
+            modes = symmetry_modes(system, x)
+            assemble_pencil(system, x, self.matrix, self.mass)
+            self._deflated = exclude_modes(system, modes, self.matrix, self.mass)
+        self._counting.at = self._solving.at = np.nan
+
+    def leftmost(self, x: PETSc.Vec, number: int) -> Modes:
+        """Return the ``number`` left-most eigenvalues of the state ``x``, at which the phase conditions must be set.
+
+        Raises :class:`ConvergenceError` where SLEPc finds fewer.
+        """
+        self.assemble(x)
+        with self.system.clock("stability"):
+            modes = self._solve(number, EXTRA[0]) if len(self._last) else NOTHING
+            if not modes.certified:
+                self.go_below()
+                for extra in EXTRA:
+                    modes = self._solve(number, extra)
+                    if modes.certified:
+                        break
+        if len(modes.values) < number:
+            raise ConvergenceError(
+                f"SLEPc found {len(modes.values)} of the {number} eigenvalues asked for: ask for fewer, or use a "
+                "richer discretisation."
+            )
+        spread = modes.values[-1] - modes.values[0] + 1e-3 * abs(modes.values).max()
+        self.shift = modes.values[0] - 0.1 * spread
+        return modes
+
+    def go_below(self) -> None:
+        """Move the shift to below the spectrum; raises :class:`ConvergenceError` where it has no lower end."""
+        step = max(abs(self.shift), self.inertia.scale)
+        for _ in range(40):
+            if self.below(self.shift) == 0:
+                return
+            self.shift -= step
+            step *= 3
+        raise ConvergenceError(
+            "The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness; give the rod a "
+            "larger mass or rotary inertia."
+        )
+
+    def below(self, sigma: float) -> int:
+        """Number of eigenvalues of the pencil last assembled below ``sigma``, symmetry modes not included."""
+        self._factor(sigma, self._counting)
+        negative, zero = self._counting.factors.inertia()
+        below = negative - self.inertia.constraints - self.system.active_drifts()
+        if zero or below < 0:
+            raise ConvergenceError(
+                f"The count of eigenvalues below {sigma:.6g} broke down ({zero} zero pivots, {negative} negative ones "
+                f"for {self.inertia.constraints} constraints): the constraints depend on each other."
+            )
+        return int(below)
+
+    def _factor(self, sigma: float, shifted: _Shifted) -> None:
+        """Factor ``S - sigma M``, unless that is what was factored last."""
+        if sigma == shifted.at:
+            return
+        self.matrix.copy(shifted.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        shifted.matrix.axpy(-sigma, self.mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        shifted.matrix.stateIncrease()
+        shifted.factors(shifted.matrix)
+        shifted.at = sigma
+        self.factorisations += 1
+
+    def _solve(self, number: int, extra: int) -> Modes:
+        """Solve for ``number`` values and some more, and count whether any is missing among the first ``number``.
+
+        A Krylov method finds the second of two equal eigenvalues late, by round-off: it is there when more are
+        asked for.
+        """
+        self._factor(self.shift, self._solving)
+        if not self._solving.factors.regular:
+            self.shift -= self.inertia.scale
+            return self._solve(number, extra)
+        values, vectors, errors = self._krylov_schur(number, number + extra)
+        reach = max(values[-1] - self.shift, self.inertia.scale) if len(values) else np.inf
+        if len(values) and values[0] - self.shift < HIT * reach:
+            self.shift -= reach
+            return self._solve(number, extra)
+        if len(values) < number:
+            return Modes(values, vectors, errors, False)
+        self._last = sum(vector.array_r for vector in vectors)
+        cut = values[number - 1] + 1e-6 * max(abs(values[number - 1]), self.inertia.scale)
+        known = int((values < cut).sum())
+        return Modes(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
+
+    def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec], np.ndarray]:
+        """Solve by SLEPc, for ``number`` eigenvalues or all there are: with their vectors and backward errors.
+
+        Where it asks for more than there are finite ones, the Krylov space breaks down, and what comes is no eigenpair.
+        """
+        start = self.inertia.seed(1)
+        if len(self._last):  # a space that is invariant already would miss all else
+            start.scale(NOISE / self.system.norm(start))
+            start.array[:] += self._last
+        inverse = Inverse(self._solving.factors)
+        solver = with_factors(self.matrix, self.mass, number, self.shift, inverse, start, self._deflated)
+        solver.solve()
+        found = solver.getConverged()
+        values = np.array([solver.getEigenvalue(i).real for i in range(found)])
+        order = np.argsort(values)[:number]
+        values, vectors = values[order], [self.system.new_vector() for _ in order]
+        for i, vector in zip(order, vectors, strict=True):
+            solver.getEigenvector(int(i), vector)
+        solver.destroy()
+        if found < least:
+            raise ConvergenceError(
+                f"SLEPc found {found} of the {least} eigenvalues asked for: "
+                f"ask for at most {found} at this discretisation."
+            )
+        self._purify(values, vectors)
+        errors = self.backward_errors(values, vectors)
+        stiffness, mass = self._norms()
+        true = [i for i in range(len(values)) if errors[i] * (1 + abs(values[i]) * mass / stiffness) < CONVERGED]
+        return values[true], [vectors[i] for i in true], errors[true]
+
+    def _norms(self) -> tuple[float, float]:
+        """Greatest sums of magnitudes of rows of stiffness and mass."""
+        return self.matrix.norm(PETSc.NormType.INFINITY), self.mass.norm(PETSc.NormType.INFINITY)
+
+    def _purify(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> None:
+        """Replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``: without what has no mass, and is arbitrary in them.
+
+        All at once: the cost is that of the call, hardly of a column.
+        """
+        right, solved = dense_columns(self.system, len(vectors)), dense_columns(self.system, len(vectors))
+        for i, vector in enumerate(vectors):
+            right.getDenseArray()[:, i] = (self.mass * vector).array_r
+        self._solving.factors.solve_all(right, solved)
+        for i, (value, vector) in enumerate(zip(values, vectors, strict=True)):
+            vector.array[:] = (value - self.shift) * solved.getDenseArray()[:, i]
+
+    def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:
+        """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""
+        stiffness, mass = self._norms()
+        errors = []
+        for value, vector in zip(values, vectors, strict=True):
+            residual = self.matrix * vector
+            residual.axpy(-value, self.mass * vector)
+            errors.append(residual.norm() / ((stiffness + abs(value) * mass) * vector.norm()))
+        return np.array(errors)
