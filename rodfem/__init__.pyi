@@ -9,7 +9,8 @@ from rodfem.continuation.branch import Branch as Branch
 from rodfem.continuation.branch import Point as Point
 from rodfem.continuation.branch import Special as Special
 from rodfem.continuation.observer import Observer as Observer
-from rodfem.continuation.solvers import Steps as Steps
+from rodfem.continuation.step_control import IndexSteps as IndexSteps
+from rodfem.continuation.step_control import Steps as Steps
 from rodfem.diagram.diagram import Diagram as Diagram
 from rodfem.diagram.plan import Plan as Plan
 from rodfem.diagram.saved import load as load

@@ -14,7 +14,8 @@ from rows import verify
 
 from rodfem.continuation.branch import Branch, Point, Special
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import Follower, Steps
+from rodfem.continuation.solvers import Follower
+from rodfem.continuation.step_control import Steps
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver

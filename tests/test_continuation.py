@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
+import classics
 import closed_form
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ import shooting
 from numpy.polynomial.legendre import leggauss
 from rods import DEFAULT, explored, follower, specials, user_points
 
-from rodfem.continuation.solvers import Steps
+import rodfem
+from rodfem import Branch, Plan, Point
+from rodfem.continuation.step_control import IndexSteps, Steps
 from rodfem.errors import SceneError
 from rodfem.output.files import load_state, save_states
 
@@ -145,3 +149,27 @@ def test_restart_from_what_is_not_there(folder: Path) -> None:
             load_state(*wrong, follower())
     with pytest.raises(SceneError, match="states of the reduced formulation"):
         load_state(path, "straight", 0, follower("pointwise"))
+
+
+def test_steps_that_bound_the_change_of_the_index() -> None:
+    """Euler's loads of a pinned column of nearly equal stiffnesses, ``pi^2`` and ``1.004 pi^2``, with a row between."""
+    rod = classics.column(
+        "euler", classics.SUPPORTS["pinned-pinned"], (8.0, 12.0), constants={"B2": 1.004}
+    )  # fmt: skip
+    found = {
+        kind: rodfem.trace(rod, plan=Plan(depth=0, steps=kind(largest=0.2, first=0.2), error_bars=False))[0]
+        for kind in (Steps, IndexSteps)
+    }
+    changes = {kind: {abs(a.index - b.index) for a, b in pairwise(_rows(b))} for kind, b in found.items()}
+    assert changes == {Steps: {0, 2}, IndexSteps: {0, 1}}
+    for branch in found.values():
+        loads = [s.point.load for s in branch.special if s.kind == "branch point"]
+        assert loads == pytest.approx([np.pi**2, 1.004 * np.pi**2], rel=1e-9)
+    with pytest.raises(SceneError, match="A change of the index of 0 leads nowhere: give change=1 or more"):
+        IndexSteps(change=0)
+
+
+def _rows(branch: Branch) -> list[Point]:
+    """Points of a branch without its special points."""
+    special = {id(s.point) for s in branch.special if s.kind == "branch point"}
+    return [p for p in branch.points if id(p) not in special]

@@ -24,7 +24,8 @@ from scipy.optimize import brentq
 from forms.energy import bending
 from rodfem.codim2.locus import Locus, locus
 from rodfem.continuation.branch import Branch, Special
-from rodfem.continuation.solvers import Equilibria, Steps
+from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.step_control import Steps
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace

@@ -16,7 +16,7 @@ from rods import run_demo
 
 from rodfem import trace
 from rodfem.app.run import run
-from rodfem.continuation.solvers import Steps
+from rodfem.continuation.step_control import Steps
 from rodfem.diagram.plan import Plan
 from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization, Fields

@@ -215,7 +215,7 @@ def main(
 
     try:
         from rodfem.app.run import run
-        from rodfem.continuation.solvers import Steps
+        from rodfem.continuation.step_control import Steps
         from rodfem.diagram.plan import Plan
         from rodfem.fem.fields import Discretization
 

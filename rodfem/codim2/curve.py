@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from rodfem.codim2.parameter_plane import Node, Plane, between, predict
 from rodfem.codim2.singular import Destroyed
-from rodfem.continuation.solvers import Steps
+from rodfem.continuation.step_control import Steps
 from rodfem.errors import ConvergenceError
 
 LOCATED = 1e-8
@@ -81,9 +81,7 @@ class Tracer:
                 return half
             history.append(node)
             order = min(len(history) - 1, 3) + 1
-            step = min(
-                step * min(max((self.steps.aim / max(moved, 1e-12)) ** (1 / order), 0.4), 1.6), self.steps.largest
-            )
+            step = self.steps.after(step, moved, order)
         half.ended = f"{self.steps.most} points reached"
         return half
 

@@ -27,7 +27,8 @@ from rodfem.codim2.curve import Criterion, Half, Tracer
 from rodfem.codim2.parameter_plane import Interval, Node, Plane
 from rodfem.codim2.singular import Singular, null_vectors
 from rodfem.continuation.branch import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, Special
-from rodfem.continuation.solvers import Equilibria, Follower, Steps
+from rodfem.continuation.solvers import Equilibria, Follower
+from rodfem.continuation.step_control import Steps
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.file_format import LOCUS

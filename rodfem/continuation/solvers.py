@@ -9,7 +9,7 @@ where it does not.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -19,12 +19,12 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.corrector import SENSITIVE, Corrector
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.continuation.step_control import Steps
+from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.newton import TOLERANCE, Outcome, correct, relax
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System, combine
-from rodfem.problem.kinds import real, whole
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.round_off import decide
@@ -46,35 +46,6 @@ ALIGNED = 0.9
 """Least cosine between the direction of a prediction and the tangent at the corrected point."""
 ON_BOUND = 1e-8
 """Distance from a bound, in spans, below which a load counts as on it: branches of constant load may lie there."""
-
-
-@dataclass(frozen=True)
-class Steps:
-    """Control of the step, in the metric (root mean square rotation in radian, load over its span).
-
-    ``largest`` also bounds how coarse a branch is drawn; ``aim`` is the distance from prediction to correction that is
-    aimed at; ``most`` the number of points at which a branch is given up.
-    """
-
-    first: float = 0.02
-    largest: float = 0.05
-    smallest: float = 1e-5
-    aim: float = 2e-3
-    most: int = 2000
-
-    def __post_init__(self) -> None:
-        """Check kinds and the largest step; raises :class:`SceneError`."""
-        for name in ("first", "largest", "smallest", "aim"):
-            real(name, getattr(self, name), getattr(Steps, name))
-        if whole("most", self.most, Steps.most) < 1:
-            raise SceneError(f"most is {self.most}: a branch has at least one point; give most=1 or more.")
-        if not self.smallest < self.largest <= 1:
-            raise SceneError(
-                f"A step of {self.largest:g} is out of bounds: choose more than {self.smallest:g}, at most 1."
-            )
-        for name in ("first", "smallest", "aim"):
-            if not getattr(self, name) > 0:
-                raise SceneError(f"Steps with {name} = {getattr(self, name):g} lead nowhere: give more than 0.")
 
 
 class Equilibria:
@@ -367,7 +338,7 @@ def follow(
     insert) points in ``points``.  The direction is that of the last point's tangent.  ``reach`` bounds the step from a
     point.
     """
-    system, step = follower.system, min(steps.first, steps.largest)
+    system, step = follower.system, steps.begin()
     span = abs(system.scene.span[1] - system.scene.span[0])
     low, high = (bound + sign * ON_BOUND * span for bound, sign in zip(bounds, (-1, 1), strict=True))
     follower.corrector.restart()
@@ -395,11 +366,12 @@ def follow(
                 yield "end of range"
                 return
         elif outcome is not None and tangent is not None and row.dot(tangent) > ALIGNED:
-            yield follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome, index)
-            order = 2 if system.damping else min(len(points) - 1, 3) + 1
-            factor = (steps.aim / max(outcome.moved, 1e-12)) ** (1 / order)
-            step = min(step * min(max(factor, 0.4), 1.6), steps.largest)
-            continue
+            point = follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome, index)
+            if steps.accepts(last, point):
+                yield point
+                order = 2 if system.damping else min(len(points) - 1, 3) + 1
+                step = steps.after(step, outcome.moved, order)
+                continue
         step /= 2
         if step < min(steps.smallest, 0.01 * most):
             why = f"steps below {steps.smallest:g}"

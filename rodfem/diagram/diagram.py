@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rodfem.continuation.branch import END, USER, Branch, Point, Special
-from rodfem.continuation.solvers import Equilibria, Follower, Steps
+from rodfem.continuation.solvers import Equilibria, Follower
+from rodfem.continuation.step_control import Steps
 from rodfem.deflation.search import states_at
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from rodfem.adaptivity.mesh_sequence import check_accuracy
-from rodfem.continuation.solvers import Steps
+from rodfem.continuation.step_control import Steps
 from rodfem.errors import SceneError
 from rodfem.problem.kinds import real, reals, whole
 from rodfem.problem.scene import Scene

@@ -1,0 +1,94 @@
+"""Control of the step of continuation: a class for each, of which a plan takes one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rodfem.continuation.branch import Point
+from rodfem.errors import SceneError
+from rodfem.problem.kinds import real, whole
+
+SHRINK, GROW = 0.4, 1.6
+"""Least and greatest ratio of a step to the one before."""
+NO_MOVE = 1e-12
+"""A correction smaller than this counts as one of this size."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Steps by the size of the correction, in the metric (root mean square rotation in radian, load over its span).
+
+    Attributes
+    ----------
+    first
+        Length of the first step.
+    largest
+        Bound of the step, which is also how coarse a branch is drawn.
+    smallest
+        Length of a step at which a branch is given up.
+    aim
+        Distance from prediction to correction that is aimed at.
+    most
+        Number of points at which a branch is given up.
+    """
+
+    first: float = 0.02
+    largest: float = 0.05
+    smallest: float = 1e-5
+    aim: float = 2e-3
+    most: int = 2000
+
+    def __post_init__(self) -> None:
+        """Check kinds and the largest step; raises :class:`SceneError`."""
+        for name in ("first", "largest", "smallest", "aim"):
+            real(name, getattr(self, name), getattr(Steps, name))
+        if whole("most", self.most, Steps.most) < 1:
+            raise SceneError(f"most is {self.most}: a branch has at least one point; give most=1 or more.")
+        if not self.smallest < self.largest <= 1:
+            raise SceneError(
+                f"A step of {self.largest:g} is out of bounds: choose more than {self.smallest:g}, at most 1."
+            )
+        for name in ("first", "smallest", "aim"):
+            if not getattr(self, name) > 0:
+                raise SceneError(f"Steps with {name} = {getattr(self, name):g} lead nowhere: give more than 0.")
+
+    def begin(self) -> float:
+        """Length of the first step."""
+        return min(self.first, self.largest)
+
+    def after(self, step: float, moved: float, order: int) -> float:
+        """Length of the next step; the correction ``moved`` the prediction, that of a predictor of an ``order``."""
+        factor = (self.aim / max(moved, NO_MOVE)) ** (1 / order)
+        return min(step * min(max(factor, SHRINK), GROW), self.largest)
+
+    def accepts(self, before: Point, after: Point) -> bool:
+        """Whether a step that has converged is kept; else half of it is tried."""
+        return True
+
+
+@dataclass(frozen=True)
+class IndexSteps(Steps):
+    """Steps over which the index changes by no more than a bound, so that there is a row between nearly equal points.
+
+    Attributes
+    ----------
+    change
+        Greatest change of the index from row to row.
+    resolved
+        Length of a step that is kept nevertheless: eigenvalues may be multiple.
+    """
+
+    change: int = 1
+    resolved: float = 1e-4
+
+    def __post_init__(self) -> None:
+        """Check the bound, too; raises :class:`SceneError`."""
+        super().__post_init__()
+        if whole("change", self.change, IndexSteps.change) < 1:
+            raise SceneError(f"A change of the index of {self.change} leads nowhere: give change=1 or more.")
+        real("resolved", self.resolved, IndexSteps.resolved)
+
+    def accepts(self, before: Point, after: Point) -> bool:
+        """Whether the index has changed by no more than the bound, or the step is as short as it needs be."""
+        small = after.arclength - before.arclength <= self.resolved
+        return small or abs(after.negative - before.negative) <= self.change
