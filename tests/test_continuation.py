@@ -14,7 +14,7 @@ from numpy.polynomial.legendre import leggauss
 from rods import DEFAULT, explored, follower, specials, user_points
 
 import rodfem
-from rodfem import Branch, Plan, Point
+from rodfem import Branch, Discretization, Plan, Point
 from rodfem.continuation.step_control import IndexSteps, Steps
 from rodfem.errors import SceneError
 from rodfem.output.files import load_state, save_states
@@ -173,3 +173,12 @@ def _rows(branch: Branch) -> list[Point]:
     """Points of a branch without its special points."""
     special = {id(s.point) for s in branch.special if s.kind == "branch point"}
     return [p for p in branch.points if id(p) not in special]
+
+
+@pytest.mark.alone
+def test_singular_equations_are_told_in_a_sentence() -> None:
+    """Two meshes of degree 1 on which the equations are exactly singular: no division by the size of nothing."""
+    with pytest.raises(SceneError, match="Constraints depend on one another"):
+        rodfem.trace(classics.pressed_ring(), Discretization("auto", 2, 1))
+    (branch,) = rodfem.trace(classics.winkler(), Discretization("auto", 16, 1))
+    assert branch.ended.startswith("no convergence at P = 0 (steps below 1e-05; 1 eigenvalues vanish there")

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
+from math import inf
 
 import numpy as np
 from dolfinx import fem
@@ -266,8 +267,18 @@ class Follower(Equilibria):
             self.system.residual(at, self.system.new_vector())
             self.system.factor(row)
         tangent = self.system.new_vector()
-        self.system.solve(self.axis, tangent)
-        tangent.scale(1.0 / self.system.norm(tangent))
+        solved = self.system.solve(self.axis, tangent)
+        if not solved and at is not None:  # exactly singular: of all directions that across the null space
+            self.system.factor(row, damping=self.inertia.tolerance)
+            solved = self.system.solve(self.axis, tangent)
+        size = self.system.norm(tangent) if solved else 0.0
+        if not 0.0 < size < inf:
+            load = "" if at is None else f" at {self.system.scene.load} = {self.system.scalar(at):.8g}"
+            raise ConvergenceError(
+                f"The equations{load} are singular, and the branch has no tangent: begin the range elsewhere, or use "
+                "another number of elements."
+            )
+        tangent.scale(1.0 / size)
         return tangent
 
     def load_tangent(self, x: PETSc.Vec, increasing: bool) -> PETSc.Vec:

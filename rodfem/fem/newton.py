@@ -114,7 +114,7 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Outc
         size = system.norm(step)
         if not isfinite(size):
             break
-        x.axpy(-min(1.0, 0.4 / size), step)  # a step that mends constraints is long whatever the time step
+        x.axpy(-(1.0 if size < 0.4 else 0.4 / size), step)  # constraints are mended in one step, however long
         tau *= 2.0 if size < 0.2 else 0.5 if size > 0.4 else 1.0
         if (iteration % 5 == 4 and size < 0.1) or size < 1e-3:  # not earlier: it might jump to a state uphill
             x.copy(trial)
