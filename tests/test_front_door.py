@@ -39,7 +39,7 @@ def test_nothing_is_printed_and_no_file_is_written(
 def test_nothing_outside_the_package_assembles_what_traces() -> None:
     """Demos, benchmarks and documentation state scenes and call :func:`rodfem.trace`, or compute by a Solver."""
     home = Path(__file__).parents[1]
-    files = [*home.glob("demos/*.py"), *home.glob("benchmarks/**/*.py"), *home.glob("docs/*.md"), home / "README.md"]
+    files = [*home.glob("demos/*.py"), *home.glob("benchmarks/**/*.py"), home / "docs" / "rods.md", home / "README.md"]
     assert len(files) > 20
     inside = re.compile(r"\b(Explorer|Follower|System)\b")
     assert {(str(f), found) for f in files for found in inside.findall(f.read_text())} == set()
