@@ -8,12 +8,11 @@ ranks.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rodfem.continuation.branch import Branch, Point, Special
 
 if TYPE_CHECKING:
-    from rodfem.diagram.diagram import Diagram
     from rodfem.fem.fields import Discretization
     from rodfem.fem.system import System
 
@@ -54,8 +53,8 @@ class Observer:
     def finished(self, branch: Branch) -> None:
         """A branch has ended, and has its error bars."""
 
-    def complete(self, diagram: Diagram) -> None:
-        """One more branch of a diagram is complete, and can be saved."""
+    def complete(self, diagram: Any) -> None:
+        """One more branch of a :class:`~rodfem.Diagram` is complete, and can be saved."""
 
     def note(self, sentence: str) -> None:
         """Something worth knowing."""
