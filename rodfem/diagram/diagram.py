@@ -223,7 +223,8 @@ class Diagram:
         """
         from rodfem.output.snapshot import snapshot
 
-        return snapshot(self, point.point if isinstance(point, Special) else point, path, caption)
+        shown = point.point if isinstance(point, Special) else point
+        return snapshot(self.branches, self.solvers, shown, path, caption)
 
     def __repr__(self) -> str:
         """Scene, size and range."""

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 from rodfem.continuation.branch import Branch, Point
+from rodfem.continuation.solvers import Equilibria
 from rodfem.output.files import save_states
-
-if TYPE_CHECKING:
-    from rodfem.diagram.diagram import Diagram
 
 
 @dataclass(frozen=True)
@@ -35,19 +33,28 @@ class Snapshot:
         return path
 
 
-def snapshot(diagram: Diagram, point: Point, path: Path | str | None, caption: str | None) -> Snapshot:
-    """Draw a point of a diagram: pictures are made from files, so that its state is written to a temporary one."""
+def snapshot(
+    branches: Sequence[Branch],
+    solvers: Sequence[Equilibria],
+    point: Point,
+    path: Path | str | None,
+    caption: str | None,
+) -> Snapshot:
+    """Draw a point of a diagram: pictures are made from files, so that its state is written to a temporary one.
+
+    The first of the ``branches`` is drawn in grey, as the reference; ``solvers`` are those of the meshes.
+    """
     from rodfem.output.render import draw_shape
 
-    comm = diagram.solvers[0].system.comm
+    comm = solvers[0].system.comm
     with TemporaryDirectory() as folder:
         states, picture = Path(folder) / "states.h5", Path(folder) / "shape.png"
-        home = next((b.name for b in diagram.branches if any(p is point for p in b.points)), "state")
-        first = diagram.branches[0]
-        save_states(replace(first, special=[]), diagram.solvers, states, first=True)
+        home = next((b.name for b in branches if any(p is point for p in b.points)), "state")
+        first = branches[0]
+        save_states(replace(first, special=[]), solvers, states, first=True)
         row = next((i for i, p in enumerate(first.points) if p is point), -1)
         if row < 0:
-            save_states(Branch(home, None, 0, [point]), diagram.solvers, states, first=False)
+            save_states(Branch(home, None, 0, [point]), solvers, states, first=False)
         png = b""
         if comm.rank == 0:
             draw_shape(states, first.name if row >= 0 else home, max(row, 0), picture, caption=caption)
