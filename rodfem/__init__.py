@@ -79,6 +79,7 @@ _HOMES = {
     "Discretization": "fem.fields",
     "Plan": "diagram.plan",
     "Steps": "continuation.step_control",
+    "Event": "problem.events",
     "IndexSteps": "continuation.step_control",
     "run": "app.run",
     "trace": "diagram.trace",

@@ -25,13 +25,14 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.grading import Gauge, weights_of
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, Law, Point, Special
-from rodfem.continuation.locate import WINDOW, refine
+from rodfem.continuation.branch import BRANCH_POINT, EVENT, FOLD, Law, Point, Special
+from rodfem.continuation.locate import WINDOW, locate_event, refine
 from rodfem.continuation.normal_form import ROUND_OFF, Origin, law_of, ordinate_along
 from rodfem.continuation.solvers import Follower
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.transfer import Transfer, richer_system
+from rodfem.problem.events import Event
 
 AMPLE, MOST = 2.0, 0.75
 """Safety factor on the ratio of the last coefficients, which may be small by coincidence; and the largest ratio of
@@ -112,10 +113,13 @@ class Richer:
         """
         if special.zero_of == "stretch":
             return  # it has its own estimate: see :mod:`rodfem.adaptivity.zero_stretch`
-        point, at_a_load = special.point, special.kind not in (FOLD, BRANCH_POINT)
+        point, at_a_load = special.point, special.kind not in (FOLD, BRANCH_POINT, EVENT)
         self.system.damping = self.coarse.system.damping
         try:
-            again = self.again(point, fixed_load=True) if at_a_load else self._located(special)
+            if special.event is not None:
+                again = self._at_event(point, special.event)
+            else:
+                again = self.again(point, fixed_load=True) if at_a_load else self._located(special)
         except ConvergenceError as trouble:
             special.error_estimate = special.ordinate_error = float("inf")
             special.resolved = False
@@ -163,6 +167,26 @@ class Richer:
             law.uncertainty = float("inf")
         else:
             law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
+
+    def _at_event(self, point: Point, event: Event) -> Again:
+        """The point of the richer discretisation at which an event happens."""
+        assert point.tangent is not None
+        x, tangent = self.transfer(point.x, state=True), self.transfer(point.tangent, state=False)
+
+        def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+            y = x.copy()
+            y.axpy(s, tangent)
+            return y, tangent
+
+        _, found, along = locate_event(self.follower, event, curve, -WINDOW, WINDOW)
+        load, ordinate = self.system.scalar(found), self.follower.shape.ordinate(found)
+        slope = abs(ordinate_along(self.follower, found, tangent))
+        left = (
+            abs(point.slope) * along + ROUND_OFF * max(1.0, abs(load)),
+            slope * along + ROUND_OFF * max(1.0, abs(ordinate)),
+        )
+        changed = self._gauges[1].changed(x, found, state=True)
+        return Again(found, load, ordinate, *left, self.rho([point.x], [found]), changed)
 
     def _located(self, special: Special) -> Again:
         """The fold or branch point on the richer discretisation, and its ordinate."""

@@ -15,6 +15,7 @@ from rodfem.continuation.branch import (
     BRANCH_POINT,
     DIVERGENCE,
     END,
+    EVENT,
     FLUTTER,
     FOLD,
     IMPERFECT,
@@ -34,7 +35,16 @@ from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Verdict
 from rodfem.timing import Clock
 
-LABELS = {FOLD: "LP", BRANCH_POINT: "BP", FLUTTER: "HB", DIVERGENCE: "BP", IMPERFECT: "IB", USER: "UZ", END: "EP"}
+LABELS = {
+    FOLD: "LP",
+    BRANCH_POINT: "BP",
+    FLUTTER: "HB",
+    DIVERGENCE: "BP",
+    IMPERFECT: "IB",
+    USER: "UZ",
+    EVENT: "UZ",
+    END: "EP",
+}
 """AUTO's two-letter labels."""
 INDEX, UNSTABLE = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING
 from petsc4py import PETSc
 
 if TYPE_CHECKING:
+    from rodfem.problem.events import Event
     from rodfem.stability.cluster import Cluster
 
 FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
+EVENT = "event"
+"""A number of the state vanishes: see :mod:`rodfem.problem.events`."""
 NOT_TRACED = "not traced"
 IMPERFECT = "imperfect bifurcation"
 """A branch point that an imperfection has taken apart, where steps of continuation do not resolve its pieces."""
@@ -125,6 +128,7 @@ class Special:
     omega2_error: float = float("nan")
     unfolding: float = float("nan")
     cluster: Cluster | None = None
+    event: Event | None = None
 
     def __repr__(self) -> str:
         """Kind, load and change of the index."""

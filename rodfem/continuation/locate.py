@@ -13,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 from petsc4py import PETSc
+from scipy.optimize import brentq
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.solvers import Follower, hermite
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.system import System, combine
+from rodfem.problem.events import Event
 
 NODES, FEWER = 6, 4
 """Number of nodes of an interpolant, and of one over a very short piece."""
@@ -31,6 +33,10 @@ SHARP = 1e-11
 PART = 0.02
 """Relative uncertainty at which the difference of two loads is accepted."""
 
+ASIDE = 1e-6
+"""Distance beside a singular point at which an event's equations are solved, relative to the piece."""
+ALONG = 1e-13
+"""Arclength to which an event is located, in the metric."""
 NARROWER = 6
 """Largest number of times a bracket is narrowed until the crossing eigenvalue is among those nearest zero."""
 
@@ -324,3 +330,28 @@ def locate(
         piece = a.arclength + 1e-3 * h, b.arclength - 1e-3 * h
         guess, mode = crossing_mode(follower, curve, piece, order, still)
     return refine(follower, curve, guess, min(WINDOW, 0.45 * h), mode, zero_of, len(still))
+
+
+def event_at(follower: Follower, event: Event, x: PETSc.Vec) -> float:
+    """Value of an event at a state; collective."""
+    return event(follower.shape.sample(x))
+
+
+def locate_event(
+    follower: Follower, event: Event, curve: Curve, low: float, high: float
+) -> tuple[float, PETSc.Vec, float]:
+    """Parameter, state and uncertainty of the parameter of an event on a piece of a branch.
+
+    Where it happens at a branch point, at which the equations across the branch are singular, states beside it serve.
+    Raises :class:`ConvergenceError` without a change of sign.
+    """
+    aside = ASIDE * (high - low)
+
+    def value(s: float) -> float:
+        return event_at(follower, event, solve_beside(follower, curve, s, aside)[0])
+
+    if value(low) * value(high) > 0:
+        raise ConvergenceError(f"The event {event.name!r} does not happen between the ends of the piece.")
+    s = float(brentq(value, low, high, xtol=ALONG))
+    x, there = solve_beside(follower, curve, s, aside)
+    return there, x, ALONG + 2 * abs(there - s)

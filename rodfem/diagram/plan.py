@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from rodfem.adaptivity.mesh_sequence import check_accuracy
 from rodfem.continuation.step_control import Steps
 from rodfem.errors import SceneError
+from rodfem.problem.events import Event
 from rodfem.problem.kinds import real, reals, whole
 from rodfem.problem.scene import Scene
 from rodfem.problem.user_functions import asked_for
@@ -24,7 +25,8 @@ class Plan:
     each of these loads look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
     special point in the plane of the load and that parameter.  With an ``accuracy`` meshes are chosen and raised on the
     way such that every row's load and ordinate, and those of every special point, are in error by less than that
-    (relative to values greater than one).
+    (relative to values greater than one).  ``events`` are numbers of the state whose zeros are special points, too
+    (conservative scenes).
     """
 
     span: tuple[float, float] | None = None
@@ -38,6 +40,7 @@ class Plan:
     method: str = ""
     modes: int = 0
     accuracy: float | None = None
+    events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that all is of the right kind; raises :class:`SceneError`."""
@@ -52,6 +55,8 @@ class Plan:
             raise SceneError(f"method is {self.method!r}: give the name of one, as in method='auto'.")
         if self.accuracy is not None:
             real("accuracy", self.accuracy, 1e-8)
+        if not all(isinstance(event, Event) for event in self.events):
+            raise SceneError(f"events is {self.events!r}: give Events, as in events=(Event('ends meet', of=f),).")
         if self.locus is not None:
             parts = tuple(self.locus) if isinstance(self.locus, (tuple, list)) else ()
             if len(parts) != 3 or not isinstance(parts[0], str):

@@ -20,6 +20,7 @@ from rodfem.continuation.locate import solve_at
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import VERTICAL, Follower, distance, follow, hermite
 from rodfem.continuation.special_points import FIRST
+from rodfem.diagram.events import Events
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
 from rodfem.errors import ConvergenceError
@@ -50,6 +51,7 @@ class Tracer:
         self.gaps = Gaps(self.meshes)
         self.warned = False
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
+        self.events = Events(plan.events)
 
     @property
     def solvers(self) -> Sequence[Follower]:
@@ -191,6 +193,7 @@ class Tracer:
         specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b)
         pieces = [a, *(s.point for s in specials if s.point.arclength > a.arclength), b]
         users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
+        users += self.events.between(self.follower, a, b)
         for special in specials + users:
             self.watch.special(special)
         for special in sorted(specials + users, key=lambda s: s.point.arclength):

@@ -41,6 +41,7 @@ MARKERS: dict[str, dict[str, Any]] = {
     "fold": {"marker": "D", "ms": 6.0, "mfc": "black", "mec": "black"},
     IMPERFECT: {"marker": "P", "ms": 9.5, "mfc": "white", "mec": "black", "mew": 1.3},
     "flutter": {"marker": "*", "ms": 13.0, "mfc": "#F0E442", "mec": "black", "mew": 1.1},
+    "event": {"marker": "+", "ms": 8.5, "mec": "black", "mew": 1.6},
     "user": {"marker": "x", "ms": 6.5, "mec": "black", "mew": 1.6, "label": "requested load"},
     UNEXPLAINED: {"marker": "^", "ms": 10.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
     SINGULAR: {"marker": "s", "ms": 8.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},

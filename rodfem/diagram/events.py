@@ -1,0 +1,49 @@
+"""The events that a plan asks for, step by step along a branch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from petsc4py import PETSc
+
+from rodfem.continuation.branch import EVENT, Point, Special
+from rodfem.continuation.locate import ROUND_OFF, event_at, locate_event
+from rodfem.continuation.solvers import Follower, hermite
+from rodfem.problem.events import Event
+
+
+class Events:
+    """The events of one branch: their values at the last row."""
+
+    def __init__(self, events: Sequence[Event]) -> None:
+        """Nothing is known yet."""
+        self.events = tuple(events)
+        self._row: Point | None = None
+        self._values: list[float] = []
+
+    def between(self, follower: Follower, a: Point, b: Point) -> list[Special]:
+        """Special points of the events that happen in the step from ``a`` to ``b``."""
+        if not self.events:
+            return []
+        before = self._values if self._row is a else [event_at(follower, event, a.x) for event in self.events]
+        self._row, self._values = b, [event_at(follower, event, b.x) for event in self.events]
+        found = []
+        for event, p, q in zip(self.events, before, self._values, strict=True):
+            if p * q < 0:
+                found.append(_special(follower, event, a, b))
+        return found
+
+
+def _special(follower: Follower, event: Event, a: Point, b: Point) -> Special:
+    def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+        return hermite(a, b, s)
+
+    margin = 1e-9 * (b.arclength - a.arclength)
+    s, x, along = locate_event(follower, event, curve, a.arclength + margin, b.arclength - margin)
+    follower.system.set_phase(x)
+    tangent = follower.tangent(follower.row(curve(s)[1]), at=x)
+    point = follower.point(x, s, tangent)
+    left = abs(point.slope) * along + ROUND_OFF * max(1.0, abs(point.load))
+    special = Special(EVENT, point, point.negative, point.negative, left, note=event.name)
+    special.event = event
+    return special

@@ -1,0 +1,39 @@
+"""Events: numbers of the state that a person asks for, whose zeros along a branch are special points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+from rodfem.errors import SceneError
+
+
+@dataclass(frozen=True)
+class Event:
+    """A number of the state, whose zeros along a branch are special points.
+
+    Attributes
+    ----------
+    name
+        What happens there, as tables show it.
+    of
+        ``of(state)``, a number that changes its sign: ``state.s`` (m,), ``state.r`` (m, 3) and ``state.q`` (m, 4) are
+        arclength, centreline and unit quaternions from left to right, nondimensional or in the units of the scene;
+        multipliers, the load and further fields have their names in ``states.h5``.
+    """
+
+    name: str
+    of: Callable[[Any], float]
+
+    def __call__(self, state: Mapping[str, Any]) -> float:
+        """Value at a state, given by its arrays; raises :class:`SceneError` for what the function raises."""
+        try:
+            return float(self.of(SimpleNamespace(**state)))
+        except Exception as trouble:  # whatever a person's function may raise
+            first = str(trouble).split("\n", 1)[0].rstrip(".")
+            raise SceneError(
+                f"The event {self.name!r} fails with {type(trouble).__name__}, {first!r}: it receives a state with "
+                "arrays s (m,), r (m, 3) and q (m, 4), and returns a number."
+            ) from trouble
