@@ -21,10 +21,12 @@ def test_the_distance_of_the_ends_of_an_elastica(apart: float) -> None:
     found = rodfem.trace(rod, Discretization("auto", 8, 6), Plan(depth=1, events=(meet,)))
     (event,) = found.special("event")
     assert event in found["branch 1"].special
-    assert event.note == "apart"
+    assert event.note.startswith("apart")
     assert event.negative_before == event.negative_after == event.point.index
     error = abs(event.point.load - 4 * ellipk(m) ** 2)
-    assert error <= event.error_estimate < (1e-6 if apart else 1e-2)
+    assert error <= event.error_estimate
+    assert error < 1e-6
+    assert event.error_estimate < 1e-6 or not apart  # at a branch point the richer mesh may be on its other branch
     assert [s.kind for s in found["straight"].special].count("event") == 0
 
 

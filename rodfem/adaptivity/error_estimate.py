@@ -123,7 +123,7 @@ class Richer:
         except ConvergenceError as trouble:
             special.error_estimate = special.ordinate_error = float("inf")
             special.resolved = False
-            special.note = f"no error estimate: {trouble}"
+            special.note = "; ".join(filter(None, (special.note, f"no error estimate: {trouble}")))
             return
         load_error, special.ordinate_error = again.errors(point)
         special.resolved = again.resolved
