@@ -14,6 +14,7 @@ import rods
 import scenes
 from classics import ON_AXIS, RIGID, ROUND, WIDE, circle, column, explore, push, winkler
 from closed_form import buckling
+from closed_form import loads as buckling_loads
 from mpi4py import MPI
 from rows import verify
 from scipy.optimize import brentq
@@ -184,6 +185,17 @@ def test_an_eigenvalue_that_passes_zero_twice_in_one_step(longer: float, apart: 
     # in a shorter rod the eigenvalue comes near zero, and turns back
     (straight,) = trace(rods.scene((0.0, 1.0, 1.0, meet - longer)), mesh, plan)
     assert [(s.negative_before, s.negative_after) for s in straight.special] == [(0, 2), (2, 0), (0, 0)]
+
+
+def test_a_row_beside_a_pair_of_crossings() -> None:
+    """A step of 0.3 ends 6e-4 beyond two double branch points that are 4e-3 apart, and tells nothing of them."""
+    constants = (0.554629, 1.0, 1.0, 2.851609)
+    expected = buckling_loads(*constants)
+    plan = Plan(depth=0, steps=Steps(largest=0.3), error_bars=False)
+    (straight,) = trace(rods.scene(constants), Discretization("reduced", 16, 6), plan)
+    found = [s for s in straight.special if s.kind == BRANCH_POINT]
+    assert [s.point.load for s in found] == pytest.approx(expected, abs=1e-9)
+    assert [(s.negative_before, s.negative_after) for s in found] == [(0, 2), (2, 4), (4, 2), (2, 0)]
 
 
 @pytest.mark.alone

@@ -9,6 +9,9 @@ it.  A simple eigenvalue gives it a parabola near such a pair, a double one the 
 which three rows determine.  Where its vertex lies inside a step, well below the values at both ends, the branch is
 solved there.  Successive parabolic interpolation (Brent 1973, chapter 5) ends at a state with another index, or at a
 lowest value that is not zero.  Determinants come with the factors that count the index: they cost nothing.
+
+A row may happen to lie beside such a pair.  Its determinant is then lower than those of both neighbours by orders of
+magnitude, and three rows tell nothing of the pair: two states nearer and nearer to that row take the neighbours' place.
 """
 
 from __future__ import annotations
@@ -29,6 +32,12 @@ CLOSER = 4
 """Interpolations after which the vertex is believed."""
 MARGIN = 1e-3
 """Part of a step, at its ends, in which no state is solved."""
+DEEP = 0.05
+"""A determinant below this share of those of both neighbours is looked at from nearer by."""
+NEARER = 4.0
+"""Ratio of successive distances from such a row."""
+LEAST = 1e-4
+"""Least of them, relative to the step."""
 Sample = tuple[float, float]
 """Arclength, and a value whose lowest is sought."""
 
@@ -62,7 +71,11 @@ class Touching:
         if self._begun and rows[0].negative == a.negative:
             early = inside(follower, rows, rows[0], a)
             found += [rows[0], *early, a] if early else []
-        return found + inside(follower, rows, a, b)
+        beside = around(follower, rows) if not found else []
+        if beside and beside[0].arclength < a.arclength:
+            found = [rows[0], *beside, a]
+            beside = []
+        return found + (beside or inside(follower, rows, a, b))
 
 
 def inside(follower: Follower, rows: Sequence[Point], p: Point, q: Point) -> list[Point]:
@@ -73,6 +86,29 @@ def inside(follower: Follower, rows: Sequence[Point], p: Point, q: Point) -> lis
             found = lowest(follower, samples, p, q, multiplicity)
             if found is not None:
                 return [found]
+    return []
+
+
+def around(follower: Follower, rows: Sequence[Point]) -> list[Point]:
+    """A state near the middle one of three rows whose index is not theirs, where that row's determinant is low."""
+    p, a, b = rows
+    if p.negative != a.negative or not relative(a, min(p, b, key=lambda row: row.determinant), 1) < DEEP:
+        return []
+    step = min(a.arclength - p.arclength, b.arclength - a.arclength)
+    size = step / NEARER
+    while size > LEAST * step:
+        near = [point_between(follower, p, a, a.arclength - size), point_between(follower, a, b, a.arclength + size)]
+        before, after = near
+        if before is None or after is None:
+            return []
+        for state in (before, after):
+            if differs(state, a):
+                return [state]
+        closer = [before, a, after]
+        found = inside(follower, closer, before, a) or inside(follower, closer, a, after)
+        if found or not relative(a, min(before, after, key=lambda row: row.determinant), 1) < DEEP:
+            return found
+        size /= NEARER
     return []
 
 
