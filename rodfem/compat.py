@@ -225,6 +225,16 @@ def _is_warning(record: logging.LogRecord) -> bool:
     return record.levelno > logging.INFO
 
 
+def destroy_garbage(comm: Any) -> None:
+    """Destroy the PETSc objects that Python has collected; collective over ``comm``.
+
+    Since PETSc 3.18 their memory is kept until then, as ranks may collect them in another order.
+    """
+    if hasattr(PETSc, "garbage_cleanup"):
+        for communicator in (comm, PETSc.COMM_SELF):
+            PETSc.garbage_cleanup(communicator)
+
+
 @contextmanager
 def announce_compilation(say: Callable[[], None]) -> Iterator[None]:
     """Call ``say`` once if forms are compiled inside the block."""

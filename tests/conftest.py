@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
+from rodfem import compat
+
 gc.disable()  # destroying PETSc objects is collective: it must not happen on one rank earlier than on another
 
 
@@ -16,9 +18,8 @@ gc.disable()  # destroying PETSc objects is collective: it must not happen on on
 def collect_garbage() -> Iterator[None]:
     """Destroy what a module has left behind, on all ranks together."""
     yield
-    MPI.COMM_WORLD.barrier()
     gc.collect()
-    MPI.COMM_WORLD.barrier()
+    compat.destroy_garbage(MPI.COMM_WORLD)
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from rodfem import compat
 from rodfem.continuation.branch import Point
 from rodfem.continuation.corrector import SENSITIVE, Corrector
 from rodfem.continuation.step_control import Steps
@@ -45,6 +46,8 @@ HELD = 1e-8
 """Drift scalar, over the lowest bending eigenvalue, above which phase conditions hold a state off the equilibrium."""
 ALIGNED = 0.9
 """Least cosine between the direction of a prediction and the tangent at the corrected point."""
+PILE = 64
+"""Points of a branch after which the vectors that are not used any more are destroyed."""
 ON_BOUND = 1e-8
 """Distance from a bound, in spans, below which a load counts as on it: branches of constant load may lie there."""
 
@@ -355,6 +358,8 @@ def follow(
     follower.corrector.restart()
     while len(points) < steps.most:
         last = points[-1]
+        if len(points) % PILE == 0:
+            compat.destroy_garbage(system.comm)
         most = min(reach(last), steps.largest)
         step = min(step, most)
         known = points

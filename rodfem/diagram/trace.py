@@ -68,11 +68,16 @@ def trace(
             mesh = _mesh(scene, discretization or Discretization(), plan, recorder, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
         recorder.system(found.system, plan.accuracy)
+
+        def complete() -> None:
+            compat.destroy_garbage(comm)
+            recorder.complete(diagram)
+
         tracer: Explorer | Sweep
         if isinstance(found, Follower):
-            tracer = Explorer(found, plan, recorder, lambda: recorder.complete(diagram))
+            tracer = Explorer(found, plan, recorder, complete)
         else:
-            tracer = Sweep(found, plan, recorder, lambda: recorder.complete(diagram))
+            tracer = Sweep(found, plan, recorder, complete)
         diagram = Diagram(scene, plan, tracer.branches, tracer.solvers)
         diagram.warnings, diagram.notes = recorder.warnings, recorder.notes
         tracer.run()
