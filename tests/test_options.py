@@ -43,8 +43,7 @@ def test_factors(options: PETSc.Options) -> None:
     options["rodfem_lu_mat_mumps_icntl_7"] = options["rodfem_cholesky_mat_mumps_icntl_7"] = ORDERING
     options["rodfem_lu_pc_factor_mat_solver_type"] = "mumps"
     system, x = cord()
-    system.residual(x, system.new_vector())
-    system.factor(system.load_axis())
+    system.at(x).factor(system.load_axis())
     judge = Judge(system)
     assert judge(x, "count").negative == 1
     for factors in (system.lu, judge.inertia.factors):

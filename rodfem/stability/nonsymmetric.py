@@ -125,15 +125,13 @@ class Vibration:
         Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
         """
         with self.system.clock("assembly"):
-            assemble_pencil(self.system, x, self.matrix, self.mass)
-            self.system.verify(self.matrix, x)
+            state = assemble_pencil(self.system, x, self.matrix, self.mass)
+            self.system.verify(self.matrix, state)
             free = symmetry_modes(self.system, x)
             if free:
                 exclude_modes(self.system, free, self.matrix, self.mass)
             self._free = {i: mode for i, (mode, _) in weighed_modes(self.system, free, self.mass).items()}
-            self.system.bring(x)
-            f = self.system.fields
-            self.turned = f.u.x.array[f.dofs[f.turning.name]]
+            self.turned = state.turned
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""

@@ -14,6 +14,7 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import SceneError
+from rodfem.fem.state import State
 from rodfem.fem.system import System, combine
 from rodfem.linalg.factorization import PIVOTS, Factors, lu_package, ordering, prefer_options
 
@@ -27,29 +28,31 @@ LEAST = 6
 """How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
 
 
-def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> None:
+def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> State:
     """Assemble tangent matrix and kinetic metric at the state ``x``, without the symmetries' phase conditions.
 
-    Raises :class:`SceneError` for a rod without any inertia.
+    Returns the state.  Raises :class:`SceneError` for a rod without any inertia.
     """
     if system.equations.massless:
         raise SceneError("A rod without inertia has no eigenvalues mu = omega^2: give it a mass or a rotary inertia.")
-    system.bring(x)
+    state = system.at(x)
     for target, form in ((matrix, system.equations.jacobian), (mass, system.equations.kinetic)):
         target.zeroEntries()
-        system.assemble_into(target, form)
+        state.assemble_into(target, form)
     if system.has_scalars:
         for index in (system.load_index, *system.drifts):  # no part of the pencil: an infinite eigenvalue each
             matrix.setValue(index, index, 1.0, addv=True)
     matrix.assemble()
     mass.assemble()
+    return state
 
 
 def symmetry_modes(system: System, x: PETSc.Vec) -> dict[int, PETSc.Vec]:
     """Generators at ``x`` of the symmetries that it breaks, by the global number of their drift scalars."""
     if not system.broken:
         return {}
-    generators = [system.generator(x, i) for i in range(len(system.drifts))]
+    state = system.at(x)
+    generators = [state.generator(i) for i in range(len(system.drifts))]
     return {index: combine(generators, weights) for index, weights in system.broken.items()}
 
 
