@@ -37,6 +37,7 @@ from rodfem.linalg.substructured import Condensed
 from rodfem.stability import mode_type as character
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.pencil import (
+    FACTORS,
     LARGE,
     Inverse,
     assemble_pencil,
@@ -326,11 +327,11 @@ class Vibration:
         """
         inverse = self._inverse(matrix, mass, target)
         while number:
-            if inverse is None:
-                solver = shift_invert(matrix, mass, number, target, symmetric=False)
-            else:
-                solver = with_factors(matrix, mass, number, target, inverse, symmetric=False)
             try:
+                if inverse is None:
+                    solver = shift_invert(matrix, mass, number, target, symmetric=False)
+                else:
+                    solver = with_factors(matrix, mass, number, target, inverse, symmetric=False)
                 solver.setUp()
             except PETSc.Error as trouble:
                 raise ConvergenceError(_singular(target)) from trouble
@@ -358,11 +359,11 @@ class Vibration:
             return None
         shifted = matrix.copy()
         shifted.axpy(-target, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        dense_rows, prefix = self.system.fields.dense_rows, "rodfem_st_"
+        dense_rows = self.system.fields.dense_rows
         if doubled:
-            factors: Factors = Condensed(dense_rows, Mumps("lu", {8: 0}, prefix=prefix))
+            factors: Factors = Condensed(dense_rows, Mumps("lu", {8: 0}, prefix=FACTORS))
         else:
-            factors = factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=prefix)
+            factors = factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=FACTORS)
         factors(shifted)
         if not factors.regular:
             raise ConvergenceError(_singular(target))

@@ -16,10 +16,12 @@ from slepc4py import SLEPc
 from rodfem.errors import SceneError
 from rodfem.fem.state import State
 from rodfem.fem.system import System, combine
-from rodfem.linalg.factorization import PIVOTS, Factors, lu_package, ordering, prefer_options
+from rodfem.linalg.factorization import Factors, lu_package, ordering, pivots, preferred
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
+FACTORS = "rodfem_st_"
+"""Prefix of the options for the factors of a pencil without symmetry."""
 ROOM = {"mat_mumps_icntl_14": 100}
 """Percentage of room beyond MUMPS's estimate: delayed pivots of a saddle point take more than its own 20."""
 LARGE = 5000
@@ -102,7 +104,10 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
 
 
 def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex, *, symmetric: bool) -> SLEPc.EPS:
-    """Set up Krylov-Schur with shift-invert (LU) for the ``number`` eigenvalues nearest to ``target``."""
+    """Set up Krylov-Schur with shift-invert (LU) for the ``number`` eigenvalues nearest to ``target``.
+
+    Raises :class:`PETSc.Error` where the shifted matrix is singular.
+    """
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_")
     solver.setOperators(matrix, mass)
@@ -117,12 +122,11 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     ksp = transform.getKSP()
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
-    package = lu_package(matrix.comm.tompi4py(), "rodfem_st_") if matrix.size[0] < LARGE else "mumps"
+    package = lu_package(matrix.comm.tompi4py(), FACTORS) if matrix.size[0] < LARGE else "mumps"
     ksp.getPC().setFactorSolverType(package)
-    prefer_options("rodfem_st_", ordering(matrix) | ROOM)
-    for prefix in ("", "rodfem_st_"):
-        prefer_options(prefix, PIVOTS)
     solver.setFromOptions()
+    with preferred(FACTORS, ordering(matrix) | ROOM), pivots(FACTORS):
+        solver.setUp()
     return solver
 
 
@@ -196,7 +200,7 @@ def with_factors(
 def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> SLEPc.EPS:
     """Set up spectrum slicing for all eigenvalues of a symmetric pencil between two numbers that are none themselves.
 
-    Options: ``-rodfem_slicing_eps_...``, ``-rodfem_slicing_st_...``.
+    Options: ``-rodfem_slicing_eps_...``, ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is one.
     """
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_slicing_")
@@ -213,5 +217,6 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> 
     ksp.setType("preonly")
     ksp.getPC().setType("cholesky")
     ksp.getPC().setFactorSolverType("mumps")
-    prefer_options(ksp.getOptionsPrefix(), ordering(matrix) | {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1})
+    with preferred(ksp.getOptionsPrefix(), ordering(matrix) | {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1}):
+        solver.setUp()
     return solver
