@@ -101,8 +101,9 @@ def test_newton_converges_quadratically() -> None:
     residual, step = f.system.new_vector(), f.system.new_vector()
     sizes = []
     for _ in range(4):
-        f.system.residual(y, residual)
-        f.system.factor(f.axis)
+        state = f.system.at(y)
+        state.residual(residual)
+        state.factor(f.axis)
         assert f.system.solve(residual, step)
         y.axpy(-1.0, step)
         sizes.append(f.system.norm(step))

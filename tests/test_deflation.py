@@ -48,7 +48,7 @@ def force(follower: Follower, x: object) -> float:
     """Size of the equations' residual at a state, without phase conditions."""
     out = follower.system.new_vector()
     follower.system.set_phase(None)
-    follower.system.residual(x, out)
+    follower.system.at(x).residual(out)
     return float(out.norm())
 
 
@@ -186,14 +186,15 @@ def test_step_is_newtons_for_the_deflated_equations() -> None:
         def deflated(t: float, direction: object, x=x, search=search, system=system) -> object:
             y, out = x.copy(), system.new_vector()
             y.axpy(t, direction)
-            system.residual(y, out)
+            system.at(y).residual(out)
             out.scale(float(np.prod([1 + 1 / d**2 for d, _ in search.known.nearest(y)])))
             return out
 
         step, plain = system.new_vector(), system.new_vector()
         value = deflated(0.0, step)
-        system.residual(x, plain)
-        system.factor(follower.axis)
+        state = system.at(x)
+        state.residual(plain)
+        state.factor(follower.axis)
         system.solve(plain, step)
         step.scale(-1.0)
         step.scale(search.rescaling(x, step))

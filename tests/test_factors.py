@@ -117,8 +117,7 @@ def test_matrix_without_symmetry(formulation: str, name: str, load: float, packa
     factors = Copied(alone) if shared == "copies" else Condensed(system.fields.dense_rows, alone)
     row = system.metric * x
     system.set_load(row, 1.0)
-    system.residual(x, system.new_vector())
-    matrix = system.jacobian(row)
+    matrix = system.at(x).jacobian(row)
     right, out = system.load_axis(), system.new_vector()
     factors(matrix)
     assert factors.regular
@@ -191,8 +190,7 @@ def test_dense_rows_do_not_fill_in(formulation: str, elements: int, degree: int)
     solver = Solver(states.scene("hemitropic"), Discretization(formulation, elements, degree), MPI.COMM_SELF).equilibria
     solver.system.set_phase(None)
     x = solver.start(0.3, 0.4)
-    solver.inertia.assemble(x)
-    matrix, times = solver.system.jacobian(solver.axis), []
+    matrix, times = solver.system.at(x).jacobian(solver.axis), []
     for factors in (Klu(LU, solver.system.fields.dense_rows), Mumps("lu", {8: 0})):
         factors(matrix)
         least = np.inf

@@ -236,14 +236,12 @@ def test_errors_that_are_not_known_are_said_to_be_so() -> None:
 
 def test_nothing_is_left_behind() -> None:
     solver, special = follower(), specials(explored()[0], "branch point")[0]
-    system, equations = solver.system, solver.system.equations
+    system = solver.system
     point = explored()[1].points[5]
     system.set_phase(point.x)
-    before, phases = solver.point(point.x, 0.0, None), list(system.phases)
-    constants = equations.base.value.copy(), equations.direction.value.copy(), system.scene
+    before, phases, line = solver.point(point.x, 0.0, None), list(system.phases), system.line
     locus(solver, special, "C", ((0.01, 0.9), (0.95, 1.05)), steps=WIDE, error_bars=0)
-    assert (equations.base.value == constants[0]).all() and (equations.direction.value == constants[1]).all()
-    assert system.scene is constants[2]
+    assert system.line is line is system.equations.line
     assert all(a is b for a, b in zip(system.phases, phases, strict=True))
     after = solver.point(point.x, 0.0, None)
     for name in ("load", "ordinate", "energy", "negative", "zero", "stretch"):

@@ -11,6 +11,7 @@ from states import plain
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
+from rodfem.linalg.factorization import Klu
 from rodfem.stability.assessment import Judge
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.nonsymmetric import Vibration
@@ -20,6 +21,7 @@ from rodfem.stability.reduction import Reduction
 
 pytestmark = pytest.mark.alone
 
+LU = "rodfem_lu_"
 ORDERING = 2
 """MUMPS's approximate minimum fill: not what rodfem asks for."""
 
@@ -34,6 +36,41 @@ def options() -> Iterator[PETSc.Options]:
         found.delValue(name)
 
 
+def test_nothing_is_left_in_the_database(options: PETSc.Options) -> None:
+    options["mat_klu_pivot_tol"] = 0.5  # of the user, without a prefix
+    before = options.getAll()
+    system, x = cord()
+    system.at(x).factor(system.load_axis())
+    judge = Judge(system)
+    for method in ("count", "shift-invert", "slicing"):
+        judge(x, method, 2)
+    system, x = plain("follower", "pointwise", 6, 3, 10.0)
+    vibration = Vibration(system)
+    vibration.assemble(x)
+    vibration.near(2, 0.0)
+    shift_invert(vibration.matrix, vibration.mass, 2, 1.0, symmetric=False).solve()
+    assert options.getAll() == before
+    del options["mat_klu_pivot_tol"]
+
+
+def test_threshold_of_pivots_is_read(options: PETSc.Options) -> None:
+    """Factors of KLU with the threshold that was asked for, whatever the prefix that it was asked for with."""
+    system, x = cord()
+    matrix, solutions = system.at(x).jacobian(system.load_axis()), []
+    for name in ("", f"{LU}mat_klu_pivot_tol", "mat_klu_pivot_tol"):
+        if name:
+            options[name] = 1e-12
+        factors, out = Klu(LU, system.fields.dense_rows), system.new_vector()
+        factors(matrix)
+        factors.solve(matrix * x, out)
+        solutions.append(out)
+        if name:
+            del options[name]
+    default, prefixed, plainly = solutions
+    assert (prefixed - plainly).norm() == 0.0
+    assert (default - plainly).norm() > 0.0
+
+
 def cord() -> tuple[System, PETSc.Vec]:
     system, x = plain("cord", "reduced", 6, 3, 20.0)
     return System(system.scene, system.fields.discretization), x
@@ -43,8 +80,7 @@ def test_factors(options: PETSc.Options) -> None:
     options["rodfem_lu_mat_mumps_icntl_7"] = options["rodfem_cholesky_mat_mumps_icntl_7"] = ORDERING
     options["rodfem_lu_pc_factor_mat_solver_type"] = "mumps"
     system, x = cord()
-    system.residual(x, system.new_vector())
-    system.factor(system.load_axis())
+    system.at(x).factor(system.load_axis())
     judge = Judge(system)
     assert judge(x, "count").negative == 1
     for factors in (system.lu, judge.inertia.factors):

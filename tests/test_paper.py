@@ -220,7 +220,7 @@ def test_tangential_hessian_is_the_second_derivative_along_rotations(name: str, 
     def slope(z: np.ndarray, eps: float) -> float:
         """``d/d eps`` of the Lagrangian: the gradient times ``1/2 theta q`` at the rotated state."""
         at = rotated(system, blocks, x, full(z), eps)
-        system.residual(at, residual)
+        system.at(at).residual(residual)
         nodes = blocks.quaternions - system.fields.offset
         dq = full(z)
         size = np.linalg.norm(dq.array_r[nodes], axis=1, keepdims=True)
@@ -269,19 +269,18 @@ def quadratic_forms(name: str, formulation: str, load: float, elements: int, deg
     blocks, f = Blocks(system, "full"), system.fields
     blocks.assemble(x)
     w = fem.Function(f.space, dtype=np.float64)
-    form, z = by_hand(system, w), system.new_vector()
+    form, z, state = by_hand(system, w), system.new_vector(), system.at(x)
     found = []
     for phase in (0.0, 1.0, 2.0, 3.0):
         perturb(system, w, phase)
         direction = w.x.array.copy()
-        direction[f.dofs["q"]] = hamilton_stack(w.x.array[f.dofs["q"]], f.u.x.array[f.dofs["q"]]) / 2
+        direction[f.dofs["q"]] = hamilton_stack(w.x.array[f.dofs["q"]], state.values("q")) / 2
         z.array[: len(f.free_owned)] = direction[f.free_owned]
         if system.has_scalars:
             for i, force in enumerate(f.forces):
                 z.setValue(f.scalars[f"n{force + 1}"], w.x.array[f.copies[0, i]])
         z.assemble()
-        by_integral = system.comm.allreduce(float(np.real(fem.assemble_scalar(form))))
-        found.append([float(z.dot(blocks.matrix * z)), by_integral])
+        found.append([float(z.dot(blocks.matrix * z)), state.integral(form)])
     return np.array(found)
 
 
@@ -307,7 +306,7 @@ def hamilton_stack(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 def by_hand(system: System, w: fem.Function) -> Any:
     """``second_variation`` at the system's state in the direction ``w``, compiled."""
     e, f, scene = system.equations, system.fields, system.scene
-    u, d = e._named(ufl.split(f.u)), e._named(ufl.split(w))
+    u, d = e.unknowns, e._named(ufl.split(w))
     c, free = e._constants(u.load), scene.free_strains
     v = strain(free, e._components(u.v, len(free)))
     zero = ufl.as_vector([0.0] * 3)

@@ -147,7 +147,7 @@ class Richer:
             )
         load, ordinate = system.scalar(x), self.follower.shape.ordinate(x)
         equations, step = system.new_vector(), system.new_vector()
-        system.residual(x, equations)
+        system.at(x).residual(equations)
         system.solve(equations, step)
         x.axpy(-1.0, step)
         last = system.scalar(x), self.follower.shape.ordinate(x)

@@ -116,15 +116,12 @@ class Gauge:
 
     def _squares(self, x: PETSc.Vec | None, directions: Sequence[PETSc.Vec]) -> np.ndarray:
         """Squared coefficients of the strains on the elements of this rank, (elements, degree)."""
-        fields, shape = self.solver.system.fields, self.solver.shape
+        system, fields, shape = self.solver.system, self.solver.system.fields, self.solver.shape
         squares = np.zeros((fields.owned_cells, fields.discretization.degree))
         for vector in directions if x is None else (x, *directions):
-            self.solver.system.bring(vector)
-            values = fields.u.x.array
-            if vector is not x:
-                values = np.where(fields.number < 0, 0.0, values)  # a state is held there, a change of it is zero
+            at = system.at(vector) if vector is x else system.change(vector)
             for name, weights in self.weights:
-                series = np.einsum("jn,cni->cji", self._series[name], values[fields.dofs[name][self._cells]])
+                series = np.einsum("jn,cni->cji", self._series[name], at.values(name)[self._cells])
                 if name == fields.turning.name:
                     series *= (2 / shape.size)[:, None, None]
                 squares += series**2 @ weights**2

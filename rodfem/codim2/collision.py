@@ -49,13 +49,14 @@ class Collision:
         width, forward = self.plane.width, tangent[0] / self.plane.width
         forward = forward / np.linalg.norm(forward)
         across = np.array([-forward[1], forward[0]])
-        self.plane.line(p, across * width)
+        system = self.solver.system
+        system.line = self.plane.line(p, across * width)
         basis = np.stack([v.array_r.real for v in near.modes], axis=1)
         t, last, here, x = self._collide(x, Cluster(basis, near.omega2), reach)
         p, omega2 = p + t * across * width, here.cluster.mean
         gradient, clearest = np.zeros(2), here
         for which in (0, 1):
-            self.plane.line(p, (np.arange(2) == which) * width)
+            system.line = self.plane.line(p, (np.arange(2) == which) * width)
             low, high = (self._measured(h, x, Cluster(basis, omega2))[0] for h in (-DIFFERENCE, DIFFERENCE))
             gradient[which] = (high.discriminant - low.discriminant) / (2 * DIFFERENCE)
             clearest = max((clearest, low, high), key=lambda m: m.spread)
@@ -63,15 +64,15 @@ class Collision:
             raise ConvergenceError("the discriminant is constant")
         dq = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
         dq = dq if dq @ forward >= 0 else -dq
-        self.plane.show(p)
-        self.solver.system.set_load(x, float(p[0]))
+        system.line = self.plane.along(p, 0)
+        system.set_load(x, float(p[0]))
         located = np.maximum(last * abs(across) * width, 1e-12 * np.maximum(1.0, abs(p)))
         ordinate = self.solver.shape.ordinate(x)
-        still, modes = self.solver.system.new_vector(), as_vectors(self.solver.system, clearest.cluster.basis)
+        still, modes = system.new_vector(), as_vectors(system, clearest.cluster.basis)
         return Node(p, x, dq * width, still, located, ordinate=ordinate, omega2=omega2, modes=modes)
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> tuple[float, float, Measured, PETSc.Vec]:
-        """Zero of ``D`` on the line last set, from t = 0, by secants: t, its last change, the cluster, state.
+        """Zero of ``D`` on the system's line of parameters, by secants: t, its last change, the cluster, state.
 
         Secants end where they no longer shrink: ``D`` has a round-off of about ``eps mu^2``.
         """
@@ -93,7 +94,7 @@ class Collision:
         raise ConvergenceError("two eigenvalues do not collide near by")
 
     def _measured(self, t: float, guess: PETSc.Vec, cluster: Cluster) -> tuple[Measured, PETSc.Vec]:
-        """The cluster at ``t`` on the line last set, and the state there."""
+        """The cluster at ``t`` on the system's line of parameters, and the state there."""
         self.solver.system.set_phase(None)
         x, outcome = self.solver.at_load(guess, t)
         if not outcome.converged:

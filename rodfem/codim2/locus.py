@@ -200,7 +200,7 @@ def locus(
             f"The special point at {scene.load} = {p[0]:g}, {parameter} = {p[1]:g} is outside the bounds: widen them."
         )
     with system.clock.purpose("locus"), plane.kept():
-        plane.look(p, 0)
+        system.line = plane.along(p, 0)
         guess = _guess(solver, special, p)
         criterion = _criterion(solver, plane, special.kind, guess)
         first = criterion.correct(p, special.point.x, (np.array([0.0, 1.0]) * plane.width, None), guess, 0.1)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
@@ -12,6 +11,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.solvers import lagrange
 from rodfem.errors import SceneError
+from rodfem.fem.parameters import Line, line
 from rodfem.fem.system import System
 from rodfem.stability.inertia import combine
 
@@ -50,7 +50,7 @@ class Node:
 
 
 class Plane:
-    """Sets the constants of the equations of a system to points and lines of the plane of two parameters.
+    """Lines in the plane of two parameters of the scene of a system.
 
     The first parameter is the scene's load.  ``bounds`` are their intervals, whose ``width`` (2,) scales them.
     """
@@ -71,34 +71,19 @@ class Plane:
             scene.parameters[name].check(name, low)
             scene.parameters[name].check(name, high)
         for end in bounds[1]:  # the stored energy must be convex at both ends
-            replace(scene, parameters=_with(scene.parameters, {parameter: end}))
+            replace(scene, parameters={**scene.parameters, parameter: replace(scene.parameters[parameter], value=end)})
         self.bounds = np.array(bounds, dtype=float)
         self.width = self.bounds[:, 1] - self.bounds[:, 0]
-        self.index = [system.equations.names.index(name) for name in self.names]
-        self._scene = scene
 
-    def home(self) -> np.ndarray:
-        """The second parameter's value in the scene, and a load of zero: (2,)."""
-        return np.array([0.0, self._scene.parameters[self.names[1]].value])
+    def line(self, origin: np.ndarray, direction: np.ndarray) -> Line:
+        """Line on which the scalar unknown ``load`` stands for ``t`` in ``origin + t direction``."""
+        named = (dict(zip(self.names, map(float, pair), strict=True)) for pair in (origin, direction))
+        return line(self.system.scene, *named)
 
-    def line(self, origin: np.ndarray, direction: np.ndarray) -> None:
-        """Make the scalar unknown ``load`` stand for ``t`` in ``origin + t direction``."""
-        equations = self.system.equations
-        equations.base.value[self.index] = origin
-        equations.direction.value[:] = 0.0
-        equations.direction.value[self.index] = direction
-
-    def look(self, p: np.ndarray, which: int) -> None:
-        """Make the scalar unknown stand for parameter number ``which``; the other one has its value in ``p``."""
+    def along(self, p: np.ndarray, which: int) -> Line:
+        """Line on which it stands for parameter number ``which``; the other one has its value in ``p``."""
         axis = np.arange(2) == which
-        self.line(np.where(axis, 0.0, p), axis.astype(float))
-
-    def show(self, p: np.ndarray) -> None:
-        """Let the scalar unknown be the load and the scene have the second parameter of ``p``, to evaluate shapes."""
-        self.look(p, 0)
-        scene = copy.copy(self._scene)  # unlike replace(), without all the checks
-        object.__setattr__(scene, "parameters", _with(scene.parameters, {self.names[1]: float(p[1])}))
-        self.system.scene = scene
+        return self.line(np.where(axis, 0.0, p), axis)
 
     def outside(self, p: np.ndarray) -> tuple[int, float] | None:
         """Number of a parameter that is out of bounds and its bound, the one farthest out; None inside."""
@@ -110,20 +95,13 @@ class Plane:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Restore on exit all that a locus changes: constants, phase conditions, the scene shown to shapes."""
-        system, equations = self.system, self.system.equations
-        base, direction = equations.base.value.copy(), equations.direction.value.copy()
-        phases, offset, scene = list(system.phases), list(system._phase_offset), system.scene
+        """Restore on exit all that a locus changes: the line of parameters and the phase conditions."""
+        system = self.system
+        before = system.line, list(system.phases), list(system.phase_offsets)
         try:
             yield
         finally:
-            equations.base.value[:], equations.direction.value[:] = base, direction
-            system.phases[:], system._phase_offset[:], system.scene = phases, offset, scene
-
-
-def _with(parameters: Mapping, values: Mapping[str, float]) -> dict:
-    """Parameters of a scene with other values for some."""
-    return {name: replace(p, value=values.get(name, p.value)) for name, p in parameters.items()}
+            system.line, system.phases[:], system.phase_offsets[:] = before
 
 
 def predict(nodes: list[Node], s: float) -> tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]:

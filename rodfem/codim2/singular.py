@@ -184,13 +184,11 @@ class Singular:
 
     def _columns(self, p: np.ndarray, x: PETSc.Vec, w: PETSc.Vec | None) -> tuple[list[PETSc.Vec], PETSc.Vec]:
         """Derivatives of ``F`` in both parameters at ``x``, and ``S^t w``."""
-        system, scratch, columns = self.system, self.system.new_vector(), []
-        x, image = x.copy(), scratch
+        system, image, columns = self.system, self.system.new_vector(), []
+        x = x.copy()
         for which in (0, 1):
-            self.plane.look(p, which)
             system.set_load(x, float(p[which]))
-            system.residual(x, scratch)
-            matrix = system.jacobian(self.solver.axis)
+            matrix = system.at(x, self.plane.along(p, which)).jacobian(self.solver.axis)
             column = matrix * self.solver.axis
             system.set_load(column, 0.0)
             columns.append(column)
@@ -198,7 +196,6 @@ class Singular:
                 image = matrix.createVecRight()
                 matrix.multTranspose(w, image)
                 system.set_load(image, 0.0)
-        self.plane.look(p, 0)
         return columns, image
 
     def _linear(self, p: np.ndarray, x: PETSc.Vec, reference: PETSc.Vec, old: _Linear | None) -> _Linear:
@@ -206,9 +203,9 @@ class Singular:
         system, bordered, k = self.system, self.bordered, len(self.psi)
         columns = self._columns(p, x, None)[0] if old is None else []
         system.set_load(x, float(p[0]))
-        self.plane.look(p, 0)
+        system.line = self.plane.along(p, 0)
         right = system.new_vector()
-        system.residual(x, right)
+        system.at(x).residual(right)
         right.scale(-1.0)
         if not np.isfinite(right.norm()):
             raise ConvergenceError("the stored energy is not defined there")
@@ -283,7 +280,6 @@ class Singular:
         size = size if forward >= 0 else -size
         dx.scale(1.0 / size)
         located = np.maximum(last, 1e-12 * np.maximum(1.0, abs(p)))
-        self.plane.show(p)
         return Node(
             p,
             x,

@@ -32,6 +32,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import Outcome, iterate
+from rodfem.fem.state import State
 from rodfem.fem.system import dense_columns
 from rodfem.stability.inertia import Index, Inertia
 
@@ -119,7 +120,7 @@ class Corrector:
     def _project_at(self, x: PETSc.Vec, step: float) -> np.ndarray:
         """The same of ``S`` at the equilibrium ``x``, by a difference of the equations over ``step``."""
         self._beside.waxpy(step, self._block[0], x)
-        self.system.residual(self._beside, self._image)
+        self.system.at(self._beside).residual(self._image)
         return np.array([self._image.dot(v) for v in self._block]) / step
 
     def _solve(self, right: PETSc.Vec | None) -> None:
@@ -166,7 +167,7 @@ class Corrector:
         """
         origin, singular = x.copy(), False
 
-        def solve(equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
+        def solve(state: State, equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
             nonlocal singular
             if not fresh:
                 self._chord(equations)

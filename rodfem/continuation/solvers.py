@@ -14,8 +14,6 @@ from functools import cached_property
 from math import inf
 
 import numpy as np
-from dolfinx import fem
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
@@ -24,9 +22,11 @@ from rodfem.continuation.corrector import SENSITIVE, Corrector
 from rodfem.continuation.step_control import Steps
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
+from rodfem.fem.fields import LOAD
 from rodfem.fem.newton import TOLERANCE, Outcome, correct, relax
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System, combine
+from rodfem.fem.values import NodalValues
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.round_off import decide
@@ -69,20 +69,12 @@ class Equilibria:
         system, f = self.system, self.system.fields
         x = f.coordinates(f.discretization.degree)
         turned = f.turning.start(system.scene.start, x.ravel(), system.scene.interval)
-        f.u.x.array[f.number >= 0] = 0.0
-        dofs = f.dofs[f.turning.name]
-        held, clamped = f.number[dofs] < 0, f.u.x.array[dofs]
         if bent:
             along = (x.ravel() - system.scene.interval[0]) / system.scene.length
             turned = f.turning.turned(turned, bent * _bend(along))
-        f.u.x.array[dofs] = np.where(held, clamped, turned.reshape(*x.shape, -1))
-        if "v" in f.dofs:
-            f.u.x.array[f.dofs["v"]] = [1.0 if i == 2 else 0.0 for i in system.scene.free_strains]
-        f.u.x.array[f.copies[:, -1]] = load
-        self.shape.place_centreline(load)
-        out = system.take()
-        system.set_load(out, load)
-        return out
+        undeformed = np.array([1.0 if i == 2 else 0.0 for i in system.scene.free_strains])
+        named = {f.turning.name: turned.reshape(*x.shape, -1), "v": undeformed, LOAD: load}
+        return self.shape.with_centreline(NodalValues(f, f.filled(named), system.line))
 
     def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, Outcome]:
         """Equilibrium at exactly ``load`` by Newton's method from ``guess``; the phase reference must be set."""
@@ -137,9 +129,7 @@ class Equilibria:
 
     def energy(self, x: PETSc.Vec) -> float:
         """Stored energy of the state ``x``."""
-        self.system.bring(x)
-        mine = fem.assemble_scalar(self.system.equations.energy)
-        return float(self.system.comm.allreduce(mine, op=MPI.SUM))
+        return self.system.at(x).energy()
 
 
 class Follower(Equilibria):
@@ -267,12 +257,11 @@ class Follower(Equilibria):
         if at is not None:
             if self.corrector.factor(at):
                 return self.corrector.tangent_along(row)
-            self.system.residual(at, self.system.new_vector())
-            self.system.factor(row)
+            self.system.at(at).factor(row)
         tangent = self.system.new_vector()
         solved = self.system.solve(self.axis, tangent)
         if not solved and at is not None:  # exactly singular: of all directions that across the null space
-            self.system.factor(row, damping=self.inertia.tolerance)
+            self.system.at(at).factor(row, damping=self.inertia.tolerance)
             solved = self.system.solve(self.axis, tangent)
         size = self.system.norm(tangent) if solved else 0.0
         if not 0.0 < size < inf:

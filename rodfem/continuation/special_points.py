@@ -70,8 +70,7 @@ def special_at(follower: Follower, located: Located, arclength: float, still: Se
 def coupling_of(follower: Follower, x: PETSc.Vec, null_vector: PETSc.Vec) -> float:
     """Cosine between a null vector and ``F_lam``, the derivative of the equations in the load at ``x``."""
     system = follower.system
-    system.residual(x, system.new_vector())
-    matrix = system.jacobian(follower.axis)
+    matrix = system.at(x).jacobian(follower.axis)
     derivative = matrix * follower.axis
     system.set_load(derivative, 0.0)
     if derivative.norm() < ROUND_OFF * matrix.norm():  # a trivial state: its equations do not feel the load
@@ -220,8 +219,7 @@ def _load_response(follower: Follower, special: Special) -> PETSc.Vec:
     out = system.new_vector()
     x = special.point.x
     system.set_phase(x)
-    system.residual(x, out)
-    system.factor(follower.axis, SHIFT * system.stiffness_scale)
+    system.at(x).factor(follower.axis, SHIFT * system.stiffness_scale)
     system.solve(follower.axis, out)
     for v in special.null_vectors:
         out.axpy(-(system.metric * v).dot(out), v)

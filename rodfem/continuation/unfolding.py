@@ -79,7 +79,7 @@ def unfold(follower: Follower, special: Special) -> Unfolded | None:
     equations = system.new_vector()
     moved, before = 0.0, np.inf
     for _ in range(MOST):
-        system.residual(x, equations)
+        system.at(x).residual(equations)
         inertia.assemble(x)
         try:
             step, beta, v, directions = _step(follower, bordered, psi, x, equations)
@@ -159,7 +159,7 @@ def _differences(
         for image, v in zip(out, vectors, strict=True):
             image.axpy(sign / (2 * h), inertia.matrix * v)
         if equations is not None:
-            system.residual(beside, there)
+            system.at(beside).residual(there)
             bend.axpy(1.0 / h**2, there)
             bend.axpy(-1.0 / h**2, equations)
     return out, bend

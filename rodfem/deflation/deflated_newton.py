@@ -54,8 +54,9 @@ class DeflatedNewton:
         equations, step = system.new_vector(), system.new_vector()
         for alpha in alphas:
             system.set_phase(None)
-            system.residual(x, equations)
-            matrix = system.jacobian(self.follower.axis)
+            state = system.at(x)
+            state.residual(equations)
+            matrix = state.jacobian(self.follower.axis)
             shift = alpha * self.follower.inertia.scale
             matrix.axpy(shift, system.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
@@ -73,8 +74,9 @@ class DeflatedNewton:
         equations, step = system.new_vector(), system.new_vector()
         for number in range(MOST):
             system.set_phase(x)
-            system.residual(x, equations)
-            system.factor(self.follower.axis)
+            state = system.at(x)
+            state.residual(equations)
+            state.factor(self.follower.axis)
             if not system.solve(equations, step):
                 return MOST
             step.scale(-1.0)
@@ -105,7 +107,7 @@ class DeflatedNewton:
             trial = x.copy()
             trial.axpy(factor, step)
             self._normalise(trial)
-            system.residual(trial, equations)
+            system.at(trial).residual(equations)
             if isfinite(equations.norm()):
                 trial.copy(x)
                 return True
@@ -114,13 +116,6 @@ class DeflatedNewton:
 
     def _normalise(self, x: PETSc.Vec) -> None:
         """Make the nodal quaternions of ``x`` of unit length."""
-        system, f = self.system, self.system.fields
-        drifts = [system.scalar(x, f"drift{i}") for i in range(len(system.drifts))]
-        system.bring(x)
-        u, dofs = f.u.x.array, f.dofs[f.turning.name]
-        u[dofs] = f.turning.normalised(u[dofs])
-        system.take().copy(x)
-        if system.has_scalars:
-            for i, value in enumerate(drifts):
-                x.setValue(system.scalars[f"drift{i}"], value)
-        x.assemble()
+        state, f = self.system.at(x), self.system.fields
+        normalised = {f.turning.name: f.turning.normalised(state.turned)}
+        self.system.vector(f.filled(state.named | normalised), state.drifts).copy(x)

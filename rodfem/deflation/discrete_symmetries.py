@@ -53,24 +53,19 @@ class Mirror:
 
     def __call__(self, system: System, x: PETSc.Vec) -> PETSc.Vec:
         """Image of the state ``x``; drift scalars of the image are zero."""
-        f, u = system.fields, system.fields.u.x.array
-        system.bring(x)
-        held = f.number < 0
-        clamped = u[held]
+        f, state = system.fields, system.at(x)
+        named = state.named
         for block in f.blocks:
             components = system.scene.free_strains if block.name == "v" else tuple(range(block.size))
-            values = u[f.dofs[block.name]]
+            values = state.values(block.name)
             if self.reversal:
                 values = _reversed(system, values, block.degree)
             values = values * self.weights(block.name, components, system.scene.normal)
             if block.name == "r" and self.reversal:
                 values = values - _misfit(system, values)
-            u[f.dofs[block.name]] = values
-        for position, i in enumerate(f.forces):
-            u[f.copies[:, position]] *= self.weights("n", (i,))
-        image = system.take()
-        u[held] = clamped
-        return image
+            named[block.name] = values
+        named |= {f"n{i + 1}": state.scalars[f"n{i + 1}"] * float(self.weights("n", (i,))[0]) for i in f.forces}
+        return system.vector(f.filled(named))
 
 
 def _reversed(system: System, values: np.ndarray, degree: int) -> np.ndarray:
@@ -108,24 +103,18 @@ def _misfit(system: System, values: np.ndarray) -> np.ndarray:
 
 def generic_state(system: System, like: PETSc.Vec, amplitude: float, seed: int) -> PETSc.Vec:
     """Add to a state smooth changes of all fields that no symmetry leaves alone; clamps are kept."""
-    f, u = system.fields, system.fields.u.x.array
+    f, named = system.fields, system.at(like).named
     rng = np.random.default_rng(seed)
-    system.bring(like)
-    held = f.number < 0
-    clamped = u[held]
     a, b = system.scene.interval
     for block in f.blocks:
         x = (f.coordinates(block.degree) - a) / (b - a)
         for i in range(block.size):
-            u[f.dofs[block.name][:, :, i]] += amplitude * sum(
+            named[block.name][:, :, i] += amplitude * sum(
                 c * np.sin(k * np.pi * x + p) for k, (c, p) in enumerate(rng.uniform(0.3, 1.0, (3, 2)), start=1)
             )
-    for position in range(len(f.forces)):
-        u[f.copies[:, position]] += amplitude * rng.uniform(0.3, 1.0)
-    u[held] = clamped
-    out = system.take()
-    u[held] = clamped
-    return out
+    for i in f.forces:
+        named[f"n{i + 1}"] += amplitude * rng.uniform(0.3, 1.0)
+    return system.vector(f.filled(named))
 
 
 def mirrors(system: System, x: PETSc.Vec) -> list[Mirror]:
@@ -148,5 +137,5 @@ def _work(system: System, x: PETSc.Vec, y: PETSc.Vec) -> tuple[float, float]:
     """``F(x) . (y - x)`` and the product of the norms."""
     equations, change = system.new_vector(), y.copy()
     change.axpy(-1.0, x)
-    system.residual(x, equations)
+    system.at(x).residual(equations)
     return float(equations.dot(change)), float(equations.norm() * change.norm())

@@ -33,10 +33,10 @@ class Orbit:
         self, system: System, y: PETSc.Vec, symmetry: int, seen: Callable[[PETSc.Vec], PETSc.Vec] = lambda x: x
     ) -> None:
         """Split the velocity of ``y`` by frequency; distances are those of what is ``seen`` of states, a projection."""
-        zero = system.generator(system.new_vector(), symmetry)
-        powers = [system.generator(y, symmetry)]
+        zero = system.at(system.new_vector()).generator(symmetry)
+        powers = [system.at(y).generator(symmetry)]
         for _ in range(5):
-            powers.append(system.generator(powers[-1], symmetry))
+            powers.append(system.at(powers[-1]).generator(symmetry))
             powers[-1].axpy(-1.0, zero)
         half, one = (w**2 for w in FREQUENCIES)
         # L^2 is -w^2 on the part of frequency w: polynomials in L^2 that are 1 on one part and 0 on the others
@@ -97,9 +97,10 @@ class Orbits:
         self.translations: list[PETSc.Vec] = []
         some = system.new_vector()
         some.set(1.0)
+        zero, ones = system.at(system.new_vector()), system.at(some)
         for i, symmetry in enumerate(system.symmetries):
             if not symmetry.along:
-                constant, change = system.generator(system.new_vector(), i), system.generator(some, i)
+                constant, change = zero.generator(i), ones.generator(i)
                 change.axpy(-1.0, constant)
                 if constant.norm() > 0 and change.norm() < 1e-12 * constant.norm():
                     self.translations.append(constant)

@@ -23,14 +23,9 @@ def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[i
     waves = _waves(x, left, right)
     dense = _waves(np.linspace(0.0, 1.0, 401), left, right)
     size = float(np.sqrt(np.mean(np.sum((dense @ weights) ** 2, axis=-1))))
-    system.bring(base)
-    u, dofs = f.u.x.array, f.dofs[f.turning.name]
-    held = f.number < 0
-    clamped = u[held]
-    u[dofs] = f.turning.turned(u[dofs], waves @ weights * (amplitude / size))
-    out = system.take()
-    u[held] = clamped
-    return out
+    state = system.at(base)
+    turned = f.turning.turned(state.turned, waves @ weights * (amplitude / size))
+    return system.vector(f.filled(state.named | {f.turning.name: turned}))
 
 
 def _clamped(system: System) -> list[bool]:

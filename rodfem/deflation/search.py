@@ -98,7 +98,7 @@ class Deflation(DeflatedNewton):
         """Deflate the known equilibria and their images; :class:`SceneError` where one is at another load."""
         super().__init__(follower)
         self.load, self.seed = load, seed
-        scene, fields = self.system.scene, self.system.fields
+        scene = self.system.scene
         scene.parameters[scene.load].check(scene.load, load)
         for point in known:
             if abs(point.load - load) > 1e-9 * abs(scene.span[1] - scene.span[0]):
@@ -106,7 +106,6 @@ class Deflation(DeflatedNewton):
                     f"A known equilibrium is at {scene.load} = {point.load:.8g}, not {load:.8g}: "
                     "give equilibria at the load of the search (diagram.at(load) computes them)."
                 )
-        fields.u.x.array[fields.number >= 0] = 0.0  # multipliers of the state that was there before are no guess
         self.start = follower.start(load)
         self.mirrors = mirrors(self.system, self.start)
         self.bases: list[PETSc.Vec] = []

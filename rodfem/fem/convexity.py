@@ -30,8 +30,7 @@ class Convexity:
         """Compile the second derivative."""
         self.system = system
         e, f, scene = system.equations, system.fields, system.scene
-        u = e._named(ufl.split(f.u))
-        free = scene.free_strains
+        u, free = e.unknowns, scene.free_strains
         values = e._components(u.v, len(free))
         k = curvature(u.q, u.q.dx(0))
         x = ufl.variable(ufl.as_vector([*values, *(k[i] for i in range(3))]))
@@ -53,8 +52,7 @@ class Convexity:
         """Least eigenvalue over the whole rod at the state ``x``, relative to the largest one; 1 if it is constant."""
         if self.evaluate is None:
             return 1.0
-        self.system.bring(x)
-        matrices = self.evaluate().reshape(-1, self.size, self.size)
+        matrices = self.system.at(x).evaluate(self.evaluate).reshape(-1, self.size, self.size)
         values = np.linalg.eigvalsh((matrices + matrices.transpose(0, 2, 1)) / 2)
         mine = (values[:, 0] / abs(values).max(axis=1)).min() if len(values) else 1.0
         return float(self.system.comm.allreduce(float(mine), op=MPI.MIN))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import dolfinx.mesh
 import numpy as np
@@ -17,8 +17,12 @@ from forms.kinematics import curvature, strain
 from forms.rotation import rotation
 from rodfem import compat
 from rodfem.fem.fields import Fields, across
+from rodfem.fem.parameters import load_line
 from rodfem.problem.ends import Constants, Place, Ring
 from rodfem.problem.local_state import place
+
+if TYPE_CHECKING:
+    from rodfem.fem.state import Evaluation
 
 
 class Equations:
@@ -41,6 +45,10 @@ class Equations:
         Stored energy ``int W ds``.
     ordinate
         Ordinate of the scene where that is an integral over the rod, else None.
+    line
+        Parameters that the scalar unknown ``load`` stands for unless an evaluation says otherwise: the scene's load.
+    held
+        Evaluation whose values are where the forms read them: see :mod:`rodfem.fem.state`.
     uniform
         Whether the equations do not have the arclength in them, and nothing acts at points inside the rod.
     """
@@ -49,10 +57,9 @@ class Equations:
         """Derive and compile the forms."""
         self.fields, scene = fields, fields.scene
         mesh, k = fields.mesh, fields.discretization.degree
-        self.names = list(scene.parameters)
-        self.base = fem.Constant(mesh, np.array([p.value for p in scene.parameters.values()]))
-        self.direction = fem.Constant(mesh, np.zeros(len(self.names)))
-        self.vary(scene.load)
+        self.names, self.line = list(scene.parameters), load_line(scene)
+        self.base, self.direction = fem.Constant(mesh, self.line.origin), fem.Constant(mesh, self.line.direction)
+        self.held: Evaluation | None = None
         self.ends = fem.Constant(mesh, np.array(scene.interval, dtype=float))
         length = self.length = self.ends[1] - self.ends[0]
 
@@ -61,7 +68,7 @@ class Equations:
         dx_nodes = ufl.dx(domain=mesh, metadata={"quadrature_degree": 2 * k - 1, "quadrature_rule": "GLL"})
         self.measures = point_measures(mesh, [*scene.interval, *scene.joints])
 
-        f = self._named(ufl.split(u))
+        f = self.unknowns = self._named(ufl.split(u))
         c = self.constants = self._constants(f.load)
         v = strain(scene.free_strains, self._components(f.v, len(scene.free_strains)))
         along = self._along(f, c, v)
@@ -255,13 +262,6 @@ class Equations:
     def quadrature_degree(degree: int) -> int:
         """Gauss degree ``2k``, and the midpoint rule for k = 1, as in Kumar & Healey (2010)."""
         return 1 if degree == 1 else 2 * degree
-
-    def vary(self, parameter: str) -> None:
-        """Make the scalar unknown ``load`` stand for ``parameter``; all others keep their values."""
-        chosen = np.array([name == parameter for name in self.names])
-        values = np.array([p.value for p in self.fields.scene.parameters.values()])
-        self.base.value[:] = np.where(chosen, 0.0, values)
-        self.direction.value[:] = chosen
 
     def _named(self, parts: Any, at: Any = None) -> SimpleNamespace:
         """Fields and scalars of a mixed function by name; ``r`` and ``n`` are None where there are none.

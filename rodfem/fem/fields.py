@@ -8,6 +8,7 @@ no number at all: PETSc drops what is added to number -1, and no Dirichlet row e
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -19,7 +20,7 @@ from mpi4py import MPI
 from rodfem import compat
 from rodfem.errors import SceneError
 from rodfem.fem.rotation_field import ByAngle, ByQuaternion, Turning
-from rodfem.problem.ends import Ring
+from rodfem.problem.ends import Constants, Ring
 from rodfem.problem.kinds import reals, whole
 from rodfem.problem.local_state import needs_centreline
 from rodfem.problem.scene import Scene
@@ -161,7 +162,7 @@ def across(axis: tuple[float, float, float] | None, normal: int | None = None) -
 
 
 class Fields:
-    """Mesh, mixed space, the unknown ``u`` as a dolfinx Function, and the numbering of free unknowns.
+    """Mesh, mixed space, the unknown ``u`` of all forms as a dolfinx Function, and the numbering of free unknowns.
 
     Attributes
     ----------
@@ -173,6 +174,10 @@ class Fields:
         Scalar unknowns without load and drifts; components of the contact force among them (reduced formulation).
     scalars
         Global number of each scalar: ``n1``.. for ``forces``, ``load``, and ``drift0``.. one for each symmetry.
+    copies
+        Local degrees of freedom of the scalars but for drifts, one in each cell, (cells, scalars).
+    clamps
+        Values of clamped local degrees of freedom, zero for all others; (local size,).
     """
 
     def __init__(
@@ -207,6 +212,7 @@ class Fields:
         self.dofs = {b.name: self._block_dofs(i, b.size, local_cells) for i, b in enumerate(self.blocks)}
         copies = self._block_dofs(len(self.blocks), len(names), local_cells)[:, 0, :]
         self._number(copies, names)
+        self.clamps = self._clamps()
 
     def _mesh(self) -> Any:
         """Mesh with the vertices that the discretisation gives, or of elements of nearly equal size; each at joints."""
@@ -310,6 +316,33 @@ class Fields:
         self.unknowns += len(names)
         self.local_unknowns += len(names) if self.comm.rank == self.comm.size - 1 else 0
 
+    def _clamps(self) -> np.ndarray:
+        out, scene = np.zeros(len(self.number)), self.scene
+        x = self.coordinates(self.discretization.degree)
+        for end, s in zip(scene.sides, scene.interval, strict=True):
+            if end.fixed_rotation is not None:
+                here = self.dofs[self.turning.name][np.isclose(x, s, rtol=0, atol=1e-9 * scene.length)]
+                out[here] = self.turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)
+        return out
+
+    def filled(self, named: Mapping[str, Any]) -> np.ndarray:
+        """Local values of nodal values of fields and of scalars by name, zero without one; clamps have their own."""
+        out = np.zeros(len(self.number))
+        for name, dofs in self.dofs.items():
+            out[dofs] = named.get(name, 0.0)
+        for name, copies in zip(self.scalars, self.copies.T, strict=False):
+            out[copies] = named.get(name, 0.0)
+        return np.where(self.number < 0, self.clamps, out)
+
+    def scattered(self, local: np.ndarray) -> np.ndarray:
+        """Local values with those of ghosts from the ranks that own them."""
+        if self.comm.size == 1:
+            return local
+        function = fem.Function(self.space, dtype=compat.REAL)
+        function.x.array[:] = local
+        function.x.scatter_forward()
+        return np.array(function.x.array)
+
     def all_vertices(self) -> np.ndarray:
         """Arclengths at which elements meet, of all ranks in ascending order, (E + 1,)."""
         mine = self.vertices[: self.owned_cells, 0]
@@ -324,19 +357,14 @@ class Fields:
         """Add a drift scalar for each symmetry; before any matrix is made."""
         self._append([f"drift{i}" for i in range(count)])
 
-    def lift(self, s: np.ndarray, load: float) -> np.ndarray:
+    def lift(self, s: np.ndarray, c: Constants) -> np.ndarray:
         """Linear function of the ends' positions that the centreline field is measured from, (..., 3) for (...,)."""
         start, stop = self.scene.interval
         x = ((np.asarray(s) - start) / (stop - start))[..., None]
-        c = self.scene.constants(load)
         left, right = ([None if p is None else float(p) for p in end.held(c)] for end in self.scene.sides)
         a = np.array([p if p is not None else q or 0.0 for p, q in zip(left, right, strict=True)])
         b = np.array([q if q is not None else p or 0.0 for p, q in zip(left, right, strict=True)])
         return np.asarray((1 - x) * a + x * b)
-
-    def rotations(self) -> np.ndarray:
-        """Quaternions at the nodes of the state that ``u`` holds, (cells, nodes, 4)."""
-        return self.turning.quaternion(self.u.x.array[self.dofs[self.turning.name]])
 
     def coordinates(self, degree: int) -> np.ndarray:
         """Arclengths of the nodes of a field of that degree in each local cell, (cells, degree + 1)."""

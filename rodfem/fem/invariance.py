@@ -16,13 +16,14 @@ derivative in it, is asked on a fine mesh, which has such a symmetry up to its s
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from dolfinx import fem
 from mpi4py import MPI
 
-from rodfem import compat
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Block, Fields
+from rodfem.fem.state import Evaluation
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
 from rodfem.problem.ends import Ring
 
@@ -43,23 +44,21 @@ SMOOTH = 0.35
 
 
 def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
-    """Find a basis of all exact symmetries; leaves the state that ``fields.u`` holds as it was."""
+    """Find a basis of all exact symmetries."""
     parts = elementary_generators(fields)
-    u, kept = fields.u.x.array, fields.u.x.array.copy()
     single = [Symmetry(row, parts) for row in np.eye(len(parts))]
     moved = np.zeros((len(parts),) * 2)
     rows, sizes, held = [], [], [np.zeros((1, len(parts)))]
     for seed in range(len(parts) + 6 if fields.scene.conservative else STATES):
-        generic_state(fields, kept, seed)
-        changes = np.array([s.change(fields) for s in single])
+        state = generic_state(equations, seed)
+        changes = np.array([s.change(state) for s in single])
         asked = _change_of_functional if fields.scene.conservative else _change_of_equations
-        row, size = asked(fields, equations, single, changes)
+        row, size = asked(state, single, changes)
         rows.append(row)
         sizes.append(size)
         held.append(changes[:, _held(fields)].T)
         free = changes[:, fields.number >= 0]
         moved += fields.comm.allreduce(free @ free.T, op=MPI.SUM)
-    u[:] = kept
     free = _null_space(np.vstack(fields.comm.allgather(np.linalg.qr(np.vstack(held), mode="r"))))
     greatest = np.nan_to_num(np.max(sizes, axis=1), nan=np.inf)
     asked_at = np.flatnonzero(greatest <= WILD * greatest.min())
@@ -86,15 +85,14 @@ def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
         return Symmetry(none, parts, along=1.0)
     if not fields.scene.conservative:
         return None
-    single, kept = [Symmetry(row, parts) for row in np.eye(len(parts))], fields.u.x.array.copy()
+    single = [Symmetry(row, parts) for row in np.eye(len(parts))]
     rows, held = [], []
     for seed in range(len(parts) + SLIDES):
-        generic_state(fields, kept, seed, SMOOTH)
-        changes = np.array([*(s.change(fields) for s in single), derivative(fields)])
-        row, terms = _change_of_functional(fields, equations, single, changes)
+        state = generic_state(equations, seed, SMOOTH)
+        changes = np.array([*(s.change(state) for s in single), derivative(state)])
+        row, terms = _change_of_functional(state, single, changes)
         rows.append(row[0] / terms.max())
         held.append(changes[:-1, _held(fields)].T)
-    fields.u.x.array[:] = kept
     free = _null_space(np.vstack(held))
     exact, along = np.array(rows)[:, :-1] @ free, np.array(rows)[:, -1]
     weights = np.linalg.lstsq(exact, -along, rcond=SLIDING)[0]
@@ -113,24 +111,22 @@ def _null_space(rows: np.ndarray) -> np.ndarray:
 
 
 def _change_of_functional(
-    fields: Fields, equations: Equations, single: list[Symmetry], changes: np.ndarray
+    state: Evaluation, single: list[Symmetry], changes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """``dL(x)[g]`` of the ``changes`` (m, local size) by each generator, (1, m), and the sums of magnitudes, (m,)."""
-    residual = np.zeros(len(fields.u.x.array))
-    fem.assemble_vector(residual, equations.residual)
-    sums = fields.comm.allreduce(np.array([changes @ residual, abs(changes) @ abs(residual)]), op=MPI.SUM)
+    residual = state.covector()
+    sums = state.fields.comm.allreduce(np.array([changes @ residual, abs(changes) @ abs(residual)]), op=MPI.SUM)
     return sums[:1], sums[1]
 
 
 def _change_of_equations(
-    fields: Fields, equations: Equations, single: list[Symmetry], changes: np.ndarray
+    state: Evaluation, single: list[Symmetry], changes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), and sums of magnitudes, (m,); for one rank alone."""
-    residual = np.zeros(len(fields.u.x.array))
-    fem.assemble_vector(residual, equations.residual)
+    fields, residual = state.fields, state.covector()
     whole = residual.copy()  # a scalar has a copy in each cell: all of its equation
     whole[fields.copies] = residual[fields.copies].sum(axis=0)
-    tangent, back = compat.local_table(equations.jacobian), [s.linear(fields).T for s in single]
+    tangent, back = state.tangent(), [s.linear(fields).T for s in single]
     table = _summed(fields, np.array([tangent @ g for g in changes]), copies=True)
     table += _summed(fields, np.array([A @ whole for A in back]))
     sizes = _summed(fields, np.array([abs(tangent) @ abs(g) for g in changes]), copies=True)
@@ -173,23 +169,22 @@ def _held(fields: Fields) -> np.ndarray:
     return used[fields.number[used] < 0]
 
 
-def generic_state(fields: Fields, kept: np.ndarray, seed: int, decay: float = DECAY) -> None:
-    """Put a generic state with a random load into ``fields.u``: the same on any number of ranks, ends held.
+def generic_state(equations: Equations, seed: int, decay: float = DECAY) -> Evaluation:
+    """Generic state with a random load: the same on any number of ranks, ends held.
 
     Values are functions of the place along the rod, not of the numbering, with all Fourier coefficients: whatever
     function of the arclength a load is, it does work.  Those of a ring are closed: whether a pressure is felt by a
     translation, say, only shows there.
     """
-    rng = np.random.default_rng(seed)
-    u, scene = fields.u.x.array, fields.scene
+    rng, fields = np.random.default_rng(seed), equations.fields
+    scene, named = fields.scene, dict[str, Any]()
     for block in fields.blocks:
         x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
-        u[fields.dofs[block.name]] = _generic(fields, block, x[..., None], rng, decay)
-    u[fields.number < 0] = kept[fields.number < 0]
-    for i in range(len(fields.unknown_scalars)):
-        u[fields.copies[:, i]] = rng.normal()
+        named[block.name] = _generic(fields, block, x[..., None], rng, decay)
+    named |= {unknown.name: rng.normal() for unknown in fields.unknown_scalars}
     low, high = sorted(scene.span)
-    u[fields.copies[:, -1]] = low + (high - low) * rng.uniform(0.1, 0.9)
+    named[LOAD] = low + (high - low) * rng.uniform(0.1, 0.9)
+    return Evaluation(equations, fields.filled(named), equations.line)
 
 
 def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generator, decay: float) -> np.ndarray:

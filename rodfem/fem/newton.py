@@ -8,6 +8,7 @@ from math import isfinite
 
 from petsc4py import PETSc
 
+from rodfem.fem.state import State
 from rodfem.fem.system import System
 
 TOLERANCE = 1e-10
@@ -43,9 +44,9 @@ def correct(
     """
     step = system.new_vector()
 
-    def solve(equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
+    def solve(state: State, equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
         if fresh:
-            system.factor(row)
+            state.factor(row)
         return step if system.solve(equations, step) else None
 
     return iterate(system, x, solve, most, reach)
@@ -54,12 +55,12 @@ def correct(
 def iterate(
     system: System,
     x: PETSc.Vec,
-    solve: Callable[[PETSc.Vec, bool], PETSc.Vec | None],
+    solve: Callable[[State, PETSc.Vec, bool], PETSc.Vec | None],
     most: int,
     reach: float,
     tolerance: float = 0.0,
 ) -> Outcome:
-    """Newton's method with chord steps, in place; ``solve(equations, fresh)`` returns what is to be subtracted from x.
+    """Newton's method with chord steps, in place; ``solve(state, equations, fresh)`` returns what x is reduced by.
 
     A Jacobian is factored first (``fresh``), and again only while corrections do not shrink tenfold from one to the
     next: near a solution the old factors cost one solve where new ones cost five.  Done when a correction, or what the
@@ -74,11 +75,12 @@ def iterate(
     previous, size, refactor = float("inf"), float("inf"), True
     iteration = 0
     for iteration in range(1, most + 1):
-        system.residual(x, equations)
+        state = system.at(x)
+        state.residual(equations)
         if not isfinite(equations.norm()):  # outside of where the stored energy is defined
             break
         fresh = refactor
-        step = solve(equations, fresh)
+        step = solve(state, equations, fresh)
         if step is None:
             break
         x.axpy(-1.0, step)
@@ -107,8 +109,9 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Outc
     equations, step = system.new_vector(), system.new_vector()
     tau, trial = 1e-2 / system.stiffness_scale, x.copy()
     for iteration in range(most):
-        system.residual(x, equations)
-        system.factor(row, damping=1.0 / tau)
+        state = system.at(x)
+        state.residual(equations)
+        state.factor(row, damping=1.0 / tau)
         if not isfinite(equations.norm()) or not system.solve(equations, step):
             break
         size = system.norm(step)

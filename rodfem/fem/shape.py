@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from dolfinx import fem
 from mpi4py import MPI
 from numpy.polynomial import legendre
 from petsc4py import PETSc
@@ -19,6 +18,7 @@ from forms.kinematics import UNDEFORMED
 from rodfem import compat
 from rodfem.fem.fields import LOAD
 from rodfem.fem.system import System
+from rodfem.fem.values import NodalValues
 
 
 def _euler_rodrigues() -> np.ndarray:
@@ -107,12 +107,8 @@ class Shape:
 
     def ordinate(self, x: PETSc.Vec) -> float:
         """Ordinate of the scene at the state ``x``."""
-        self.system.bring(x)
-        of, integral = self.system.scene.ordinate, self.system.equations.ordinate
-        if of.s is None:
-            return float(self.system.comm.allreduce(fem.assemble_scalar(integral).real, op=MPI.SUM))
-        r, q = self._at(of.s)
-        return float(of.of(r, q))
+        state, of = self.system.at(x), self.system.scene.ordinate
+        return state.integral(self.system.equations.ordinate) if of.s is None else float(of.of(*self._at(state, of.s)))
 
     def stretch(self, x: PETSc.Vec) -> float:
         """Smallest stretch ``v3`` along the rod; 1 for an inextensible rod.
@@ -120,11 +116,9 @@ class Shape:
         The least value at many points picks an element and a place; Newton's method finds the minimum of the polynomial
         nearby.
         """
-        f = self.system.fields
         if 2 not in self.system.scene.free_strains:
             return 1.0
-        self.system.bring(x)
-        nodal = f.u.x.array[f.dofs["v"][self._cells]][:, :, -1]
+        nodal = self.system.at(x).values("v")[self._cells, :, -1]
         dense = nodal @ self._v_dense.T
         cell, place = divmod(int(dense.argmin()), dense.shape[1])
         spacing = 2.0 / (dense.shape[1] - 1)
@@ -137,14 +131,12 @@ class Shape:
         ``s`` (m,), ``r`` (m, 3) and ``q`` (m, 4) at the nodes from left to right; each further field by name,
         continuous ones (m, components), discontinuous ones (elements, nodes, components); scalars by name.
         """
-        system, f = self.system, self.system.fields
-        system.bring(x)
+        system, f, state = self.system, self.system.fields, self.system.at(x)
         local: dict[str, np.ndarray] = {"start": self.start}
         for block in f.blocks:
-            values = f.u.x.array[f.dofs[block.name][self._cells]]
-            local[block.name] = values[:, np.argsort(compat.nodes(block.degree)), :]
+            local[block.name] = state.values(block.name)[self._cells][:, np.argsort(compat.nodes(block.degree)), :]
         if self.reduced:
-            slopes = self._slopes()
+            slopes = self._slopes(state)
             local["ends"] = np.einsum("g,cgi,c->ci", self.gauss.weights, slopes, self.size)
             local["inside"] = np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), slopes, self.size)
         out: dict[str, Any] = {"elements": f.discretization.elements}
@@ -155,65 +147,52 @@ class Shape:
         for block in f.blocks:
             values = all_fields[block.name]
             out[block.name] = self._unique(values) if block.continuous else values
-        load = system.scalar(x, LOAD)
         if self.reduced:
             ends = np.vstack([np.zeros(3), np.cumsum(all_fields["ends"], axis=0)])
-            out["r"] = self._anchor(load, ends[-1]) + self._unique(ends[:-1, None, :] + all_fields["inside"])
+            out["r"] = self._anchor(state, ends[-1]) + self._unique(ends[:-1, None, :] + all_fields["inside"])
         else:
-            out["r"] = out["r"] + self.system.fields.lift(out["s"], load)
+            out["r"] = out["r"] + f.lift(out["s"], state.constants())
         out["q"] = f.turning.quaternion(out[f.turning.name])
-        for name in system.scalars:
-            out[name] = system.scalar(x, name)
-        return out
+        return out | dict(zip(system.scalars, [*state.scalars.values(), *state.drifts.tolist()], strict=True))
 
     def restore(self, sample: dict[str, Any]) -> PETSc.Vec:
         """State vector of a :meth:`sample`, taken with the same formulation but any number of elements and degree."""
         f = self.system.fields
         ends = np.append(sample["s"][:: self._degree_of(sample)], sample["s"][-1])[: self._elements_of(sample) + 1]
-        held = f.number < 0
-        clamped = f.u.x.array[held]
+        named = {name: sample[name] for name in self.system.scalars if not name.startswith("drift")}
         for block in f.blocks:
             x = f.coordinates(block.degree)
             inwards = x + 1e-9 * (x.mean(axis=1, keepdims=True) - x)  # the end of a cell belongs to that cell
-            values = self._evaluate(sample, block, ends, x, inwards)
-            f.u.x.array[f.dofs[block.name]] = values
-        for position, name in enumerate(name for name in self.system.scalars if not name.startswith("drift")):
-            f.u.x.array[f.copies[:, position]] = sample[name]
-        f.u.x.array[held] = clamped
-        return self.system.take()
+            named[block.name] = self._evaluate(sample, block, ends, x, inwards)
+        return self.system.vector(f.filled(named))
 
-    def place_centreline(self, load: float) -> None:
-        """Set the centreline, or the scalar positions of the ends, to what the rotations and strains integrate to.
+    def with_centreline(self, given: NodalValues) -> PETSc.Vec:
+        """State with the centreline, or the scalar positions of the ends, that rotations and strains integrate to.
 
         What then misses a held end is spread evenly over the rod.
         """
-        system, f = self.system, self.system.fields
-        slopes = self._slopes()
+        system, f, out = self.system, self.system.fields, given.local.copy()
+        slopes = self._slopes(given)
         pieces = np.einsum("g,cgi,c->ci", self.gauss.weights, slopes, self.size)
         starts, inside = self.start, np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), slopes, self.size)
         order = np.argsort(self.gather(starts))
         steps = self.gather(pieces)[order]
         before = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
-        c = system.scene.constants(load)
+        c = given.constants()
         left, right = ([None if p is None else float(p) for p in end.held(c)] for end in system.scene.sides)
         a = np.array([p if p is not None else (q or 0.0) - d for p, q, d in zip(left, right, before[-1], strict=True)])
         b = np.array([q if q is not None else x + d for q, x, d in zip(right, a, before[-1], strict=True)])
         for i, unknown in enumerate(f.unknown_scalars):
             if unknown.group in ("a", "b"):
-                f.u.x.array[f.copies[:, i]] = (a if unknown.group == "a" else b)[unknown.component]
+                out[f.copies[:, i]] = (a if unknown.group == "a" else b)[unknown.component]
         if self.reduced:
-            return
+            return system.vector(out)
         first = np.searchsorted(self.gather(starts)[order], starts)
         r = a + before[:-1][first][:, None, :] + inside
         s = starts[:, None] + self.size[:, None] * self.nodes
         x = (s - system.scene.interval[0])[..., None] / system.scene.length
-        r = r + x * (b - a - before[-1]) - f.lift(s, load)
-        values = np.empty_like(r)
-        values[:, self._order] = r
-        local = f.dofs["r"][self._cells]
-        free = f.number[local] >= 0
-        f.u.x.array[local[free]] = values[free]
-        f.u.x.scatter_forward()
+        out[f.dofs["r"][self._cells][:, self._order]] = r + x * (b - a - before[-1]) - f.lift(s, c)
+        return system.vector(out)
 
     # --- inside ------------------------------------------------------------------------------------------------
 
@@ -231,7 +210,7 @@ class Shape:
         own = degree if block.continuous else degree - 1
         table = np.asarray(sample[block.name])
         if block.name == "r":
-            table = table - self.system.fields.lift(sample["s"], sample[LOAD])
+            table = table - self.system.fields.lift(sample["s"], self.system.line.constants(sample[LOAD]))
         if block.continuous:
             table = table[np.arange(len(ends) - 1)[:, None] * degree + np.arange(degree + 1)]
         local = (x - ends[cell]) / (ends[cell + 1] - ends[cell])
@@ -247,16 +226,13 @@ class Shape:
         """Values at the nodes of a continuous field, (cells, nodes, ...) -> (m, ...)."""
         return np.concatenate([values[:, :-1].reshape(-1, values.shape[-1]), values[-1:, -1]])
 
-    def _slopes(self) -> np.ndarray:
+    def _slopes(self, state: NodalValues) -> np.ndarray:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""
-        f = self.system.fields
-        u = f.u.x.array
-        turned = self._q_at_gauss @ u[f.dofs[f.turning.name][self._cells]]
-        R = directors(f.turning.quaternion(turned))
+        R = directors(state.fields.turning.quaternion(self._q_at_gauss @ state.turned[self._cells]))
         free = list(self.system.scene.free_strains)
         slopes = R @ self._held_strains
         if free:
-            v = self._v_at_gauss @ u[f.dofs["v"][self._cells]]
+            v = self._v_at_gauss @ state.values("v")[self._cells]
             slopes += (R[..., free] @ v[..., None])[..., 0]
         return np.asarray(slopes)
 
@@ -271,36 +247,30 @@ class Shape:
         whole = np.outer(self.size, self.gauss.weights)
         return np.stack([integral.ravel(), whole.ravel()]), value.ravel()
 
-    def _at(self, s: float) -> tuple[np.ndarray, np.ndarray]:
+    def _at(self, state: NodalValues, s: float) -> tuple[np.ndarray, np.ndarray]:
         """Centreline (3,) and unit quaternion (4,) at the ordinate's arclength."""
         system, f = self.system, self.system.fields
         ((integral, value),) = self._probe_weights
-        u = f.u.x.array
         parts = np.zeros((3, 4))
         size = f.turning.size
-        parts[0, :size] = value @ u[f.dofs[f.turning.name][self._cells]].reshape(-1, size)
+        parts[0, :size] = value @ state.turned[self._cells].reshape(-1, size)
         if self.reduced:
-            slopes = self._slopes()
-            parts[1:, :3] = integral @ slopes.reshape(-1, 3)
+            parts[1:, :3] = integral @ self._slopes(state).reshape(-1, 3)
         else:
-            parts[1, :3] = value @ u[f.dofs["r"][self._cells]].reshape(-1, 3)
+            parts[1, :3] = value @ state.values("r")[self._cells].reshape(-1, 3)
         if system.comm.size > 1:
             parts = system.comm.allreduce(parts)
-        load = float(f.u.x.array[f.copies[0, -1]])
         r = parts[1, :3] + (
-            self._anchor(load, parts[2, :3]) if self.reduced else self.system.fields.lift(np.array(s), load)
+            self._anchor(state, parts[2, :3]) if self.reduced else f.lift(np.array(s), state.constants())
         )
         q = f.turning.quaternion(parts[0, :size])
         return r, q / np.linalg.norm(q)
 
-    def _anchor(self, load: float, chord: np.ndarray) -> np.ndarray:
+    def _anchor(self, state: NodalValues, chord: np.ndarray) -> np.ndarray:
         """Position of the left end: where it is held, or else a chord back from where the right end is held."""
-        f = self.system.fields
-        values = f.u.x.array[f.copies[0]]
-        scalar = {x.name: float(value) for x, value in zip(f.unknown_scalars, values, strict=False)}
-        c = self.system.scene.constants(load)
+        c, scalars = state.constants(), state.scalars
         left, right = (
-            [scalar.get(f"{letter}{i + 1}") if p is None else float(p) for i, p in enumerate(end.held(c))]
+            [scalars.get(f"{letter}{i + 1}") if p is None else float(p) for i, p in enumerate(end.held(c))]
             for letter, end in zip("ab", self.system.scene.sides, strict=True)
         )
         return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])

@@ -19,6 +19,7 @@ from mpi4py import MPI
 from forms.symmetry import AXES, Matrix, cross, left, right
 from rodfem import compat
 from rodfem.fem.fields import Block, Fields
+from rodfem.fem.values import NodalValues
 from rodfem.problem.ends import Ring
 from rodfem.problem.scene import Scene
 
@@ -45,11 +46,11 @@ class Symmetry:
     parts: tuple[Elementary, ...]
     along: float = 0.0
 
-    def change(self, fields: Fields) -> np.ndarray:
-        """Change of the state that ``fields.u`` holds: local values, consistent on all ranks; zero for the load."""
-        out = self.along * derivative(fields) if self.along else np.zeros(len(fields.u.x.array))
+    def change(self, state: NodalValues) -> np.ndarray:
+        """Change of a state: local values, consistent on all ranks; zero for the load."""
+        out = self.along * derivative(state) if self.along else np.zeros(len(state.local))
         for target, (matrix, constant) in self._targets.items():
-            add_change(fields, target, matrix, constant, out)
+            add_change(state, target, matrix, constant, out)
         return out
 
     def linear(self, fields: Fields) -> sp.csr_matrix:
@@ -96,32 +97,25 @@ class Symmetry:
 # --- the motion of a closed rod along itself ------------------------------------------------------------------------
 
 
-def derivative(fields: Fields) -> np.ndarray:
-    """Derivative in arclength of the state that ``fields.u`` holds, the mean of elements at nodes; zero for scalars."""
-    u, kept = fields.u, fields.u.x.array.copy()
-    out, count = np.zeros(len(kept)), np.ones(len(kept))
+def derivative(state: NodalValues) -> np.ndarray:
+    """Derivative in arclength of a state, local values, the mean of elements at nodes; zero for scalars."""
+    fields, size = state.fields, len(state.local)
+    out, count = np.zeros(size), np.ones(size)
     for block in fields.blocks:
-        dofs, slopes = fields.dofs[block.name].ravel(), _slopes(fields, block).ravel()
-        out += np.bincount(dofs, slopes, minlength=len(kept))
-        count = np.maximum(count, np.bincount(dofs, minlength=len(kept)))
-    out /= count
-    if fields.comm.size > 1:
-        u.x.array[:] = out
-        u.x.scatter_forward()
-        out = u.x.array.copy()
-        u.x.array[:] = kept
-    out[fields.number < 0] = 0.0
-    return out
+        dofs, slopes = fields.dofs[block.name].ravel(), _slopes(state, block).ravel()
+        out += np.bincount(dofs, slopes, minlength=size)
+        count = np.maximum(count, np.bincount(dofs, minlength=size))
+    return np.where(fields.number < 0, 0.0, fields.scattered(out / count))
 
 
-def mismatch(fields: Fields) -> float:
+def mismatch(state: NodalValues) -> float:
     """Greatest jump between elements of the derivative of rotation or centreline.
 
     It tells how far the mesh is from moving along itself.
     """
-    worst = 0.0
+    fields, worst = state.fields, 0.0
     for block in (b for b in fields.blocks if b.name in (fields.turning.name, "r")):
-        dofs, slopes = fields.dofs[block.name].ravel(), _slopes(fields, block).ravel()
+        dofs, slopes = fields.dofs[block.name].ravel(), _slopes(state, block).ravel()
         low, high = np.full(len(fields.number), np.inf), np.full(len(fields.number), -np.inf)
         np.minimum.at(low, dofs, slopes)
         np.maximum.at(high, dofs, slopes)
@@ -129,11 +123,11 @@ def mismatch(fields: Fields) -> float:
     return float(fields.comm.allreduce(worst, op=MPI.MAX))
 
 
-def _slopes(fields: Fields, block: Block) -> np.ndarray:
+def _slopes(state: NodalValues, block: Block) -> np.ndarray:
     """Derivative in arclength of a field at the nodes of each cell, (cells, nodes, components)."""
-    size = (fields.vertices[:, 1] - fields.vertices[:, 0])[:, None, None]
-    values = fields.u.x.array[fields.dofs[block.name]].real
-    return np.asarray(np.matmul(differentiation(block.degree), values) / size)
+    vertices = state.fields.vertices
+    size = (vertices[:, 1] - vertices[:, 0])[:, None, None]
+    return np.asarray(np.matmul(differentiation(block.degree), state.values(block.name)) / size)
 
 
 @cache
@@ -185,30 +179,27 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
     return tuple(out)
 
 
-def add_change(fields: Fields, target: str, matrix: np.ndarray, constant: np.ndarray, out: np.ndarray) -> None:
-    """Add the change ``matrix value + constant`` of one target, at the state that ``fields.u`` holds."""
-    u = fields.u.x.array
-    load = float(u[fields.copies[0, -1]])
+def add_change(state: NodalValues, target: str, matrix: np.ndarray, constant: np.ndarray, out: np.ndarray) -> None:
+    """Add to ``out`` the change ``matrix value + constant`` of one target of a state, a field or a group of scalars."""
+    fields = state.fields
     if target in fields.dofs:
-        dofs = fields.dofs[target]
-        values = u[dofs]
+        dofs, values = fields.dofs[target], state.values(target)
         if target == "r":
-            values = values + fields.lift(fields.coordinates(fields.discretization.degree), load)
+            values = values + fields.lift(fields.coordinates(fields.discretization.degree), state.constants())
         out[dofs] += values @ matrix.T + constant  # of dofs that cells share, once: the sum is buffered
         return
     members = [(i, x.component) for i, x in enumerate(fields.unknown_scalars) if x.group == target]
-    values = np.zeros(len(constant)) if len(members) == len(constant) else _known(fields, target, load, len(constant))
+    values = np.zeros(len(constant)) if len(members) == len(constant) else _known(state, target, len(constant))
     for i, component in members:
-        values[component] = u[fields.copies[0, i]]
+        values[component] = state.local[fields.copies[0, i]]
     change = matrix @ values + constant
     for i, component in members:
         out[fields.copies[:, i]] += change[component]
 
 
-def _known(fields: Fields, group: str, load: float, size: int) -> np.ndarray:
+def _known(state: NodalValues, group: str, size: int) -> np.ndarray:
     """Values of the components of a group that are not unknowns (known forces, held positions), else zero."""
-    scene, values = fields.scene, np.zeros(size)
-    c = scene.constants(load)
+    scene, values, c = state.fields.scene, np.zeros(size), state.constants()
     if group == "n":
         known = [scene.known_force(i, c) for i in range(3)]
     elif group in ("a", "b"):

@@ -17,16 +17,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem import compat
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Discretization, Fields
 from rodfem.fem.invariance import find_motion_along, find_symmetries
+from rodfem.fem.parameters import Line
 from rodfem.fem.sparsity import bordered_pattern, metric_pattern, new_matrix
+from rodfem.fem.state import State
 from rodfem.fem.symmetries import Symmetry, may_slide, mismatch
+from rodfem.fem.values import NodalValues
 from rodfem.fem.verification import Verification
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.scene import Scene
@@ -52,11 +53,12 @@ class System:
     metric
         Symmetric matrix of the squared size of a change of state: rotations, centreline, and the load over its span.
     lu
-        LU factors of the last Jacobian given to :meth:`factor`.
+        LU factors of the last Jacobian that a :class:`~rodfem.fem.state.State` factored.
     symmetries
         Those found in the equations of the scene; the motion of a closed rod along itself comes last.
-    drifting
-        Drift scalars of the state that :meth:`residual` was last asked of.
+    line
+        Parameters that the load of a state stands for where nothing else is said: the scene's load, unless a locus in
+        two parameters is followed.
     verification
         What verifies the symmetries at the states where the second variation is assembled.
     damping
@@ -79,7 +81,7 @@ class System:
         self.clock = clock or Clock()
         self.fields = Fields(scene, discretization, comm, mesh)
         self.equations = Equations(self.fields)
-        _set_clamps(self.fields)
+        self.line = self.equations.line
         self.symmetries = self._symmetries() if symmetries is None else list(symmetries)
         self.fields.add_drifts(len(self.symmetries))
         number, self.scalars = self.fields.number, self.fields.scalars
@@ -90,22 +92,21 @@ class System:
         self._columns = {True: number.astype(PETSc.IntType), False: without_load}
         self._all = PETSc.LGMap().create(self._columns[True], comm=comm)
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
-        self._equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
-        self._equation_numbers = number[self._equation_targets].astype(PETSc.IntType)
+        self.equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
+        self.equation_numbers = number[self.equation_targets].astype(PETSc.IntType)
         self._pattern, self._metric_pattern = bordered_pattern(self.fields), metric_pattern(self.fields)
         self.matrix = self.state_matrix(load=True)
-        self.x_local = PETSc.Vec().createSeq(int((number >= 0).sum()), comm=PETSc.COMM_SELF)
         self._numbered = np.flatnonzero(number >= 0)
+        sources = np.append(number[self._numbered], self.drifts).astype(PETSc.IntType)
+        self._gathered = PETSc.Vec().createSeq(len(sources), comm=PETSc.COMM_SELF)
         self.workspace = self.matrix.createVecRight()
-        source = PETSc.IS().createGeneral(number[self._numbered].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-        self._gather = PETSc.Scatter().create(self.workspace, source, self.x_local, None)
-        self._residual_local = np.zeros(len(self.fields.u.x.array))
+        source = PETSc.IS().createGeneral(sources, comm=PETSc.COMM_SELF)
+        self._gather = PETSc.Scatter().create(self.workspace, source, self._gathered, None)
         self.metric = self._assemble_metric()
         self.phases: list[PETSc.Vec | None] = [None] * len(self.drifts)
         self.broken: dict[int, np.ndarray] = {}
-        self._phase_offset = [0.0] * len(self.drifts)
+        self.phase_offsets = [0.0] * len(self.drifts)
         self._reference: PETSc.Vec | None = None
-        self.drifting = np.zeros(len(self.drifts))
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
         self.lu = factors_of("lu", comm, self.fields.unknowns, self.fields.dense_rows, {8: 0})
@@ -131,7 +132,6 @@ class System:
     def _elsewhere(self, discretization: Discretization) -> tuple[Fields, Equations]:
         """The scene on another mesh, all of it on each rank."""
         fields = Fields(self.scene, discretization, MPI.COMM_SELF)
-        _set_clamps(fields)
         return fields, Equations(fields)
 
     # --- vectors -----------------------------------------------------------------------------------------------
@@ -164,63 +164,37 @@ class System:
         self.metric.mult(d, self.workspace)
         return float(max(self.workspace.dot(d).real, 0.0)) ** 0.5
 
-    def bring(self, x: PETSc.Vec) -> None:
-        """Put ``x`` into the dolfinx function on which the forms are assembled."""
-        self.fields.u.x.array[self._numbered] = self.gathered(x)
+    def at(self, x: PETSc.Vec, line: Line | None = None) -> State:
+        """State of the values ``x`` has now, with the parameters of a ``line``, :attr:`line` unless given."""
+        gathered, local = self.gathered(x), self.fields.clamps.copy()
+        local[self._numbered] = gathered[: len(self._numbered)]
+        return State(self, local, gathered[len(self._numbered) :], line or self.line)
+
+    def change(self, d: PETSc.Vec) -> NodalValues:
+        """Nodal values of a change of state: zero where a state is clamped."""
+        local = np.zeros(len(self.fields.number))
+        local[self._numbered] = self.gathered(d)[: len(self._numbered)]
+        return NodalValues(self.fields, local, self.line)
 
     def gathered(self, x: PETSc.Vec) -> np.ndarray:
-        """Values of a vector at this rank's free local degrees of freedom, in ascending order; overwritten later."""
-        self._gather.scatter(x, self.x_local, addv=PETSc.InsertMode.INSERT_VALUES)
-        return np.asarray(self.x_local.array_r.real)
+        """Values of a vector at this rank's free local degrees of freedom, in ascending order, then the drifts'."""
+        self._gather.scatter(x, self._gathered, addv=PETSc.InsertMode.INSERT_VALUES)
+        return np.array(self._gathered.array_r.real)
 
-    def take(self) -> PETSc.Vec:
-        """Vector of the values that the dolfinx function holds; drift scalars are zero."""
+    def vector(self, local: np.ndarray, drifts: Sequence[float] | np.ndarray = ()) -> PETSc.Vec:
+        """Vector of local values (see :meth:`Fields.filled`), of which those of clamps are left out, and of drifts."""
         x, f = self.new_vector(), self.fields
-        x.array[: len(f.free_owned)] = f.u.x.array[f.free_owned]
-        if self.has_scalars:
-            x.array[len(f.free_owned) : len(f.free_owned) + f.copies.shape[1]] = f.u.x.array[f.copies[0]]
+        own = [local[f.free_owned], local[f.copies[0]], drifts] if self.has_scalars else [local[f.free_owned]]
+        values = np.concatenate(own)
+        x.array[: len(values)] = values
         x.assemble()
         return x
 
     # --- assembly ----------------------------------------------------------------------------------------------
 
-    def residual(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Equations at ``x`` into ``out``; the row of the load is left zero."""
-        with self.clock("assembly"):
-            self.bring(x)
-            self._residual_local[:] = 0.0
-            fem.assemble_vector(self._residual_local, self.equations.residual)
-            out.set(0.0)
-            values = self._residual_local[self._equation_targets]
-            out.setValues(self._equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)
-            out.assemble()
-            for i, (phase, index) in enumerate(zip(self.phases, self.drifts, strict=True)):
-                drift = self.drifting[i] = self.scalar(x, f"drift{i}")
-                value = drift
-                if phase is not None:
-                    out.axpy(drift, phase)
-                    value = phase.dot(x) - self._phase_offset[i]
-                if self.has_scalars:
-                    out.setValue(index, value)
-                out.assemble()
-
-    def jacobian(self, row: PETSc.Vec) -> PETSc.Mat:
-        """Jacobian at the state last brought by :meth:`residual`, with ``row`` as the row of the load."""
-        with self.clock("assembly"):
-            self.matrix.zeroEntries()
-            self.assemble_into(self.matrix, self.equations.jacobian, load=True)
-            self.add_drifts(self.matrix)
-            begin, end = row.getOwnershipRange()
-            self.matrix.setValues([self.load_index], np.arange(begin, end, dtype=PETSc.IntType), row.array_r, addv=True)
-            self.matrix.assemble()
-        return self.matrix
-
-    def assemble_into(self, matrix: PETSc.Mat, form: Any, *, load: bool = False) -> None:
-        """Add a bilinear form at the state last brought to a matrix of this system, with or without the load's column.
-
-        The caller assembles the matrix (``matrix.assemble()``) when all is added.
-        """
-        compat.assemble_matrix(matrix, form, self._columns[False], self._columns[load])
+    def maps(self, load: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Global numbers of the rows and columns of a matrix at each local degree of freedom, -1 for none."""
+        return self._columns[False], self._columns[load]
 
     def add_drifts(self, matrix: PETSc.Mat) -> None:
         """Add rows and columns of the drift scalars: the generators, or a one where a drift is switched off."""
@@ -239,15 +213,6 @@ class System:
         """Lowest bending eigenvalue of the rod relative to the metric, up to a number about one."""
         return float(np.linalg.eigvalsh(self.scene.stiffness()[-3:, -3:])[0] * np.pi**2 / self.scene.length)
 
-    def factor(self, row: PETSc.Vec, damping: float = 0.0) -> None:
-        """Assemble and factor the Jacobian at the state last brought, with ``damping`` times the metric added."""
-        matrix, damping = self.jacobian(row), damping or self.damping
-        if damping:
-            matrix.axpy(damping, self.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            matrix.stateIncrease()
-        with self.clock("solve"):
-            self.lu(matrix)
-
     def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> bool:
         """Solve with the last factors; False where the matrix was found singular."""
         with self.clock("solve"):
@@ -265,15 +230,6 @@ class System:
 
     # --- symmetry ----------------------------------------------------------------------------------------------
 
-    def generator(self, x: PETSc.Vec, symmetry: int) -> PETSc.Vec:
-        """Change of ``x`` under the infinitesimal symmetry, in all fields and scalars that it moves."""
-        self.bring(x)
-        u = self.fields.u.x.array
-        state, u[:] = u.copy(), self.symmetries[symmetry].change(self.fields)
-        change = self.take()
-        u[:] = state
-        return change
-
     def set_phase(self, reference: PETSc.Vec | None) -> None:
         """Take the phase conditions at ``reference``: as many as it breaks symmetries; None: none active.
 
@@ -281,11 +237,12 @@ class System:
         are its own symmetries and have no phase condition; the others, orthonormal in the metric, have one each.
         """
         count, dropped = len(self.drifts), self.verification.dropped
-        self.phases, self._phase_offset, self.kept = [None] * count, [0.0] * count, np.eye(count)
+        self.phases, self.phase_offsets, self.kept = [None] * count, [0.0] * count, np.eye(count)
         self.broken, self._reference = {}, None if reference is None else reference.copy()
         if reference is None or count == len(dropped):
             return
-        generators = [self.generator(reference, i) for i in range(count)]
+        state = self.at(reference)
+        generators = [state.generator(i) for i in range(count)]
         images = [self.metric * g for g in generators]
         exact = [i for i, s in enumerate(self.symmetries) if not s.along and i not in dropped]
         gram = np.array([[np.real(generators[i].dot(images[j])) for j in exact] for i in exact])
@@ -300,30 +257,28 @@ class System:
                     rest = rest - weights / size**2 * np.real(combine(images, weights).dot(generators[-1]))
             combinations.append(rest / np.linalg.norm(rest))
             sizes.append(self.norm(combine(generators, combinations[-1])))
-            self.bring(reference)
-            least.append(max(MESH * mismatch(self.fields), 10 * SYMMETRIC_STATE))
+            least.append(max(MESH * mismatch(state), 10 * SYMMETRIC_STATE))
         broken = np.array(sizes) >= least
         self.kept = np.array(combinations)[~broken]
         for i in np.flatnonzero(broken):
             phase = combine(images, combinations[i] / sizes[i])
-            self.phases[i], self._phase_offset[i] = phase, np.real(phase.dot(reference))
+            self.phases[i], self.phase_offsets[i] = phase, state.along(phase)
             self.broken[self.drifts[i]] = combinations[i] / sizes[i]
 
-    def verify(self, matrix: PETSc.Mat, x: PETSc.Vec, equations: PETSc.Vec | None = None) -> bool:
-        """Verify the symmetries at the state ``x``, where ``S`` is ``matrix`` and the equations are given (None: zero).
+    def verify(self, matrix: PETSc.Mat, state: State, equations: PETSc.Vec | None = None) -> bool:
+        """Verify the symmetries at a state, where ``S`` is ``matrix`` and the equations are given (None: zero).
 
         Where one is none the phase conditions are taken anew without it, and False is returned: the borders of the
         matrix are to be assembled again.
         """
-        if not self.symmetries or self.verification(matrix, x, equations):
+        if not self.symmetries or self.verification(matrix, state, equations):
             return True
         self.set_phase(self._reference)
-        self.bring(x)
         return False
 
     def drift(self, x: PETSc.Vec) -> float:
         """Greatest drift scalar of a state: zero, but for round-off, at an equilibrium."""
-        return max((abs(self.scalar(x, f"drift{i}")) for i in range(len(self.drifts))), default=0.0)
+        return float(abs(self.at(x).drifts).max(initial=0.0))
 
     def equivalent_directions(self, x: PETSc.Vec, direction: PETSc.Vec) -> list[PETSc.Vec]:
         """Directions into which the symmetries that the state ``x`` has itself carry a direction, to first order.
@@ -332,10 +287,10 @@ class System:
         """
         moved = x.copy()
         moved.axpy(1.0, direction)
-        changes = []
+        before, after, changes = self.at(x), self.at(moved), []
         for i in range(len(self.drifts)):
-            change = self.generator(moved, i)
-            change.axpy(-1.0, self.generator(x, i))
+            change = after.generator(i)
+            change.axpy(-1.0, before.generator(i))
             changes.append(change)
         return [combine(changes, weights) for weights in self.kept]
 
@@ -356,23 +311,12 @@ class System:
 
     def _assemble_metric(self) -> PETSc.Mat:
         metric = self.metric_matrix()
-        self.assemble_into(metric, self.equations.metric)
+        self.at(self.new_vector()).assemble_into(metric, self.equations.metric)
         if self.has_scalars:
             a, b = self.scene.span
             metric.setValue(self.load_index, self.load_index, 1.0 / (b - a) ** 2, addv=True)
         metric.assemble()
         return metric
-
-
-def _set_clamps(fields: Fields) -> None:
-    """Give the clamped degrees of freedom their values, once and for all."""
-    u, scene = fields.u.x.array, fields.scene
-    u[:] = 0.0
-    x = fields.coordinates(fields.discretization.degree)
-    for end, s in zip(scene.sides, scene.interval, strict=True):
-        if end.fixed_rotation is not None:
-            here = fields.dofs[fields.turning.name][np.isclose(x, s, rtol=0, atol=1e-9 * scene.length)]
-            u[here] = fields.turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)
 
 
 def dense_columns(system: System, count: int) -> PETSc.Mat:

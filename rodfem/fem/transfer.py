@@ -43,17 +43,11 @@ class Transfer:
     def __call__(self, vector: PETSc.Vec, *, state: bool) -> PETSc.Vec:
         """Interpolate a state, or (``state=False``) a direction, which is zero where a state is clamped."""
         old, new = self.source.fields, self.target.fields
-        clamped = new.u.x.array.copy()
-        self.source.bring(vector)
-        values = old.u.x.array.copy()
-        if not state:
-            values[old.number < 0] = 0.0
+        values = (self.source.at(vector) if state else self.source.change(vector)).local
+        out = np.zeros(len(new.number))
         for name, bases in self._bases.items():
             every = np.concatenate(self.source.comm.allgather(values[old.dofs[name][self._owned]]))[self._order]
             for members, basis in zip(self._members, bases, strict=True):
-                new.u.x.array[new.dofs[name][members]] = np.einsum("pn,cni->cpi", basis, every[self._parents[members]])
-        new.u.x.array[new.copies] = values[old.copies[0]]
-        out = self.target.take()
-        fixed = new.number < 0
-        new.u.x.array[fixed] = clamped[fixed]
-        return out
+                out[new.dofs[name][members]] = np.einsum("pn,cni->cpi", basis, every[self._parents[members]])
+        out[new.copies] = values[old.copies[0]]
+        return self.target.vector(out)

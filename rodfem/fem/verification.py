@@ -21,9 +21,12 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from rodfem.fem.fields import LOAD
 from rodfem.fem.symmetries import Symmetry, mismatch
+from rodfem.fem.values import NodalValues
 
 if TYPE_CHECKING:
+    from rodfem.fem.state import State
     from rodfem.fem.system import System
 
 EPS = 100 * float(np.finfo(float).eps)
@@ -60,39 +63,39 @@ class Verification:
         self._closing: list[PETSc.Vec] | None = None
         self._left, self._none = system.new_vector(), np.zeros(len(system.drifts))
 
-    def __call__(self, matrix: PETSc.Mat, x: PETSc.Vec, equations: PETSc.Vec | None = None) -> bool:
-        """Try the symmetries at the state ``x``, whose ``S`` is given; False where one of them was dropped.
+    def __call__(self, matrix: PETSc.Mat, state: State, equations: PETSc.Vec | None = None) -> bool:
+        """Try the symmetries at a state, whose ``S`` is given; False where one of them was dropped.
 
-        ``equations`` are those at ``x``, zero at an equilibrium (None).  The state must be the one last brought.
+        ``equations`` are those at the state, zero at an equilibrium (None).
         """
-        failed = self._failing(matrix, equations)
+        failed = self._failing(matrix, state, equations)
         if failed and equations is None:  # the state may be no equilibrium: one that was carried over from another mesh
             equations = self.system.new_vector()
-            self.system.residual(x, equations)
-            failed = self._failing(matrix, equations)
+            state.residual(equations)
+            failed = self._failing(matrix, state, equations)
         for i in failed:
-            self.drop(i, x)
+            self.drop(i, state.load)
         return not failed
 
-    def _failing(self, matrix: PETSc.Mat, equations: PETSc.Vec | None) -> list[int]:
-        """Symmetries, by number, whose generators are no null vectors of ``S`` at the state last brought."""
+    def _failing(self, matrix: PETSc.Mat, state: State, equations: PETSc.Vec | None) -> list[int]:
+        """Symmetries, by number, whose generators are no null vectors of ``S`` at the state."""
         candidates = [i for i in range(len(self.system.symmetries)) if i not in self.dropped]
         if not candidates:
             return []
         self._norm = self._norm or matrix.norm(PETSc.NormType.INFINITY)
         exact = [i for i in candidates if not self.system.symmetries[i].along]
         suspects = [i for i in candidates if i not in exact]
-        if exact and not self._holds(matrix, self._mixture(tuple(exact)), equations):
+        if exact and not self._holds(matrix, self._mixture(tuple(exact)), state, equations):
             suspects += exact
-        return [i for i in suspects if not self._holds(matrix, self._mixture((i,)), equations)]
+        return [i for i in suspects if not self._holds(matrix, self._mixture((i,)), state, equations)]
 
-    def drop(self, i: int, x: PETSc.Vec) -> None:
-        """Drop a symmetry, in words."""
+    def drop(self, i: int, at: float) -> None:
+        """Drop a symmetry that failed at a load, in words."""
         load = self.system.scene.load
         self.dropped.add(i)
         self.notices.append(
             f"No symmetry is the {self.system.symmetries[i]}: it was taken for one, but is no null vector of the "
-            f"second variation at {load} = {self.system.scalar(x):.6g}; it is left out from there on."
+            f"second variation at {load} = {at:.6g}; it is left out from there on."
         )
 
     def read(self) -> list[str]:
@@ -110,10 +113,10 @@ class Verification:
             self._generators[chosen] = Generator(self.system, mixed)
         return self._generators[chosen]
 
-    def _holds(self, matrix: PETSc.Mat, generator: Generator, equations: PETSc.Vec | None) -> bool:
-        """Whether a generator is a null vector of ``S`` at the state last brought."""
+    def _holds(self, matrix: PETSc.Mat, generator: Generator, state: State, equations: PETSc.Vec | None) -> bool:
+        """Whether a generator is a null vector of ``S`` at the state."""
         system, left = self.system, self._left
-        g = generator.change()
+        g = generator.change(state)
         matrix.mult(g, left)
         if system.has_scalars:
             left.setValues(system.drifts, self._none)  # phase conditions, no part of S
@@ -122,44 +125,41 @@ class Verification:
         zero = ZERO * system.stiffness_scale * max(size, TINY) + EPS * self._norm * length**2
         quotient = float(np.real(left.dot(g)))
         if generator.symmetry.along:
-            return abs(quotient) <= zero or self._of_the_mesh(generator.symmetry, g, quotient, zero, equations)
+            return abs(quotient) <= zero or self._of_the_mesh(generator.symmetry, g, quotient, zero, state, equations)
         small = ROUND_OFF * self._norm * (length + TINY)
         if equations is not None:
-            left.axpy(1.0, generator.pulled_back(self._unloaded(equations)))
+            left.axpy(1.0, generator.pulled_back(self._unloaded(state, equations)))
             quotient = float(np.real(left.dot(g)))
         if left.norm() > small:
             self._across_closing(matrix, left)
         return left.norm() <= small and abs(quotient) <= zero
 
     def _of_the_mesh(
-        self, symmetry: Symmetry, g: PETSc.Vec, quotient: float, zero: float, equations: PETSc.Vec | None
+        self, symmetry: Symmetry, g: PETSc.Vec, quotient: float, zero: float, state: State, equations: PETSc.Vec | None
     ) -> bool:
-        """Whether a ``quotient`` that is not zero is the error of the mesh, or of a state that is no equilibrium."""
-        system, u = self.system, self.system.fields.u.x.array
-        state = u.copy()
-        zero += OF_THE_MESH * system.stiffness_scale * mismatch(system.fields) * system.norm(g)
+        """Whether a ``quotient`` that is not zero is the error of the mesh, or of a state that is no equilibrium.
+
+        ``zero`` is its round-off, ``g`` the change of the ``state`` by the ``symmetry``.
+        """
+        system = self.system
+        zero += OF_THE_MESH * system.stiffness_scale * mismatch(state) * system.norm(g)
         if equations is not None:
             change = self._change_of(symmetry, g)
             quotient += float(np.real(equations.dot(change)))
             zero += FAR * equations.norm() * change.norm()
-            u[:] = state
         return abs(quotient) <= zero
 
     def _change_of(self, symmetry: Symmetry, g: PETSc.Vec) -> PETSc.Vec:
-        """``A g`` for the generator ``A x + c``; the state that the dolfinx function holds is lost."""
-        fields, system = self.system.fields, self.system
-        fields.u.x.array[:] = 0.0
-        constant = symmetry.change(fields)
-        system.bring(g)
-        fields.u.x.array[:] = symmetry.change(fields) - constant
-        return system.take()
+        """``A g`` for the generator ``A x + c``."""
+        constant = symmetry.change(self.system.change(self.system.new_vector()))
+        return self.system.vector(symmetry.change(self.system.change(g)) - constant)
 
-    def _unloaded(self, equations: PETSc.Vec) -> PETSc.Vec:
+    def _unloaded(self, state: State, equations: PETSc.Vec) -> PETSc.Vec:
         """The equations without the forces of the drift scalars."""
-        if not self.system.drifting.any():
+        if not state.drifts.any():
             return equations
         out = equations.copy()
-        for drift, phase in zip(self.system.drifting, self.system.phases, strict=True):
+        for drift, phase in zip(state.drifts.tolist(), self.system.phases, strict=True):
             if phase is not None and drift:
                 out.axpy(-drift, phase)
         return out
@@ -179,40 +179,34 @@ class Verification:
 
 
 class Generator:
-    """Change ``A x + c`` of the state last brought by a symmetry, and ``A^t y``, by sparse matrices."""
+    """Change ``A x + c`` of a state by a symmetry, and ``A^t y``, by sparse matrices."""
 
     def __init__(self, system: System, symmetry: Symmetry) -> None:
         """Make the matrices."""
         fields = system.fields
         self.system, self.symmetry = system, symmetry
         scalars = fields.copies[0] if system.has_scalars else np.zeros(0, int)
-        rows, columns = np.concatenate([fields.free_owned, scalars]), np.flatnonzero(fields.number >= 0)
+        rows, self._columns = np.concatenate([fields.free_owned, scalars]), np.flatnonzero(fields.number >= 0)
         A = symmetry.linear(fields)
-        self._forth, self._back = A[rows][:, columns], A.T.tocsr()[rows][:, columns]
+        self._forth, self._back = A[rows][:, self._columns], A.T.tocsr()[rows][:, self._columns]
         self._change, self._pulled = system.new_vector(), system.new_vector()
-        self._size, (low, high), u = len(rows), system.scene.span, fields.u.x.array
-        kept, u[fields.number >= 0] = u.copy(), 0.0
+        self._size, (low, high) = len(rows), system.scene.span
         constants = []
         for load in (low, 0.62 * low + 0.38 * high, high):
-            u[fields.copies[:, -1]] = load
-            constants.append(symmetry.change(fields)[rows])
-        u[:] = kept
+            at_load = NodalValues(fields, fields.filled({LOAD: load}), system.line)
+            constants.append(symmetry.change(at_load)[rows])
         self._constant = constants[0]
         varies = any(np.any(c != self._constant) for c in constants)  # with ends that are held, and known forces
         self._varies = bool(symmetry.along) or bool(system.comm.allreduce(varies, op=MPI.LOR))
 
-    def change(self) -> PETSc.Vec:
-        """Change of the state last brought."""
+    def change(self, state: State) -> PETSc.Vec:
+        """Change of a state."""
         if self._varies:
-            u = self.system.fields.u.x.array
-            state, u[:] = u.copy(), self.symmetry.change(self.system.fields)
-            change = self.system.take()
-            u[:] = state
-            return change
-        self._change.array[: self._size] = self._forth @ self.system.x_local.array_r.real + self._constant
+            return self.system.vector(self.symmetry.change(state))
+        self._change.array[: self._size] = self._forth @ state.local[self._columns] + self._constant
         return self._change
 
     def pulled_back(self, covector: PETSc.Vec) -> PETSc.Vec:
         """``A^t`` times a covector."""
-        self._pulled.array[: self._size] = self._back @ self.system.gathered(covector)
+        self._pulled.array[: self._size] = self._back @ self.system.gathered(covector)[: len(self._columns)]
         return self._pulled

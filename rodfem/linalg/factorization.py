@@ -8,6 +8,8 @@ solves in a tenth (reduced formulation) to a quarter (pointwise) of MUMPS's time
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from math import inf, log
 from typing import Any, Protocol
 
@@ -28,11 +30,8 @@ and at 1e5 elements MUMPS's parallel analysis overflows its stack on it.
 """
 DENSE_ROWS = {"mat_mumps_icntl_7": 6}
 """MUMPS's ordering for matrices with dense rows (QAMD).  PETSc takes it from its options only."""
-PIVOTS = {"mat_klu_pivot_tol": 1.0}
-"""KLU's threshold of pivots: the largest of a column.  With KLU's own, 1e-3, eigenvalues lose a digit or two.
-
-PETSc 3.18 and 3.22 want the option without a prefix.
-"""
+PIVOT = "mat_klu_pivot_tol"
+"""PETSc's option for KLU's threshold of pivots."""
 SMALL = 2.0**-14
 """Scaling of dense rows and columns, so that none is chosen as the pivot of a sparse row and fills in all others.
 
@@ -52,12 +51,27 @@ def ordering(matrix: PETSc.Mat) -> dict[str, int]:
     return BALANCED if is_cut(matrix.comm.tompi4py(), matrix.size[0]) else DENSE_ROWS
 
 
-def prefer_options(prefix: str, values: dict[str, Any]) -> None:
-    """Set PETSc options that nobody has set."""
+@contextmanager
+def preferred(prefix: str, values: dict[str, Any]) -> Iterator[None]:
+    """Give PETSc those of the options that nobody has set, while it reads them."""
     options = PETSc.Options(prefix)
-    for name, value in values.items():
-        if not options.hasName(name):
-            options.setValue(name, value)
+    given = [name for name in values if not options.hasName(name)]
+    for name in given:
+        options.setValue(name, values[name])
+    try:
+        yield
+    finally:
+        for name in given:
+            options.delValue(name)
+
+
+def pivots(prefix: str) -> AbstractContextManager[None]:
+    """Threshold of pivots while KLU's factors are made: the largest of a column, or the option with the prefix.
+
+    With KLU's own, 1e-3, eigenvalues lose a digit or two.  PETSc 3.18 and 3.22 read the option without a prefix: new
+    factors have none.
+    """
+    return preferred("", {PIVOT: PETSc.Options(prefix).getReal(PIVOT, 1.0)})
 
 
 class Factors(Protocol):
@@ -151,8 +165,7 @@ class Klu:
         self.ksp.setType("preonly")
         self.ksp.getPC().setType("lu")
         self.ksp.getPC().setFactorSolverType("klu")
-        prefer_options("", PIVOTS)
-        prefer_options(prefix, PIVOTS)
+        self.prefix = prefix
         self.ksp.setFromOptions()
         self.regular = False
         self._given: PETSc.Mat | None = None
@@ -168,7 +181,8 @@ class Klu:
         self._scaled.diagonalScale(self._scale, self._scale)
         self.ksp.setOperators(self._scaled)
         try:
-            self.ksp.setUp()
+            with pivots(self.prefix):
+                self.ksp.setUp()
         except PETSc.Error as trouble:
             if trouble.ierr != PETSC_ERR_LIB:
                 raise
@@ -298,7 +312,6 @@ class Mumps:
         self.ksp.setOperators(matrix)
         pc.setFactorSetUpSolverType()
         self.factor, self._matrix = pc.getFactorMatrix(), matrix.handle
-        prefer_options(self.prefix, DENSE_ROWS)
         self.factor.setOptionsPrefix(self.prefix)  # made before PETSc's own set-up, it has none
         self.factor.setMumpsIcntl(14, self.room)
         if self.kind == "cholesky":
@@ -307,3 +320,5 @@ class Mumps:
             self.factor.setMumpsIcntl(control, value)
         for control, threshold in self.thresholds.items():
             self.factor.setMumpsCntl(control, threshold)
+        with preferred(self.prefix, DENSE_ROWS):
+            self.ksp.setUp()

@@ -82,10 +82,7 @@ class ModeFinder:
 
     def _name(self, x: PETSc.Vec, v: PETSc.Vec) -> str:
         """Name of the motion."""
-        self.system.bring(x)
-        f = self.system.fields
-        field = f.u.x.array[f.dofs[f.turning.name]]
-        return character.name(character.shares(self.system, field, [v.array_r]))
+        return character.name(character.shares(self.system, self.system.at(x).turned, [v.array_r]))
 
     def _turned(self, x: PETSc.Vec, values: np.ndarray, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
         """Sign each mode, and choose a basis of the modes of equal eigenvalues: the same from any orthonormal one.

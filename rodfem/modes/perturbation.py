@@ -17,6 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.shape import Shape, directors
+from rodfem.fem.values import NodalValues
 from rodfem.problem.ends import Ring
 
 
@@ -34,22 +35,19 @@ class Motions(Shape):
 
     def at(self, x: PETSc.Vec, d: PETSc.Vec) -> Motion:
         """Motion in the perturbation ``d`` of the state ``x``, at fixed load."""
-        f = self.system.fields
-        turning = f.turning
-        field = self._values(x, turning.name, state=True)
-        slopes = self._slopes() if self.reduced else np.zeros(0)
-        change = self._values(d, turning.name, state=False)
+        turning, state, motion = self.system.fields.turning, self.system.at(x), self.system.change(d)
+        field, change = state.turned[self._cells], motion.turned[self._cells]
         dq = turning.change(field, change)
         pieces = {"q": dq, "w": spin(turning.quaternion(field), dq)}
         if not self.reduced:
-            every = self._in_order(pieces | {"r": self._values(d, "r", state=False)})
+            every = self._in_order(pieces | {"r": motion.values("r")[self._cells]})
             return Motion(self._unique(every["r"]), self._unique(every["w"]), self._unique(every["q"]))
         field, change = (np.einsum("gn,cni->cgi", self._q_at_gauss, values) for values in (field, change))
         q, dq = turning.quaternion(field), turning.change(field, change)
-        turned = np.cross(spin(q, dq), slopes)
-        if "v" in f.dofs:
+        turned = np.cross(spin(q, dq), self._slopes(state))
+        if "v" in motion.fields.dofs:
             free = list(self.system.scene.free_strains)
-            dv = np.einsum("gn,cni->cgi", self._v_at_gauss, self._values(d, "v", state=False))
+            dv = np.einsum("gn,cni->cgi", self._v_at_gauss, motion.values("v")[self._cells])
             turned += np.einsum("cgij,cgj->cgi", directors(q)[..., free], dv)
         every = self._in_order(pieces) | self._in_order(
             {
@@ -59,7 +57,7 @@ class Motions(Shape):
             sort=False,
         )
         ends = np.vstack([np.zeros(3), np.cumsum(every["ends"], axis=0)])
-        r = self._unique(ends[:-1, None, :] + every["r"]) + self._first(ends[-1])
+        r = self._unique(ends[:-1, None, :] + every["r"]) + self._first(motion, ends[-1])
         if isinstance(self.system.scene.ends, Ring):
             r = r - self._mean(r)
         return Motion(r, self._unique(every["w"]), self._unique(every["q"]))
@@ -70,22 +68,14 @@ class Motions(Shape):
         ``sum over nodes of (r . displacement + w . rotation)`` is its value, where ``y`` involves nothing but positions
         and rotations, as a product with the kinetic metric does.
         """
-        turning = self.system.fields.turning
-        field = self._values(x, turning.name, state=True)
-        q, dq = turning.quaternion(field), turning.functional(field, self._values(y, turning.name, state=False))
+        turning, weights = self.system.fields.turning, self.system.change(y)
+        field = self.system.at(x).turned[self._cells]
+        q, dq = turning.quaternion(field), turning.functional(field, weights.turned[self._cells])
         pieces = {"q": dq, "w": np.sum(q * q, axis=-1, keepdims=True) / 4 * spin(q, dq)}
         if not self.reduced:
-            pieces["r"] = self._values(y, "r", state=False)
+            pieces["r"] = weights.values("r")[self._cells]
         every = {name: self._unique(values) for name, values in self._in_order(pieces).items()}
         return Motion(every.get("r", np.zeros_like(every["w"])), every["w"], every["q"])
-
-    def _values(self, vector: PETSc.Vec, name: str, *, state: bool) -> np.ndarray:
-        """Nodal values of a field in this rank's cells; of a perturbation, zero where an end is held."""
-        f = self.system.fields
-        self.system.bring(vector)
-        dofs = f.dofs[name][self._cells]
-        values = f.u.x.array[dofs].real.copy()
-        return values if state else np.where(f.number[dofs] < 0, 0.0, values)
 
     def _in_order(self, pieces: dict[str, np.ndarray], *, sort: bool = True) -> dict[str, np.ndarray]:
         """Values of all ranks' cells from left to right, with ``sort`` those of their nodes too."""
@@ -93,13 +83,12 @@ class Motions(Shape):
         every = {name: self.gather(values)[order] for name, values in pieces.items()}
         return {name: values[:, self._order] for name, values in every.items()} if sort else every
 
-    def _first(self, chord: np.ndarray) -> np.ndarray:
-        """Displacement of the left end, if the right one's is ``chord`` more; of the perturbation last brought."""
-        f, scene = self.system.fields, self.system.scene
-        scalar = {x.name: float(f.u.x.array[f.copies[0, i]].real) for i, x in enumerate(f.unknown_scalars)}
+    def _first(self, motion: NodalValues, chord: np.ndarray) -> np.ndarray:
+        """Displacement of the left end in a perturbation, if the right one's is ``chord`` more."""
+        scene, scalars = self.system.scene, motion.scalars
         c = scene.constants()
         left, right = (
-            [scalar.get(f"{letter}{i + 1}") if p is None else 0.0 for i, p in enumerate(end.held(c))]
+            [scalars.get(f"{letter}{i + 1}") if p is None else 0.0 for i, p in enumerate(end.held(c))]
             for letter, end in zip("ab", scene.sides, strict=True)
         )
         return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])

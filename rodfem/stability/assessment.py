@@ -277,13 +277,12 @@ class Judge:
         for wider in WIDER:  # an end on an eigenvalue is moved off it
             low, high = low - wider * (high - low), high + wider * (high - low)
             wanted = spectrum.below(high) - spectrum.below(low)
-            solver = in_interval(spectrum.matrix, spectrum.mass, low, high)
             try:
+                solver = in_interval(spectrum.matrix, spectrum.mass, low, high)
                 solver.solve()
             except PETSc.Error as trouble:
                 if trouble.ierr != PETSC_ERR_PLIB:
                     raise
-                solver.destroy()
             else:
                 break
         else:

@@ -43,6 +43,7 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from rodfem.errors import SceneError
+from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import block_matrix, first_of, local_rows, petsc_matrix
 from rodfem.problem.ends import Ring
@@ -121,7 +122,7 @@ class Blocks:
     def assemble(self, x: PETSc.Vec) -> Pencil:
         """Blocks at the state ``x``."""
         comm = self.system.comm
-        assemble_pencil(self.system, x, self.matrix, self.mass)
+        state = assemble_pencil(self.system, x, self.matrix, self.mass)
         rows, columns = (
             PETSc.IS().createGeneral(n.astype(PETSc.IntType), comm=comm) for n in (self.rows, self.columns)
         )
@@ -140,7 +141,7 @@ class Blocks:
         if "angle" in where:  # a spin about the normal already
             where["theta"] = where.pop("angle")
             return full if self.coordinates == "tangent" or "v" not in where else self._compatible(full)
-        T = self._tangent_map()
+        T = self._tangent_map(state)
         spins = np.zeros(len(self.rows), dtype=bool)
         spins[self._quads[:, 1:].ravel()] = True
         kept = np.delete(np.arange(len(self.rows)), self._quads[:, 0])
@@ -154,7 +155,7 @@ class Blocks:
         del where["q"]
         pencil = Pencil(K.ptap(T), T.transposeMatMult(C), M.ptap(T), T, where, self.place, symmetric)
         if isinstance(self.system.scene.ends, Ring):
-            pencil = self._closed(pencil)
+            pencil = self._closed(pencil, state)
         if self.coordinates == "tangent" or "v" not in where:
             return pencil
         return self._compatible(pencil)
@@ -192,10 +193,10 @@ class Blocks:
 
     # --- maps --------------------------------------------------------------------------------------------------
 
-    def _tangent_map(self) -> PETSc.Mat:
+    def _tangent_map(self, state: State) -> PETSc.Mat:
         """``T``: columns of a spin in the places of q1, q2, q3, and one for each strain and centreline unknown."""
         quads = self._quads
-        a, b, c, d = self.system.fields.u.x.array[self._dofs].real.T / 2
+        a, b, c, d = state.local[self._dofs].T / 2
         values = np.array([[-b, -c, -d], [a, d, -c], [-d, a, b], [c, -b, a]])  # of 1/2 (0, theta) q
         rows = np.broadcast_to(quads.T[:, None, :], values.shape)
         columns = np.broadcast_to(quads.T[None, 1:, :], values.shape)
@@ -209,11 +210,11 @@ class Blocks:
         )
         return petsc_matrix(self.system.comm, full[:, np.delete(np.arange(len(self.rows)), quads[:, 0])])
 
-    def _closed(self, pencil: Pencil) -> Pencil:
+    def _closed(self, pencil: Pencil, state: State) -> Pencil:
         """Keep of the equations that close a ring's rotation the combinations across the quaternion at its start."""
         f, comm = self.system.fields, self.system.comm
         start = np.isclose(f.coordinates(self.system.fields.discretization.degree), self.system.scene.interval[0])
-        here = f.u.x.array[f.dofs["q"][start]].real
+        here = state.values("q")[start]
         q = next(part[0] for part in comm.allgather(here) if len(part))
         closing = [x for x in f.unknown_scalars if x.group == "t"]
         scalars = np.array([f.scalars[x.name] for x in closing] if self.system.has_scalars else [], dtype=int)

@@ -19,6 +19,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
+from rodfem.fem.state import State
 from rodfem.fem.system import System, combine
 from rodfem.linalg.factorization import Factors
 from rodfem.linalg.selection import factors_of
@@ -81,18 +82,18 @@ class Inertia:
 
         The symmetries are verified there; ``equations`` are those at ``x``, None at an equilibrium.
         """
-        self._assemble(x)
+        state = self.system.at(x)
+        self._assemble(state)
         with self.system.clock("stability"):
-            sound = self.system.verify(self.matrix, x, equations)
+            sound = self.system.verify(self.matrix, state, equations)
         if not sound:
-            self._assemble(x)
+            self._assemble(state)
 
-    def _assemble(self, x: PETSc.Vec) -> None:
+    def _assemble(self, state: State) -> None:
         system = self.system
         with system.clock("assembly"):
-            system.bring(x)
             self.matrix.zeroEntries()
-            system.assemble_into(self.matrix, system.equations.jacobian, load=True)
+            state.assemble_into(self.matrix, system.equations.jacobian, load=True)
             system.add_drifts(self.matrix)
             self.matrix.assemble()
             self.matrix.mult(self._axis, self.border)

@@ -30,12 +30,10 @@ def squares(system: System, turned: np.ndarray, columns: np.ndarray) -> np.ndarr
     f = system.fields
     cells = slice(0, f.owned_cells)
     size = (f.vertices[cells, 1] - f.vertices[cells, 0])[:, None, None]
-    dofs, vector = f.dofs[f.turning.name][cells], system.new_vector()
-    free, change = f.number[dofs] >= 0, []
+    vector, change = system.new_vector(), []
     for column in columns.T:
         vector.array[:] = column
-        system.bring(vector)
-        change.append(np.where(free, f.u.x.array[dofs], 0.0))
+        change.append(system.change(vector).turned[cells])
     q, dq = f.turning.quaternion(turned[cells]), f.turning.change(turned[cells], np.array(change))
     scalar, v, dv = q[..., :1], q[..., 1:], dq[..., 1:]
     across = v[..., [1, 2, 0]] * dv[..., [2, 0, 1]] - v[..., [2, 0, 1]] * dv[..., [1, 2, 0]]  # v x dv

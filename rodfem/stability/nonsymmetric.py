@@ -37,6 +37,7 @@ from rodfem.linalg.substructured import Condensed
 from rodfem.stability import mode_type as character
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.pencil import (
+    FACTORS,
     LARGE,
     Inverse,
     assemble_pencil,
@@ -125,15 +126,13 @@ class Vibration:
         Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
         """
         with self.system.clock("assembly"):
-            assemble_pencil(self.system, x, self.matrix, self.mass)
-            self.system.verify(self.matrix, x)
+            state = assemble_pencil(self.system, x, self.matrix, self.mass)
+            self.system.verify(self.matrix, state)
             free = symmetry_modes(self.system, x)
             if free:
                 exclude_modes(self.system, free, self.matrix, self.mass)
             self._free = {i: mode for i, (mode, _) in weighed_modes(self.system, free, self.mass).items()}
-            self.system.bring(x)
-            f = self.system.fields
-            self.turned = f.u.x.array[f.dofs[f.turning.name]]
+            self.turned = state.turned
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
@@ -328,11 +327,11 @@ class Vibration:
         """
         inverse = self._inverse(matrix, mass, target)
         while number:
-            if inverse is None:
-                solver = shift_invert(matrix, mass, number, target, symmetric=False)
-            else:
-                solver = with_factors(matrix, mass, number, target, inverse, symmetric=False)
             try:
+                if inverse is None:
+                    solver = shift_invert(matrix, mass, number, target, symmetric=False)
+                else:
+                    solver = with_factors(matrix, mass, number, target, inverse, symmetric=False)
                 solver.setUp()
             except PETSc.Error as trouble:
                 raise ConvergenceError(_singular(target)) from trouble
@@ -360,11 +359,11 @@ class Vibration:
             return None
         shifted = matrix.copy()
         shifted.axpy(-target, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        dense_rows, prefix = self.system.fields.dense_rows, "rodfem_st_"
+        dense_rows = self.system.fields.dense_rows
         if doubled:
-            factors: Factors = Condensed(dense_rows, Mumps("lu", {8: 0}, prefix=prefix))
+            factors: Factors = Condensed(dense_rows, Mumps("lu", {8: 0}, prefix=FACTORS))
         else:
-            factors = factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=prefix)
+            factors = factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=FACTORS)
         factors(shifted)
         if not factors.regular:
             raise ConvergenceError(_singular(target))

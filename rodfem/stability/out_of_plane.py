@@ -9,6 +9,7 @@ from petsc4py import PETSc
 from rodfem.errors import SceneError
 from rodfem.fem.fields import across
 from rodfem.fem.newton import correct
+from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.stability.inertia import Index, Inertia
 
@@ -35,29 +36,16 @@ class InSpace:
 
     def lift(self, x: PETSc.Vec) -> PETSc.Vec:
         """State in space of the planar state ``x``, as accurate an equilibrium as the discretisation is."""
-        self.planar.bring(x)
-        old, new = self.planar.fields, self.system.fields
-        u = new.u.x.array
-        clamped = u[new.number < 0]
-        u[:] = 0.0
-        u[new.dofs["q"]] = old.rotations()
-        for name, dofs in old.dofs.items():
-            if name in new.dofs:
-                u[new.dofs[name]] = old.u.x.array[dofs]
-        u[new.number < 0] = clamped
-        values = {x.name: float(old.u.x.array[old.copies[0, i]]) for i, x in enumerate(old.unknown_scalars)}
-        values |= self._moments(values)
-        for i, unknown in enumerate(new.unknown_scalars):
-            u[new.copies[:, i]] = values.get(unknown.name, 0.0)
-        u[new.copies[:, -1]] = old.u.x.array[old.copies[:, -1]]
-        return self.system.take()
+        state = self.planar.at(x)
+        quaternions = state.fields.turning.quaternion(state.turned)
+        return self.system.vector(self.system.fields.filled(state.named | self._moments(state) | {"q": quaternions}))
 
     def count(self, x: PETSc.Vec) -> Index:
         """Index in space of the planar equilibrium ``x``; raises :class:`SceneError` where it is none in space."""
         state = self.lift(x)
         self.system.set_phase(state)
         residual = self.system.new_vector()
-        self.system.residual(state, residual)
+        self.system.at(state).residual(residual)
         out = self.system.comm.allreduce(float(np.sum(residual.array_r[self._out] ** 2)), op=MPI.SUM) ** 0.5
         if out > PUSHED * self.system.stiffness_scale:
             raise SceneError(
@@ -69,10 +57,9 @@ class InSpace:
             state = settled  # else the state is so near a singular one that its own error decides as well
         return self.inertia.count(state)
 
-    def _moments(self, values: dict[str, float]) -> dict[str, float]:
+    def _moments(self, state: State) -> dict[str, float]:
         """Moments that hold or close the rod in space, from the one about the normal."""
-        scene, new = self.planar.scene, self.system.fields
-        normal = scene.normal
+        scene, values, normal = self.planar.scene, state.scalars, self.planar.scene.normal
         assert normal is not None
         out: dict[str, float] = {}
         for letter, end in zip("ab", scene.sides, strict=True):
@@ -82,12 +69,11 @@ class InSpace:
                 out |= {f"m{letter}{i + 1}": float(m) for i, m in enumerate(moments)}
         if "t1" in values:
             old = self.planar.fields
-            dofs = old.dofs["angle"]
             at_end = np.isclose(
                 old.coordinates(old.discretization.degree), scene.interval[1], rtol=0, atol=1e-9 * scene.length
             )
-            mine = old.u.x.array[dofs[at_end]].max(initial=-np.inf)
-            last = np.array([new.comm.allreduce(float(mine), op=MPI.MAX)])
+            mine = state.turned[at_end].max(initial=-np.inf)
+            last = np.array([old.comm.allreduce(float(mine), op=MPI.MAX)])
             closing = 4 * values["t1"] * old.turning.change(last, np.ones(1))
             out |= {f"t{i + 1}": float(t) for i, t in enumerate(closing)}
         return out

@@ -14,11 +14,14 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import SceneError
+from rodfem.fem.state import State
 from rodfem.fem.system import System, combine
-from rodfem.linalg.factorization import PIVOTS, Factors, lu_package, ordering, prefer_options
+from rodfem.linalg.factorization import Factors, lu_package, ordering, pivots, preferred
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
+FACTORS = "rodfem_st_"
+"""Prefix of the options for the factors of a pencil without symmetry."""
 ROOM = {"mat_mumps_icntl_14": 100}
 """Percentage of room beyond MUMPS's estimate: delayed pivots of a saddle point take more than its own 20."""
 LARGE = 5000
@@ -27,29 +30,31 @@ LEAST = 6
 """How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
 
 
-def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> None:
+def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> State:
     """Assemble tangent matrix and kinetic metric at the state ``x``, without the symmetries' phase conditions.
 
-    Raises :class:`SceneError` for a rod without any inertia.
+    Returns the state.  Raises :class:`SceneError` for a rod without any inertia.
     """
     if system.equations.massless:
         raise SceneError("A rod without inertia has no eigenvalues mu = omega^2: give it a mass or a rotary inertia.")
-    system.bring(x)
+    state = system.at(x)
     for target, form in ((matrix, system.equations.jacobian), (mass, system.equations.kinetic)):
         target.zeroEntries()
-        system.assemble_into(target, form)
+        state.assemble_into(target, form)
     if system.has_scalars:
         for index in (system.load_index, *system.drifts):  # no part of the pencil: an infinite eigenvalue each
             matrix.setValue(index, index, 1.0, addv=True)
     matrix.assemble()
     mass.assemble()
+    return state
 
 
 def symmetry_modes(system: System, x: PETSc.Vec) -> dict[int, PETSc.Vec]:
     """Generators at ``x`` of the symmetries that it breaks, by the global number of their drift scalars."""
     if not system.broken:
         return {}
-    generators = [system.generator(x, i) for i in range(len(system.drifts))]
+    state = system.at(x)
+    generators = [state.generator(i) for i in range(len(system.drifts))]
     return {index: combine(generators, weights) for index, weights in system.broken.items()}
 
 
@@ -99,7 +104,10 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
 
 
 def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex, *, symmetric: bool) -> SLEPc.EPS:
-    """Set up Krylov-Schur with shift-invert (LU) for the ``number`` eigenvalues nearest to ``target``."""
+    """Set up Krylov-Schur with shift-invert (LU) for the ``number`` eigenvalues nearest to ``target``.
+
+    Raises :class:`PETSc.Error` where the shifted matrix is singular.
+    """
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_")
     solver.setOperators(matrix, mass)
@@ -114,12 +122,11 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     ksp = transform.getKSP()
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
-    package = lu_package(matrix.comm.tompi4py(), "rodfem_st_") if matrix.size[0] < LARGE else "mumps"
+    package = lu_package(matrix.comm.tompi4py(), FACTORS) if matrix.size[0] < LARGE else "mumps"
     ksp.getPC().setFactorSolverType(package)
-    prefer_options("rodfem_st_", ordering(matrix) | ROOM)
-    for prefix in ("", "rodfem_st_"):
-        prefer_options(prefix, PIVOTS)
     solver.setFromOptions()
+    with preferred(FACTORS, ordering(matrix) | ROOM), pivots(FACTORS):
+        solver.setUp()
     return solver
 
 
@@ -193,7 +200,7 @@ def with_factors(
 def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> SLEPc.EPS:
     """Set up spectrum slicing for all eigenvalues of a symmetric pencil between two numbers that are none themselves.
 
-    Options: ``-rodfem_slicing_eps_...``, ``-rodfem_slicing_st_...``.
+    Options: ``-rodfem_slicing_eps_...``, ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is one.
     """
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_slicing_")
@@ -210,5 +217,6 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> 
     ksp.setType("preonly")
     ksp.getPC().setType("cholesky")
     ksp.getPC().setFactorSolverType("mumps")
-    prefer_options(ksp.getOptionsPrefix(), ordering(matrix) | {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1})
+    with preferred(ksp.getOptionsPrefix(), ordering(matrix) | {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1}):
+        solver.setUp()
     return solver

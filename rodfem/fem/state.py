@@ -1,0 +1,142 @@
+"""A state of a rod: its values, and the equations evaluated there.
+
+Forms are compiled for one dolfinx Function and a few Constants, the *register*.  Only this module writes there: an
+evaluation puts its own values there before a form is assembled, unless they are there already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem import compat
+from rodfem.fem.values import NodalValues
+
+if TYPE_CHECKING:
+    from rodfem.fem.equations import Equations
+    from rodfem.fem.parameters import Line
+    from rodfem.fem.system import System
+
+
+class Evaluation(NodalValues):
+    """Values with the equations that are evaluated there."""
+
+    def __init__(self, equations: Equations, local: np.ndarray, line: Line) -> None:
+        """Own the values from now on."""
+        super().__init__(equations.fields, local, line)
+        self.equations = equations
+
+    def _register(self) -> None:
+        """Put these values where the compiled forms read them."""
+        equations = self.equations
+        held = equations.held
+        if held is self:
+            return
+        self.fields.u.x.array[:] = self.local
+        if held is None or held.line is not self.line:
+            equations.base.value[:], equations.direction.value[:] = self.line.origin, self.line.direction
+        equations.held = self
+
+    def covector(self) -> np.ndarray:
+        """The equations of this rank's cells, (local size,)."""
+        self._register()
+        out = np.zeros(len(self.local))
+        fem.assemble_vector(out, self.equations.residual)
+        return out
+
+    def tangent(self) -> sp.csr_matrix:
+        """Their derivative in all local degrees of freedom, clamped ones included."""
+        self._register()
+        return compat.local_table(self.equations.jacobian)
+
+    def integral(self, form: Any) -> float:
+        """Integral over the rod; collective."""
+        self._register()
+        return float(self.fields.comm.allreduce(fem.assemble_scalar(form).real, op=MPI.SUM))
+
+    def energy(self) -> float:
+        """Stored energy; collective."""
+        return self.integral(self.equations.energy)
+
+    def evaluate(self, expression: Callable[[], np.ndarray]) -> np.ndarray:
+        """Values of a compiled expression: see :func:`rodfem.compat.expression`."""
+        self._register()
+        return expression()
+
+
+class State(Evaluation):
+    """State of a :class:`~rodfem.fem.system.System`, whose borders and matrices it uses; collective over its ranks.
+
+    Attributes
+    ----------
+    drifts
+        Drift scalars, the same on all ranks.
+    """
+
+    def __init__(self, system: System, local: np.ndarray, drifts: np.ndarray, line: Line) -> None:
+        """Own the values from now on."""
+        super().__init__(system.equations, local, line)
+        self.system, self.drifts = system, drifts
+
+    def residual(self, out: PETSc.Vec) -> None:
+        """Equations and phase conditions into ``out``; the row of the load is left zero."""
+        system = self.system
+        with system.clock("assembly"):
+            out.set(0.0)
+            values = self.covector()[system.equation_targets]
+            out.setValues(system.equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)
+            out.assemble()
+            for i, value in enumerate(self.drifts.tolist()):
+                phase = system.phases[i]
+                if phase is not None:
+                    out.axpy(value, phase)
+                    value = self.along(phase) - system.phase_offsets[i]
+                if system.has_scalars:
+                    out.setValue(system.drifts[i], value)
+                out.assemble()
+
+    def along(self, phase: PETSc.Vec) -> float:
+        """Product with a covector that has no component along scalars."""
+        own = self.fields.free_owned
+        return float(self.fields.comm.allreduce(phase.array_r[: len(own)].real @ self.local[own], op=MPI.SUM))
+
+    def jacobian(self, row: PETSc.Vec) -> PETSc.Mat:
+        """Jacobian into the system's matrix, with ``row`` as the row of the load."""
+        system = self.system
+        with system.clock("assembly"):
+            matrix = system.matrix
+            matrix.zeroEntries()
+            self.assemble_into(matrix, self.equations.jacobian, load=True)
+            system.add_drifts(matrix)
+            begin, end = row.getOwnershipRange()
+            matrix.setValues([system.load_index], np.arange(begin, end, dtype=PETSc.IntType), row.array_r, addv=True)
+            matrix.assemble()
+        return matrix
+
+    def assemble_into(self, matrix: PETSc.Mat, form: Any, *, load: bool = False) -> None:
+        """Add a bilinear form to a matrix of the system, with or without the load's column.
+
+        The caller assembles the matrix (``matrix.assemble()``) when all is added.
+        """
+        self._register()
+        compat.assemble_matrix(matrix, form, *self.system.maps(load))
+
+    def factor(self, row: PETSc.Vec, damping: float = 0.0) -> None:
+        """Factor the Jacobian, with ``damping`` times the metric added, for :meth:`System.solve`."""
+        system, matrix = self.system, self.jacobian(row)
+        damping = damping or system.damping
+        if damping:
+            matrix.axpy(damping, system.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            matrix.stateIncrease()
+        with system.clock("solve"):
+            system.lu(matrix)
+
+    def generator(self, symmetry: int) -> PETSc.Vec:
+        """Change under the infinitesimal symmetry, in all fields and scalars that it moves."""
+        return self.system.vector(self.system.symmetries[symmetry].change(self))
