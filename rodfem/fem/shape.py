@@ -17,8 +17,10 @@ from petsc4py import PETSc
 
 from forms.kinematics import UNDEFORMED
 from rodfem import compat
-from rodfem.fem.fields import LOAD
+from rodfem.fem.fields import LOAD, end_positions
 from rodfem.fem.system import System
+from rodfem.problem.contribution import Motion
+from rodfem.problem.end import LETTERS
 
 
 def _euler_rodrigues() -> np.ndarray:
@@ -199,8 +201,8 @@ class Shape:
         a = np.array([p if p is not None else (q or 0.0) - d for p, q, d in zip(left, right, before[-1], strict=True)])
         b = np.array([q if q is not None else x + d for q, x, d in zip(right, a, before[-1], strict=True)])
         for i, unknown in enumerate(f.unknown_scalars):
-            if unknown.group in ("a", "b"):
-                f.u.x.array[f.copies[:, i]] = (a if unknown.group == "a" else b)[unknown.component]
+            if unknown.group.motion is Motion.POSITION:
+                f.u.x.array[f.copies[:, i]] = (a, b)[LETTERS.index(unknown.group.name)][unknown.component]
         if self.reduced:
             return
         first = np.searchsorted(self.gather(starts)[order], starts)
@@ -299,8 +301,5 @@ class Shape:
         values = f.u.x.array[f.copies[0]]
         scalar = {x.name: float(value) for x, value in zip(f.unknown_scalars, values, strict=False)}
         c = self.system.scene.constants(load)
-        left, right = (
-            [scalar.get(f"{letter}{i + 1}") if p is None else float(p) for i, p in enumerate(end.held(c))]
-            for letter, end in zip("ab", self.system.scene.sides, strict=True)
-        )
+        left, right = end_positions(self.system.scene, c, scalar, float)
         return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])

@@ -22,6 +22,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.fem.symmetries import Symmetry, mismatch
+from rodfem.problem.contribution import Motion
 
 if TYPE_CHECKING:
     from rodfem.fem.system import System
@@ -169,7 +170,7 @@ class Verification:
         if self._closing is None:
             fields, self._closing = self.system.fields, []
             for unknown in fields.unknown_scalars:
-                if unknown.group in ("t", "f"):
+                if unknown.group.motion is Motion.CLOSING:
                     column = self.system.new_vector()
                     matrix.getColumnVector(fields.scalars[unknown.name], column)
                     column.normalize()

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.fem.fields import end_positions
 from rodfem.fem.shape import Shape, directors
-from rodfem.problem.ends import Ring
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Motions(Shape):
         )
         ends = np.vstack([np.zeros(3), np.cumsum(every["ends"], axis=0)])
         r = self._unique(ends[:-1, None, :] + every["r"]) + self._first(ends[-1])
-        if isinstance(self.system.scene.ends, Ring):
+        if self.system.scene.closed:
             r = r - self._mean(r)
         return Motion(r, self._unique(every["w"]), self._unique(every["q"]))
 
@@ -97,11 +97,7 @@ class Motions(Shape):
         """Displacement of the left end, if the right one's is ``chord`` more; of the perturbation last brought."""
         f, scene = self.system.fields, self.system.scene
         scalar = {x.name: float(f.u.x.array[f.copies[0, i]].real) for i, x in enumerate(f.unknown_scalars)}
-        c = scene.constants()
-        left, right = (
-            [scalar.get(f"{letter}{i + 1}") if p is None else 0.0 for i, p in enumerate(end.held(c))]
-            for letter, end in zip("ab", scene.sides, strict=True)
-        )
+        left, right = end_positions(scene, scene.constants(), scalar, lambda held: 0.0)
         return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])
 
     def _mean(self, values: np.ndarray) -> np.ndarray:

@@ -45,7 +45,7 @@ from petsc4py import PETSc
 from rodfem.errors import SceneError
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import block_matrix, first_of, local_rows, petsc_matrix
-from rodfem.problem.ends import Ring
+from rodfem.problem.ring import CLOSING_MOMENT
 from rodfem.stability.pencil import assemble_pencil
 
 COORDINATES = ("full", "tangent", "compatible")
@@ -153,7 +153,7 @@ class Blocks:
         where["theta"] = np.flatnonzero(spins[kept]) + first
         del where["q"]
         pencil = Pencil(K.ptap(T), T.transposeMatMult(C), M.ptap(T), T, where, self.place, symmetric)
-        if isinstance(self.system.scene.ends, Ring):
+        if self.system.scene.closed:
             pencil = self._closed(pencil)
         if self.coordinates == "tangent" or "v" not in where:
             return pencil
@@ -215,7 +215,7 @@ class Blocks:
         start = np.isclose(f.coordinates(self.system.fields.discretization.degree), self.system.scene.interval[0])
         here = f.u.x.array[f.dofs["q"][start]].real
         q = next(part[0] for part in comm.allgather(here) if len(part))
-        closing = [x for x in f.unknown_scalars if x.group == "t"]
+        closing = [x for x in f.unknown_scalars if x.group == CLOSING_MOMENT]
         scalars = np.array([f.scalars[x.name] for x in closing] if self.system.has_scalars else [], dtype=int)
         columns = np.searchsorted(self.columns, scalars)
         across = np.linalg.svd(q[[x.component for x in closing]][None])[2][1:].T if len(columns) else np.zeros((0, 0))
