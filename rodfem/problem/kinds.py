@@ -52,11 +52,3 @@ def check_scalar(what: str, value: Any) -> None:
         raise SceneError(f"The {what} is {value!r}: return a number or a UFL expression.") from None
     if shape != ():
         raise SceneError(f"The {what} has the shape {shape}: return a scalar.")
-
-
-def check_size(what: str, value: Any, size: int | None) -> None:
-    """Raise :class:`SceneError` unless ``value`` is a vector of this size, a scalar for zero, anything for None."""
-    if size:
-        check_vector(what, value, size)
-    elif size == 0:
-        check_scalar(what, value)

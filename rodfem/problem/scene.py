@@ -248,8 +248,7 @@ class Scene(Contribution):
     @property
     def joints(self) -> tuple[float, ...]:
         """Arclengths inside the rod that must be element boundaries, in ascending order."""
-        places = {*self.breaks, *(x.s for x in self.attachments)}
-        places |= {x.s for x in self.constraints if x.s is not None}
+        places = {*self.breaks, *(part.s for part in self.parts if part.s is not None)}
         close = 1e-9 * self.length
         return tuple(sorted(s for s in places if self.interval[0] + close < s < self.interval[1] - close))
 
@@ -333,8 +332,9 @@ class Scene(Contribution):
 
     def plain(self, side: int) -> bool:
         """Whether dead forces are all that loads an end (0: left, 1: right): they are the contact force there."""
-        at_end = [x.s for x in self.attachments] + [x.s for x in self.constraints if x.s is not None]
-        return self.sides[side].dead and not any(abs(s - self.interval[side]) < 1e-9 * self.length for s in at_end)
+        close = 1e-9 * self.length
+        here = [x.of for x in self.parts if x.s is not None and abs(x.s - self.interval[side]) < close]
+        return self.sides[side].dead and len(here) == 1
 
     def known_force(self, component: int, c: Constants) -> Any | None:
         """Component of the contact force that a dead end force prescribes, or None where it is an unknown.

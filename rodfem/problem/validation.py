@@ -15,7 +15,7 @@ from rodfem.errors import SceneError
 from rodfem.problem.attachment import Attachment
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End
-from rodfem.problem.kinds import check_scalar, check_size
+from rodfem.problem.kinds import check_scalar, check_vector
 from rodfem.problem.local_state import asked_for, asks_where, functions_of_places, some_places
 from rodfem.problem.roles import functions_of
 
@@ -61,8 +61,10 @@ def check_shapes(scene: Scene) -> None:
     """Check that forces and moments are vectors, and energies and constraints scalars."""
     c = scene.constants()
     for what, function, role in functions_of(scene):
-        if role.call == "f(c)":
-            check_size(what, function(c), role.size)
+        if role.call == "f(c)" and role.size:
+            check_vector(what, function(c), role.size)
+        elif role.call == "f(c)" and role.size == 0:
+            check_scalar(what, function(c))
     for what, function, known in functions_of_places(scene):
         check_scalar(what, function(known, c))
 

@@ -225,7 +225,7 @@ class Blocks:
             chosen[np.ix_(columns, np.searchsorted(kept, columns[:-1]))] = across
         first, begin = pencil.C.getOwnershipRangeColumn()[0], first_of(comm, len(kept))
         where = dict(pencil.where)
-        for name in ("n", "scalars", *(n for n in where if n.startswith("p") and n[1:].isdigit())):
+        for name in ("scalars", *(b.name for b in f.blocks if b.multiplier)):
             if name in where:
                 own = where[name] - first
                 where[name] = np.searchsorted(kept, own[np.isin(own, kept)]) + begin
