@@ -20,7 +20,6 @@ from rodfem.deflation.search import SAME, further, states_at
 from rodfem.diagram.tracer import Tracer, equivalent, near
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
-from rodfem.problem.ends import Ring
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.rank import rank_of
@@ -104,7 +103,7 @@ class Explorer(Tracer):
                 f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
                 f"{start:g}: write the energy of stretch in v[2] - 1 (zero in the undeformed rod), or push less."
             )
-        if isinstance(self.scene.ends, Ring):
+        if self.scene.closed:
             number, Tw, Wr = link(self.follower.shape.sample(point.x))
             self.observer.note(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
         if point.negative:
@@ -162,15 +161,8 @@ class Explorer(Tracer):
 
     def _check_rank(self, x: PETSc.Vec) -> None:
         """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others."""
-        words = {
-            "n": "position of the ends along e{}",
-            "m": "rotation of an end, direction {}",
-            "g": "constraint {} of the scene",
-            "t": "closing of the ring's rotation, component {}",
-            "f": "closing of the ring along e{}",
-        }
         scalars = [u for u in self.follower.system.fields.unknown_scalars if u.multiplier]
-        names = [words[u.group[0]].format(u.component + 1) for u in scalars]
+        names = [u.group.equation.format(u.component + 1) for u in scalars]
         rank_of(Blocks(self.follower.system, "full").assemble(x), names)
 
     def _switch(self, parent: Branch, i: int, special: Special) -> None:

@@ -9,8 +9,8 @@ from rodfem.continuation.step_control import Steps
 from rodfem.errors import SceneError
 from rodfem.problem.events import Event
 from rodfem.problem.kinds import real, reals, whole
+from rodfem.problem.local_state import asked_for
 from rodfem.problem.scene import Scene
-from rodfem.problem.user_functions import asked_for
 from rodfem.problem.validation import check_load
 
 

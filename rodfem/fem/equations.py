@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -12,14 +13,15 @@ from dolfinx import fem
 from ufl.algorithms.analysis import extract_type
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 
-from forms import inertia, lagrangian, loads
+from forms import inertia, lagrangian
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
 from rodfem import compat
-from rodfem.fem.fields import Fields, across
+from rodfem.fem.fields import Fields, end_positions
 from rodfem.fem.parameters import load_line
-from rodfem.problem.ends import Constants, Place, Ring
-from rodfem.problem.local_state import place
+from rodfem.problem.contribution import Site
+from rodfem.problem.local_state import Constants, Place, place
+from rodfem.problem.scene import Part
 
 if TYPE_CHECKING:
     from rodfem.fem.state import Evaluation
@@ -73,15 +75,17 @@ class Equations:
         v = strain(scene.free_strains, self._components(f.v, len(scene.free_strains)))
         along = self._along(f, c, v)
         W = scene.energy(v, along.k, c)
-        L = (self._rod(f, c, W, along) + self._along_loads(f, c, along)) * dx
+        a, b = self._named(ufl.split(test), f.turned), self._named(ufl.split(trial), f.turned)
+        sites = [(part.of, *self._site(part, f, (a, b), along)) for part in scene.parts]
+        inside = [(of, site) for of, site, measure in sites if measure is None and not of.nodal]
+        L = (self._rod(f, c, W, along) + sum(term for of, site in inside for term in of.lagrangian(site))) * dx
         if f.eta is not None:
             L += lagrangian.unit_norm(f.eta, f.q) * dx_nodes
-        for i, constraint in enumerate(x for x in scene.constraints if x.kind == "pointwise"):
-            L += f.fields[f"p{i}"] * constraint.of(along, c) * (dx_nodes if constraint.continuous else dx)
-        L += self._points(f)
-
-        a, b = self._named(ufl.split(test), f.turned), self._named(ufl.split(trial), f.turned)
-        first = ufl.derivative(L, u, test) - self._virtual_work(f, a, c, dx)
+        for of, site, measure in sites:
+            if measure is not None or of.nodal:
+                L += sum(term * (measure or dx_nodes) for term in of.lagrangian(site))
+        work = sum(term * (measure or dx) for of, site, measure in sites for term in of.virtual_work(site))
+        first = ufl.derivative(L, u, test) - work
         second = ufl.derivative(first, u, trial)
         metric = (inertia.rotation_metric(a.q, b.q) if scene.normal is None else a.turned * b.turned) / length
         if f.r is not None:
@@ -89,7 +93,7 @@ class Equations:
         kinetic = inertia.rotary(f.q, a.q, b.q, tuple(scene.inertia.rho_I(c))) * dx
         if f.r is not None:
             kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c)) * dx
-        kinetic += self._attached_inertia(f, a, b)
+        kinetic += sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
         self.massless = apply_algebra_lowering(kinetic).empty()
         self.uniform = not extract_type(first, ufl.SpatialCoordinate) and not scene.joints
         forms = [first, second, W * dx, metric * dx, kinetic]
@@ -115,97 +119,32 @@ class Equations:
             return lagrangian.pointwise(W, along.R, along.v, along.dr, f.n)
         scene = self.fields.scene
         force = [f.scalars.get(f"n{i + 1}", scene.known_force(i, c) or 0.0) for i in range(3)]
-        left, right = self._ends(f, c)
+        left, right = end_positions(scene, c, f.scalars)
         chord = [0.0 if x is None or y is None else y - x for x, y in zip(left, right, strict=True)]
         return lagrangian.reduced(W, along.R, along.v, ufl.as_vector(force), ufl.as_vector(chord) / self.length)
 
-    def _ends(self, f: Any, c: Any) -> list[list[Any]]:
-        """Positions of the ends in the reduced formulation: held, a scalar unknown, or None (known force there).
+    def _site(self, part: Part, f: Any, variations: Any, along: Place) -> tuple[Site, Any]:
+        """State where a part of the scene is, and the measure of its terms, None along the rod."""
+        fields, scene = self.fields, self.fields.scene
+        names = [x.name for x in part.of.unknowns(part.number, scene.normal, f.r is not None)]
+        blocks = [f.fields[b.name] for b in part.of.blocks(part.number, fields.discretization.degree)]
+        if part.s is None:
+            x, c, at, measure = along, self.constants, lambda expression: expression, None
+        else:
+            x, c, at, measure = self._at(f, part.s)
+        free = [i for i, p in enumerate(part.of.held(c)) if p is None and i != scene.normal]
+        y = [at(f.scalars[name]) for name in names] + blocks
+        first, second = (SimpleNamespace(r=None if v.r is None else at(v.r), q=at(v.q)) for v in variations)
+        return Site(x, c, y, at(f.turned), scene.normal, free, first, second, self._whole), measure
 
-        Across the plane of a planar rod an end that nothing holds is where the plane is: at zero.
-        """
-        scene = self.fields.scene
-        return [
-            [
-                x if x is not None else f.scalars.get(f"{letter}{i + 1}", 0.0 if i == scene.normal else None)
-                for i, x in enumerate(end.held(c))
-            ]
-            for letter, end in zip("ab", scene.sides, strict=True)
-        ]
-
-    def _along_loads(self, f: Any, c: Any, along: Place) -> Any:
-        """Potential of what acts along the rod, and integral constraints with their multipliers."""
-        scene = self.fields.scene
-        out = 0.0 * c.s
-        if scene.distributed is not None:
-            out += loads.dead(along.r, scene.distributed(c))
-        if scene.potential is not None:
-            out += scene.potential(along, c)
-        for name, constraint in self._scalar_constraints():
-            if constraint.kind == "integral":
-                out += f.scalars[name] * constraint.of(along, c)
-        return out
-
-    def _scalar_constraints(self) -> list[tuple[str, Any]]:
-        scalar = [x for x in self.fields.scene.constraints if x.kind != "pointwise"]
-        return [(f"g{i + 1}", x) for i, x in enumerate(scalar)]
-
-    def _points(self, f: Any) -> Any:
-        """What acts at points: ends, attachments, constraints; each with the measure of its point."""
-        scene, out = self.fields.scene, 0
-        for side, (letter, end) in enumerate(zip("ab", scene.sides, strict=True)):
-            s = scene.interval[side]
-            x, c, _, ds = self._at(f, s)
-            free = [i for i, p in enumerate(end.held(c)) if p is None]
-            if end.force is not None and (f.r is not None or not scene.plain(side)):
-                out += -sum(end.applied(c)[i] * x.r[i] for i in free if i != scene.normal) * ds
-            if end.energy is not None:
-                out += end.energy(x, c) * ds
-            if scene.normal is not None:
-                moments = [
-                    moment(c)[scene.normal] for moment in (end.moment, end.follower_moment) if moment is not None
-                ]
-                out += sum(-moment * f.turned * ds for moment in moments)
-            if end.turned is not None:
-                g = loads.misalignment(x.q, end.turned(c))
-                for i, direction in enumerate(across(end.hinge, scene.normal)):
-                    out += f.scalars[f"m{letter}{i + 1}"] * ufl.dot(g, ufl.as_vector(direction)) * ds
-        for attachment in scene.attachments:
-            x, c, _, measure = self._at(f, attachment.s)
-            if attachment.force is not None:
-                out += loads.dead(x.r, attachment.force(c)) * measure
-            if attachment.energy is not None:
-                out += attachment.energy(x, c) * measure
-        for name, constraint in self._scalar_constraints():
-            if constraint.kind == "point":
-                x, c, at, measure = self._at(f, constraint.s)
-                out += at(f.scalars[name]) * constraint.of(x, c) * measure
-        if isinstance(scene.ends, Ring):
-            out += self._closure(f, scene.ends.sign)
-        return out
-
-    def _closure(self, f: Any, sign: float) -> Any:
-        """Both ends of a ring joined: ``q(l) = +-q(0)`` and, with a centreline, ``r(l) = r(0)``.
-
-        In a plane the angle grows by the whole number of turns that the scene's start makes.
-        """
-
-        def closing(letter: str) -> list[tuple[str, Any]]:
-            return [(name, x) for name, x in f.scalars.items() if name[0] == letter]
-
-        scene, turned = self.fields.scene, f.turned if f.turned.ufl_shape else ufl.as_vector([f.turned])
-        out = 0
-        if scene.normal is not None:
-            first, last = self.fields.turning.start(scene.start, np.array(scene.interval), scene.interval)[:, 0]
-            whole = fem.Constant(self.fields.mesh, 2 * np.pi * np.round((last - first) / (2 * np.pi)))
-            sign = 1.0
-            out += -f.scalars["t1"] * whole * self.measures(scene.interval[1])[0]
-        for s, weights in zip(scene.interval, ((-sign, -1.0), (1.0, 1.0)), strict=True):
-            ds = self.measures(s)[0]
-            out += weights[0] * sum(x * turned[int(name[1]) - 1] for name, x in closing("t")) * ds
-            if f.r is not None:
-                out += weights[1] * sum(x * f.r[int(name[1]) - 1] for name, x in closing("f")) * ds
-        return out
+    @cached_property
+    def _whole(self) -> Any:
+        """Angle by which a closed planar rod turns in all at the scene's start; None for others."""
+        scene, turning = self.fields.scene, self.fields.turning
+        if not scene.closed or scene.normal is None:
+            return None
+        first, last = turning.start(scene.start, np.array(scene.interval), scene.interval)[:, 0]
+        return fem.Constant(self.fields.mesh, 2 * np.pi * np.round((last - first) / (2 * np.pi)))
 
     def _at(self, f: Any, s: float) -> tuple[Place, Any, Any, Any]:
         """Place at arclength ``s``, the constants there, what restricts a field to it, and its measure."""
@@ -219,42 +158,10 @@ class Equations:
         if f.r is not None:
             return place(q, rotation(q), s, at(f.r) + self._lift(c), length=scene.length), c, at, measure
         if not inside:
-            r = self._ends(f, c)[int(abs(s - scene.interval[1]) < abs(s - scene.interval[0]))]
+            r = end_positions(scene, c, f.scalars)[int(abs(s - scene.interval[1]) < abs(s - scene.interval[0]))]
             if None not in r:
                 return place(q, rotation(q), s, ufl.as_vector(r), length=scene.length), c, at, measure
         return place(q, rotation(q), s, length=scene.length), c, at, measure
-
-    def _virtual_work(self, f: Any, a: Any, c: Any, dx: Any) -> Any:
-        """Virtual work of the loads that have no potential, in the variation ``a``."""
-        scene, work = self.fields.scene, 0
-        if scene.follower is not None:
-            work += loads.follower_work(rotation(f.q), scene.follower(c), a.r) * dx
-        for end, s in zip(scene.sides, scene.interval, strict=True):
-            _, c, _, ds = self._at(f, s)
-            if end.follower is not None:
-                work += loads.follower_work(rotation(f.q), end.follower(c), a.r) * ds
-            if scene.normal is not None:
-                continue
-            if end.moment is not None:
-                work += loads.moment_work(f.q, end.moment(c), a.q) * ds
-            if end.follower_moment is not None:
-                work += loads.follower_moment_work(f.q, end.follower_moment(c), a.q) * ds
-        for attachment in scene.attachments:
-            if attachment.follower is not None:
-                x, c, at, measure = self._at(f, attachment.s)
-                work += loads.follower_work(x.R, attachment.follower(c), at(a.r)) * measure
-        return work
-
-    def _attached_inertia(self, f: Any, a: Any, b: Any) -> Any:
-        """Kinetic metric of masses at points."""
-        out = 0
-        for attachment in self.fields.scene.attachments:
-            x, c, at, measure = self._at(f, attachment.s)
-            if attachment.mass is not None and f.r is not None:
-                out += inertia.translational(at(a.r), at(b.r), attachment.mass(c)) * measure
-            if attachment.rotary_inertia is not None:
-                out += inertia.rotary(x.q, at(a.q), at(b.q), tuple(attachment.rotary_inertia(c))) * measure
-        return out
 
     # --- names -----------------------------------------------------------------------------------------------------
 

@@ -8,8 +8,9 @@ no number at all: PETSc drops what is added to number -1, and no Dirichlet row e
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -20,26 +21,16 @@ from mpi4py import MPI
 from rodfem import compat
 from rodfem.errors import SceneError
 from rodfem.fem.rotation_field import ByAngle, ByQuaternion, Turning
-from rodfem.problem.ends import Constants, Ring
+from rodfem.problem.contribution import UNIT, Block, Group, Motion, Unknown
+from rodfem.problem.end import LETTERS, SIDES
 from rodfem.problem.kinds import reals, whole
-from rodfem.problem.local_state import needs_centreline
+from rodfem.problem.local_state import Constants, needs_centreline
 from rodfem.problem.scene import Scene
 
 FORMULATIONS = ("auto", "reduced", "pointwise")
-LOAD = "load"
+LOAD, CONTACT_FORCE = "load", "n"
 HIGHEST = 12
 """Highest degree of elements."""
-
-
-@dataclass(frozen=True)
-class Block:
-    """One field: its name, number of components, degree, continuity, and whether it is a multiplier."""
-
-    name: str
-    size: int
-    degree: int
-    continuous: bool
-    multiplier: bool
 
 
 @dataclass(frozen=True)
@@ -85,16 +76,6 @@ class Discretization:
         return replace(self, elements=factor * self.elements, degree=self.degree + richer, vertices=vertices)
 
 
-@dataclass(frozen=True)
-class Unknown:
-    """One scalar unknown: its name, its group and place there, and whether it is a multiplier."""
-
-    name: str
-    group: str
-    component: int
-    multiplier: bool
-
-
 def turning_of(scene: Scene) -> Turning:
     """How the rotation of a scene's rod is described."""
     return ByQuaternion() if scene.normal is None else ByAngle(scene.normal)
@@ -103,7 +84,7 @@ def turning_of(scene: Scene) -> Turning:
 def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:
     """Fields: ``q`` and ``eta``, in a plane ``angle``; ``v`` where strains are free; ``r`` and ``n`` if pointwise.
 
-    Multipliers ``p0``.. belong to constraints that hold all along the rod.
+    Besides what the parts of the scene bring: multipliers of constraints that hold all along the rod.
     """
     k = discretization.degree
     turning = turning_of(scene)
@@ -114,51 +95,54 @@ def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:
         blocks.append(Block("v", len(scene.free_strains), k - 1, False, False))
     if discretization.formulation == "pointwise":
         blocks += [Block("r", 3, k, True, False), Block("n", 3, k - 1, False, True)]
-    for i, constraint in enumerate(c for c in scene.constraints if c.kind == "pointwise"):
-        blocks.append(Block(f"p{i}", 1, k if constraint.continuous else k - 1, constraint.continuous, True))
-    return blocks
+    return blocks + [block for part in scene.parts for block in part.of.blocks(part.number, k)]
 
 
 def scalars_of(scene: Scene, discretization: Discretization) -> list[Unknown]:
-    """Scalar unknowns of a scene, without the load.
+    """Scalar unknowns of a scene, without the load: those of the formulation, and of the parts of the scene."""
+    reduced = discretization.formulation == "reduced"
+    out = _unknowns_of_reduced(scene) if reduced else []
+    for part in scene.parts:
+        out += part.of.unknowns(part.number, scene.normal, not reduced)
+    return list(dict.fromkeys(out))
 
-    Reduced: components ``n1``.. of a constant contact force, positions ``a1``.., ``b1``.. of the left and right end
-    where other than dead forces act on it.  Always: moments ``m`` of moving clamps and hinges, multipliers ``g`` of
-    integral and point constraints, forces ``f`` and moments ``t`` that close a ring.
+
+def _unknowns_of_reduced(scene: Scene) -> list[Unknown]:
+    """Scalar unknowns in the place of fields.
+
+    Components ``n1``.. of a constant contact force, positions ``a1``.., ``b1``.. of the left and right end where other
+    than dead forces act on it.
     """
-    out, c = [], scene.constants()
-    inside = [i for i in range(3) if i != scene.normal]
-    if discretization.formulation == "reduced":
-        out += [Unknown(f"n{i + 1}", "n", i, True) for i in inside if scene.known_force(i, c) is None]
-        for side, (letter, end) in enumerate(zip("ab", scene.sides, strict=True)):
-            if not scene.plain(side):
-                free = [i for i in inside if end.held(c)[i] is None]
-                out += [Unknown(f"{letter}{i + 1}", letter, i, False) for i in free]
-    for letter, end in zip("ab", scene.sides, strict=True):
-        if end.turned is not None:
-            size = len(across(end.hinge, scene.normal))
-            out += [Unknown(f"m{letter}{i + 1}", f"m{letter}", i, True) for i in range(size)]
-    count = sum(x.kind != "pointwise" for x in scene.constraints)
-    out += [Unknown(f"g{i + 1}", "g", i, True) for i in range(count)]
-    if isinstance(scene.ends, Ring):
-        out += [Unknown(f"t{i + 1}", "t", i, True) for i in range(turning_of(scene).size)]
-        if discretization.formulation == "pointwise":
-            out += [Unknown(f"f{i + 1}", "f", i, True) for i in inside]
+    c, inside = scene.constants(), [i for i in range(3) if i != scene.normal]
+    force = Group(
+        CONTACT_FORCE,
+        "contact force",
+        "position of the ends along e{}",
+        Motion.VECTOR,
+        lambda c: [scene.known_force(i, c) for i in range(3)],
+    )
+    out = [Unknown(force, i, UNIT[i]) for i in inside if scene.known_force(i, c) is None]
+    for side, end in enumerate(scene.sides):
+        if not scene.plain(side):
+            place = Group(LETTERS[side], f"position of the {SIDES[side]} end", "", Motion.POSITION, end.held)
+            out += [Unknown(place, i, UNIT[i]) for i in inside if end.held(c)[i] is None]
     return out
 
 
-def across(axis: tuple[float, float, float] | None, normal: int | None = None) -> list[list[float]]:
-    """Unit vectors across ``axis``, all three without one: the directions about which an end does not turn.
+def end_positions(
+    scene: Scene, c: Constants, scalars: Mapping[str, Any], given: Callable[[Any], Any] = lambda x: x
+) -> list[list[Any]]:
+    """Positions of the ends in the reduced formulation: ``given(held)``, a scalar unknown, or None (known force there).
 
-    In a plane that is its normal, or nothing where the axis is along it.
+    Across the plane of a planar rod an end that nothing holds is where the plane is: at zero.
     """
-    if normal is not None:
-        unit = [float(i == normal) for i in range(3)]
-        along = axis is not None and abs(axis[normal]) > 0.999 * float(np.linalg.norm(axis))
-        return [] if along else [unit]
-    if axis is None:
-        return [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-    return [[float(x) for x in row] for row in np.linalg.svd(np.array([axis], dtype=float))[2][1:]]
+    return [
+        [
+            given(x) if x is not None else scalars.get(f"{letter}{i + 1}", 0.0 if i == scene.normal else None)
+            for i, x in enumerate(end.held(c))
+        ]
+        for letter, end in zip(LETTERS, scene.sides, strict=True)
+    ]
 
 
 class Fields:
@@ -200,7 +184,7 @@ class Fields:
         self.turning = turning_of(scene)
         self.blocks = blocks_of(scene, discretization)
         self.unknown_scalars = scalars_of(scene, discretization)
-        self.forces = [x.component for x in self.unknown_scalars if x.group == "n"]
+        self.forces = [x.component for x in self.unknown_scalars if x.group.name == CONTACT_FORCE]
         names = [x.name for x in self.unknown_scalars] + [LOAD]
         self.mesh = mesh or self._mesh()
         parts = [(b.continuous, b.degree, b.size) for b in self.blocks] + [(False, 0, len(names))]
@@ -256,23 +240,12 @@ class Fields:
         Of a planar rod also all that would leave the plane.
         """
         found = [dofs.ravel() for dofs in self.out_of_plane().values()]
-        ring = isinstance(self.scene.ends, Ring)
+        c = self.scene.constants()
         for end, s in zip(self.scene.sides, self.scene.interval, strict=True):
-            for block in self.blocks:
-                if not block.continuous:
-                    continue
+            for block in (b for b in self.blocks if b.continuous):
                 x = self.coordinates(block.degree)
                 at_end = self.dofs[block.name][np.isclose(x, s, rtol=0, atol=1e-9 * self.scene.length)]
-                if block.name == "r":
-                    held = [x is not None for x in end.held(self.scene.constants())]
-                    found.append(at_end[:, held].ravel())
-                elif block.name.startswith("p"):  # what holds the end fulfils the constraint there
-                    if end.rotation is not None or any(x is not None for x in end.held(self.scene.constants())):
-                        found.append(at_end.ravel())
-                elif end.fixed_rotation is not None:
-                    found.append(at_end.ravel())
-                elif ring and block.name == "eta" and s == self.scene.interval[1]:
-                    found.append(at_end.ravel())  # the norm of q(l) = +-q(0) is that of q(0)
+                found.append(at_end[:, np.broadcast_to(end.clamps(block, c), block.size)].ravel())
         return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
 
     def out_of_plane(self) -> dict[str, np.ndarray]:
@@ -378,6 +351,14 @@ class Fields:
         owned = mine[(mine < self.space.dofmap.index_map.size_local) & (self.number[mine] >= 0)]
         return self.comm.allreduce(len(owned)) + sum(x.multiplier for x in self.unknown_scalars)
 
+    @cached_property
+    def groups(self) -> dict[Group, list[Unknown]]:
+        """Scalar unknowns by the groups that they belong to."""
+        out: dict[Group, list[Unknown]] = {}
+        for unknown in self.unknown_scalars:
+            out.setdefault(unknown.group, []).append(unknown)
+        return out
+
     def describe(self) -> str:
         """Fields and scalars in words, for the terminal."""
         names = {
@@ -389,19 +370,8 @@ class Fields:
             "n": "contact force n",
         }
         words = [f"{names.get(b.name, f'multiplier {b.name}')} (P{b.degree})" for b in self.blocks]
-        groups = {
-            "n": "contact force",
-            "a": "position of the left end",
-            "b": "position of the right end",
-            "ma": "moment at the left end",
-            "mb": "moment at the right end",
-            "g": "multipliers of constraints",
-            "t": "closing moment",
-            "f": "closing force",
-        }
-        for group, name in groups.items():
-            members = [x.name for x in self.unknown_scalars if x.group == group]
-            words += [f"{name} {', '.join(members)} (scalar)"] if members else []
+        for group, members in self.groups.items():
+            words.append(f"{group.words} {', '.join(x.name for x in members)} (scalar)")
         return ", ".join(words)
 
     def left_out(self) -> list[str]:

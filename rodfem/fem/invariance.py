@@ -22,10 +22,10 @@ import numpy as np
 from mpi4py import MPI
 
 from rodfem.fem.equations import Equations
-from rodfem.fem.fields import LOAD, Block, Fields
+from rodfem.fem.fields import LOAD, Fields
 from rodfem.fem.state import Evaluation
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
-from rodfem.problem.ends import Ring
+from rodfem.problem.contribution import Block
 
 EXACT = 1e-10
 """Round-off of the change of the functional, relative to the sum of magnitudes of its terms."""
@@ -189,8 +189,7 @@ def generic_state(equations: Equations, seed: int, decay: float = DECAY) -> Eval
 
 def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generator, decay: float) -> np.ndarray:
     """Values of a field at places ``x`` (..., 1) in [0, 1]: periodic for a ring, but for what its closure asks for."""
-    ends = fields.scene.ends
-    scene, closed = fields.scene, isinstance(ends, Ring)
+    scene, closed = fields.scene, fields.scene.closed
 
     def wave() -> np.ndarray:
         a, b, w, p = rng.normal(size=(4, block.size))
@@ -203,7 +202,7 @@ def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generat
         u, v = np.linalg.qr(rng.normal(size=(4, 2)))[0].T
         clamps = [end.fixed_rotation for end in scene.sides if end.fixed_rotation is not None]
         u = np.array(clamps[0]) if clamps else u  # far from a clamp a rotation would come to it in a jump
-        if isinstance(ends, Ring) and ends.odd:  # of one sign at the start and of the other at the end
+        if scene.sides[1].sign < 0:  # of one sign at the start and of the other at the end
             half = np.pi * x
             values = (u + 0.3 * values) * np.cos(half) + (v + 0.3 * wave()) * np.sin(half)
         else:

@@ -16,9 +16,11 @@ from petsc4py import PETSc
 
 from forms.kinematics import UNDEFORMED
 from rodfem import compat
-from rodfem.fem.fields import LOAD
+from rodfem.fem.fields import LOAD, end_positions
 from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
+from rodfem.problem.contribution import Motion
+from rodfem.problem.end import LETTERS
 
 
 def _euler_rodrigues() -> np.ndarray:
@@ -183,8 +185,8 @@ class Shape:
         a = np.array([p if p is not None else (q or 0.0) - d for p, q, d in zip(left, right, before[-1], strict=True)])
         b = np.array([q if q is not None else x + d for q, x, d in zip(right, a, before[-1], strict=True)])
         for i, unknown in enumerate(f.unknown_scalars):
-            if unknown.group in ("a", "b"):
-                out[f.copies[:, i]] = (a if unknown.group == "a" else b)[unknown.component]
+            if unknown.group.motion is Motion.POSITION:
+                out[f.copies[:, i]] = (a, b)[LETTERS.index(unknown.group.name)][unknown.component]
         if self.reduced:
             return system.vector(out)
         first = np.searchsorted(self.gather(starts)[order], starts)
@@ -268,9 +270,5 @@ class Shape:
 
     def _anchor(self, state: NodalValues, chord: np.ndarray) -> np.ndarray:
         """Position of the left end: where it is held, or else a chord back from where the right end is held."""
-        c, scalars = state.constants(), state.scalars
-        left, right = (
-            [scalars.get(f"{letter}{i + 1}") if p is None else float(p) for i, p in enumerate(end.held(c))]
-            for letter, end in zip("ab", self.system.scene.sides, strict=True)
-        )
+        left, right = end_positions(self.system.scene, state.constants(), state.scalars, float)
         return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])

@@ -18,9 +18,9 @@ from mpi4py import MPI
 
 from forms.symmetry import AXES, Matrix, cross, left, right
 from rodfem import compat
-from rodfem.fem.fields import Block, Fields
+from rodfem.fem.fields import Fields
 from rodfem.fem.values import NodalValues
-from rodfem.problem.ends import Ring
+from rodfem.problem.contribution import Block, Motion
 from rodfem.problem.scene import Scene
 
 
@@ -61,7 +61,7 @@ class Symmetry:
                 dofs = np.unique(fields.dofs[target].reshape(-1, len(matrix)), axis=0)
                 places = list(enumerate(dofs.T))
             else:
-                members = [(i, x.component) for i, x in enumerate(fields.unknown_scalars) if x.group == target]
+                members = [(i, x.component) for i, x in enumerate(fields.unknown_scalars) if x.group.name == target]
                 places = [(component, fields.copies[:1, i]) for i, component in members]
             for i, row in places:
                 for j, column in places:
@@ -143,7 +143,7 @@ def differentiation(degree: int) -> np.ndarray:
 def may_slide(scene: Scene) -> bool:
     """Whether nothing but functions of the arclength can keep a closed rod from moving along itself."""
     at_points = scene.attachments or any(x.s is not None for x in scene.constraints)
-    return isinstance(scene.ends, Ring) and not at_points
+    return scene.closed and not at_points
 
 
 # --- elementary generators ------------------------------------------------------------------------------------------
@@ -151,10 +151,10 @@ def may_slide(scene: Scene) -> bool:
 
 def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
     """All elementary generators of the fields and groups of scalars that a scene has."""
-    vectors = {"n", "a", "b", "ma", "mb"} & {x.group for x in fields.unknown_scalars}
-    blocks = {b.name for b in fields.blocks}
+    groups = {group.name: group for group in fields.groups}
+    vectors = [name for name, group in groups.items() if group.motion in (Motion.VECTOR, Motion.POSITION)]
+    moved = ["r", *(name for name, group in groups.items() if group.motion is Motion.POSITION)]
     out = []
-    sizes = {g: sum(x.group == g for x in fields.unknown_scalars) for g in vectors}
     for i, axis in enumerate(AXES, start=1):
         turn = f"rotation about e{i}"
         if fields.scene.normal is None:
@@ -162,20 +162,17 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
             out.append(Elementary("q", right(axis), (0.0,) * 4, f"turning of the cross-sections about d{i}"))
         elif axis == AXES[fields.scene.normal]:
             out.append(Elementary("angle", ((0.0,),), (1.0,), turn))
-        for target in sorted(vectors | ({"r", "n"} & blocks)):
-            if target in ("ma", "mb") and sizes[target] == 2:
-                continue
+        for target in sorted([*vectors, *(b.name for b in fields.blocks if b.name in ("r", "n"))]):
             out.append(Elementary(target, cross(axis), (0.0,) * 3, ""))
-            if target in ("r", "a", "b"):
+            if target in moved:
                 out.append(Elementary(target, ((0.0,) * 3,) * 3, axis, f"translation along e{i}"))
-    count = sum(x.group == "g" for x in fields.unknown_scalars)
-    for i in range(count):  # multipliers of constraints may turn into each other
-        for j in range(i):
-            turned = np.zeros((count, count))
-            turned[i, j], turned[j, i] = 1.0, -1.0
-            out.append(Elementary("g", tuple(map(tuple, turned)), (0.0,) * count, ""))
-    for target in sorted(g for g in vectors if g in ("ma", "mb") and sizes[g] == 2):
-        out.append(Elementary(target, ((0.0, -1.0), (1.0, 0.0)), (0.0, 0.0), ""))
+    for name in sorted(name for name, group in groups.items() if group.motion is Motion.MIXED):
+        count = len(fields.groups[groups[name]])
+        for i in range(count):
+            for j in range(i):
+                turned = np.zeros((count, count))
+                turned[i, j], turned[j, i] = 1.0, -1.0
+                out.append(Elementary(name, tuple(map(tuple, turned)), (0.0,) * count, ""))
     return tuple(out)
 
 
@@ -188,22 +185,12 @@ def add_change(state: NodalValues, target: str, matrix: np.ndarray, constant: np
             values = values + fields.lift(fields.coordinates(fields.discretization.degree), state.constants())
         out[dofs] += values @ matrix.T + constant  # of dofs that cells share, once: the sum is buffered
         return
-    members = [(i, x.component) for i, x in enumerate(fields.unknown_scalars) if x.group == target]
-    values = np.zeros(len(constant)) if len(members) == len(constant) else _known(state, target, len(constant))
-    for i, component in members:
-        values[component] = state.local[fields.copies[0, i]]
+    members = [(i, x) for i, x in enumerate(fields.unknown_scalars) if x.group.name == target]
+    values = np.zeros(len(constant))
+    if len(members) != len(constant) and (known := members[0][1].group.known):
+        values[:] = [0.0 if x is None else float(x) for x in known(state.constants())]
+    for i, x in members:
+        values[x.component] = state.local[fields.copies[0, i]]
     change = matrix @ values + constant
-    for i, component in members:
-        out[fields.copies[:, i]] += change[component]
-
-
-def _known(state: NodalValues, group: str, size: int) -> np.ndarray:
-    """Values of the components of a group that are not unknowns (known forces, held positions), else zero."""
-    scene, values, c = state.fields.scene, np.zeros(size), state.constants()
-    if group == "n":
-        known = [scene.known_force(i, c) for i in range(3)]
-    elif group in ("a", "b"):
-        known = scene.sides["ab".index(group)].held(c)
-    else:
-        return values
-    return np.array([0.0 if x is None else float(x) for x in known])
+    for i, x in members:
+        out[fields.copies[:, i]] += change[x.component]

@@ -24,6 +24,7 @@ from petsc4py import PETSc
 from rodfem.fem.fields import LOAD
 from rodfem.fem.symmetries import Symmetry, mismatch
 from rodfem.fem.values import NodalValues
+from rodfem.problem.contribution import Motion
 
 if TYPE_CHECKING:
     from rodfem.fem.state import State
@@ -169,7 +170,7 @@ class Verification:
         if self._closing is None:
             fields, self._closing = self.system.fields, []
             for unknown in fields.unknown_scalars:
-                if unknown.group in ("t", "f"):
+                if unknown.group.motion is Motion.CLOSING:
                     column = self.system.new_vector()
                     matrix.getColumnVector(fields.scalars[unknown.name], column)
                     column.normalize()

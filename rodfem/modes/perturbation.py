@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.fem.fields import end_positions
 from rodfem.fem.shape import Shape, directors
 from rodfem.fem.values import NodalValues
-from rodfem.problem.ends import Ring
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Motions(Shape):
         )
         ends = np.vstack([np.zeros(3), np.cumsum(every["ends"], axis=0)])
         r = self._unique(ends[:-1, None, :] + every["r"]) + self._first(motion, ends[-1])
-        if isinstance(self.system.scene.ends, Ring):
+        if self.system.scene.closed:
             r = r - self._mean(r)
         return Motion(r, self._unique(every["w"]), self._unique(every["q"]))
 
@@ -85,12 +85,8 @@ class Motions(Shape):
 
     def _first(self, motion: NodalValues, chord: np.ndarray) -> np.ndarray:
         """Displacement of the left end in a perturbation, if the right one's is ``chord`` more."""
-        scene, scalars = self.system.scene, motion.scalars
-        c = scene.constants()
-        left, right = (
-            [scalars.get(f"{letter}{i + 1}") if p is None else 0.0 for i, p in enumerate(end.held(c))]
-            for letter, end in zip("ab", scene.sides, strict=True)
-        )
+        scene = self.system.scene
+        left, right = end_positions(scene, scene.constants(), motion.scalars, lambda held: 0.0)
         return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])
 
     def _mean(self, values: np.ndarray) -> np.ndarray:

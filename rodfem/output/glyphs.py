@@ -90,9 +90,9 @@ def _body(support: Support, at: Floats, home: Floats, R: Floats, away: Floats, s
     The rails are where ``home`` (3,) has them.  ``away`` is the direction from the other end of the rod, zero inside of
     it; ``size`` half the size of a block.
     """
-    if support.turning != HELD and not support.held.any():
+    free = support.slides
+    if support.turning != HELD and len(free) == 3:
         return []
-    free = [e for e, held in zip(np.eye(3), support.held, strict=True) if not held]
     frame = Rotation.from_quat(support.frame[[1, 2, 3, 0]]).as_matrix()
     if support.turning == HELD:
         middle = at + 0.5 * size * frame[:, 2] * _sign(frame[:, 2] @ away)

@@ -1,4 +1,4 @@
-"""Validation of numbers given by the user: the kind, or one sentence with the kind expected."""
+"""Validation of what the user gives, numbers, vectors, scalars: the kind, or one sentence with the kind expected."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
+import ufl
 
 from rodfem.errors import SceneError
 
@@ -31,3 +32,23 @@ def reals(name: str, values: Any, example: tuple[float, ...], count: int | None 
     if given is None or (count is not None and len(given) != count):
         raise SceneError(f"{name} is {values!r}: give {count or 'a tuple of'} numbers, as in {name}={example}.")
     return tuple(real(f"{name}[{i}]", value, example[0]) for i, value in enumerate(given))
+
+
+def check_vector(what: str, values: Any, size: int) -> None:
+    """Raise :class:`SceneError` unless ``values`` has ``size`` components."""
+    try:
+        count = len(values)
+    except TypeError:
+        raise SceneError(f"The {what} is a single value: give {size} components.") from None
+    if count != size:
+        raise SceneError(f"The {what} has {count} components: give {size}.")
+
+
+def check_scalar(what: str, value: Any) -> None:
+    """Raise :class:`SceneError` unless ``value`` is a scalar, a number or an expression."""
+    try:
+        shape = ufl.as_ufl(value).ufl_shape
+    except Exception:  # of UFL's own, which differ from release to release
+        raise SceneError(f"The {what} is {value!r}: return a number or a UFL expression.") from None
+    if shape != ():
+        raise SceneError(f"The {what} has the shape {shape}: return a scalar.")

@@ -1,7 +1,8 @@
-"""The state of a rod at a place, as the functions of a scene receive it."""
+"""What the functions of a scene receive: its named constants, and the state of the rod at a place."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -10,10 +11,42 @@ import ufl
 from forms.kinematics import UNDEFORMED
 from forms.rotation import IDENTITY, rotation
 from rodfem.errors import SceneError
-from rodfem.problem.ends import Place
+from rodfem.problem.roles import functions_of
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
+
+
+class Constants(SimpleNamespace):
+    """The named constants of a scene and the arclength ``s``; an unknown name is a :class:`SceneError`."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Name what is missing, and what there is."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        raise SceneError(
+            f"A function of the scene asks for a constant {name!r}: add it to the parameters, or choose one of "
+            f"{', '.join(sorted(vars(self)))}."
+        )
+
+
+def watched(c: Constants) -> tuple[Constants, set[str]]:
+    """Return the same constants, and the set of names that they will have been asked for."""
+    asked: set[str] = set()
+
+    class Watched(Constants):
+        def __getattribute__(self, name: str) -> Any:
+            asked.add(name)
+            return super().__getattribute__(name)
+
+    return Watched(**vars(c)), asked
+
+
+Place = SimpleNamespace
+Vector = Sequence[Any]
+OfConstants = Callable[[Constants], Vector]
+OfPlace = Callable[[Place, Constants], Any]
+Quaternion = tuple[float, float, float, float]
 
 
 class NoCentreline(SceneError):
@@ -62,16 +95,49 @@ def needs_centreline(scene: Scene) -> str:
         return "what is attached along the rod"
     if scene.inertia.rho_A(c) != 0:
         return "the mass of the rod"
-    q = ufl.as_vector([ufl.as_ufl(x) for x in IDENTITY])
-    known = {"v": ufl.as_vector(UNDEFORMED), "k": ufl.as_vector([0.0, 0.0, 0.0]), "length": scene.length}
-    along = place(q, rotation(q), scene.interval[0], **known)
     functions = [("the potential along the rod", scene.potential)] if scene.potential else []
     functions += [] if scene.ordinate.places else [("the ordinate", scene.ordinate.of)]
     functions += [("what is attached along the rod", x.energy) for x in scene.attachments if x.energy and x.s in inner]
     functions += [("a constraint", x.of) for x in scene.constraints if x.s is None or x.s in inner]
-    for what, function in functions:
-        try:
-            function(along, c)
-        except NoCentreline:
-            return what
-    return ""
+    return next((what for what, function in functions if asks_where(function, c)), "")
+
+
+def asks_where(function: OfPlace, c: Constants) -> bool:
+    """Whether a function of a place depends on where the rod is."""
+    q = ufl.as_vector([ufl.as_ufl(x) for x in IDENTITY])
+    strains = {"v": ufl.as_vector(UNDEFORMED), "k": ufl.as_vector([0.0, 0.0, 0.0]), "length": 1.0}
+    try:
+        function(place(q, rotation(q), 0.0, **strains), c)
+    except NoCentreline:
+        return True
+    return False
+
+
+def functions_of_places(scene: Scene) -> Iterator[tuple[str, OfPlace, Place]]:
+    """Functions of a place in the equations, each with a place of the kind that it will be given."""
+    point, rod = some_places(scene)
+    for what, function, role in functions_of(scene):
+        if role.call == "f(x, c)":
+            yield what, function, rod if role.along else point
+
+
+def some_places(scene: Scene) -> tuple[Place, Place]:
+    """Return a point and a place along the rod: some rotation, strains, position."""
+    q = ufl.as_vector([0.5, 0.1, 0.7, 0.5])
+    R = rotation(q)
+    r, strains = ufl.as_vector([0.2, 0.3, 0.4]), (ufl.as_vector([0.01, 0.02, 1.01]), ufl.as_vector([0.1, 0.2, 0.3]))
+    point = place(q, R, scene.interval[0], r, length=scene.length)
+    rod = place(q, R, scene.interval[0], r, dr=ufl.dot(R, strains[0]), v=strains[0], k=strains[1], length=scene.length)
+    return point, rod
+
+
+def asked_for(scene: Scene) -> set[str]:
+    """Names of the constants that the equations of a scene ask for."""
+    c, asked = watched(scene.constants())
+    for _, function, role in functions_of(scene):
+        if role.call == "f(c)":
+            function(c)
+    for _, function, known in functions_of_places(scene):
+        function(known, c)
+    scene.energy(ufl.as_vector(UNDEFORMED), ufl.as_vector([0.0, 0.0, 0.0]), c)
+    return asked

@@ -3,14 +3,22 @@
 The ``metadata`` of a dataclass's field says under ``role`` that it holds a function and what for: a :class:`Role`, or a
 function that returns one for the object that the field belongs to.  Under ``places`` are the words for where the
 objects of a tuple are.  :func:`changes` walks a scene by these declarations alone, so that what checks functions,
-guards them or asks what they depend on cannot forget one.
+guards them, makes terms of them or asks what they depend on cannot forget one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any
+from functools import wraps
+from typing import TYPE_CHECKING, Any
+
+from rodfem.errors import SceneError
+
+if TYPE_CHECKING:
+    from rodfem.problem.load import Load
+
+UFL = "write it with UFL (ufl.cosh, ufl.conditional), without math, numpy and if"
 
 
 @dataclass(frozen=True)
@@ -29,6 +37,10 @@ class Role:
         Whether its place is the whole rod.
     or_value
         Whether a constant value may stand in its place.
+    load
+        Kind of load that it is, None where it is none.
+    hint, returns
+        How it is to be written, for where it fails; type of what it returns, where it is converted.
     """
 
     words: str
@@ -36,6 +48,9 @@ class Role:
     size: int | None = None
     along: bool = False
     or_value: bool = False
+    load: Load | None = None
+    hint: str = UFL
+    returns: type | None = None
 
     @property
     def arguments(self) -> int:
@@ -46,7 +61,39 @@ class Role:
 Visit = Callable[[str, Any, Role], Any]
 
 
-def changes(owner: Any, visit: Visit, place: str = "") -> dict[str, Any]:
+def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[..., Any]:
+    """Return ``function`` such that all it raises is a :class:`SceneError` that names it."""
+    if hasattr(function, "guards"):
+        return function
+
+    @wraps(function)
+    def call(*arguments: Any) -> Any:
+        try:
+            value = function(*arguments)
+            return value if role.returns is None else role.returns(value)
+        except SceneError:
+            raise
+        except Exception as trouble:  # whatever a person's function may raise
+            first = str(trouble).split("\n", 1)[0].rstrip(".")
+            raise SceneError(f"The {what} fails with {type(trouble).__name__}, {first!r}: {role.hint}.") from trouble
+
+    call.guards = what  # type: ignore[attr-defined]
+    return call
+
+
+def functions_of(owner: Any, *, nested: bool = True) -> list[tuple[str, Callable[..., Any], Role]]:
+    """All functions given in the fields of an object, and in what they hold if ``nested``: words, function, role."""
+    found: list[tuple[str, Callable[..., Any], Role]] = []
+
+    def note(what: str, function: Callable[..., Any], role: Role) -> Callable[..., Any]:
+        found.append((what, function, role))
+        return function
+
+    changes(owner, note, nested=nested)
+    return found
+
+
+def changes(owner: Any, visit: Visit, place: str = "", *, nested: bool = True) -> dict[str, Any]:
     """Fields of a dataclass with each function ``f``, and all in what they hold, replaced by ``visit(words, f, role)``.
 
     A field's own default (None, say), and what is replaced by itself, is left out.
@@ -54,9 +101,10 @@ def changes(owner: Any, visit: Visit, place: str = "") -> dict[str, Any]:
     new = {}
     for f in fields(owner):
         value = getattr(owner, f.name)
-        found = value if value is f.default else _visited(owner, f.metadata, value, visit, place)
-        if found is not value:
-            new[f.name] = found
+        if value is not f.default and (nested or "role" in f.metadata):
+            found = _visited(owner, f.metadata, value, visit, place)
+            if found is not value:
+                new[f.name] = found
     return new
 
 

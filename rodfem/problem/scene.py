@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -20,10 +20,18 @@ from ufl.utils.stacks import StackDict
 
 from forms.kinematics import RODS, UNDEFORMED
 from rodfem.errors import SceneError
-from rodfem.problem.ends import Attachment, Constants, Constraint, End, OfConstants, OfPlace, Ring, Vector
-from rodfem.problem.guard import guarded
-from rodfem.problem.roles import Role, changes
+from rodfem.problem.contribution import Contribution
+from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
+from rodfem.problem.local_state import Constants, watched
+from rodfem.problem.roles import Role, changes, functions_of, guarded
 from rodfem.problem.validation import check_kinds, check_scene
+
+if TYPE_CHECKING:
+    from rodfem.problem.attachment import Attachment
+    from rodfem.problem.constraint import Constraint
+    from rodfem.problem.end import End
+    from rodfem.problem.local_state import OfConstants, OfPlace, Vector
+    from rodfem.problem.ring import Ring
 
 
 @dataclass(frozen=True)
@@ -67,7 +75,8 @@ class Inertia:
 def _role_of_ordinate(ordinate: Ordinate) -> Role:
     """Role of an ordinate's function: of numbers at a point, of UFL expressions along the rod."""
     if ordinate.places:
-        return Role("ordinate", "of(r, q)")
+        hint = "it receives arrays r (3,) and q (4,), and returns a number"
+        return Role("ordinate", "of(r, q)", hint=hint, returns=float)
     return Role("ordinate along the rod", "of(x, c)", along=True)
 
 
@@ -101,8 +110,19 @@ class Ordinate:
         return () if self.s is None else (self.s,)
 
 
+START = "it receives an array of arclengths (m,), and returns one (m, 4)"
+
+
+class Part(NamedTuple):
+    """A contribution to a scene, its number among those of its kind, and its arclength, None along the whole rod."""
+
+    of: Contribution
+    number: int
+    s: float | None
+
+
 @dataclass(frozen=True)
-class Scene:
+class Scene(Contribution):
     """A boundary value problem for one rod, as a person states it.
 
     Parameters
@@ -155,16 +175,22 @@ class Scene:
     span: tuple[float, float]
     title: str = ""
     inertia: Inertia = Inertia()
-    distributed: OfConstants | None = field(default=None, metadata={"role": Role("distributed force", "f(c)", 3)})
-    follower: OfConstants | None = field(default=None, metadata={"role": Role("distributed follower force", "f(c)", 3)})
+    distributed: OfConstants | None = field(
+        default=None, metadata={"role": Role("distributed force", "f(c)", 3, load=DEAD)}
+    )
+    follower: OfConstants | None = field(
+        default=None, metadata={"role": Role("distributed follower force", "f(c)", 3, load=FOLLOWER)}
+    )
     potential: OfPlace | None = field(
-        default=None, metadata={"role": Role("potential along the rod", "f(x, c)", 0, along=True)}
+        default=None, metadata={"role": Role("potential along the rod", "f(x, c)", 0, along=True, load=POTENTIAL)}
     )
     attachments: tuple[Attachment, ...] = ()
     constraints: tuple[Constraint, ...] = ()
     breaks: tuple[float, ...] = ()
     planar: str | None = None
-    start: Callable[[np.ndarray], np.ndarray] | None = field(default=None, metadata={"role": Role("start", "start(s)")})
+    start: Callable[[np.ndarray], np.ndarray] | None = field(
+        default=None, metadata={"role": Role("start", "start(s)", hint=START)}
+    )
     states: str = field(default="straight")
 
     def __post_init__(self) -> None:
@@ -193,8 +219,26 @@ class Scene:
 
     @property
     def sides(self) -> tuple[End, End]:
-        """The two ends; those of a ring hold nothing."""
-        return (End(), End()) if isinstance(self.ends, Ring) else self.ends
+        """The two ends."""
+        left, right = self.ends
+        return left, right
+
+    @property
+    def closed(self) -> bool:
+        """Whether the two ends are joined to each other."""
+        return self.sides[0].closed
+
+    @cached_property
+    def parts(self) -> list[Part]:
+        """All that contributes to the problem beside the stored energy: loads along the rod, ends, what is attached.
+
+        Constraints whose multipliers are fields, and those whose multipliers are scalars, are numbered each for itself.
+        """
+        out = [Part(self, 0, None), *(Part(end, i, self.interval[i]) for i, end in enumerate(self.sides))]
+        out += [Part(x, i, x.s) for i, x in enumerate(self.attachments)]
+        for i, x in enumerate(self.constraints):
+            out.append(Part(x, sum(y.letter == x.letter for y in self.constraints[:i]), x.s))
+        return out
 
     @property
     def normal(self) -> int | None:
@@ -204,8 +248,7 @@ class Scene:
     @property
     def joints(self) -> tuple[float, ...]:
         """Arclengths inside the rod that must be element boundaries, in ascending order."""
-        places = {*self.breaks, *(x.s for x in self.attachments)}
-        places |= {x.s for x in self.constraints if x.s is not None}
+        places = {*self.breaks, *(part.s for part in self.parts if part.s is not None)}
         close = 1e-9 * self.length
         return tuple(sorted(s for s in places if self.interval[0] + close < s < self.interval[1] - close))
 
@@ -228,7 +271,7 @@ class Scene:
         """Reference length of the rod."""
         return self.interval[1] - self.interval[0]
 
-    @property
+    @cached_property
     def conservative(self) -> bool:
         """Whether all loads have a potential, so that stability is a matter of the second variation alone."""
         return not self.without_potential()
@@ -239,17 +282,10 @@ class Scene:
 
     def without_potential(self, *, in_space: bool = False) -> list[str]:
         """Loads that have no potential, in words; for a planar rod those that have none while it stays in its plane."""
-        found = []
-        for side, end in zip(("left", "right"), self.sides, strict=True):
-            kinds = {"follower force": end.follower}
-            if (
-                self.planar is None or in_space
-            ):  # in a plane all moments are about its normal: their potential is -M times the angle
-                kinds |= {"moment": end.moment, "follower moment": end.follower_moment}
-            found += [f"{kind} on the {side} end" for kind, load in kinds.items() if load is not None]
-        if self.follower is not None:
-            found.append("distributed follower force")
-        return found + [f"follower force at s = {x.s:g}" for x in self.attachments if x.follower is not None]
+        planar = self.planar is not None and not in_space
+        return [
+            what for what, _, role in functions_of(self) if role.load and role.load.potential_in(planar=planar) is None
+        ]
 
     @property
     def has_inertia(self) -> bool:
@@ -296,37 +332,26 @@ class Scene:
 
     def plain(self, side: int) -> bool:
         """Whether dead forces are all that loads an end (0: left, 1: right): they are the contact force there."""
-        at_end = [x.s for x in self.attachments] + [x.s for x in self.constraints if x.s is not None]
-        return self.sides[side].energy is None and not any(
-            abs(s - self.interval[side]) < 1e-9 * self.length for s in at_end
-        )
+        close = 1e-9 * self.length
+        here = [x.of for x in self.parts if x.s is not None and abs(x.s - self.interval[side]) < close]
+        return self.sides[side].dead and len(here) == 1
 
     def known_force(self, component: int, c: Constants) -> Any | None:
         """Component of the contact force that a dead end force prescribes, or None where it is an unknown.
 
         Free at the right end the contact force is the applied one, free at the left end it is minus the applied one.
         """
-        if isinstance(self.ends, Ring):
-            return None
-        left, right = self.ends
-        if self.plain(1) and right.held(c)[component] is None:
-            return right.applied(c)[component]
-        if self.plain(0) and left.held(c)[component] is None:
-            return -left.applied(c)[component]
+        for side, sign in ((1, 1), (0, -1)):
+            force = self.sides[side].contact_force(c)[component]
+            if self.plain(side) and force is not None:
+                return sign * force
         return None
 
     def depends_on_s(self) -> bool:
         """Whether the stored energy is a function of the arclength too."""
-        asked: list[bool] = []
-
-        class Watched(Constants):
-            def __getattribute__(self, name: str) -> Any:
-                if name == "s":
-                    asked.append(True)
-                return super().__getattribute__(name)
-
-        self._energy_at(np.zeros(3), np.zeros(3), Watched(**vars(self.constants())))
-        return bool(asked)
+        c, asked = watched(self.constants())
+        self._energy_at(np.zeros(3), np.zeros(3), c)
+        return "s" in asked
 
     def _energy_at(self, v: np.ndarray, k: np.ndarray, c: Constants) -> float:
         strains = [UNDEFORMED[i] + float(v[i]) for i in range(3)]

@@ -10,7 +10,7 @@ Cross-sections are not part of a scene.  A picture gives them the proportion of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, TypeVar
 
 import numpy as np
@@ -53,6 +53,8 @@ class Support:
         In the frame of space, felt in the free directions, (3,); those of potentials that are no springs among them.
     follower, follower_moment
         Along the directors, (3,).
+    guide
+        The only direction in which the position moves where that need not be e1, e2 or e3, (3,); zero without one.
     """
 
     s: float
@@ -68,6 +70,14 @@ class Support:
     moment: Floats
     follower: Floats
     follower_moment: Floats
+    guide: Floats = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def slides(self) -> list[Floats]:
+        """Unit vectors along which the position moves freely, (3,) each."""
+        if self.guide.any():
+            return [self.guide / np.linalg.norm(self.guide)]
+        return [e for e, held in zip(np.eye(3), self.held, strict=True) if not held]
 
     def loads(self, R: Floats) -> tuple[Floats, Floats]:
         """Force and moment (3,) in the frame of space where the directors are the columns of ``R`` (3, 3)."""
@@ -177,11 +187,11 @@ def read(group: Any, row: int | None = None) -> Setting:
 
 def _made(kind: type[T], entries: dict[str, Any], group: Any) -> T:
     """A support or a constraint from the entries of a file, of which it needs some."""
-    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
-    missing = [name for name in names if name not in entries]
+    known = {f.name: f.default_factory is MISSING for f in fields(kind)}  # type: ignore[arg-type]
+    missing = [name for name, needed in known.items() if needed and name not in entries]
     if missing:
         raise SceneError(
             f"{group.file.filename} has a {kind.__name__.lower()} without {', '.join(missing)} in {group.name}: "
             "another version of rodfem wrote it; run the scene again."
         )
-    return kind(**{name: entries[name] for name in names})
+    return kind(**{name: entries[name] for name in known if name in entries})

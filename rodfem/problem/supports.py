@@ -28,23 +28,11 @@ from ufl.utils.stacks import StackDict
 from forms.kinematics import UNDEFORMED
 from forms.rotation import IDENTITY, product, rotation
 from rodfem.errors import SceneError
-from rodfem.problem.ends import Constants, Constraint, End, OfPlace, Ring
-from rodfem.problem.local_state import place
+from rodfem.problem.constraint import Constraint
+from rodfem.problem.end import SIDES, End
+from rodfem.problem.local_state import Constants, OfPlace, asks_where, place
 from rodfem.problem.scene import Scene
-from rodfem.problem.setting import (
-    AXIS,
-    DISTRIBUTED,
-    FOUNDATION,
-    HELD,
-    SECTION,
-    SUPPORTS,
-    TIES,
-    TURNS,
-    Support,
-    Tie,
-    kind_of,
-)
-from rodfem.problem.user_functions import asks_where
+from rodfem.problem.setting import DISTRIBUTED, FOUNDATION, HELD, SECTION, SUPPORTS, TIES, Support, Tie, kind_of
 
 Floats = NDArray[np.float64]
 
@@ -67,16 +55,15 @@ def supports_of(scene: Scene, sample: Sample) -> dict[str, Support]:
     load, out = float(sample["load"]), {}
     for name, (s, end, mass) in _places(scene).items():
         c, start = scene.constants(load, s), _start(scene, s)
-        held = np.array([p is not None for p in end.held(c)])
-        turning = TURNS if end.rotation is None else HELD if end.hinge is None else AXIS
         springs = np.zeros((2, 3, 3))
         if end.energy is not None:
             springs = stiffness_of(end.energy, c, s, scene.length, _state(sample, s)[0], start)
         out[name] = Support(
             s=s,
-            kind=kind_of(int(held.sum()), turning, bool(springs.any())),
-            held=held,
-            turning=turning,
+            kind=kind_of(len(end.fixed(c)), end.turning, bool(springs.any())),
+            held=np.array([p is not None for p in end.held(c)]),
+            guide=np.array(end.guide),
+            turning=end.turning,
             axis=np.zeros(3) if end.hinge is None else np.asarray(end.hinge, dtype=float),
             translation_stiffness=springs[0],
             rotation_stiffness=springs[1],
@@ -89,9 +76,9 @@ def supports_of(scene: Scene, sample: Sample) -> dict[str, Support]:
 def _places(scene: Scene) -> dict[str, tuple[float, End, Callable[[Constants], Any] | None]]:
     """Where something may hold or load the rod: arclength, the end or what is like one, and the mass attached."""
     out: dict[str, tuple[float, End, Callable[[Constants], Any] | None]] = {}
-    if not isinstance(scene.ends, Ring):
-        for name, s, end in zip(("left end", "right end"), scene.interval, scene.sides, strict=True):
-            out[name] = s, end, None
+    for side, s, end in zip(SIDES, scene.interval, scene.sides, strict=True):
+        if not end.closed:
+            out[f"{side} end"] = s, end, None
     for i, x in enumerate(scene.attachments):
         out[f"attachment {i + 1}"] = x.s, End(force=x.force, follower=x.follower, energy=x.energy), x.mass
     return out
@@ -115,9 +102,9 @@ def _changing(scene: Scene, s: float, end: End, sample: Sample, springs: Floats)
     frame, loads = _start(scene, s), np.zeros((2, 3))
     if end.energy is not None:
         loads = load_of(end.energy, c, s, scene.length, *_state(sample, s), springs)
-        loads[1] *= end.rotation is None or end.hinge is not None
+        loads[1] *= end.turning != HELD
     if end.rotation is not None:
-        frame = _vector(end.rotation, c) if callable(end.rotation) else np.asarray(end.rotation, dtype=float)
+        frame = np.array([_number(x) for x in end.frame(c)])
     return {
         "frame": frame / np.linalg.norm(frame),
         "force": np.where([p is not None for p in end.held(c)], 0.0, _vector(end.force, c) + loads[0]),
@@ -258,7 +245,7 @@ def foundation_of(scene: Scene, sample: Sample) -> tuple[Floats, Floats] | None:
 def ties_of(scene: Scene, samples: Sequence[Sample]) -> list[list[Tie]]:
     """What each constraint of a scene keeps, in states given by :meth:`~rodfem.fem.shape.Shape.sample`."""
     load = float(samples[0]["load"])
-    whole = [_of_the_ends(scene, x, load) if x.kind == "integral" else None for x in scene.constraints]
+    whole = [_of_the_ends(scene, x, load) if x.whole else None for x in scene.constraints]
     return [[_tie(scene, x, a, sample) for sample in samples] for x, a in zip(scene.constraints, whole, strict=True)]
 
 
@@ -271,8 +258,7 @@ def _tie(scene: Scene, constraint: Constraint, a: Floats | None, sample: Sample)
     if a is not None:
         start, end = np.asarray(sample["r"][0]), np.asarray(sample["r"][-1])
         return Tie(np.nan, np.array([start, start + a * (a @ (end - start)) / (a @ a)]), none[0], "")
-    words = "integral constraint" if constraint.kind == "integral" else "constraint all along the rod"
-    return Tie(np.nan, none, none[0], words)
+    return Tie(np.nan, none, none[0], constraint.words)
 
 
 def _surface(scene: Scene, of: OfPlace, s: float, sample: Sample) -> tuple[Floats, Floats]:
@@ -306,12 +292,12 @@ def _of_the_ends(scene: Scene, constraint: Constraint, load: float) -> Floats | 
         R, strains = rotation(turned), ufl.as_vector(v.tolist())
         known = {"dr": ufl.dot(R, strains), "v": strains, "k": ufl.as_vector(rng.normal(size=3).tolist())}
         x = place(turned, R, s, r, length=scene.length, **known)
-        values.append(_number(constraint.of(x, scene.constants(load, s))))
+        values.append(_number(constraint.value(x, scene.constants(load, s))))
         rows.append([*(Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix() @ v), 1.0])
     matrix, value = np.array(rows), np.array(values)
     a = np.linalg.lstsq(matrix, value, rcond=None)[0]
     fits = np.linalg.norm(matrix @ a - value) < SMALL * np.linalg.norm(value)
-    return a[:3] if fits and np.linalg.norm(a[:3]) > SMALL and not isinstance(scene.ends, Ring) else None
+    return a[:3] if fits and np.linalg.norm(a[:3]) > SMALL and not scene.closed else None
 
 
 def _stations(scene: Scene) -> Floats:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import ufl
 
 from forms.kinematics import UNDEFORMED
 from rodfem.errors import SceneError
-from rodfem.problem.ends import Attachment, Constraint, End, Ring, check_vector
-from rodfem.problem.user_functions import asked_for, asks_where, functions_of, functions_of_places, some_places
+from rodfem.problem.attachment import Attachment
+from rodfem.problem.constraint import Constraint
+from rodfem.problem.end import SIDES, End
+from rodfem.problem.kinds import check_scalar, check_vector
+from rodfem.problem.local_state import asked_for, asks_where, functions_of_places, some_places
+from rodfem.problem.roles import functions_of
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
@@ -21,9 +25,7 @@ if TYPE_CHECKING:
 
 def check_kinds(scene: Scene) -> None:
     """Check that what a scene is made of is of the right kind."""
-    if not isinstance(scene.ends, Ring) and not (
-        isinstance(scene.ends, (tuple, list)) and len(scene.ends) == 2 and all(isinstance(e, End) for e in scene.ends)
-    ):
+    if not isinstance(scene.ends, Iterable) or [isinstance(end, End) for end in scene.ends] != [True, True]:
         raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
     for what, given, kind, example in (
         ("attachments", scene.attachments, Attachment, "(Attachment(0.5, force=...),)"),
@@ -59,11 +61,10 @@ def check_shapes(scene: Scene) -> None:
     """Check that forces and moments are vectors, and energies and constraints scalars."""
     c = scene.constants()
     for what, function, role in functions_of(scene):
-        if role.call == "f(c)" and role.size is not None:
-            if role.size:
-                check_vector(what, function(c), role.size)
-            else:
-                check_scalar(what, function(c))
+        if role.call == "f(c)" and role.size:
+            check_vector(what, function(c), role.size)
+        elif role.call == "f(c)" and role.size == 0:
+            check_scalar(what, function(c))
     for what, function, known in functions_of_places(scene):
         check_scalar(what, function(known, c))
 
@@ -81,9 +82,9 @@ def check_plane(scene: Scene) -> None:
                 "is planar: hold both at the same, or leave planar out."
             )
     for what, function, role in functions_of(scene):
-        if role.call != "f(c)" or not ("force" in what or "moment" in what):
+        if role.load is None or role.call != "f(c)":
             continue
-        out = [i for i in range(3) if (i == normal) != ("moment" in what)]
+        out = [i for i in range(3) if (i == normal) != role.load.moment]
         for s in scene.samples():
             values = [float(x) for x in function(scene.constants(max(scene.span, key=abs), s))]
             if any(values[i] for i in out):
@@ -114,22 +115,9 @@ def check_ordinate(scene: Scene) -> None:
             raise
 
 
-def check_scalar(what: str, value: Any) -> None:
-    """Raise :class:`SceneError` unless ``value`` is a scalar, a number or an expression."""
-    try:
-        shape = ufl.as_ufl(value).ufl_shape
-    except Exception:  # of UFL's own, which differ from release to release
-        raise SceneError(f"The {what} is {value!r}: return a number or a UFL expression.") from None
-    if shape != ():
-        raise SceneError(f"The {what} has the shape {shape}: return a scalar.")
-
-
 def check_start(scene: Scene) -> None:
-    """Check that the start returns quaternions, and that of a ring closes."""
-    ring = isinstance(scene.ends, Ring)
+    """Check that the start returns quaternions, of rotations in the plane."""
     if scene.start is None:
-        if ring:
-            raise SceneError("A ring has no straight start: give its rotation as a function start(s).")
         return
     s = np.linspace(*scene.interval, 5)
     q = np.asarray(scene.start(s), dtype=float)
@@ -139,11 +127,6 @@ def check_start(scene: Scene) -> None:
         raise SceneError("The start is no rotation everywhere: return quaternions of unit norm.")
     if scene.normal is not None and abs(np.delete(q[:, 1:], scene.normal, axis=1)).max() > 1e-12:
         raise SceneError(f"The start leaves the plane across {scene.planar}: turn about that axis only.")
-    if isinstance(scene.ends, Ring) and scene.ends.sign * (q[0] @ q[-1]) <= 0:
-        raise SceneError(
-            f"The start of the ring does not end as it begins: make q(l) = {scene.ends.sign:+g} q(0), or choose "
-            f"Ring(odd={not scene.ends.odd})."
-        )
 
 
 def check_energy(scene: Scene) -> None:
@@ -174,9 +157,9 @@ def check_scene(scene: Scene) -> None:
     check_energy(scene)
     check_places(scene)
     check_shapes(scene)
+    check_start(scene)
     check_supports(scene)
     check_plane(scene)
-    check_start(scene)
     check_convexity(scene)
     check_inertia(scene)
     check_ordinate(scene)
@@ -197,40 +180,8 @@ def check_convexity(scene: Scene) -> None:
 
 def check_supports(scene: Scene) -> None:
     """Check shapes, whether anything holds the rod, and whether the ends can be where they are asked to be."""
-    for side, end in zip(("left", "right"), scene.sides, strict=True):
-        for load in scene.span:
-            c = scene.constants(load)
-            if end.position is not None:
-                check_vector(f"position of the {side} end", end.position(c), 3)
-            rotation = end.rotation(c) if callable(end.rotation) else end.rotation
-            if rotation is not None:
-                check_vector(f"rotation of the {side} end", rotation, 4)
-                if scene.normal is not None and any(rotation[i + 1] != 0 for i in range(3) if i != scene.normal):
-                    raise SceneError(
-                        f"The rotation of the {side} end leaves the plane across {scene.planar}: "
-                        "turn about that axis only."
-                    )
-                if not sum(float(x) ** 2 for x in rotation) > 0:
-                    raise SceneError(f"The rotation of the {side} end is the zero quaternion: give one of unit norm.")
-        if end.hinge is not None and end.rotation is None:
-            raise SceneError(f"The {side} end has a hinge but no rotation: say which directors the hinge holds.")
-        if end.hinge is not None:
-            check_vector(f"hinge of the {side} end", end.hinge, 3)
-        if end.hinge is not None and not np.linalg.norm(end.hinge) > 0:
-            raise SceneError(f"The hinge of the {side} end has no axis: give three components, not all zero.")
-        if end.follower is not None and all(x is not None for x in end.held(scene.constants())):
-            raise SceneError(
-                f"A follower force acts on the {side} end, whose position is held: leave it free in one direction."
-            )
-        if end.force is not None and all(x is not None for x in end.held(scene.constants())):
-            raise SceneError(
-                f"A dead force acts on the {side} end, whose position is held: it has no effect there; leave it out, "
-                "or leave the position free in one direction."
-            )
-        if end.fixed_rotation is not None and (end.moment or end.follower_moment):
-            raise SceneError(
-                f"A moment acts on the {side} end, whose directors are held: leave its rotation free, or use a hinge."
-            )
+    for side, end in zip(SIDES, scene.sides, strict=True):
+        end.check(side, scene)
     check_drift(scene)
     check_reach(scene)
 
@@ -238,11 +189,11 @@ def check_supports(scene: Scene) -> None:
 def check_drift(scene: Scene) -> None:
     """Raise unless something holds the rod, or what acts on it is in balance whatever its shape."""
     c = scene.constants()
-    if isinstance(scene.ends, Ring) or any(asks_where(f, c) for _, f, _ in functions_of_places(scene)):
+    if scene.closed or any(asks_where(f, c) for _, f, _ in functions_of_places(scene)):
         return
-    held = [[x is not None for x in end.held(c)] for end in scene.sides]
-    for i, (left, right) in enumerate(zip(*held, strict=True)):
-        if not (left or right):
+    held = np.vstack([np.zeros(3), *(end.fixed(c) for end in scene.sides)])
+    for i, direction in enumerate(np.eye(3)):
+        if np.linalg.matrix_rank(np.vstack([held, direction])) > np.linalg.matrix_rank(held):
             raise SceneError(
                 f"The rod can drift away along e{i + 1}: hold that component of the position at one end at least, "
                 "or attach a spring."

@@ -46,7 +46,7 @@ from rodfem.errors import SceneError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import block_matrix, first_of, local_rows, petsc_matrix
-from rodfem.problem.ends import Ring
+from rodfem.problem.ring import CLOSING_MOMENT
 from rodfem.stability.pencil import assemble_pencil
 
 COORDINATES = ("full", "tangent", "compatible")
@@ -154,7 +154,7 @@ class Blocks:
         where["theta"] = np.flatnonzero(spins[kept]) + first
         del where["q"]
         pencil = Pencil(K.ptap(T), T.transposeMatMult(C), M.ptap(T), T, where, self.place, symmetric)
-        if isinstance(self.system.scene.ends, Ring):
+        if self.system.scene.closed:
             pencil = self._closed(pencil, state)
         if self.coordinates == "tangent" or "v" not in where:
             return pencil
@@ -216,7 +216,7 @@ class Blocks:
         start = np.isclose(f.coordinates(self.system.fields.discretization.degree), self.system.scene.interval[0])
         here = state.values("q")[start]
         q = next(part[0] for part in comm.allgather(here) if len(part))
-        closing = [x for x in f.unknown_scalars if x.group == "t"]
+        closing = [x for x in f.unknown_scalars if x.group == CLOSING_MOMENT]
         scalars = np.array([f.scalars[x.name] for x in closing] if self.system.has_scalars else [], dtype=int)
         columns = np.searchsorted(self.columns, scalars)
         across = np.linalg.svd(q[[x.component for x in closing]][None])[2][1:].T if len(columns) else np.zeros((0, 0))
@@ -226,7 +226,7 @@ class Blocks:
             chosen[np.ix_(columns, np.searchsorted(kept, columns[:-1]))] = across
         first, begin = pencil.C.getOwnershipRangeColumn()[0], first_of(comm, len(kept))
         where = dict(pencil.where)
-        for name in ("n", "scalars", *(n for n in where if n.startswith("p") and n[1:].isdigit())):
+        for name in ("scalars", *(b.name for b in f.blocks if b.multiplier)):
             if name in where:
                 own = where[name] - first
                 where[name] = np.searchsorted(kept, own[np.isin(own, kept)]) + begin

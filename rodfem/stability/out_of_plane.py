@@ -7,10 +7,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import SceneError
-from rodfem.fem.fields import across
 from rodfem.fem.newton import correct
 from rodfem.fem.state import State
 from rodfem.fem.system import System
+from rodfem.problem.ring import CLOSING_MOMENT
 from rodfem.stability.inertia import Index, Inertia
 
 PUSHED = 1e-8
@@ -38,7 +38,7 @@ class InSpace:
         """State in space of the planar state ``x``, as accurate an equilibrium as the discretisation is."""
         state = self.planar.at(x)
         quaternions = state.fields.turning.quaternion(state.turned)
-        return self.system.vector(self.system.fields.filled(state.named | self._moments(state) | {"q": quaternions}))
+        return self.system.vector(self.system.fields.filled(state.named | self._scalars(state) | {"q": quaternions}))
 
     def count(self, x: PETSc.Vec) -> Index:
         """Index in space of the planar equilibrium ``x``; raises :class:`SceneError` where it is none in space."""
@@ -57,25 +57,26 @@ class InSpace:
             state = settled  # else the state is so near a singular one that its own error decides as well
         return self.inertia.count(state)
 
-    def _moments(self, state: State) -> dict[str, float]:
-        """Moments that hold or close the rod in space, from the one about the normal."""
-        scene, values, normal = self.planar.scene, state.scalars, self.planar.scene.normal
-        assert normal is not None
-        out: dict[str, float] = {}
-        for letter, end in zip("ab", scene.sides, strict=True):
-            if f"m{letter}1" in values:
-                directions = np.array(across(end.hinge))
-                moments = directions[:, normal] * values[f"m{letter}1"]
-                out |= {f"m{letter}{i + 1}": float(m) for i, m in enumerate(moments)}
-        if "t1" in values:
-            old = self.planar.fields
+    def _scalars(self, state: State) -> dict[str, float]:
+        """Scalar unknowns in space from those in the plane, vectors by their components along new directions."""
+        scene, old, new = self.planar.scene, self.planar.fields, self.system.fields
+        out = {x.name: state.scalars[x.name] for x in old.unknown_scalars}
+        vectors: dict[str, np.ndarray] = {}
+        for x in old.unknown_scalars:
+            if x.direction is not None:
+                vectors[x.group.name] = vectors.get(x.group.name, np.zeros(3)) + out.pop(x.name) * np.array(x.direction)
+        if scene.closed:
             at_end = np.isclose(
                 old.coordinates(old.discretization.degree), scene.interval[1], rtol=0, atol=1e-9 * scene.length
             )
             mine = state.turned[at_end].max(initial=-np.inf)
-            last = np.array([old.comm.allreduce(float(mine), op=MPI.MAX)])
-            closing = 4 * values["t1"] * old.turning.change(last, np.ones(1))
-            out |= {f"t{i + 1}": float(t) for i, t in enumerate(closing)}
+            last = np.array([new.comm.allreduce(float(mine), op=MPI.MAX)])
+            moment = [out.pop(x.name) for x in old.groups[CLOSING_MOMENT]]
+            closing = old.turning.functional(last, np.array(moment))
+            out |= {x.name: float(closing[x.component]) for x in new.groups[CLOSING_MOMENT]}
+        for x in new.unknown_scalars:
+            if x.direction is not None and x.group.name in vectors:
+                out[x.name] = float(np.dot(x.direction, vectors[x.group.name]))
         return out
 
     def _out_of_plane(self) -> np.ndarray:

@@ -1,0 +1,212 @@
+"""An end of the rod: what holds and loads it, what that contributes to the problem, and what is checked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import ufl
+
+from forms import loads
+from rodfem.errors import SceneError
+from rodfem.problem.contribution import UNIT, Block, Contribution, Direction, Group, Motion, Site, Unknown
+from rodfem.problem.kinds import check_vector
+from rodfem.problem.load import DEAD_AT_END, FOLLOWER, FOLLOWER_MOMENT, MOMENT, POTENTIAL
+from rodfem.problem.roles import Role
+from rodfem.problem.setting import AXIS, HELD, TURNS
+
+if TYPE_CHECKING:
+    from rodfem.problem.local_state import Constants, OfConstants, OfPlace, Quaternion
+    from rodfem.problem.scene import Scene
+
+SIDES, LETTERS = ("left", "right"), "ab"
+"""The two ends in words, and in names of unknowns."""
+ALONG = 0.999
+"""Cosine of the angle between an axis and the normal of the plane above which a planar rod turns about the axis."""
+
+
+@dataclass(frozen=True)
+class End(Contribution):
+    """What holds and loads one end of the rod.
+
+    Parameters
+    ----------
+    position
+        ``position(c)`` gives three components, each an expression (held there) or None (free to move in that
+        direction); None leaves all three free.
+    rotation
+        Quaternion (scalar first) at which the directors are held; ``rotation(c)`` gives one that changes with the
+        constants; None leaves them free.
+    hinge
+        Axis, in components along the directors of the held end, about which the end turns freely nevertheless.
+    force
+        ``force(c)``, dead force on the end, felt in the free directions.  Conservative.
+    follower
+        ``follower(c)``, force on a free end by its components along the directors, with which it turns.  Not
+        conservative.
+    moment
+        ``moment(c)``, moment about axes fixed in space.  Not conservative, but for a planar rod.
+    follower_moment
+        ``follower_moment(c)``, moment by its components along the directors.  Not conservative, but for a planar rod.
+    energy
+        ``energy(x, c)``, potential energy of what else acts on the end: springs, a semi-tangential moment.
+        Conservative.
+    """
+
+    position: OfConstants | None = field(default=None, metadata={"role": Role("position of the {} end", "f(c)")})
+    rotation: Quaternion | OfConstants | None = field(
+        default=None, metadata={"role": Role("rotation of the {} end", "f(c)", or_value=True)}
+    )
+    force: OfConstants | None = field(
+        default=None, metadata={"role": Role("force on the {} end", "f(c)", 3, load=DEAD_AT_END)}
+    )
+    follower: OfConstants | None = field(
+        default=None, metadata={"role": Role("follower force on the {} end", "f(c)", 3, load=FOLLOWER)}
+    )
+    hinge: tuple[float, float, float] | None = None
+    moment: OfConstants | None = field(
+        default=None, metadata={"role": Role("moment on the {} end", "f(c)", 3, load=MOMENT)}
+    )
+    follower_moment: OfConstants | None = field(
+        default=None, metadata={"role": Role("follower moment on the {} end", "f(c)", 3, load=FOLLOWER_MOMENT)}
+    )
+    energy: OfPlace | None = field(
+        default=None, metadata={"role": Role("energy of the {} end", "f(x, c)", 0, load=POTENTIAL)}
+    )
+
+    # --- what is held ----------------------------------------------------------------------------------------------
+
+    closed = False
+    """Whether it is joined to the other end."""
+
+    @property
+    def sign(self) -> float:
+        """Factor between the quaternion of an end and of that which it is joined to."""
+        return 1.0
+
+    @property
+    def guide(self) -> Direction:
+        """Direction in which the position slides where that need not be e1, e2 or e3; zero without one."""
+        return (0.0, 0.0, 0.0)
+
+    def held(self, c: Constants) -> list[Any]:
+        """Position of the end: three expressions, None where the end is free."""
+        return [None] * 3 if self.position is None else list(self.position(c))
+
+    def fixed(self, c: Constants) -> np.ndarray:
+        """Directions in which the position is held, as rows of (m, 3)."""
+        return np.array([e for e, x in zip(UNIT, self.held(c), strict=True) if x is not None]).reshape(-1, 3)
+
+    def frame(self, c: Constants) -> Any:
+        """Quaternion at which the directors are held, None where they are free."""
+        return self.rotation(c) if callable(self.rotation) else self.rotation
+
+    @property
+    def turning(self) -> str:
+        """What the directors may do: nothing, turn about the axis of the hinge, or turn freely."""
+        return TURNS if self.rotation is None else HELD if self.hinge is None else AXIS
+
+    @property
+    def fixed_rotation(self) -> Quaternion | None:
+        """Quaternion at which the directors are clamped once and for all, None where they are not."""
+        if self.rotation is None or callable(self.rotation) or self.hinge is not None:
+            return None
+        size = sum(x * x for x in self.rotation) ** 0.5
+        a, b, c, d = (x / size for x in self.rotation)
+        return (a, b, c, d)
+
+    def clamps(self, block: Block, c: Constants) -> list[bool]:
+        """Components of a continuous field that are given at the end; one for all of a rotation or a multiplier."""
+        held = [x is not None for x in self.held(c)]
+        if block.name == "r":
+            return held
+        if block.along:  # what holds the end fulfils the constraint there
+            return [self.rotation is not None or any(held)]
+        return [self.fixed_rotation is not None]
+
+    # --- what it contributes ---------------------------------------------------------------------------------------
+
+    def contact_force(self, c: Constants) -> list[Any]:
+        """Components of the contact force that dead forces prescribe, pulling outwards; None elsewhere."""
+        force = [0.0] * 3 if self.force is None else self.force(c)
+        return [f if x is None else None for f, x in zip(force, self.held(c), strict=True)]
+
+    @property
+    def dead(self) -> bool:
+        """Whether dead forces are all that acts on the position where it is free."""
+        return self.energy is None
+
+    def unknowns(self, number: int, normal: int | None, pointwise: bool) -> list[Unknown]:
+        """Moments of a moving clamp or a hinge."""
+        directions = self._stiff(normal)
+        motion = Motion.MIXED if len(directions) == 2 else Motion.VECTOR
+        words = f"moment at the {SIDES[number]} end"
+        group = Group(f"m{LETTERS[number]}", words, "rotation of an end, direction {}", motion)
+        return [Unknown(group, i, direction) for i, direction in enumerate(directions)]
+
+    def lagrangian(self, at: Site) -> Iterator[Any]:
+        """Loads, and the misalignment of a moving clamp or a hinge with its moments."""
+        yield from super().lagrangian(at)
+        for moment, direction in zip(at.y, self._stiff(at.normal), strict=False):
+            yield moment * ufl.dot(loads.misalignment(at.x.q, self.frame(at.c)), ufl.as_vector(direction))
+
+    def _stiff(self, normal: int | None) -> list[Direction]:
+        """Directions about which moments, as unknowns, keep the end from turning."""
+        return [] if self.rotation is None or self.fixed_rotation is not None else across(self.hinge, normal)
+
+    # --- what is checked -------------------------------------------------------------------------------------------
+
+    def check(self, side: str, scene: Scene) -> None:
+        """Check shapes, and that nothing acts on what is held; raises :class:`SceneError`."""
+        for load in scene.span:
+            c = scene.constants(load)
+            if self.position is not None:
+                check_vector(f"position of the {side} end", self.position(c), 3)
+            self._check_rotation(side, scene, c)
+        if self.hinge is not None:
+            if self.rotation is None:
+                raise SceneError(f"The {side} end has a hinge but no rotation: say which directors the hinge holds.")
+            check_vector(f"hinge of the {side} end", self.hinge, 3)
+            if not np.linalg.norm(self.hinge) > 0:
+                raise SceneError(f"The hinge of the {side} end has no axis: give three components, not all zero.")
+        if len(self.fixed(scene.constants())) == 3:
+            if self.follower is not None:
+                raise SceneError(
+                    f"A follower force acts on the {side} end, whose position is held: leave it free in one direction."
+                )
+            if self.force is not None:
+                raise SceneError(
+                    f"A dead force acts on the {side} end, whose position is held: it has no effect there; leave it "
+                    "out, or leave the position free in one direction."
+                )
+        if self.fixed_rotation is not None and (self.moment or self.follower_moment):
+            raise SceneError(
+                f"A moment acts on the {side} end, whose directors are held: leave its rotation free, or use a hinge."
+            )
+
+    def _check_rotation(self, side: str, scene: Scene, c: Constants) -> None:
+        rotation = self.frame(c)
+        if rotation is None:
+            return
+        check_vector(f"rotation of the {side} end", rotation, 4)
+        if scene.normal is not None and any(rotation[i + 1] != 0 for i in range(3) if i != scene.normal):
+            raise SceneError(
+                f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about that axis only."
+            )
+        if not sum(float(x) ** 2 for x in rotation) > 0:
+            raise SceneError(f"The rotation of the {side} end is the zero quaternion: give one of unit norm.")
+
+
+def across(axis: tuple[float, float, float] | None, normal: int | None = None) -> list[Direction]:
+    """Unit vectors across ``axis``, all three without one: the directions about which an end does not turn.
+
+    In a plane that is its normal, or nothing where the axis is along it.
+    """
+    if normal is not None:
+        along = axis is not None and abs(axis[normal]) > ALONG * float(np.linalg.norm(axis))
+        return [] if along else [UNIT[normal]]
+    if axis is None:
+        return list(UNIT)
+    return [tuple(map(float, row)) for row in np.linalg.svd(np.array([axis], dtype=float))[2][1:]]
