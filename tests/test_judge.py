@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from states import buckled, plain, scene
 
 from rodfem.diagram.solver import Solver
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.linalg.matrices import gathered, petsc_matrix
 from rodfem.linalg.selection import factors_of
@@ -111,13 +111,13 @@ def test_methods_agree_without_symmetry(load: float) -> None:
 
 def test_names() -> None:
     to_judge, x = at("cord", "reduced", 20.0, False)
-    with pytest.raises(SceneError, match="Unknown method 'magic': choose one of auto, count, shift-invert"):
+    with pytest.raises(InputError, match="Unknown method 'magic': choose one of auto, count, shift-invert"):
         to_judge(x, "magic")
-    with pytest.raises(SceneError, match="ask for none or more"):
+    with pytest.raises(InputError, match="ask for none or more"):
         to_judge(x, "auto", -1)
     system, y = plain("follower", "pointwise", *SMALL, 10.0)
     for method in ("count", "cayley", "slicing"):
-        with pytest.raises(SceneError, match="needs a symmetric pencil"):
+        with pytest.raises(InputError, match="needs a symmetric pencil"):
             judge(system, y, method)
     assert to_judge(x, number=0).method == "count"
     assert to_judge(x, number=2).method == "shift-invert"
@@ -164,7 +164,7 @@ def test_interval() -> None:
     found = to_judge(x, "slicing", interval=(low, high))
     np.testing.assert_allclose(found.values, every[2:6], rtol=1e-9)
     assert found.certified
-    with pytest.raises(SceneError, match="is empty"):
+    with pytest.raises(InputError, match="is empty"):
         to_judge(x, "slicing", interval=(high, low))
 
 

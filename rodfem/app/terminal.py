@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite
 from typing import TextIO
 
@@ -27,6 +27,7 @@ from rodfem.continuation.branch import (
     not_followed,
 )
 from rodfem.continuation.observer import Observer
+from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.modes import Modes
@@ -84,9 +85,11 @@ def _roots(point: Point) -> dict[str, str]:
 class Report(Observer):
     """Prints on rank 0."""
 
-    def __init__(self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None) -> None:
-        """Print to ``stream``, by default the terminal."""
-        self.count = INDEX
+    def __init__(
+        self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None, words: Callable[[str], str] = str
+    ) -> None:
+        """Print what ``words`` makes of each line to ``stream``, by default the terminal."""
+        self.count, self.words = INDEX, words
         self.on = comm.rank == 0
         self.stream = stream or sys.stdout
         self.live = self.on and self.stream.isatty() and comm.size == 1
@@ -96,7 +99,7 @@ class Report(Observer):
         if self.on:
             if self.live:
                 self.stream.write("\r\033[K")
-            self.stream.write(line + end)
+            self.stream.write(self.words(line) + end)
             self.stream.flush()
 
     def note(self, sentence: str) -> None:
@@ -226,7 +229,7 @@ class Report(Observer):
             )
             self.say(
                 f"  {missed} branch point{'s were' if missed > 1 else ' was'} not followed, at the depth of switches: "
-                f"--depth {deepest + 1} follows what leaves there"
+                f"{Argument('Plan', 'depth', deepest + 1)} follows what leaves there"
             )
 
     def spectra(self, branches: Sequence[Branch], scene: Scene) -> None:

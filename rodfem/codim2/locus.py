@@ -29,7 +29,7 @@ from rodfem.codim2.singular import Singular, null_vectors
 from rodfem.continuation.branch import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, Special
 from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.continuation.step_control import Steps
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.file_format import LOCUS
 from rodfem.output.digits import number
@@ -187,7 +187,7 @@ def locus(
 
     Raises
     ------
-    SceneError
+    InputError
         For a parameter, bounds or a kind of special point that make no sense.
     ConvergenceError
         Where the special point itself is not found again.
@@ -196,7 +196,7 @@ def locus(
     plane = Plane(system, parameter, bounds)
     p = np.array([special.point.load, scene.parameters[parameter].value])
     if plane.outside(p) is not None:
-        raise SceneError(
+        raise InputError(
             f"The special point at {scene.load} = {p[0]:g}, {parameter} = {p[1]:g} is outside the bounds: widen them."
         )
     with system.clock.purpose("locus"), plane.kept():
@@ -254,18 +254,18 @@ def locus(
 
 
 def _guess(solver: Equilibria, special: Special, p: np.ndarray) -> Node:
-    """The special point as a point of the plane; raises :class:`SceneError` for a kind that has no locus."""
+    """The special point as a point of the plane; raises :class:`InputError` for a kind that has no locus."""
     if special.kind not in (FOLD, BRANCH_POINT, FLUTTER, DIVERGENCE):
-        raise SceneError(
+        raise InputError(
             f"A point of the kind {special.kind!r} has no locus: choose a fold, branch point, flutter or divergence."
         )
     if special.kind in (FOLD, BRANCH_POINT) and not isinstance(solver, Follower):
-        raise SceneError("The locus of a fold or a branch point needs the follower that found it.")
+        raise InputError("The locus of a fold or a branch point needs the follower that found it.")
     x, left = special.point.x, list[PETSc.Vec]()
     modes = list(special.null_vectors)
     if special.kind == FLUTTER:
         if special.cluster is None or special.note:
-            raise SceneError(f"This flutter has no locus: {special.note or 'it was not found by a sweep'}.")
+            raise InputError(f"This flutter has no locus: {special.note or 'it was not found by a sweep'}.")
         modes = as_vectors(solver.system, special.cluster.basis)
     if special.kind == DIVERGENCE:
         number = abs(special.negative_after - special.negative_before)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from petsc4py import PETSc
 
+from rodfem.errors import SMALLER_STEPS
+
 if TYPE_CHECKING:
     from rodfem.problem.events import Event
     from rodfem.stability.cluster import Cluster
@@ -154,7 +156,7 @@ class Unexplained:
         """Say it in a sentence."""
         return (
             f"Between loads {self.a.load:.8g} and {self.b.load:.8g} the index changes from {self.before} to "
-            f"{self.after}, and no special point was found that says why: use smaller steps (--step) or more elements."
+            f"{self.after}, and no special point was found that says why: {SMALLER_STEPS} or more elements."
         )
 
 

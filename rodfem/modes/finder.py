@@ -9,7 +9,7 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import bound, halved
 from rodfem.continuation.solvers import Equilibria
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.fem.system import combine
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
@@ -57,7 +57,7 @@ class ModeFinder:
         spectrum = self.judge.spectrum
         assert spectrum is not None
         if not verdict.vectors:
-            raise SceneError("Counting alone finds no modes: choose another method than 'count'.")
+            raise InputError("Counting alone finds no modes: choose another method than 'count'.")
         spectrum.assemble(x)
         vectors = [v.copy() for v in verdict.vectors]
         orthonormalize(vectors, spectrum.mass)

@@ -20,7 +20,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.file_format import DIAGRAM, read_json
 from rodfem.output.plot_pieces import COUNTED, IMPERFECT, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
 
@@ -71,7 +71,7 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
 
     Raises
     ------
-    SceneError
+    InputError
         If these are contents of another or a newer format.
     ValueError
         If there are no branches, if columns of one differ in length, or if the format is unknown.
@@ -293,7 +293,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         diagram = read_json(options.diagram, DIAGRAM, ("title", "parameter_label", "ordinate", "branches"))
         print(draw_diagram(diagram, options.output or options.diagram.with_suffix(".png")))
-    except SceneError as error:
+    except InputError as error:
         print(error, file=sys.stderr)
         return 2
     except (KeyError, OSError, ValueError) as error:

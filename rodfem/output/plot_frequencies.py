@@ -66,7 +66,7 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
     One line a curve, one colour a kind of motion: eigenvalues that are double are two lines on each other, of one
     colour.  Real frequencies are dots, a complex pair is a cross (real part) and a plus (imaginary part), what has
     diverged is a plus; flutter loads are stars, divergence loads triangles.  The axis shows the ``most`` left-most
-    eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any ``omega2``, and SceneError for
+    eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any ``omega2``, and InputError for
     contents of another or a newer format.
     """
     figure = figure_of(diagram, most)

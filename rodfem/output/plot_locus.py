@@ -49,7 +49,7 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
 
     Raises
     ------
-    SceneError
+    InputError
         For contents of another or a newer format.
     ValueError
         Without any locus, or if they are not of the same parameters.

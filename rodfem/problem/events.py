@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,12 @@ class Event:
     of: Callable[[Any], float]
 
     def __call__(self, state: Mapping[str, Any]) -> float:
-        """Value at a state, given by its arrays; raises :class:`SceneError` for what the function raises."""
+        """Value at a state, given by its arrays; raises :class:`InputError` for what the function raises."""
         try:
             return float(self.of(SimpleNamespace(**state)))
         except Exception as trouble:  # whatever a person's function may raise
             first = str(trouble).split("\n", 1)[0].rstrip(".")
-            raise SceneError(
+            raise InputError(
                 f"The event {self.name!r} fails with {type(trouble).__name__}, {first!r}: it receives a state with "
                 "arrays s (m,), r (m, 3) and q (m, 4), and returns a number."
             ) from trouble

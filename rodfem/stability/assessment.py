@@ -24,7 +24,7 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import first_of, gathered, local_rows
 from rodfem.stability.blocks import Blocks, Pencil
@@ -127,7 +127,7 @@ class Judge:
         return Spectrum(self.inertia) if self.inertia else None
 
     def choose(self, method: str, number: int) -> tuple[str, str]:
-        """Name of the method to use and the reason; raises :class:`SceneError` for one unknown or not applicable."""
+        """Name of the method to use and the reason; raises :class:`InputError` for one unknown or not applicable."""
         if method == "auto":
             if not self.conservative:
                 return "shift-invert", "the load has no potential, the pencil no symmetry"
@@ -137,14 +137,14 @@ class Judge:
                 return "dense", f"{self.system.fields.unknowns} unknowns are too few for a Krylov space"
             return "shift-invert", "the pencil is symmetric: one sparse factorisation serves eigenvalues and count"
         if method not in METHODS:
-            raise SceneError(f"Unknown method {method!r}: choose one of auto, {', '.join(METHODS)}.")
+            raise InputError(f"Unknown method {method!r}: choose one of auto, {', '.join(METHODS)}.")
         if method in SYMMETRIC_ONLY and not self.conservative:
-            raise SceneError(
+            raise InputError(
                 f"Method {method!r} needs a symmetric pencil, which a load without potential does not have: "
                 "use shift-invert, reduction or dense."
             )
         if method == "dense" and self.system.fields.unknowns > LARGEST:
-            raise SceneError(
+            raise InputError(
                 f"Method 'dense' is for at most {LARGEST} unknowns, not {self.system.fields.unknowns}: "
                 "use another method, or a coarser discretisation."
             )
@@ -154,12 +154,12 @@ class Judge:
         """Judge the equilibrium ``x``; sets the phase conditions there.
 
         ``interval`` (low, high) is where slicing looks, by default where the ``number`` left-most are.  Raises
-        :class:`SceneError` for a method that does not exist or apply and for dependent constraints,
+        :class:`InputError` for a method that does not exist or apply and for dependent constraints,
         :class:`ConvergenceError` where an eigensolver fails.
         """
         method, reason = self.choose(method, number)
         if number < 0:
-            raise SceneError(f"{number} eigenvalues cannot be computed: ask for none or more.")
+            raise InputError(f"{number} eigenvalues cannot be computed: ask for none or more.")
         started = perf_counter()
         self.system.set_phase(x)
         self._made, self._note = 0, ""
@@ -273,7 +273,7 @@ class Judge:
         assert spectrum is not None
         low, high = interval or self._enclose(number)
         if not low < high:
-            raise SceneError(f"An interval from {low:g} to {high:g} is empty: give its lower end first.")
+            raise InputError(f"An interval from {low:g} to {high:g} is empty: give its lower end first.")
         for wider in WIDER:  # an end on an eigenvalue is moved off it
             low, high = low - wider * (high - low), high + wider * (high - low)
             wanted = spectrum.below(high) - spectrum.below(low)
