@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from rodfem.errors import ConvergenceError, InputError, SetupError
+from rodfem.stability.methods import AUTO, METHODS
 
 NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
 
@@ -167,8 +168,7 @@ def parser_for(
         "--method",
         default="",
         metavar="NAME",
-        help="judge the states at the loads of --at by auto, count, shift-invert, cayley, slicing, reduction or dense, "
-        "and print all that it says",
+        help=f"judge the states at the loads of --at by {', '.join((AUTO, *METHODS))}, and print all that it says",
     )
     group.add_argument(
         "--modes",

@@ -12,6 +12,7 @@ from rodfem.problem.kinds import real, reals, whole
 from rodfem.problem.scene import Scene
 from rodfem.problem.user_functions import asked_for
 from rodfem.problem.validation import check_load
+from rodfem.stability import methods
 
 MODES, METHOD = Argument("Plan", "modes"), Argument("Plan", "method")
 COUNTS = {
@@ -63,6 +64,8 @@ class Plan:
             raise InputError(f"steps is {self.steps!r}: give Steps, as in steps=Steps(largest=0.02).")
         if not isinstance(self.method, str):
             raise InputError(f"method is {self.method!r}: give the name of one, as in method='auto'.")
+        if self.method not in ("", methods.AUTO):
+            methods.find(self.method)
         if self.accuracy is not None:
             real("accuracy", self.accuracy, 1e-8)
         if not all(isinstance(event, Event) for event in self.events):
@@ -116,5 +119,5 @@ class Plan:
             raise InputError("A search needs loads to search at", GIVE_LOADS)
         if (self.modes or self.method) and not self.at:
             raise InputError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at", GIVE_LOADS)
-        if self.modes and self.method == "count":
+        if self.modes and self.method in methods.METHODS and not methods.find(self.method).finds_modes:
             raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))

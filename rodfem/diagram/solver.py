@@ -140,8 +140,7 @@ class Solver:
         point
             The equilibrium.
         method
-            ``count``, ``shift-invert``, ``cayley``, ``slicing``, ``reduction``, ``dense``, or ``auto``: see
-            :class:`rodfem.stability.assessment.Judge`.
+            ``auto``, or a name of ``rodfem.stability.methods.METHODS``.
         number
             How many eigenvalues are computed.
 

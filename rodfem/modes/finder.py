@@ -55,7 +55,6 @@ class ModeFinder:
     def _conservative(self, x: PETSc.Vec, verdict: Verdict) -> dict[str, Any]:
         """Modes from the vectors of a verdict, orthonormal in the mass, and the symmetries'."""
         spectrum = self.judge.spectrum
-        assert spectrum is not None
         if not verdict.vectors:
             raise InputError("Counting alone finds no modes: choose another method than 'count'.")
         spectrum.assemble(x)
@@ -115,7 +114,6 @@ class ModeFinder:
 
     def _pairs(self, x: PETSc.Vec, number: int) -> dict[str, Any]:
         """Right and left modes of the eigenvalues nearest zero, biorthonormal in the mass."""
-        assert self.judge.vibration is not None
         self.judge.vibration.assemble(x)
         found = both_sides(self.judge.vibration, number)
         right, left = ([self._complex(x, column) for column in part.T] for part in (found.right, found.left))

@@ -28,6 +28,8 @@ from rodfem.stability.blocks import Pencil
 from rodfem.stability.projection import INVERSES, Projection, ShiftedInverse
 
 TRANSFORMS = ("shift-invert", "cayley")
+FACTORISATIONS = 3
+"""Of the eigenvalues of a symmetric pencil near a shift: there, and to count on both sides of it."""
 TOLERANCE = 1e-13
 SPURIOUS = 1e-8
 """A vector of an infinite eigenvalue (no mass) comes with an arbitrary value, and a residual greater than this."""
