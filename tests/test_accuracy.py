@@ -21,7 +21,8 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from rodfem.app.run import run
-from rodfem.continuation.branch import BRANCH_POINT, FLUTTER, FOLD, USER, Branch
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.kinds import BRANCH_POINT, FLUTTER, FOLD, USER
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver

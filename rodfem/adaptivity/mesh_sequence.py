@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Richer
 from rodfem.adaptivity.grading import Gauge, cheapest, cost, first_mesh, weights_of
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, Point, Special
+from rodfem.continuation.branch import Point, Special
 from rodfem.continuation.solvers import Follower
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
 from rodfem.fem.fields import Discretization
@@ -99,7 +99,7 @@ class Meshes:
     def error_of(self, special: Special) -> float:
         """Estimated error of a special point in load and ordinate, relative to those that exceed one."""
         error = special.ordinate_error / max(1.0, abs(special.point.ordinate))
-        if special.kind in (FOLD, BRANCH_POINT) or special.zero_of == "stretch":
+        if special.kind.singular or special.zero_of == "stretch":
             error = max(error, special.error_estimate / max(1.0, abs(special.point.load)))
         return error
 

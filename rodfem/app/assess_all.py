@@ -8,7 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import USER, Branch
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.kinds import USER
 from rodfem.continuation.solvers import Equilibria
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, InputError

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from rodfem import compat
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import END, EVENT, USER, Branch
+from rodfem.continuation.branch import Branch
 from rodfem.continuation.solvers import Equilibria
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
@@ -139,7 +139,7 @@ def _loci(
     for branch in branches:
         known: list[Locus] = []
         for special in branch.special:
-            if special.kind in (USER, EVENT, END) or special.meets is not None:
+            if not (special.kind.counted or special.kind.line) or special.meets is not None:
                 continue
             if any(found.passes(special) for found in known):
                 report.say(f"\nThe {special.kind} of {branch.name} at {special.point.load:.8g} is on a locus above")

@@ -11,21 +11,8 @@ import numpy as np
 from mpi4py import MPI
 
 from forms.kinematics import RODS
-from rodfem.continuation.branch import (
-    BRANCH_POINT,
-    DIVERGENCE,
-    END,
-    EVENT,
-    FLUTTER,
-    FOLD,
-    IMPERFECT,
-    USER,
-    Branch,
-    Law,
-    Point,
-    Special,
-    not_followed,
-)
+from rodfem.continuation.branch import Branch, Law, Point, Special, not_followed
+from rodfem.continuation.kinds import END, FLUTTER
 from rodfem.continuation.observer import Observer
 from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
@@ -36,17 +23,6 @@ from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Verdict
 from rodfem.timing import Clock
 
-LABELS = {
-    FOLD: "LP",
-    BRANCH_POINT: "BP",
-    FLUTTER: "HB",
-    DIVERGENCE: "BP",
-    IMPERFECT: "IB",
-    USER: "UZ",
-    EVENT: "UZ",
-    END: "EP",
-}
-"""AUTO's two-letter labels."""
 INDEX, UNSTABLE = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
@@ -181,7 +157,7 @@ class Report(Observer):
         p = special.point
         meets = f"  meets {special.meets[0]}" if special.meets else ""
         return (
-            f"{LABELS[special.kind]}   {round(p.load, 10) + 0.0:<14.10f} {round(p.ordinate, 9) + 0.0:<14.9f} "
+            f"{special.kind.code}   {round(p.load, 10) + 0.0:<14.10f} {round(p.ordinate, 9) + 0.0:<14.9f} "
             f"{p.energy:<10.6f} "
             f"{index_in_words(special):>{max(6, len(self.count))}} {p.zero:>5}  {special.located_to:.0e}{meets}"
         )
@@ -205,7 +181,7 @@ class Report(Observer):
         self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
         for branch in branches:
             for s in branch.special:
-                exact = s.kind in (USER, END) and s.zero_of != "stretch"
+                exact = s.kind.given and s.zero_of != "stretch"
                 load = f"{s.point.load:.10g}" if exact else number(s.point.load, s.error_estimate, s.resolved)
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
                 ordinate = number(s.point.ordinate, s.ordinate_error, s.resolved)
@@ -224,9 +200,7 @@ class Report(Observer):
             )
         missed = not_followed(branches)
         if missed:
-            deepest = max(
-                b.depth for b in branches if any(s.kind == BRANCH_POINT and not s.switched for s in b.special)
-            )
+            deepest = max(b.depth for b in branches if any(s.to_follow for s in b.special))
             self.say(
                 f"  {missed} branch point{'s were' if missed > 1 else ' was'} not followed, at the depth of switches: "
                 f"{Argument('Plan', 'depth', deepest + 1)} follows what leaves there"

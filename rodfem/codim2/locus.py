@@ -26,7 +26,8 @@ from rodfem.codim2.collision import Collision
 from rodfem.codim2.curve import Criterion, Half, Tracer
 from rodfem.codim2.parameter_plane import Interval, Node, Plane
 from rodfem.codim2.singular import Singular, null_vectors
-from rodfem.continuation.branch import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, Special
+from rodfem.continuation.branch import Special
+from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FOLD, KINDS
 from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.continuation.step_control import Steps
 from rodfem.errors import ConvergenceError, InputError
@@ -255,11 +256,10 @@ def locus(
 
 def _guess(solver: Equilibria, special: Special, p: np.ndarray) -> Node:
     """The special point as a point of the plane; raises :class:`InputError` for a kind that has no locus."""
-    if special.kind not in (FOLD, BRANCH_POINT, FLUTTER, DIVERGENCE):
-        raise InputError(
-            f"A point of the kind {special.kind!r} has no locus: choose a fold, branch point, flutter or divergence."
-        )
-    if special.kind in (FOLD, BRANCH_POINT) and not isinstance(solver, Follower):
+    if special.kind.line is None:
+        kinds = ", ".join(name for name, kind in KINDS.items() if kind.line is not None)
+        raise InputError(f"A point of the kind {special.kind!r} has no locus: choose one of {kinds}.")
+    if special.kind.singular and not isinstance(solver, Follower):
         raise InputError("The locus of a fold or a branch point needs the follower that found it.")
     x, left = special.point.x, list[PETSc.Vec]()
     modes = list(special.null_vectors)

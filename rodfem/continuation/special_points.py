@@ -15,7 +15,8 @@ from itertools import pairwise
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch, Point, Special
+from rodfem.continuation.branch import Branch, Point, Special
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.locate import Located, across, locate, solve_at
 from rodfem.continuation.solvers import VERTICAL, Follower, distance, hermite
 from rodfem.errors import SMALLER_STEPS, ConvergenceError

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rodfem.continuation.branch import END, USER, Branch, Point, Special
+from rodfem.continuation.branch import Branch, Point, Special
 from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.continuation.step_control import Steps
 from rodfem.deflation.search import states_at
@@ -92,7 +92,7 @@ class Diagram:
         """
         chosen = self.branches if branch is None else [self[branch]]
         every = [s for b in chosen for s in b.special]
-        return [s for s in every if (s.kind == kind if kind is not None else s.kind not in (USER, END))]
+        return [s for s in every if (s.kind == kind if kind is not None else not s.kind.given)]
 
     def at(self, load: float) -> list[Point]:
         """All equilibria of the diagram at exactly ``load``, computed there, each with its own index.

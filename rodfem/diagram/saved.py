@@ -10,7 +10,8 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch, Law, Point, Special
+from rodfem.continuation.branch import Branch, Law, Point, Special
+from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
@@ -135,7 +136,7 @@ def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[E
     point = points[entry["row"]]
     solver = solvers[point.mesh]
     special = Special(
-        entry["kind"], point, entry["negative_before"], entry["negative_after"], entry["located_to"],
+        KINDS[entry["kind"]], point, entry["negative_before"], entry["negative_after"], entry["located_to"],
         coupling=entry["coupling"], error_estimate=_number(entry["error_estimate"]),
         ordinate_error=_number(entry["ordinate_error_estimate"]), resolved=entry.get("resolved"), row=entry["row"],
         switched=entry["followed"], unfolding=_number(entry["unfolding"]), note=entry["note"],
@@ -146,7 +147,7 @@ def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[E
     if entry["law"]:
         known = {f.name for f in fields(Law)}
         special.law = Law(**{name: _number(v) for name, v in entry["law"].items() if name in known})
-    if isinstance(solver, Follower) and special.kind in (FOLD, BRANCH_POINT) and entry["multiplicity"]:
+    if isinstance(solver, Follower) and special.kind.singular and entry["multiplicity"]:
         solver.system.set_phase(point.x)
         solver.inertia.count(point.x)
         special.null_vectors = [v.copy() for v in solver.inertia.nearest(entry["multiplicity"], accuracy=1e-8)[1]]
