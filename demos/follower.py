@@ -19,7 +19,7 @@ from math import hypot, inf
 
 import rodfem.app.cli as cli
 from forms.energy import bending
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.problem.ends import clamped, free
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 
@@ -29,7 +29,7 @@ def scene(options: Namespace) -> Scene:
     b1, b2, b3 = options.stiffness
     j1, j2, j3 = options.rotary_inertia
     if min(j1, j2, j3) < 0:
-        raise SceneError(f"A rotary inertia of {min(j1, j2, j3):g} is negative: give zero or more.")
+        raise InputError(f"A rotary inertia of {min(j1, j2, j3):g} is negative: give zero or more.")
 
     def energy(v, k, c):
         return bending(k, (c.B1, c.B2, c.B3))

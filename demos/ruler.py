@@ -19,7 +19,7 @@ from argparse import Namespace
 
 import rodfem.app.cli as cli
 from forms.energy import bending, logarithmic_stretch
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.problem.ends import clamped, free
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 
@@ -29,7 +29,7 @@ DIRECTIONS = {"e1": (1.0, 0.0), "e2": (0.0, 1.0)}
 def scene(options: Namespace) -> Scene:
     """State the problem: what the rod is made of, how its ends are held, and what to look at."""
     if options.direction not in DIRECTIONS:
-        raise SceneError(f"Unknown direction {options.direction!r}: choose e1 or e2.")
+        raise InputError(f"Unknown direction {options.direction!r}: choose e1 or e2.")
     x, y = DIRECTIONS[options.direction]
 
     def energy(v, k, c):

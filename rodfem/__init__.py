@@ -93,8 +93,10 @@ _HOMES = {
     "many": "app.many",
     "Modes": "modes.modes",
     "load_modes": "modes.modes",
+    "InputError": "errors",
     "SceneError": "errors",
     "ConvergenceError": "errors",
+    "SetupError": "errors",
     "load_json": "output.files",
 }
 

@@ -17,7 +17,9 @@ from rodfem.diagram.saved import load as load
 from rodfem.diagram.solver import Solver as Solver
 from rodfem.diagram.trace import trace as trace
 from rodfem.errors import ConvergenceError as ConvergenceError
+from rodfem.errors import InputError as InputError
 from rodfem.errors import SceneError as SceneError
+from rodfem.errors import SetupError as SetupError
 from rodfem.fem.fields import Discretization as Discretization
 from rodfem.modes.modes import Modes as Modes
 from rodfem.modes.modes import load_modes as load_modes

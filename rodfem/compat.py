@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from rodfem.errors import EnvironmentTrouble
+from rodfem.errors import SetupError
 
 try:
     import basix
@@ -27,7 +27,7 @@ try:
     from dolfinx import fem
     from petsc4py import PETSc
 except ModuleNotFoundError as missing:
-    raise EnvironmentTrouble(
+    raise SetupError(
         f"This Python has no module {missing.name!r}: install Debian's python3-dolfinx and run with a virtual "
         "environment made by '/usr/bin/python3 -m venv --system-site-packages .venv' ('make setup' does both)."
     ) from missing
@@ -40,9 +40,9 @@ COMPLEX = bool(np.issubdtype(PETSc.ScalarType, np.complexfloating))
 
 
 def require_real_petsc() -> None:
-    """Raise :class:`EnvironmentTrouble` on a PETSc with complex numbers, where a saddle matrix has no inertia."""
+    """Raise :class:`SetupError` on a PETSc with complex numbers, where a saddle matrix has no inertia."""
     if COMPLEX:
-        raise EnvironmentTrouble(
+        raise SetupError(
             "This PETSc was built for complex numbers, where MUMPS counts no inertia: under a load with a potential "
             "rodfem needs the real one; unset PETSC_DIR and SLEPC_DIR, or point both at the real build."
         )
@@ -150,12 +150,12 @@ def cell_vertices(mesh: Any, cells: int) -> np.ndarray:
 
 
 def compile_forms(forms: Sequence[Any]) -> list[Any]:
-    """Compile UFL forms; raises :class:`EnvironmentTrouble` where the form cache is locked by a killed run."""
+    """Compile UFL forms; raises :class:`SetupError` where the form cache is locked by a killed run."""
     try:
         with _quiet():
             return [fem.form(form, dtype=REAL) for form in forms]
     except TimeoutError as locked:
-        raise EnvironmentTrouble(
+        raise SetupError(
             "A compiled form never became ready, most likely because an earlier run was killed while compiling: "
             "delete the folder ~/.cache/fenics (or $XDG_CACHE_HOME/fenics) and run again."
         ) from locked

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rodfem import __version__
-from rodfem.errors import SceneError
+from rodfem.errors import Argument, InputError
 
 if TYPE_CHECKING:
     import h5py
@@ -49,11 +49,11 @@ class Format:
     def check(self, data: Any, where: Path | str, needs: Sequence[str] = ()) -> None:
         """Check the contents of a JSON file, named ``where`` in what is raised.
 
-        Raises :class:`SceneError` where it has another format, a newer version of this one, or no mark and not all
+        Raises :class:`InputError` where it has another format, a newer version of this one, or no mark and not all
         entries that a reader ``needs``.
         """
         if not isinstance(data, Mapping):
-            raise SceneError(f"{where} has no entries by name, so it is no {self.name}: give {self.file}.")
+            raise InputError(f"{where} has no entries by name, so it is no {self.name}: give {self.file}.")
         mark = data.get(MARK)
         if mark is not None and not isinstance(mark, Mapping):
             mark = {"name": mark}
@@ -70,21 +70,21 @@ class Format:
         if mark is None:
             missing = [name for name in needs if name not in entries]
             if missing:
-                raise SceneError(
+                raise InputError(
                     f"{where} has no {', '.join(missing)}, so it is no {self.name}, or one of a version of rodfem that "
                     f"wrote less: give {self.file}, or run the scene again."
                 )
             return
         name, version, program = (mark.get(key) for key in KEYS)
         if name != self.name:
-            raise SceneError(f"{where} has the format {name!r}, not {self.name!r}: give {self.file}.")
+            raise InputError(f"{where} has the format {name!r}, not {self.name!r}: give {self.file}.")
         if not isinstance(version, (int, np.integer)) or version < 1:
-            raise SceneError(
+            raise InputError(
                 f"{where} has version {version!r} of the format {self.name!r}, where a whole number from 1 on was "
                 "expected: run the scene again."
             )
         if version > self.version:
-            raise SceneError(
+            raise InputError(
                 f"{where} was written by {program}, in version {version} of the format {self.name!r}, and {PROGRAM} "
                 f"reads versions up to {self.version}: read it with {program} or newer, or run the scene again."
             )
@@ -94,17 +94,17 @@ KEYS = ("name", "version", "program")
 """Entries of a mark."""
 DIAGRAM = Format("rodfem diagram", 1, "the diagram.json of a run")
 STATES = Format("rodfem states", 1, "the states.h5 of a run")
-MODES = Format("rodfem modes", 1, "the modes.h5 of a run with --modes")
-LOCUS = Format("rodfem locus", 1, "a locus-1.json, locus-2.json ... of a run with --locus")
+MODES = Format("rodfem modes", 1, f"the modes.h5 of a run with {Argument('Plan', 'modes')}")
+LOCUS = Format("rodfem locus", 1, f"a locus-1.json, locus-2.json ... of a run with {Argument('Plan', 'locus')}")
 RESULT = Format("rodfem result", 1, "a rod-00000.json, rod-00001.json ... of rodfem.many")
 FORMATS = (DIAGRAM, STATES, MODES, LOCUS, RESULT)
 
 
 def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, Any]:
-    """Contents of a JSON file; raises :class:`SceneError` where it cannot be read, and as :meth:`Format.check` does."""
+    """Contents of a JSON file; raises :class:`InputError` where it cannot be read, and as :meth:`Format.check` does."""
     try:
         data: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as trouble:
-        raise SceneError(f"{path} is no {form.name} ({trouble}): give {form.file}.") from trouble
+        raise InputError(f"{path} is no {form.name} ({trouble}): give {form.file}.") from trouble
     form.check(data, path, needs)
     return data

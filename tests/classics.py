@@ -40,7 +40,8 @@ from rodfem import (
     sliding,
     trace,
 )
-from rodfem.continuation.branch import BRANCH_POINT, Special
+from rodfem.continuation.branch import Special
+from rodfem.continuation.kinds import BRANCH_POINT
 
 RIGID = "unshearable and inextensible"
 FORMULATIONS = ("reduced", "pointwise")

@@ -48,7 +48,7 @@ from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.solvers import Follower
 from rodfem.diagram.explorer import Explorer
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.pencil import assemble_pencil
@@ -289,7 +289,7 @@ def examine(scene: Scene, depth: int = 0, elements: int = 6, degree: int = 5) ->
         explorer = Explorer(follower, plan, Report(stream=text), lambda: None)
         branches = explorer.branches
         explorer.run()
-    except (SceneError, ConvergenceError) as trouble:
+    except (InputError, ConvergenceError) as trouble:
         finding.said.append(f"{type(trouble).__name__}: {trouble}")
     finding.said += [line.strip() for line in text.getvalue().splitlines() if line.startswith("  !")]
     for branch in branches:

@@ -14,7 +14,8 @@ import test_classics
 import test_docs
 
 import rodfem
-from rodfem.continuation.branch import FLUTTER, Branch, Special
+from rodfem.continuation.branch import Branch, Special
+from rodfem.continuation.kinds import FLUTTER
 from rodfem.diagram.plan import Plan
 from rodfem.fem.fields import Discretization
 from rodfem.problem.scene import Scene

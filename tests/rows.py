@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.solvers import Follower
 from rodfem.stability.assessment import judge
 

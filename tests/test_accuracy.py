@@ -21,12 +21,13 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from rodfem.app.run import run
-from rodfem.continuation.branch import BRANCH_POINT, FLUTTER, FOLD, USER, Branch
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.kinds import BRANCH_POINT, FLUTTER, FOLD, USER
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization, Fields
 from rodfem.output.files import load_state
 from rodfem.problem.scene import Scene
@@ -155,7 +156,7 @@ def test_what_was_used_where(folder: Path) -> None:
 @pytest.mark.parametrize("accuracy", [0.0, -1e-6, 1e-20, 1.0, float("nan"), float("inf")])
 def test_bad_accuracy(accuracy: float) -> None:
     scene = rods.scene()
-    with pytest.raises(SceneError, match=r"is not attainable: ask for one between 1e-10 .round-off. and 0.1"):
+    with pytest.raises(InputError, match=r"is not attainable: ask for one between 1e-10 .round-off. and 0.1"):
         Plan(scene.span, accuracy=accuracy).check(scene)
 
 
@@ -192,5 +193,5 @@ def test_accuracy_and_a_mesh(words: tuple[str, ...], capfd: pytest.CaptureFixtur
     [((0.0, 0.5), "2 vertices"), ((0.0, 0.7, 0.5, 1.0), "ascend"), ((0.0, 0.2, 0.5, 0.9), "begin and end at 0 and 1")],
 )
 def test_bad_vertices(vertices: tuple[float, ...], words: str) -> None:
-    with pytest.raises(SceneError, match=words):
+    with pytest.raises(InputError, match=words):
         Fields(taut.scene(), Discretization("auto", 3, 4, vertices))

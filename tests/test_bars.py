@@ -19,7 +19,8 @@ from scipy.special import ellipk
 
 from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, trace
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.output.digits import number
 
 LARGE = 3.0

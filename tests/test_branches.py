@@ -14,7 +14,8 @@ from scipy.special import ellipe, ellipk
 
 from forms import loads
 from forms.energy import bending
-from rodfem.continuation.branch import BRANCH_POINT, Branch
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.kinds import BRANCH_POINT
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization

@@ -38,8 +38,8 @@ from rodfem import (
 )
 from rodfem.app.terminal import Report
 from rodfem.codim2.locus import locus
-from rodfem.continuation.branch import BRANCH_POINT, FOLD
 from rodfem.continuation.index_chain import Row, breaks, chained, explain
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.solvers import _to_load
 from rodfem.continuation.special_points import directions, leave
 from rodfem.diagram.explorer import Explorer

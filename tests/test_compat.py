@@ -15,7 +15,7 @@ from numpy.polynomial import legendre
 from rods import follower, run_demo, scene
 
 from rodfem import compat
-from rodfem.errors import EnvironmentTrouble
+from rodfem.errors import SetupError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 
@@ -130,7 +130,7 @@ def test_complex_petsc_gives_one_sentence(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(compat, "COMPLEX", True)
-    with pytest.raises(EnvironmentTrouble, match="complex"):
+    with pytest.raises(SetupError, match="complex"):
         compat.require_real_petsc()
     with pytest.raises(SystemExit) as ended:
         run_demo("--output", str(folder / "out"))
@@ -145,5 +145,5 @@ def test_locked_cache_gives_one_sentence(monkeypatch: pytest.MonkeyPatch) -> Non
         raise TimeoutError("JIT compilation timed out")
 
     monkeypatch.setattr(compat.fem, "form", locked)
-    with pytest.raises(EnvironmentTrouble, match="delete the folder"):
+    with pytest.raises(SetupError, match="delete the folder"):
         compat.compile_forms([None])

@@ -16,7 +16,7 @@ from rods import DEFAULT, explored, follower, specials, user_points
 import rodfem
 from rodfem import Branch, Discretization, Plan, Point
 from rodfem.continuation.step_control import IndexSteps, Steps
-from rodfem.errors import SceneError
+from rodfem.errors import InputError, SceneError
 from rodfem.output.files import load_state, save_states
 
 HALF = DEFAULT[3]
@@ -146,9 +146,9 @@ def test_restart_from_what_is_not_there(folder: Path) -> None:
     save_states(branch, [follower()], path, first=True)
     follower().system.comm.barrier()
     for wrong in ((folder / "nothing.h5", "straight", 0), (path, "crooked", 0), (path, "straight", 999)):
-        with pytest.raises(SceneError, match=r"no row .* of a branch"):
+        with pytest.raises(InputError, match=r"no row .* of a branch"):
             load_state(*wrong, follower())
-    with pytest.raises(SceneError, match="states of the reduced formulation"):
+    with pytest.raises(InputError, match="states of the reduced formulation"):
         load_state(path, "straight", 0, follower("pointwise"))
 
 
@@ -166,7 +166,7 @@ def test_steps_that_bound_the_change_of_the_index() -> None:
     for branch in found.values():
         loads = [s.point.load for s in branch.special if s.kind == "branch point"]
         assert loads == pytest.approx([np.pi**2, 1.004 * np.pi**2], rel=1e-9)
-    with pytest.raises(SceneError, match="A change of the index of 0 leads nowhere: give change=1 or more"):
+    with pytest.raises(InputError, match="A change of the index of 0 leads nowhere: give change=1 or more"):
         IndexSteps(change=0)
 
 

@@ -7,8 +7,9 @@ import pytest
 import rods
 import scenes
 
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch
+from rodfem.continuation.branch import Branch
 from rodfem.continuation.corrector import NEAR
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.solvers import Follower
 from rodfem.fem.newton import TOLERANCE, correct
 

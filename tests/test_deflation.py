@@ -23,7 +23,7 @@ from rodfem.deflation.search import NEW, SAME, Deflation, further, starts, state
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 
 K0 = 3 * pi
@@ -155,7 +155,7 @@ def test_nothing_to_find() -> None:
 
 
 def test_known_state_at_another_load() -> None:
-    with pytest.raises(SceneError, match=r"not 6\.5"):
+    with pytest.raises(InputError, match=r"not 6\.5"):
         Deflation(ruler().follower, 6.5, rods.user_points(ruler()["plane"], 6.0))
 
 

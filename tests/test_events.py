@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import rodfem
-from rodfem import Discretization, Event, Plan, SceneError
+from rodfem import Discretization, Event, InputError, Plan
 
 
 @pytest.mark.parametrize("apart", [0.5, 0.0, -0.1])
@@ -33,7 +33,7 @@ def test_the_distance_of_the_ends_of_an_elastica(apart: float) -> None:
 def test_an_event_that_fails_is_named() -> None:
     rod = classics.column("pinned", classics.SUPPORTS["pinned-pinned"], (0.0, 5.0), planar="e1")
     wrong = Plan(depth=0, events=(Event("tip", of=lambda state: state.tip),))
-    with pytest.raises(SceneError, match=r"The event 'tip' fails with AttributeError, .*: it receives a state with"):
+    with pytest.raises(InputError, match=r"The event 'tip' fails with AttributeError, .*: it receives a state with"):
         rodfem.trace(rod, plan=wrong)
-    with pytest.raises(SceneError, match="give Events, as in"):
+    with pytest.raises(InputError, match="give Events, as in"):
         Plan(events=(np.sin,))  # type: ignore[arg-type]

@@ -23,7 +23,7 @@ from rodfem.app.run import run
 from rodfem.continuation.branch import Unexplained
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM, FORMATS, LOCUS, MODES, PROGRAM, RESULT, STATES
 from rodfem.output import plot_diagram as plot
@@ -334,7 +334,7 @@ def test_newer_files_are_refused(copied: Path, capfd: pytest.CaptureFixture[str]
         rf"was written by rodfem 9\.1, in version 2 of the format 'rodfem \w+', and {PROGRAM} reads versions up to"
     )
     for reader in read(copied):
-        with pytest.raises(SceneError, match=sentence):
+        with pytest.raises(InputError, match=sentence):
             reader()
     assert plot.main([str(copied / "diagram.json")]) == 2
     assert render.main([str(copied / "states.h5"), "--branch=straight", "--row=0"]) == 2
@@ -348,9 +348,9 @@ def test_files_of_another_kind_are_refused(copied: Path) -> None:
     for path in (copied / name for name in NAMES.values()):
         marked(path, name="rodfem song")
     for reader in read(copied):
-        with pytest.raises(SceneError, match=r"has the format 'rodfem song', not 'rodfem [a-z]+': give .* of"):
+        with pytest.raises(InputError, match=r"has the format 'rodfem song', not 'rodfem [a-z]+': give .* of"):
             reader()
-    with pytest.raises(SceneError, match=r"'rodfem song', not 'rodfem modes': give the modes.h5 of a run with --modes"):
+    with pytest.raises(InputError, match=r"not 'rodfem modes': give the modes.h5 of a run with Plan.modes="):
         rodfem.load_modes(copied / "modes.h5", "straight", 0)
 
 
@@ -368,7 +368,7 @@ def test_what_an_old_file_lacks_is_named(copied: Path, lost: str, sentence: str)
         del file[lost]
     reader = render._read if "supports" in lost else load_state
     more = () if "supports" in lost else (Solver(scenes()["euler"], MESH).equilibria,)
-    with pytest.raises(SceneError, match=sentence):
+    with pytest.raises(InputError, match=sentence):
         reader(path, "straight", 0, *more)
 
 
@@ -377,18 +377,18 @@ def test_old_modes_and_diagrams_that_lack_something(copied: Path, capfd: pytest.
         (row,) = file["branches/straight"]
         del file[f"branches/straight/{row}/weight_rotation"]
     with pytest.raises(
-        SceneError, match=f"modes of row {row} of the branch 'straight' without weight_rotation: another"
+        InputError, match=f"modes of row {row} of the branch 'straight' without weight_rotation: another"
     ):
         rodfem.load_modes(copied / "modes.h5", "straight", int(row))
     whole = json.loads(marked(copied / "diagram.json").read_text())
     del whole["branches"][1]["special"][0]["unfolding"]
     (copied / "diagram.json").write_text(json.dumps(whole))
     with pytest.raises(
-        SceneError, match=r"diagram.json, branch 'branch 1', has no unfolding, so it is no rodfem diagram"
+        InputError, match=r"diagram.json, branch 'branch 1', has no unfolding, so it is no rodfem diagram"
     ):
         rodfem.load(copied, scenes()["euler"])
     (copied / "diagram.json").write_text(json.dumps({"branches": []}))
-    with pytest.raises(SceneError, match="has no scene, parameter, so it is no rodfem diagram"):
+    with pytest.raises(InputError, match="has no scene, parameter, so it is no rodfem diagram"):
         rodfem.load_json(copied / "diagram.json")
     (copied / "diagram.json").write_text("[1]")
     assert plot.main([str(copied / "diagram.json")]) == 2
@@ -399,5 +399,5 @@ def test_old_modes_and_diagrams_that_lack_something(copied: Path, capfd: pytest.
 
 @pytest.mark.parametrize("version", [0, "1", None, 1.5])
 def test_versions_that_are_none(version: Any) -> None:
-    with pytest.raises(SceneError, match="where a whole number from 1 on was expected"):
+    with pytest.raises(InputError, match="where a whole number from 1 on was expected"):
         DIAGRAM.check({"format": {"name": DIAGRAM.name, "version": version}}, "file")

@@ -16,7 +16,7 @@ import scenes
 from mpi4py import MPI
 
 import rodfem
-from rodfem import Diagram, Discretization, Observer, Parameter, Plan, SceneError
+from rodfem import Diagram, Discretization, InputError, Observer, Parameter, Plan
 from rodfem.continuation.branch import Branch
 
 MESH = Discretization("reduced", 8, 6)
@@ -71,7 +71,7 @@ def test_states_at_a_load(diagram: Diagram) -> None:
         values = diagram.modes(point, 2).value
         np.testing.assert_allclose(values, verdict.values[:2], rtol=1e-7)
     assert (found[0].stable, found[1].stable) == (False, True)
-    with pytest.raises(SceneError, match=r"The load 20 is outside the range 30 to 60 of this diagram: trace a wider"):
+    with pytest.raises(InputError, match=r"The load 20 is outside the range 30 to 60 of this diagram: trace a wider"):
         diagram.at(20.0)
 
 
@@ -108,12 +108,12 @@ def test_a_saved_diagram_is_a_diagram(diagram: Diagram, folder: Path) -> None:
 
 def test_files_of_another_scene(diagram: Diagram, folder: Path) -> None:
     saved = diagram.save(folder / "cord")
-    with pytest.raises(SceneError, match=r"holds the scene 'cord' with the load lam, not 'hemitropic' with lam: give"):
+    with pytest.raises(InputError, match=r"holds the scene 'cord' with the load lam, not 'hemitropic' with lam: give"):
         rodfem.load(saved, rods.scene())
     other = replace(diagram.scene, parameters={**diagram.scene.parameters, "k0": Parameter(3.0)})
-    with pytest.raises(SceneError, match=r"was computed with k0 = 9.42\d+, and the scene has 3: give the scene that"):
+    with pytest.raises(InputError, match=r"was computed with k0 = 9.42\d+, and the scene has 3: give the scene that"):
         rodfem.load(saved, other)
-    with pytest.raises(SceneError, match="is no rodfem diagram"):
+    with pytest.raises(InputError, match="is no rodfem diagram"):
         rodfem.load(folder, diagram.scene)
 
 
@@ -128,7 +128,7 @@ def test_loads_without_a_potential(folder: Path) -> None:
     again = rodfem.load(found.save(folder / "beck"), beck)
     assert repr(again) == repr(found)
     assert again.special("flutter")[0].point.load == flutter.point.load
-    with pytest.raises(SceneError, match="A search by deflation needs a scene whose loads all have a potential"):
+    with pytest.raises(InputError, match="A search by deflation needs a scene whose loads all have a potential"):
         found.search(15.0)
 
 
@@ -175,7 +175,7 @@ def test_one_solver(diagram: Diagram) -> None:
     assert (near.load, near.index) == (39.0, 0)
     others = solver.search(40.0, [solver.equilibrium(40.0)], tries=6)
     assert any(p.energy == pytest.approx(buckled.energy, rel=1e-9) for p in others)
-    with pytest.raises(SceneError, match="0 modes cannot be computed: ask for 1 or more"):
+    with pytest.raises(InputError, match="0 modes cannot be computed: ask for 1 or more"):
         solver.modes(near, 0)
 
 

@@ -12,7 +12,8 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc
 
 from rodfem import Discretization, Ordinate, Plan, Scene, Solver, clamped, free, pinned, sliding, trace
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, IMPERFECT, Special
+from rodfem.continuation.branch import Special
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.unfolding import unfold
 
 EULER = pi**2 / 4

@@ -29,7 +29,7 @@ from rodfem.continuation.step_control import Steps
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.output.plot_locus import _footer, draw_locus
 from rodfem.problem.ends import clamped, free
@@ -276,11 +276,11 @@ def test_saved_and_drawn(folder: Path) -> None:
 )
 def test_mistakes(parameter: str, bounds: tuple, message: str) -> None:
     special = specials(explored()[0], "branch point")[0]
-    with pytest.raises(SceneError, match=message):
+    with pytest.raises(InputError, match=message):
         locus(follower(), special, parameter, bounds)
 
 
 def test_no_locus_of_an_end() -> None:
     end: Special = specials(explored()[0], "end")[0]
-    with pytest.raises(SceneError, match="has no locus"):
+    with pytest.raises(InputError, match="has no locus"):
         locus(follower(), end, "A", ((0.01, 0.96), (-3.1, 1.0)))

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from scenes import scene
 
 from rodfem.app.many import many
-from rodfem.errors import SceneError
+from rodfem.errors import InputError, SceneError
 from rodfem.problem.scene import Scene
 
 COMM = MPI.COMM_WORLD
@@ -54,6 +54,6 @@ def test_a_result_of_a_newer_format_is_kept(folder: Path) -> None:
         file.write_text(json.dumps(data | {"format": data["format"] | {"version": 2, "program": "rodfem 9.1"}}))
     COMM.barrier()
     text = file.read_text()
-    with pytest.raises(SceneError, match=r"rod-00001.json was written by rodfem 9.1, in version 2 of the format"):
+    with pytest.raises(InputError, match=r"rod-00001.json was written by rodfem 9.1, in version 2 of the format"):
         many(rods, lambda rod: {}, folder)
     assert file.read_text() == text

@@ -19,7 +19,7 @@ from states import solver as solver_of
 
 from rodfem.continuation.solvers import Equilibria
 from rodfem.diagram.solver import Solver
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import SYMMETRY, Modes, load_modes, save_modes
@@ -221,7 +221,7 @@ def test_planar_rod_stays_in_its_plane() -> None:
 
 def test_counting_finds_no_modes() -> None:
     solver, x = state(classics.planar_column(), FINE, 6.0)
-    with pytest.raises(SceneError, match="another method than 'count'"):
+    with pytest.raises(InputError, match="another method than 'count'"):
         modes_of(solver, x, 2, "count")
 
 
@@ -237,11 +237,11 @@ def test_file_and_pictures(folder: Path, capfd: pytest.CaptureFixture) -> None:
     again = load_modes(path, "branch 1", 7)
     np.testing.assert_array_equal(again.displacement, modes.displacement)
     assert again.motion == modes.motion
-    with pytest.raises(SceneError, match="has no modes of row 3 of a branch 'branch 1': it has branch 1, row 7"):
+    with pytest.raises(InputError, match="has no modes of row 3 of a branch 'branch 1': it has branch 1, row 7"):
         load_modes(path, "branch 1", 3)
-    with pytest.raises(SceneError, match=r"run a scene with --modes and --at"):
+    with pytest.raises(InputError, match=r"run a scene with Plan.modes=.* and Plan.at="):
         load_modes(folder / "nothing.h5", "branch 1", 3)
-    with pytest.raises(SceneError, match="no mode 3 of 'branch 1', row 7: choose 1 to 2"):
+    with pytest.raises(InputError, match="no mode 3 of 'branch 1', row 7: choose 1 to 2"):
         draw_modes(path, "branch 1", 7, folder / "modes.png", [3])
     arguments = [str(path), "--branch", "branch 1", "--row", "7", "--mode", "1", "--output"]
     assert main([*arguments, str(folder / "a" / "modes.gif")]) == main([*arguments, str(folder / "modes.png")]) == 0

@@ -16,7 +16,7 @@ from matplotlib.image import imread
 
 from forms import loads
 from forms.energy import bending
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.output.glyphs import DARK, GREY, LOAD, STEEL, glyphs_of
 from rodfem.output.render import _read, draw_shape_safely, triad
 from rodfem.output.solids import FLATTEST, SIDES, profile_of, round_arrow
@@ -326,5 +326,5 @@ def test_typical_state_is_well_inside_what_it_is_said_to_be() -> None:
     assert typical_state({"branches": [planar | {"name": "x"}]})[2] == "0, stable"
     planar["columns"]["negative_in_space"] = [1] * 6
     assert typical_state({"branches": [planar]})[2] == "3, stable in the plane, unstable in space, index 1"
-    with pytest.raises(SceneError, match="no states"):
+    with pytest.raises(InputError, match="no states"):
         typical_state({"branches": [branch("straight", [])]})

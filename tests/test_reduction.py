@@ -14,7 +14,7 @@ from petsc4py import PETSc
 from states import buckled, plain, scene
 
 from rodfem.diagram.solver import Solver
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import gathered
@@ -149,9 +149,9 @@ def test_spins_fulfil_the_norm_conditions(formulation: str) -> None:
 
 def test_impossible_coordinates() -> None:
     system = System(scene("cord"), Discretization("reduced", 4, 1))
-    with pytest.raises(SceneError, match="choose one of full, tangent, compatible"):
+    with pytest.raises(InputError, match="choose one of full, tangent, compatible"):
         Blocks(system, "polar")
-    with pytest.raises(SceneError, match="--formulation pointwise"):
+    with pytest.raises(InputError, match=r"use Discretization\(formulation='pointwise'\)"):
         Blocks(system, "compatible")
 
 
@@ -201,18 +201,18 @@ def test_dependent_constraints_are_an_error(formulation: str) -> None:
     p = pencil("hemitropic", formulation, 0.2, True)
     C = gathered(p.C).tolil()
     C[:, 1] = C[:, 0] - 2 * C[:, 2]
-    with pytest.raises(SceneError, match=r"depend on one another.*remove"):
+    with pytest.raises(InputError, match=r"depend on one another.*remove"):
         kernel(C.tocsr(), p.place)
 
 
 def test_more_constraints_than_unknowns() -> None:
     for place in (np.full(5, np.nan), np.zeros(5)):
-        with pytest.raises(SceneError, match="5 constraints on 4 unknowns"):
+        with pytest.raises(InputError, match="5 constraints on 4 unknowns"):
             kernel(sp.csr_matrix(np.ones((4, 5))), place)
 
 
 def test_rows_that_reach_too_far() -> None:
-    with pytest.raises(SceneError, match="more than two neighbouring groups"):
+    with pytest.raises(InputError, match="more than two neighbouring groups"):
         kernel(sp.csr_matrix(np.ones((6, 3))), np.arange(3.0))
 
 
@@ -333,14 +333,14 @@ def test_cayley_parameters() -> None:
 
 def test_impossible_requests() -> None:
     p = pencil("cord", "reduced", 20.0, False)
-    with pytest.raises(SceneError, match="choose one of saddle, elimination"):
+    with pytest.raises(InputError, match="choose one of saddle, elimination"):
         Reduction(p, "magic")
-    with pytest.raises(SceneError, match="use shift-invert"):
+    with pytest.raises(InputError, match="use shift-invert"):
         Reduction(pencil("follower", "pointwise", 40.0, False)).near(3, -1.0, "cayley")
     reduction = Reduction(p)
-    with pytest.raises(SceneError, match="choose one of shift-invert, cayley"):
+    with pytest.raises(InputError, match="choose one of shift-invert, cayley"):
         reduction.near(3, -1.0, "none")
-    with pytest.raises(SceneError, match="ask for at most 49"):
+    with pytest.raises(InputError, match="ask for at most 49"):
         reduction.near(50, -1.0)
-    with pytest.raises(SceneError, match="is constant"):
+    with pytest.raises(InputError, match="is constant"):
         reduction.near(3, -1.0, "cayley", -1.0)

@@ -18,7 +18,7 @@ from rodfem import trace
 from rodfem.app.run import run
 from rodfem.continuation.step_control import Steps
 from rodfem.diagram.plan import Plan
-from rodfem.errors import SceneError
+from rodfem.errors import InputError, SceneError
 from rodfem.fem.fields import Discretization, Fields
 from rodfem.fem.system import System
 from rodfem.output.files import load_json
@@ -242,8 +242,11 @@ def test_mistakes(change: dict, words: str, capfd: pytest.CaptureFixture[str]) -
 
 def test_parameters_that_nothing_feels() -> None:
     scene = Scene(**(GOOD | {"parameters": {"F": 0.0, "B": 2.0, "G": 1.0}}))
-    for load, locus, words in (("G", None, "depends on its load 'G'"), ("F", ("G", 0.0, 2.0), "depends on 'G'")):
-        with pytest.raises(SceneError, match=words):
+    for load, locus, kind, words in (
+        ("G", None, SceneError, "depends on its load 'G'"),
+        ("F", ("G", 0.0, 2.0), InputError, "depends on 'G'"),
+    ):
+        with pytest.raises(kind, match=words):
             Plan((0.0, 1.0), locus=locus).check(scene.varying(load, (0.0, 1.0)))
 
 
@@ -309,14 +312,14 @@ def test_scenes_that_are_no_mistakes() -> None:
 )
 def test_no_centreline(change: dict, what: str) -> None:
     scene = Scene(**(GOOD | change))
-    with pytest.raises(SceneError, match=f"{what} needs: use --formulation pointwise"):
+    with pytest.raises(InputError, match=f"{what} needs: use Discretization.formulation=.pointwise.."):
         Fields(scene, Discretization("reduced", 4, 3))
     assert Fields(scene, Discretization("auto", 4, 3)).discretization.formulation == "pointwise"
 
 
 def test_fewer_elements_than_pieces() -> None:
     scene = Scene(**(GOOD | {"breaks": (0.1, 0.2, 0.3, 0.4)}))
-    with pytest.raises(SceneError, match=r"5 pieces between joints.*use more than 4 elements"):
+    with pytest.raises(InputError, match=r"5 pieces between joints.*use more than 4 elements"):
         Fields(scene, Discretization("auto", 4, 3))
 
 
@@ -324,7 +327,7 @@ def test_fewer_elements_than_pieces() -> None:
     "make", [lambda: Discretization("mixed"), lambda: Discretization(elements=0), lambda: Discretization(degree=0)]
 )
 def test_bad_discretization(make: Callable[[], Discretization]) -> None:
-    with pytest.raises(SceneError, match=r"choose|give"):
+    with pytest.raises(InputError, match=r"choose|give"):
         make()
 
 
@@ -408,7 +411,7 @@ NAN = float("nan")
 )
 def test_numbers_of_the_wrong_kind(make: Callable[[], object], words: str) -> None:
     """A float for a whole number is no raw error of pybind from inside the mesh."""
-    with pytest.raises(SceneError, match=words) as raised:
+    with pytest.raises(InputError, match=words) as raised:
         make()
     assert str(raised.value).endswith(".") and "\n" not in str(raised.value)
 
@@ -427,7 +430,7 @@ def test_a_plan_without_a_range_takes_the_scenes(folder: Path) -> None:
         assert branches[0].points[-1].load == 0.3
         assert [s.point.load for s in branches[0].special if s.kind == "user"] == rows
     assert load_json(folder / "diagram.json")["range"] == [0.0, 0.3]
-    with pytest.raises(SceneError, match="outside the range 0 to"):
+    with pytest.raises(InputError, match="outside the range 0 to"):
         Plan(at=(1.0,)).check(rod)
 
 

@@ -208,7 +208,7 @@ def test_a_saved_state_of_another_scene(folder: Path) -> None:
     """An unshearable rod has a stretch, the one whose state was saved none."""
     run(compressed("unshearable and inextensible"), MESH, Plan(error_bars=False), folder, figures=False, quiet=True)
     stretched = rodfem.Solver(compressed("unshearable"), MESH)
-    with pytest.raises(rodfem.SceneError, match="has no v, needed for the scene 'column': it was written for"):
+    with pytest.raises(rodfem.InputError, match="has no v, needed for the scene 'column': it was written for"):
         stretched.restore(folder / "states.h5", "straight", 0)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.references import Spectrum, spectra
 from benchmarks.speed.scenes import with_inertia
 from rodfem.diagram.solver import Solver
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.stability.assessment import Judge
 
@@ -58,7 +58,7 @@ def main() -> None:
     for n in elements:
         try:
             found = measure(spectrum, formulation, int(n), int(degree), int(runs))
-        except (ConvergenceError, SceneError) as trouble:
+        except (ConvergenceError, InputError) as trouble:
             print(f"{name}, {n} elements of degree {degree}: {trouble}", file=sys.stderr)
         else:
             print(json.dumps({"name": name, **found}), flush=True)

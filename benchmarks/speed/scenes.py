@@ -11,7 +11,6 @@ from typing import Any
 from benchmarks.common import ROOT
 from benchmarks.references import Spectrum
 from benchmarks.targets import TARGETS, Target
-from rodfem.app.terminal import LABELS
 from rodfem.continuation.branch import Branch
 from rodfem.problem.scene import Inertia, Scene
 
@@ -40,7 +39,7 @@ def loads(name: str) -> tuple[float, ...]:
 
 def value(target: Target, branch: Branch) -> float:
     """What the branch has for a target; nan if nothing."""
-    found = [s.point for s in branch.special if LABELS[s.kind] == target.kind]
+    found = [s.point for s in branch.special if s.kind.code == target.kind]
     if target.at is None:
         return found[target.number].load if target.number < len(found) else nan
     found = [p for p in found if p.load == target.at]

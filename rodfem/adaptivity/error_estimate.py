@@ -25,7 +25,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.grading import Gauge, weights_of
-from rodfem.continuation.branch import BRANCH_POINT, EVENT, FOLD, Law, Point, Special
+from rodfem.continuation.branch import Law, Point, Special
+from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.locate import WINDOW, locate_event, refine
 from rodfem.continuation.normal_form import ROUND_OFF, Origin, law_of, ordinate_along
 from rodfem.continuation.solvers import Follower
@@ -113,7 +114,7 @@ class Richer:
         """
         if special.zero_of == "stretch":
             return  # it has its own estimate: see :mod:`rodfem.adaptivity.zero_stretch`
-        point, at_a_load = special.point, special.kind not in (FOLD, BRANCH_POINT, EVENT)
+        point, at_a_load = special.point, not special.kind.solved
         self.system.damping = self.coarse.system.damping
         try:
             if special.event is not None:

@@ -15,9 +15,9 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Richer
 from rodfem.adaptivity.grading import Gauge, cheapest, cost, first_mesh, weights_of
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, Point, Special
+from rodfem.continuation.branch import Point, Special
 from rodfem.continuation.solvers import Follower
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.newton import correct
 from rodfem.fem.symmetries import may_slide
@@ -33,11 +33,15 @@ MARGIN = 100.0
 FURTHER = 10.0
 """By this factor more at each further try at one place."""
 
+OWN_MESH = Remedy(
+    "use {} and {} instead of an accuracy", *(Argument("Discretization", name) for name in ("elements", "degree"))
+)
+
 
 def check_accuracy(accuracy: float) -> None:
-    """Raise :class:`SceneError` for an accuracy outside :data:`FINEST` to :data:`COARSEST`."""
+    """Raise :class:`InputError` for an accuracy outside :data:`FINEST` to :data:`COARSEST`."""
     if not FINEST <= accuracy <= COARSEST:
-        raise SceneError(
+        raise InputError(
             f"An accuracy of {accuracy:g} is not attainable: ask for one between {FINEST:g} (round-off) and "
             f"{COARSEST:g}."
         )
@@ -95,7 +99,7 @@ class Meshes:
     def error_of(self, special: Special) -> float:
         """Estimated error of a special point in load and ordinate, relative to those that exceed one."""
         error = special.ordinate_error / max(1.0, abs(special.point.ordinate))
-        if special.kind in (FOLD, BRANCH_POINT) or special.zero_of == "stretch":
+        if special.kind.singular or special.zero_of == "stretch":
             error = max(error, special.error_estimate / max(1.0, abs(special.point.load)))
         return error
 
@@ -185,7 +189,6 @@ class Meshes:
                 break
         if not pairs:
             raise ConvergenceError(
-                f"The branch could not be carried to another mesh near load {history[-1].load:.8g}: use --elements and "
-                "--degree instead of an accuracy."
+                f"The branch could not be carried to another mesh near load {history[-1].load:.8g}", OWN_MESH
             )
         return pairs

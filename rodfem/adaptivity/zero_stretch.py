@@ -9,7 +9,8 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.continuation.branch import END, Point, Special
+from rodfem.continuation.branch import Point, Special
+from rodfem.continuation.kinds import END
 from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import HIGHEST

@@ -8,10 +8,11 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import USER, Branch
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.kinds import USER
 from rodfem.continuation.solvers import Equilibria
 from rodfem.diagram.plan import Plan
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.system import System
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import save_modes
@@ -20,7 +21,7 @@ from rodfem.stability.assessment import Judge
 
 
 def check_method(system: System, plan: Plan) -> None:
-    """Raise :class:`SceneError` for a method that does not apply, before anything is computed."""
+    """Raise :class:`InputError` for a method that does not apply, before anything is computed."""
     Judge(system).choose(plan.method or "auto", plan.modes)
 
 
@@ -49,7 +50,7 @@ def judge_users(
                 report.verdict(branch.name, where, finder.judge(special.point.x, plan.method))
                 continue
             verdict, modes = finder(special.point.x, plan.modes, plan.method or "auto")
-        except (SceneError, ConvergenceError) as trouble:
+        except (InputError, ConvergenceError) as trouble:
             report.warn(str(trouble))
             continue
         report.verdict(branch.name, where, verdict, modes)

@@ -7,13 +7,15 @@ module is missing.
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rodfem.errors import ConvergenceError, EnvironmentTrouble, SceneError
+from rodfem.errors import ConvergenceError, InputError, SetupError
+from rodfem.stability.methods import AUTO, METHODS
 
 NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
 
@@ -32,12 +34,31 @@ def check_installation() -> None:
 check_installation()
 
 
+ARGUMENT = re.compile(r"\b(?:Discretization|Plan|Steps|run)\((\w+)=([^()]*)\)")
+"""An :class:`~rodfem.errors.Argument` in a sentence: its name and its value."""
+
+
 class Parser(argparse.ArgumentParser):
-    """Argument parser whose complaints are one sentence, printed once under MPI."""
+    """Argument parser whose complaints are one sentence, printed once under MPI.
+
+    The destination of an option is the name of the argument that it is for.
+    """
+
+    def option(self, name: str) -> str:
+        """Option for an argument, or the argument where there is none."""
+        return next((action.option_strings[0] for action in self._actions if action.dest == name), name)
+
+    def in_options(self, text: str) -> str:
+        """Text in which options stand for arguments of Python: ``--depth 1`` for ``Plan(depth=1)``."""
+
+        def option(found: re.Match[str]) -> str:
+            return self.option(found[1]) + ("" if found[2] == "..." else " " + found[2].strip("'"))
+
+        return ARGUMENT.sub(option, text)
 
     def gives(self, name: str, words: Sequence[str]) -> bool:
         """Whether the command line sets an option, by an abbreviation maybe."""
-        full = next(action.option_strings[0] for action in self._actions if action.dest == name)
+        full = self.option(name)
         return any(word.split("=")[0] in [full[:end] for end in range(3, len(full) + 1)] for word in words)
 
     def error(self, message: str) -> NoReturn:
@@ -122,6 +143,7 @@ def parser_for(
     )
     group.add_argument(
         "--step",
+        dest="largest",
         type=float,
         default=0.05,
         metavar="S",
@@ -146,8 +168,7 @@ def parser_for(
         "--method",
         default="",
         metavar="NAME",
-        help="judge the states at the loads of --at by auto, count, shift-invert, cayley, slicing, reduction or dense, "
-        "and print all that it says",
+        help=f"judge the states at the loads of --at by {', '.join((AUTO, *METHODS))}, and print all that it says",
     )
     group.add_argument(
         "--modes",
@@ -158,6 +179,7 @@ def parser_for(
     )
     group.add_argument(
         "--search",
+        dest="tries",
         type=int,
         default=0,
         metavar="TRIES",
@@ -183,13 +205,13 @@ def parser_for(
 
 
 def pair(words: Sequence[str] | None) -> tuple[str, float, float] | None:
-    """Name and interval of a second parameter; raises :class:`SceneError` for what are no numbers."""
+    """Name and interval of a second parameter; raises :class:`InputError` for what are no numbers."""
     if words is None:
         return None
     try:
         return words[0], float(words[1]), float(words[2])
     except ValueError:
-        raise SceneError(f"{words[1]} to {words[2]} is no interval: give two numbers after {words[0]}.") from None
+        raise InputError(f"{words[1]} to {words[2]} is no interval: give two numbers after {words[0]}.") from None
 
 
 def main(
@@ -224,13 +246,13 @@ def main(
         if options.accuracy is not None:
             for name in ("elements", "degree"):
                 if parser.gives(name, ours):
-                    raise SceneError(
+                    raise InputError(
                         f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy."
                     )
         discretization = Discretization(options.formulation, options.elements, options.degree)
         scene = scene_of(options)
         span = tuple(options.span)
-        steps = Steps(largest=options.step)
+        steps = Steps(largest=options.largest)
         at = tuple(options.at)
         plan = Plan(
             span,
@@ -238,20 +260,20 @@ def main(
             depth=options.depth,
             spectrum=options.spectrum,
             steps=steps,
-            tries=options.search,
+            tries=options.tries,
             locus=pair(options.locus),
             method=options.method,
             modes=options.modes,
             accuracy=options.accuracy,
         )
-        run(scene, discretization, plan, options.output, figures=options.figures)
+        run(scene, discretization, plan, options.output, figures=options.figures, words=parser.in_options)
     except KeyboardInterrupt:
         from mpi4py import MPI
 
         if MPI.COMM_WORLD.rank == 0:
             sys.stderr.write(f"\ninterrupted; the branches that were finished are in {options.output}\n")
         sys.exit(130)
-    except (SceneError, EnvironmentTrouble, ConvergenceError) as trouble:
-        complain(str(trouble))
+    except (InputError, SetupError, ConvergenceError) as trouble:
+        complain(parser.in_options(str(trouble)))
     except PETSc.Error as trouble:
         complain(f"PETSc gave up ({str(trouble).splitlines()[0]}): try other constants or another discretisation.")

@@ -14,7 +14,7 @@ from typing import Any
 from mpi4py import MPI
 
 from rodfem.app.run import writable
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.file_format import RESULT
 from rodfem.output.files import save_json
 from rodfem.problem.scene import Scene
@@ -38,8 +38,8 @@ def many(
     """Return ``work(scene)`` for all scenes, in order, on every rank; rods are dealt out to the ranks in turn.
 
     ``work`` gets no communicator but must use ``MPI.COMM_SELF``, and returns what JSON can hold.  Where it raises
-    :class:`SceneError` or :class:`ConvergenceError` the result is ``{"error": sentence}``, and the others go on.
-    ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`SceneError` where ``folder``
+    :class:`InputError` or :class:`ConvergenceError` the result is ``{"error": sentence}``, and the others go on.
+    ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`InputError` where ``folder``
     cannot be written, or has a result in another or a newer format.
     """
     writable(folder, comm)
@@ -50,7 +50,7 @@ def many(
         if _saved(files[i], key_of(scenes[i])) is None:
             try:
                 result = work(scenes[i])
-            except (SceneError, ConvergenceError) as trouble:
+            except (InputError, ConvergenceError) as trouble:
                 result = {"error": str(trouble)}
             save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
         if comm.rank == 0:
@@ -61,17 +61,17 @@ def many(
 
 
 def _check(files: Sequence[Path], comm: MPI.Comm) -> None:
-    """Raise :class:`SceneError` on every rank where a file has a format that is not to be written over."""
+    """Raise :class:`InputError` on every rank where a file has a format that is not to be written over."""
     trouble = ""
     if comm.rank == 0:
         try:
             for file in files:
                 RESULT.check(_contents(file), file)
-        except SceneError as error:
+        except InputError as error:
             trouble = str(error)
     trouble = comm.bcast(trouble)
     if trouble:
-        raise SceneError(trouble)
+        raise InputError(trouble)
 
 
 def _saved(file: Path, key: dict[str, Any]) -> dict[str, Any] | None:

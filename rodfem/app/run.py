@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mpi4py import MPI
 
 from rodfem import compat
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import END, EVENT, USER, Branch
+from rodfem.continuation.branch import Branch
 from rodfem.continuation.solvers import Equilibria
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.output.files import save_json, save_states
@@ -25,9 +25,11 @@ from rodfem.problem.scene import Scene
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
 """What a picture's caption shows for TeX names."""
 
+ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
+
 
 def writable(folder: Path, comm: MPI.Comm) -> None:
-    """Make ``folder``; raises :class:`SceneError` on every rank where it cannot be written."""
+    """Make ``folder``; raises :class:`InputError` on every rank where it cannot be written."""
     trouble = ""
     if comm.rank == 0:
         probe = folder / f".probe-{os.getpid()}"
@@ -39,7 +41,7 @@ def writable(folder: Path, comm: MPI.Comm) -> None:
             trouble = error.strerror or str(error)
     trouble = comm.bcast(trouble)
     if trouble:
-        raise SceneError(f"The output folder {folder} cannot be written ({trouble}): choose another one with --output.")
+        raise InputError(f"The output folder {folder} cannot be written ({trouble})", ANOTHER_FOLDER)
 
 
 def run(
@@ -51,13 +53,15 @@ def run(
     figures: bool = True,
     comm: MPI.Comm = MPI.COMM_WORLD,
     quiet: bool = False,
+    words: Callable[[str], str] = str,
 ) -> Diagram:
     """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
     By default 8 elements of degree 6 (few elements to start with where the plan has an accuracy), the scene's own span,
     and the folder ``results/<name>``.  Files are updated after every branch: an interrupted run keeps all completed
-    branches.  Returns the diagram.  Raises :class:`~rodfem.errors.SceneError` for bad input, before any computation,
-    and :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
+    branches.  What the terminal prints is what ``words`` makes of each line.  Returns the diagram.  Raises
+    :class:`~rodfem.errors.InputError` for bad input, before any computation, and
+    :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
     """
     plan = plan or Plan()
     output = output or Path("results") / scene.name
@@ -65,7 +69,7 @@ def run(
         compat.require_real_petsc()
     plan.check(scene)
     writable(output, comm)
-    terminal = Terminal(plan, output, comm, quiet)
+    terminal = Terminal(plan, output, comm, quiet, words)
     diagram = trace(scene, discretization, plan, terminal, comm=comm)
     branches, clock = diagram.branches, diagram.clock
     if comm.rank == 0:
@@ -90,9 +94,11 @@ def run(
 class Terminal(Report):
     """Shows a run on the terminal, and keeps its files up to date."""
 
-    def __init__(self, plan: Plan, output: Path, comm: MPI.Comm, quiet: bool) -> None:
+    def __init__(
+        self, plan: Plan, output: Path, comm: MPI.Comm, quiet: bool, words: Callable[[str], str] = str
+    ) -> None:
         """Write into the folder ``output``, which there is; with ``quiet`` print nothing."""
-        super().__init__(comm)
+        super().__init__(comm, words=words)
         if quiet:
             self.on = self.live = False
         self.plan, self.output = plan, output
@@ -133,7 +139,7 @@ def _loci(
     for branch in branches:
         known: list[Locus] = []
         for special in branch.special:
-            if special.kind in (USER, EVENT, END) or special.meets is not None:
+            if not (special.kind.counted or special.kind.line) or special.meets is not None:
                 continue
             if any(found.passes(special) for found in known):
                 report.say(f"\nThe {special.kind} of {branch.name} at {special.point.load:.8g} is on a locus above")
@@ -143,7 +149,7 @@ def _loci(
             report.say(f"\nLocus of the {special.kind} of {branch.name} at {special.point.load:.8g}")
             try:
                 found = locus(solvers[special.point.mesh], special, name, (load, (low, high)))
-            except (SceneError, ConvergenceError) as trouble:
+            except (InputError, ConvergenceError) as trouble:
                 report.warn(str(trouble))
                 continue
             report.say(found.text())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite
 from typing import TextIO
 
@@ -11,22 +11,10 @@ import numpy as np
 from mpi4py import MPI
 
 from forms.kinematics import RODS
-from rodfem.continuation.branch import (
-    BRANCH_POINT,
-    DIVERGENCE,
-    END,
-    EVENT,
-    FLUTTER,
-    FOLD,
-    IMPERFECT,
-    USER,
-    Branch,
-    Law,
-    Point,
-    Special,
-    not_followed,
-)
+from rodfem.continuation.branch import Branch, Law, Point, Special, not_followed
+from rodfem.continuation.kinds import END, FLUTTER
 from rodfem.continuation.observer import Observer
+from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.modes import Modes
@@ -35,17 +23,6 @@ from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Verdict
 from rodfem.timing import Clock
 
-LABELS = {
-    FOLD: "LP",
-    BRANCH_POINT: "BP",
-    FLUTTER: "HB",
-    DIVERGENCE: "BP",
-    IMPERFECT: "IB",
-    USER: "UZ",
-    EVENT: "UZ",
-    END: "EP",
-}
-"""AUTO's two-letter labels."""
 INDEX, UNSTABLE = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
@@ -84,9 +61,11 @@ def _roots(point: Point) -> dict[str, str]:
 class Report(Observer):
     """Prints on rank 0."""
 
-    def __init__(self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None) -> None:
-        """Print to ``stream``, by default the terminal."""
-        self.count = INDEX
+    def __init__(
+        self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None, words: Callable[[str], str] = str
+    ) -> None:
+        """Print what ``words`` makes of each line to ``stream``, by default the terminal."""
+        self.count, self.words = INDEX, words
         self.on = comm.rank == 0
         self.stream = stream or sys.stdout
         self.live = self.on and self.stream.isatty() and comm.size == 1
@@ -96,7 +75,7 @@ class Report(Observer):
         if self.on:
             if self.live:
                 self.stream.write("\r\033[K")
-            self.stream.write(line + end)
+            self.stream.write(self.words(line) + end)
             self.stream.flush()
 
     def note(self, sentence: str) -> None:
@@ -178,7 +157,7 @@ class Report(Observer):
         p = special.point
         meets = f"  meets {special.meets[0]}" if special.meets else ""
         return (
-            f"{LABELS[special.kind]}   {round(p.load, 10) + 0.0:<14.10f} {round(p.ordinate, 9) + 0.0:<14.9f} "
+            f"{special.kind.code}   {round(p.load, 10) + 0.0:<14.10f} {round(p.ordinate, 9) + 0.0:<14.9f} "
             f"{p.energy:<10.6f} "
             f"{index_in_words(special):>{max(6, len(self.count))}} {p.zero:>5}  {special.located_to:.0e}{meets}"
         )
@@ -202,7 +181,7 @@ class Report(Observer):
         self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
         for branch in branches:
             for s in branch.special:
-                exact = s.kind in (USER, END) and s.zero_of != "stretch"
+                exact = s.kind.given and s.zero_of != "stretch"
                 load = f"{s.point.load:.10g}" if exact else number(s.point.load, s.error_estimate, s.resolved)
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
                 ordinate = number(s.point.ordinate, s.ordinate_error, s.resolved)
@@ -221,12 +200,10 @@ class Report(Observer):
             )
         missed = not_followed(branches)
         if missed:
-            deepest = max(
-                b.depth for b in branches if any(s.kind == BRANCH_POINT and not s.switched for s in b.special)
-            )
+            deepest = max(b.depth for b in branches if any(s.to_follow for s in b.special))
             self.say(
                 f"  {missed} branch point{'s were' if missed > 1 else ' was'} not followed, at the depth of switches: "
-                f"--depth {deepest + 1} follows what leaves there"
+                f"{Argument('Plan', 'depth', deepest + 1)} follows what leaves there"
             )
 
     def spectra(self, branches: Sequence[Branch], scene: Scene) -> None:

@@ -26,10 +26,11 @@ from rodfem.codim2.collision import Collision
 from rodfem.codim2.curve import Criterion, Half, Tracer
 from rodfem.codim2.parameter_plane import Interval, Node, Plane
 from rodfem.codim2.singular import Singular, null_vectors
-from rodfem.continuation.branch import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, Special
+from rodfem.continuation.branch import Special
+from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FOLD, KINDS
 from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.continuation.step_control import Steps
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.file_format import LOCUS
 from rodfem.output.digits import number
@@ -187,7 +188,7 @@ def locus(
 
     Raises
     ------
-    SceneError
+    InputError
         For a parameter, bounds or a kind of special point that make no sense.
     ConvergenceError
         Where the special point itself is not found again.
@@ -196,7 +197,7 @@ def locus(
     plane = Plane(system, parameter, bounds)
     p = np.array([special.point.load, scene.parameters[parameter].value])
     if plane.outside(p) is not None:
-        raise SceneError(
+        raise InputError(
             f"The special point at {scene.load} = {p[0]:g}, {parameter} = {p[1]:g} is outside the bounds: widen them."
         )
     with system.clock.purpose("locus"), plane.kept():
@@ -254,18 +255,17 @@ def locus(
 
 
 def _guess(solver: Equilibria, special: Special, p: np.ndarray) -> Node:
-    """The special point as a point of the plane; raises :class:`SceneError` for a kind that has no locus."""
-    if special.kind not in (FOLD, BRANCH_POINT, FLUTTER, DIVERGENCE):
-        raise SceneError(
-            f"A point of the kind {special.kind!r} has no locus: choose a fold, branch point, flutter or divergence."
-        )
-    if special.kind in (FOLD, BRANCH_POINT) and not isinstance(solver, Follower):
-        raise SceneError("The locus of a fold or a branch point needs the follower that found it.")
+    """The special point as a point of the plane; raises :class:`InputError` for a kind that has no locus."""
+    if special.kind.line is None:
+        kinds = ", ".join(name for name, kind in KINDS.items() if kind.line is not None)
+        raise InputError(f"A point of the kind {special.kind!r} has no locus: choose one of {kinds}.")
+    if special.kind.singular and not isinstance(solver, Follower):
+        raise InputError("The locus of a fold or a branch point needs the follower that found it.")
     x, left = special.point.x, list[PETSc.Vec]()
     modes = list(special.null_vectors)
     if special.kind == FLUTTER:
         if special.cluster is None or special.note:
-            raise SceneError(f"This flutter has no locus: {special.note or 'it was not found by a sweep'}.")
+            raise InputError(f"This flutter has no locus: {special.note or 'it was not found by a sweep'}.")
         modes = as_vectors(solver.system, special.cluster.basis)
     if special.kind == DIVERGENCE:
         number = abs(special.negative_after - special.negative_before)

@@ -8,18 +8,14 @@ from typing import TYPE_CHECKING
 
 from petsc4py import PETSc
 
+from rodfem.continuation.kinds import Kind
+from rodfem.errors import SMALLER_STEPS
+
 if TYPE_CHECKING:
     from rodfem.problem.events import Event
     from rodfem.stability.cluster import Cluster
 
-FOLD, BRANCH_POINT, USER, END = "fold", "branch point", "user", "end"
-EVENT = "event"
-"""A number of the state vanishes: see :mod:`rodfem.problem.events`."""
 NOT_TRACED = "not traced"
-IMPERFECT = "imperfect bifurcation"
-"""A branch point that an imperfection has taken apart, where steps of continuation do not resolve its pieces."""
-FLUTTER, DIVERGENCE = "flutter", "divergence"
-"""Under loads without a potential: a pair of frequencies becomes complex; one becomes imaginary."""
 
 
 @dataclass(repr=False)
@@ -108,7 +104,7 @@ class Special:
     eigenvalues that collide.
     """
 
-    kind: str
+    kind: Kind
     point: Point
     negative_before: int
     negative_after: int
@@ -140,6 +136,11 @@ class Special:
         """Number of eigenvalues that cross or touch zero here."""
         return len(self.null_vectors)
 
+    @property
+    def to_follow(self) -> bool:
+        """Whether other branches leave there, and none has been sought."""
+        return self.kind.branches and not self.switched
+
 
 @dataclass(frozen=True)
 class Unexplained:
@@ -154,7 +155,7 @@ class Unexplained:
         """Say it in a sentence."""
         return (
             f"Between loads {self.a.load:.8g} and {self.b.load:.8g} the index changes from {self.before} to "
-            f"{self.after}, and no special point was found that says why: use smaller steps (--step) or more elements."
+            f"{self.after}, and no special point was found that says why: {SMALLER_STEPS} or more elements."
         )
 
 
@@ -207,4 +208,4 @@ class Branch:
 
 def not_followed(branches: Sequence[Branch]) -> int:
     """Number of branch points from which no branch was sought, as the depth of the plan was reached."""
-    return sum(s.kind == BRANCH_POINT and not s.switched for b in branches for s in b.special)
+    return sum(s.to_follow for b in branches for s in b.special)

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
 
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch, Point, Special, Unexplained
+from rodfem.continuation.branch import Branch, Point, Special, Unexplained
+from rodfem.continuation.kinds import BRANCH_POINT
 
 Interval = tuple[int, int]
 
@@ -50,7 +51,7 @@ def breaks(points: Sequence[Point], specials: Sequence[Special], begins: int | N
 
     ``begins`` is the index right after the first row, where it is known although it is none of these special points.
     """
-    at = {id(s.point): s for s in specials if s.kind in (FOLD, BRANCH_POINT)}
+    at = {id(s.point): s for s in specials if s.kind.singular}
     persistent = persistent_zeros(points)
     found = []
     for a, b in pairwise(points):

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.solvers import Follower, hermite
-from rodfem.errors import ConvergenceError
+from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.system import System, combine
 from rodfem.problem.events import Event
@@ -61,8 +61,8 @@ def solve_at(follower: Follower, curve: Curve, s: float) -> PETSc.Vec:
     outcome = correct(follower.system, x, follower.row(direction))
     if not outcome.converged:
         raise ConvergenceError(
-            f"No equilibrium near load {follower.system.scalar(x):.8g} while locating a special point: "
-            "use smaller steps (--step)."
+            f"No equilibrium near load {follower.system.scalar(x):.8g} while locating a special point",
+            SMALLER_STEPS,
         )
     return x
 
@@ -110,7 +110,7 @@ def eigenvalue(
         if len(side) > position:
             chosen = side[np.argsort(abs(values[side]))[position]]
             return float(values[chosen]), vectors[chosen].copy()
-    raise ConvergenceError(f"Eigenvalue number {order} is not among those nearest zero; use smaller steps (--step).")
+    raise ConvergenceError(f"Eigenvalue number {order} is not among those nearest zero", SMALLER_STEPS)
 
 
 def sample(
@@ -249,9 +249,7 @@ def refine(
             center = nodes[0] + float(np.clip(step, -4 * half, 6 * half))
     if best is not None:
         return best
-    raise ConvergenceError(
-        f"A special point near load {samples[0].load:.8g} could not be located; use smaller steps (--step)."
-    )
+    raise ConvergenceError(f"A special point near load {samples[0].load:.8g} could not be located", SMALLER_STEPS)
 
 
 def _slopes(samples: list[Sample]) -> list[float]:
@@ -275,8 +273,8 @@ def crossing_mode(
         except ConvergenceError:
             width /= 16
     raise ConvergenceError(
-        f"Eigenvalue number {order} is not among those nearest zero near load {follower.system.scalar(x):.8g}; use "
-        "smaller steps (--step)."
+        f"Eigenvalue number {order} is not among those nearest zero near load {follower.system.scalar(x):.8g}",
+        SMALLER_STEPS,
     )
 
 

@@ -15,10 +15,11 @@ from itertools import pairwise
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch, Point, Special
+from rodfem.continuation.branch import Branch, Point, Special
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.locate import Located, across, locate, solve_at
 from rodfem.continuation.solvers import VERTICAL, Follower, distance, hermite
-from rodfem.errors import ConvergenceError
+from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.stability.round_off import decide
 
@@ -50,14 +51,14 @@ def special_at(follower: Follower, located: Located, arclength: float, still: Se
     null_count = point.zero - system.active_drifts()
     if null_count < 1:  # what was interpolated has no zero there: two branches were taken for one
         raise ConvergenceError(
-            f"No eigenvalue vanishes at load {point.load:.8g}, where one was expected to: use smaller steps (--step)."
+            f"No eigenvalue vanishes at load {point.load:.8g}, where one was expected to", SMALLER_STEPS
         )
     _, vectors = inertia.nearest(null_count, accuracy=1e-8)
     vectors = across(system, vectors, still)
     if not vectors:
         raise ConvergenceError(
-            f"The null vector near load {located.load:.8g} is in the span of those that persist along the branch: "
-            "use smaller steps (--step)."
+            f"The null vector near load {located.load:.8g} is in the span of those that persist along the branch",
+            SMALLER_STEPS,
         )
     coupling = max(coupling_of(follower, x, v) for v in vectors)
     turning = abs(system.scalar(tangent)) < 1e-3 * abs(system.scene.span[1] - system.scene.span[0])
@@ -168,8 +169,8 @@ def _special(
     margin = 0.01 * (b.arclength - a.arclength)
     if not a.arclength - margin <= located.s <= b.arclength + margin:
         raise ConvergenceError(
-            f"A special point between loads {a.load:.8g} and {b.load:.8g} slipped out of its bracket: "
-            "use smaller steps (--step)."
+            f"A special point between loads {a.load:.8g} and {b.load:.8g} slipped out of its bracket",
+            SMALLER_STEPS,
         )
     special = special_at(follower, located, located.s, still)
     special.zero_of = zero_of

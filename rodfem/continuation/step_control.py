@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rodfem.continuation.branch import Point
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.problem.kinds import real, whole
 
 SHRINK, GROW = 0.4, 1.6
@@ -39,18 +39,18 @@ class Steps:
     most: int = 2000
 
     def __post_init__(self) -> None:
-        """Check kinds and the largest step; raises :class:`SceneError`."""
+        """Check kinds and the largest step; raises :class:`InputError`."""
         for name in ("first", "largest", "smallest", "aim"):
             real(name, getattr(self, name), getattr(Steps, name))
         if whole("most", self.most, Steps.most) < 1:
-            raise SceneError(f"most is {self.most}: a branch has at least one point; give most=1 or more.")
+            raise InputError(f"most is {self.most}: a branch has at least one point; give most=1 or more.")
         if not self.smallest < self.largest <= 1:
-            raise SceneError(
+            raise InputError(
                 f"A step of {self.largest:g} is out of bounds: choose more than {self.smallest:g}, at most 1."
             )
         for name in ("first", "smallest", "aim"):
             if not getattr(self, name) > 0:
-                raise SceneError(f"Steps with {name} = {getattr(self, name):g} lead nowhere: give more than 0.")
+                raise InputError(f"Steps with {name} = {getattr(self, name):g} lead nowhere: give more than 0.")
 
     def begin(self) -> float:
         """Length of the first step."""
@@ -82,10 +82,10 @@ class IndexSteps(Steps):
     resolved: float = 1e-4
 
     def __post_init__(self) -> None:
-        """Check the bound, too; raises :class:`SceneError`."""
+        """Check the bound, too; raises :class:`InputError`."""
         super().__post_init__()
         if whole("change", self.change, IndexSteps.change) < 1:
-            raise SceneError(f"A change of the index of {self.change} leads nowhere: give change=1 or more.")
+            raise InputError(f"A change of the index of {self.change} leads nowhere: give change=1 or more.")
         real("resolved", self.resolved, IndexSteps.resolved)
 
     def accepts(self, before: Point, after: Point) -> bool:

@@ -27,7 +27,7 @@ from rodfem.continuation.solvers import Follower, hermite
 from rodfem.deflation.deflated_newton import FLOW, MOST, DeflatedNewton
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
 from rodfem.deflation.guesses import turned_state
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import correct
 from rodfem.fem.system import combine
 
@@ -95,14 +95,14 @@ class Deflation(DeflatedNewton):
     """
 
     def __init__(self, follower: Follower, load: float, known: Sequence[Point] = (), seed: int = 0) -> None:
-        """Deflate the known equilibria and their images; :class:`SceneError` where one is at another load."""
+        """Deflate the known equilibria and their images; :class:`InputError` where one is at another load."""
         super().__init__(follower)
         self.load, self.seed = load, seed
         scene = self.system.scene
         scene.parameters[scene.load].check(scene.load, load)
         for point in known:
             if abs(point.load - load) > 1e-9 * abs(scene.span[1] - scene.span[0]):
-                raise SceneError(
+                raise InputError(
                     f"A known equilibrium is at {scene.load} = {point.load:.8g}, not {load:.8g}: "
                     "give equilibria at the load of the search (diagram.at(load) computes them)."
                 )
@@ -206,7 +206,7 @@ def further(
 
     Each stands for all that the scene's symmetries make of it, and carries its index, energy, ordinate and a tangent in
     the direction of increasing load.  How the tries ended goes to the ``observer``; :class:`Deflation` has the numbers.
-    Raises :class:`SceneError` for a load that is not admissible, or known equilibria at another one.
+    Raises :class:`InputError` for a load that is not admissible, or known equilibria at another one.
     """
     search = Deflation(follower, load, known, seed)
     found = search.run(tries)

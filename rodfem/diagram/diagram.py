@@ -8,13 +8,13 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rodfem.continuation.branch import END, USER, Branch, Point, Special
+from rodfem.continuation.branch import Branch, Point, Special
 from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.continuation.step_control import Steps
 from rodfem.deflation.search import states_at
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
 from rodfem.output.files import as_data, save_json, save_states
@@ -92,16 +92,16 @@ class Diagram:
         """
         chosen = self.branches if branch is None else [self[branch]]
         every = [s for b in chosen for s in b.special]
-        return [s for s in every if (s.kind == kind if kind is not None else s.kind not in (USER, END))]
+        return [s for s in every if (s.kind == kind if kind is not None else not s.kind.given)]
 
     def at(self, load: float) -> list[Point]:
         """All equilibria of the diagram at exactly ``load``, computed there, each with its own index.
 
-        In the order of their branches.  Raises :class:`~rodfem.errors.SceneError` for a load outside the range.
+        In the order of their branches.  Raises :class:`~rodfem.errors.InputError` for a load outside the range.
         """
         low, high = sorted(self.span)
         if not low <= load <= high:
-            raise SceneError(
+            raise InputError(
                 f"The load {load:g} is outside the range {low:g} to {high:g} of this diagram: trace a wider one, as in "
                 "diagram.again(span=...)."
             )
@@ -152,7 +152,7 @@ class Diagram:
         steps
             Control of the step, by default :data:`rodfem.codim2.locus.STEPS`.
 
-        Raises :class:`~rodfem.errors.SceneError` for a parameter, bounds or a kind of special point that make no sense,
+        Raises :class:`~rodfem.errors.InputError` for a parameter, bounds or a kind of special point that make no sense,
         and :class:`~rodfem.errors.ConvergenceError` where the special point is not found again.
         """
         from rodfem.codim2.locus import STEPS, locus

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import EVENT, Point, Special
+from rodfem.continuation.branch import Point, Special
+from rodfem.continuation.kinds import EVENT
 from rodfem.continuation.locate import ROUND_OFF, event_at, locate_event
 from rodfem.continuation.solvers import Follower, hermite
 from rodfem.problem.events import Event

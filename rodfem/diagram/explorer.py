@@ -11,7 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.gaps import Gap, arms
-from rodfem.continuation.branch import BRANCH_POINT, Branch, Point, Special
+from rodfem.continuation.branch import Branch, Point, Special
 from rodfem.continuation.normal_form import law_of, origin_of
 from rodfem.continuation.solvers import ON_BOUND
 from rodfem.continuation.special_points import COUPLED, coupling_of, directions, start_branch
@@ -87,7 +87,7 @@ class Explorer(Tracer):
                     self._crossed += 1
                     self._detached(self.gaps.known[self._crossed - 1], branch.depth + 1)
                 for i, special in enumerate(branch.special):
-                    if special.kind == BRANCH_POINT and not special.switched:
+                    if special.to_follow:
                         self._switch(branch, i, special)
 
     def _primary(self) -> Branch:

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.solvers import Equilibria
 from rodfem.diagram.sweep import at_load
-from rodfem.errors import ConvergenceError
+from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
@@ -69,7 +69,8 @@ def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndar
         values = vibration.near(number + 2, -1e-3).values
         found.append(values[np.argsort(abs(values))][: number + 2])
     if min(map(len, found)) < number:
-        raise ConvergenceError(f"The coarsest mesh has fewer than {number} frequencies: ask for fewer (--spectrum).")
+        remedy = Remedy("ask for fewer ({})", Argument("Plan", "spectrum"))
+        raise ConvergenceError(f"The coarsest mesh has fewer than {number} frequencies", remedy)
     return found
 
 

@@ -6,12 +6,23 @@ from dataclasses import dataclass, field
 
 from rodfem.adaptivity.mesh_sequence import check_accuracy
 from rodfem.continuation.step_control import Steps
-from rodfem.errors import SceneError
+from rodfem.errors import Argument, InputError, Remedy
 from rodfem.problem.events import Event
 from rodfem.problem.kinds import real, reals, whole
 from rodfem.problem.local_state import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import check_load
+from rodfem.stability import methods
+
+MODES, METHOD = Argument("Plan", "modes"), Argument("Plan", "method")
+COUNTS = {
+    Argument("Plan", "depth"): "depth",
+    Argument("Plan", "tries"): "number of tries",
+    Argument("Plan", "spectrum"): "number of eigenvalues",
+    MODES: "number of modes",
+}
+"""What is not negative."""
+GIVE_LOADS = Remedy("give them in {}", Argument("Plan", "at"))
 
 
 @dataclass(frozen=True)
@@ -43,24 +54,26 @@ class Plan:
     events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check that all is of the right kind; raises :class:`SceneError`."""
+        """Check that all is of the right kind; raises :class:`InputError`."""
         if self.span is not None:
             object.__setattr__(self, "span", reals("span", self.span, (0.0, 1.0), 2))
         object.__setattr__(self, "at", reals("at", self.at, (0.5, 1.0)))
         for name, example in (("depth", 2), ("spectrum", 4), ("tries", 24), ("modes", 3)):
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
         if not isinstance(self.steps, Steps):
-            raise SceneError(f"steps is {self.steps!r}: give Steps, as in steps=Steps(largest=0.02).")
+            raise InputError(f"steps is {self.steps!r}: give Steps, as in steps=Steps(largest=0.02).")
         if not isinstance(self.method, str):
-            raise SceneError(f"method is {self.method!r}: give the name of one, as in method='auto'.")
+            raise InputError(f"method is {self.method!r}: give the name of one, as in method='auto'.")
+        if self.method not in ("", methods.AUTO):
+            methods.find(self.method)
         if self.accuracy is not None:
             real("accuracy", self.accuracy, 1e-8)
         if not all(isinstance(event, Event) for event in self.events):
-            raise SceneError(f"events is {self.events!r}: give Events, as in events=(Event('ends meet', of=f),).")
+            raise InputError(f"events is {self.events!r}: give Events, as in events=(Event('ends meet', of=f),).")
         if self.locus is not None:
             parts = tuple(self.locus) if isinstance(self.locus, (tuple, list)) else ()
             if len(parts) != 3 or not isinstance(parts[0], str):
-                raise SceneError(f"locus is {self.locus!r}: give a name and an interval, as in locus=('A', -3.0, 0.0).")
+                raise InputError(f"locus is {self.locus!r}: give a name and an interval, as in locus=('A', -3.0, 0.0).")
             reals("locus[1:]", parts[1:], (-3.0, 0.0))
 
     def over(self, scene: Scene) -> tuple[float, float]:
@@ -68,7 +81,7 @@ class Plan:
         return scene.span if self.span is None else self.span
 
     def check(self, scene: Scene) -> None:
-        """Raise :class:`SceneError` for a range that the scene does not admit, or a load outside the range."""
+        """Raise :class:`InputError` for a range that the scene does not admit, or a load outside the range."""
         span = self.over(scene)
         scene.check_span(span)
         check_load(scene)
@@ -77,7 +90,7 @@ class Plan:
         low, high = sorted(span)
         for load in self.at:
             if not low <= load <= high:
-                raise SceneError(
+                raise InputError(
                     f"The load {load:g} asked for is outside the range {low:g} to {high:g}: "
                     "widen the range or leave it out."
                 )
@@ -86,30 +99,25 @@ class Plan:
             if name == scene.load or name not in scene.parameters:
                 others = ", ".join(n for n in scene.parameters if n != scene.load)
                 choose = f"choose one of {others}" if others else "the scene has none beside its load, so add one"
-                raise SceneError(f"{name!r} is no second parameter: {choose}.")
+                raise InputError(f"{name!r} is no second parameter: {choose}.")
             if name not in asked_for(scene):
-                raise SceneError(f"Nothing in the scene depends on {name!r}: choose another parameter for the locus.")
+                raise InputError(f"Nothing in the scene depends on {name!r}: choose another parameter for the locus.")
             if not a <= scene.parameters[name].value <= b or a == b:
-                raise SceneError(
+                raise InputError(
                     f"The interval of {name} from {a:g} to {b:g} does not hold its value "
                     f"{scene.parameters[name].value:g}: choose one that does."
                 )
             for value in (a, b):
                 try:
                     scene.varying(scene.load, scene.span, **{name: value})
-                except SceneError as trouble:
-                    raise SceneError(f"The locus cannot reach {name} = {value:g}. {trouble}") from None
-        if self.depth < 0:
-            raise SceneError(f"{self.depth} is not a depth: give 0 (the first branch alone) or more to --depth.")
-        if self.tries < 0:
-            raise SceneError(f"{self.tries} is not a number of tries: give 0 or more to --search.")
+                except InputError as trouble:
+                    raise InputError(f"The locus cannot reach {name} = {value:g}. {trouble}") from None
+        for argument, what in COUNTS.items():
+            if (value := getattr(self, argument.name)) < 0:
+                raise InputError(f"{value} is not a {what}", Remedy("give 0 or more in {}", argument))
         if self.tries and not self.at:
-            raise SceneError("A search needs loads to search at: give them with --at.")
-        if self.modes < 0:
-            raise SceneError(f"{self.modes} is not a number of modes: give 0 or more to --modes.")
+            raise InputError("A search needs loads to search at", GIVE_LOADS)
         if (self.modes or self.method) and not self.at:
-            raise SceneError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at: give them with --at.")
-        if self.modes and self.method == "count":
-            raise SceneError("Counting alone finds no modes: leave out --modes, or name another --method.")
-        if self.spectrum < 0:
-            raise SceneError(f"{self.spectrum} is not a number of eigenvalues: give 0 or more to --spectrum.")
+            raise InputError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at", GIVE_LOADS)
+        if self.modes and self.method in methods.METHODS and not methods.find(self.method).finds_modes:
+            raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))

@@ -10,12 +10,13 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, Branch, Law, Point, Special
+from rodfem.continuation.branch import Branch, Law, Point, Special
+from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM
 from rodfem.output.files import COLUMNS, load_json, load_state
@@ -47,7 +48,7 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
     comm
         Ranks that share the rod: as many as there are, whatever number wrote the file.
 
-    Raises :class:`~rodfem.errors.SceneError` where the files are missing, are those of another scene or of a newer
+    Raises :class:`~rodfem.errors.InputError` where the files are missing, are those of another scene or of a newer
     format, or lack something.
     """
     folder = Path(folder)
@@ -63,7 +64,7 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
 
 
 def _check_entries(data: dict[str, Any], path: Path) -> None:
-    """Raise :class:`SceneError` where a file without a version lacks what a diagram is made of."""
+    """Raise :class:`InputError` where a file without a version lacks what a diagram is made of."""
     DIAGRAM.check(data, path, NEEDED)
     for branch in data["branches"]:
         where = f"{path}, branch {branch.get('name')!r},"
@@ -74,10 +75,10 @@ def _check_entries(data: dict[str, Any], path: Path) -> None:
 
 
 def _check(data: dict[str, Any], scene: Scene, folder: Path) -> None:
-    """Raise :class:`SceneError` where a scene is not the one that was saved, as far as numbers tell."""
+    """Raise :class:`InputError` where a scene is not the one that was saved, as far as numbers tell."""
     name, load = data["scene"], data["parameter"]
     if (name, load) != (scene.name, scene.load):
-        raise SceneError(
+        raise InputError(
             f"{folder} holds the scene {name!r} with the load {load}, not {scene.name!r} with {scene.load}: give the "
             "scene that was run."
         )
@@ -85,7 +86,7 @@ def _check(data: dict[str, Any], scene: Scene, folder: Path) -> None:
         known = scene.parameters.get(constant)
         if known is None or abs(known.value - value) > SAME * max(1.0, abs(value)):
             there = "has no such parameter" if known is None else f"has {known.value:.12g}"
-            raise SceneError(
+            raise InputError(
                 f"{folder} was computed with {constant} = {value:.12g}, and the scene {there}: give the scene that was "
                 "run."
             )
@@ -135,7 +136,7 @@ def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[E
     point = points[entry["row"]]
     solver = solvers[point.mesh]
     special = Special(
-        entry["kind"], point, entry["negative_before"], entry["negative_after"], entry["located_to"],
+        KINDS[entry["kind"]], point, entry["negative_before"], entry["negative_after"], entry["located_to"],
         coupling=entry["coupling"], error_estimate=_number(entry["error_estimate"]),
         ordinate_error=_number(entry["ordinate_error_estimate"]), resolved=entry.get("resolved"), row=entry["row"],
         switched=entry["followed"], unfolding=_number(entry["unfolding"]), note=entry["note"],
@@ -146,7 +147,7 @@ def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[E
     if entry["law"]:
         known = {f.name for f in fields(Law)}
         special.law = Law(**{name: _number(v) for name, v in entry["law"].items() if name in known})
-    if isinstance(solver, Follower) and special.kind in (FOLD, BRANCH_POINT) and entry["multiplicity"]:
+    if isinstance(solver, Follower) and special.kind.singular and entry["multiplicity"]:
         solver.system.set_phase(point.x)
         solver.inertia.count(point.x)
         special.null_vectors = [v.copy() for v in solver.inertia.nearest(entry["multiplicity"], accuracy=1e-8)[1]]

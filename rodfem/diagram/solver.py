@@ -16,7 +16,7 @@ from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.deflation.search import further
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.finder import ModeFinder
@@ -61,7 +61,7 @@ class Solver:
         clock
             Where times are noted.
 
-        Raises :class:`~rodfem.errors.SceneError` for a discretisation that does not fit the scene.
+        Raises :class:`~rodfem.errors.InputError` for a discretisation that does not fit the scene.
         """
         if scene.conservative:
             compat.require_real_petsc()
@@ -114,7 +114,7 @@ class Solver:
             A state nearby to start Newton's method from: on the same mesh, at another load perhaps.  Without one the
             scene's own start is taken, as for the first state of a diagram.
 
-        Raises :class:`~rodfem.errors.SceneError` for a load that is not admissible, and
+        Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, and
         :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found.
         """
         scene, found = self.scene, self.equilibria
@@ -140,12 +140,11 @@ class Solver:
         point
             The equilibrium.
         method
-            ``count``, ``shift-invert``, ``cayley``, ``slicing``, ``reduction``, ``dense``, or ``auto``: see
-            :class:`rodfem.stability.assessment.Judge`.
+            ``auto``, or a name of ``rodfem.stability.methods.METHODS``.
         number
             How many eigenvalues are computed.
 
-        Raises :class:`~rodfem.errors.SceneError` for a method that does not exist or apply, and
+        Raises :class:`~rodfem.errors.InputError` for a method that does not exist or apply, and
         :class:`~rodfem.errors.ConvergenceError` where an eigensolver fails.
         """
         return judge(self.equilibria, state_of(point), method, number)
@@ -153,13 +152,13 @@ class Solver:
     def modes(self, point: Point | Special | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
         """Left-most modes of an equilibrium on this mesh, each with its value, motion and error."""
         if isinstance(number, bool) or not isinstance(number, int) or number < 1:
-            raise SceneError(f"{number!r} modes cannot be computed: ask for 1 or more, as in modes(point, 3).")
+            raise InputError(f"{number!r} modes cannot be computed: ask for 1 or more, as in modes(point, 3).")
         return self._finder(state_of(point), number, method)[1]
 
     def restore(self, states: Path | str, branch: str, row: int) -> Point:
         """Equilibrium of a saved row; it is solved anew, as the mesh may be another one.
 
-        Raises :class:`~rodfem.errors.SceneError` where the file ``states`` has no such row.
+        Raises :class:`~rodfem.errors.InputError` where the file ``states`` has no such row.
         """
         x = load_state(Path(states), branch, row, self.equilibria)
         return self.equilibrium(self.equilibria.system.scalar(x), x)
@@ -167,11 +166,11 @@ class Solver:
     def search(self, load: float, known: Sequence[Point] = (), tries: int = 24, seed: int = 0) -> list[Point]:
         """Equilibria at ``load`` beside the ``known`` ones, by ``tries`` deflated Newton iterations.
 
-        Raises :class:`~rodfem.errors.SceneError` for a load that is not admissible, for known equilibria at another
+        Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, for known equilibria at another
         one, and where a load has no potential.
         """
         if not isinstance(self.equilibria, Follower):
-            raise SceneError(
+            raise InputError(
                 "A search by deflation needs a scene whose loads all have a potential: "
                 f"{', '.join(self.scene.without_potential())} has none."
             )

@@ -8,8 +8,9 @@ from math import inf
 
 from rodfem.adaptivity.gaps import Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes
-from rodfem.continuation.branch import BRANCH_POINT, FOLD, IMPERFECT, Point, Special
+from rodfem.continuation.branch import Point, Special
 from rodfem.continuation.index_chain import Row, chained
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.special_points import COUPLED, find_special, midpoint, renew
 from rodfem.continuation.touching import Touching

@@ -19,9 +19,10 @@ from petsc4py import PETSc
 from scipy.optimize import brentq, newton
 
 from rodfem.adaptivity.error_estimate import bound, halved
-from rodfem.continuation.branch import DIVERGENCE, END, FLUTTER, USER, Branch, Point, Special
+from rodfem.continuation.branch import Branch, Point, Special
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
+from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER, Kind
 from rodfem.continuation.locate import real_root, zero_uncertainty
 from rodfem.continuation.normal_form import ROUND_OFF
 from rodfem.continuation.observer import Observer
@@ -62,7 +63,7 @@ NONE = Frequencies(np.zeros(0, dtype=complex), np.zeros(0))
 class _Event:
     """A special point between two loads, before it is evaluated: by how much ``change`` of the unstable eigenvalues."""
 
-    kind: str
+    kind: Kind
     load: float
     change: int
     uncertainty: float

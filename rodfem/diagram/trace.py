@@ -53,7 +53,7 @@ def trace(
 
     Raises
     ------
-    SceneError
+    InputError
         For bad input, before any computation.
     ConvergenceError
         Where not even a first equilibrium is found.

@@ -14,8 +14,9 @@ from rodfem.adaptivity.accuracy_control import Watch
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
 from rodfem.adaptivity.zero_stretch import zero_stretch
-from rodfem.continuation.branch import BRANCH_POINT, END, NOT_TRACED, USER, Branch, Point, Special
+from rodfem.continuation.branch import NOT_TRACED, Branch, Point, Special
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
+from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.locate import solve_at
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import VERTICAL, Follower, distance, follow, hermite
@@ -197,7 +198,7 @@ class Tracer:
         for special in specials + users:
             self.watch.special(special)
         for special in sorted(specials + users, key=lambda s: s.point.arclength):
-            if special.kind == BRANCH_POINT:
+            if special.kind.branches:
                 reason = self._meeting(branch, special)
                 branch.insert(special)
                 self.observer.special(branch, special)
@@ -281,7 +282,7 @@ class Tracer:
             for i, known in enumerate(other.special):
                 if other is branch and special.point.arclength - known.point.arclength < 0.5:
                     continue  # a neighbour on this branch: a nearly double eigenvalue
-                if known.kind == BRANCH_POINT and self.alike(known.point, special.point, 1e-6):
+                if known.kind.branches and self.alike(known.point, special.point, 1e-6):
                     special.meets = (other.name, i)
                     special.switched = known.switched = True
                     if branch.parent == special.meets:
@@ -324,7 +325,7 @@ class Tracer:
         """Record that a range begins at a singular state: a branch point there is not located, and not followed."""
         first = branch.points[0]
         extra = first.zero - persistent_zeros(branch.points)
-        located = any(s.point is first and s.kind == BRANCH_POINT for s in branch.special)
+        located = any(s.point is first and s.kind.branches for s in branch.special)
         if branch.parent is None and extra > 0 and not located:
             branch.singular_start = extra
             self.observer.warn(branch.start_in_words(self.scene.load))
@@ -341,7 +342,7 @@ class Tracer:
                 guess = hermite(previous, last, last.arclength)[0]
                 point = self.user(guess, beyond, 2 * last.arclength - previous.arclength, beyond > load)
                 point.arclength = last.arclength + distance(self.follower.system, last.x, point.x)
-                found = [s for s in self.specials.beyond(previous, point) if s.kind == BRANCH_POINT]
+                found = [s for s in self.specials.beyond(previous, point) if s.kind.branches]
         except ConvergenceError as trouble:
             self.observer.warn(
                 f"The last state, at {self.scene.load} = {load:g}, is singular, and was not resolved: {trouble}"

@@ -19,7 +19,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from rodfem import compat
-from rodfem.errors import SceneError
+from rodfem.errors import POINTWISE, InputError
 from rodfem.fem.rotation_field import ByAngle, ByQuaternion, Turning
 from rodfem.problem.contribution import UNIT, Block, Group, Motion, Unknown
 from rodfem.problem.end import LETTERS, SIDES
@@ -48,24 +48,24 @@ class Discretization:
     vertices: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        """Check the values; raises :class:`SceneError`."""
+        """Check the values; raises :class:`InputError`."""
         for name, example in (("elements", 8), ("degree", 6)):
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
         if self.vertices is not None:
             object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
         if self.formulation not in FORMULATIONS:
-            raise SceneError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(FORMULATIONS)}.")
+            raise InputError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(FORMULATIONS)}.")
         if self.elements < 1:
-            raise SceneError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
+            raise InputError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
         if not 1 <= self.degree <= HIGHEST:
-            raise SceneError(f"Degree {self.degree} is not available: choose 1 to {HIGHEST}.")
+            raise InputError(f"Degree {self.degree} is not available: choose 1 to {HIGHEST}.")
         if self.vertices is not None:
             if len(self.vertices) != self.elements + 1:
-                raise SceneError(
+                raise InputError(
                     f"{len(self.vertices)} vertices do not bound {self.elements} elements: give {self.elements + 1}."
                 )
             if not all(a < b for a, b in pairwise(self.vertices)):
-                raise SceneError("The vertices of a mesh must ascend along the rod: sort them, each once.")
+                raise InputError("The vertices of a mesh must ascend along the rod: sort them, each once.")
 
     def finer(self, factor: int, richer: int = 0) -> Discretization:
         """Each element cut into ``factor`` equal ones, of a degree higher by ``richer``."""
@@ -167,9 +167,9 @@ class Fields:
     def __init__(
         self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD, mesh: Any = None
     ) -> None:
-        """Make the mesh (unless given), number the unknowns; :class:`SceneError` for more ranks than elements."""
+        """Make the mesh (unless given), number the unknowns; :class:`InputError` for more ranks than elements."""
         if comm.size > discretization.elements:
-            raise SceneError(
+            raise InputError(
                 f"{discretization.elements} elements cannot be shared by {comm.size} ranks: "
                 "use more elements or fewer ranks."
             )
@@ -177,9 +177,7 @@ class Fields:
         if discretization.formulation == "auto":
             discretization = replace(discretization, formulation="pointwise" if reason else "reduced")
         if discretization.formulation == "reduced" and reason:
-            raise SceneError(
-                f"The reduced formulation has no centreline, which {reason} needs: use --formulation pointwise."
-            )
+            raise InputError(f"The reduced formulation has no centreline, which {reason} needs", POINTWISE)
         self.scene, self.discretization, self.comm = scene, discretization, comm
         self.turning = turning_of(scene)
         self.blocks = blocks_of(scene, discretization)
@@ -207,14 +205,14 @@ class Fields:
         if given is not None:
             ends = (given[0], given[-1]) == tuple(scene.interval)
             if not ends or any(abs(np.subtract(given, s)).min() > 1e-9 * scene.length for s in scene.joints):
-                raise SceneError(
+                raise InputError(
                     f"The vertices of the mesh must begin and end at {scene.interval[0]:g} and {scene.interval[1]:g} "
                     "and hold every joint of the scene: add what is missing."
                 )
             compat.move_vertices(mesh, uniform, np.array(given))
             return mesh
         if elements < len(pieces) - 1:
-            raise SceneError(
+            raise InputError(
                 f"The rod has {len(pieces) - 1} pieces between joints, and needs an element for each: use more than "
                 f"{elements} elements."
             )

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 
 
 def writhe(r: np.ndarray) -> float:
@@ -48,7 +48,7 @@ def twist(s: np.ndarray, q: np.ndarray) -> float:
 def link(sample: dict[str, Any], points: int = 400) -> tuple[int, float, float]:
     """Linking number, twist and writhe of a state of a closed rod, given by :meth:`~rodfem.fem.shape.Shape.sample`.
 
-    Raises :class:`SceneError` where the sum of the last two is not near an integer: the rod is not closed, or touches
+    Raises :class:`InputError` where the sum of the last two is not near an integer: the rod is not closed, or touches
     itself.
     """
     from scipy.interpolate import CubicSpline
@@ -60,5 +60,5 @@ def link(sample: dict[str, Any], points: int = 400) -> tuple[int, float, float]:
     Tw, Wr = twist(s, np.asarray(sample["q"])), writhe(CubicSpline(s, closed, bc_type="periodic")(fine))
     Lk = round(Tw + Wr)
     if abs(Tw + Wr - Lk) > 0.05:
-        raise SceneError(f"Twist {Tw:.4f} plus writhe {Wr:.4f} is no integer: close the rod, without contact.")
+        raise InputError(f"Twist {Tw:.4f} plus writhe {Wr:.4f} is no integer: close the rod, without contact.")
     return Lk, Tw, Wr

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.linalg.householder import Reflections, factor
 
 DEPENDENT = 1e-12
@@ -78,12 +78,12 @@ class Kernel:
 def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
     """Kernel of ``C^t``, for ``C`` (m, p) and the arclengths of its columns' groups (p,), nan for a dense column.
 
-    Raises :class:`SceneError` where a constraint depends on the others, or where there are more than unknowns.
+    Raises :class:`InputError` where a constraint depends on the others, or where there are more than unknowns.
     """
     C = sp.csr_matrix(C, copy=True)
     m, p = C.shape
     if p > m:
-        raise SceneError(f"{p} constraints on {m} unknowns leave no free unknown: use fewer constraints.")
+        raise InputError(f"{p} constraints on {m} unknowns leave no free unknown: use fewer constraints.")
     scale = float(abs(C.data).max()) if C.nnz else 1.0
     C.data[abs(C.data) < ROUND_OFF * scale] = 0.0
     C.eliminate_zeros()
@@ -97,7 +97,7 @@ def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
         columns = found.project(C[:, dense].toarray())
         count = columns.shape[1]
         if count > len(found.free):
-            raise SceneError(f"{p} constraints on {m} unknowns leave no free unknown: use fewer constraints.")
+            raise InputError(f"{p} constraints on {m} unknowns leave no free unknown: use fewer constraints.")
         reflections, R = factor(found.free[None, :], columns[None])
         require_independent(R, scale, int((~dense).sum()) + np.arange(count)[None])
         found.steps.append(reflections)
@@ -106,12 +106,12 @@ def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
 
 
 def require_independent(R: np.ndarray, scale: float, columns: np.ndarray) -> None:
-    """Raise :class:`SceneError` if a factor R (b, c, c) is singular; ``columns`` (b, c) numbers its columns."""
+    """Raise :class:`InputError` if a factor R (b, c, c) is singular; ``columns`` (b, c) numbers its columns."""
     diagonal = abs(np.diagonal(R, axis1=1, axis2=2))
     if R.shape[1] < R.shape[2] or (diagonal < DEPENDENT * scale).any():
         bad = columns[:, : diagonal.shape[1]][diagonal < DEPENDENT * scale]
         which = f" (number {', '.join(map(str, bad[:5]))} along the rod)" if len(bad) else ""
-        raise SceneError(f"Constraints depend on one another{which}: remove those that follow from the others.")
+        raise InputError(f"Constraints depend on one another{which}: remove those that follow from the others.")
 
 
 class Chain:
@@ -138,7 +138,7 @@ class Chain:
         np.maximum.at(last, row, of_entry)
         used = last >= 0
         if (last - first)[used].max() > 1:
-            raise SceneError("A row of C couples constraints of more than two neighbouring groups: make larger groups.")
+            raise InputError("A row of C couples constraints of more than two neighbouring groups: make larger groups.")
         self.left, self.right = np.zeros((m, widest)), np.zeros((m, widest))
         right = of_entry > first[row]
         self.left[row[~right], within[C.indices[~right]]] = C.data[~right]

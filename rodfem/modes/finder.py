@@ -9,7 +9,7 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import bound, halved
 from rodfem.continuation.solvers import Equilibria
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.fem.system import combine
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
@@ -55,9 +55,8 @@ class ModeFinder:
     def _conservative(self, x: PETSc.Vec, verdict: Verdict) -> dict[str, Any]:
         """Modes from the vectors of a verdict, orthonormal in the mass, and the symmetries'."""
         spectrum = self.judge.spectrum
-        assert spectrum is not None
         if not verdict.vectors:
-            raise SceneError("Counting alone finds no modes: choose another method than 'count'.")
+            raise InputError("Counting alone finds no modes: choose another method than 'count'.")
         spectrum.assemble(x)
         vectors = [v.copy() for v in verdict.vectors]
         orthonormalize(vectors, spectrum.mass)
@@ -112,7 +111,6 @@ class ModeFinder:
 
     def _pairs(self, x: PETSc.Vec, number: int) -> dict[str, Any]:
         """Right and left modes of the eigenvalues nearest zero, biorthonormal in the mass."""
-        assert self.judge.vibration is not None
         self.judge.vibration.assemble(x)
         found = both_sides(self.judge.vibration, number)
         right, left = ([self._complex(x, column) for column in part.T] for part in (found.right, found.left))

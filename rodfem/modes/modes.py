@@ -29,7 +29,7 @@ import h5py
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rodfem.errors import SceneError
+from rodfem.errors import Argument, InputError
 from rodfem.file_format import MODES
 from rodfem.problem.setting import Setting, read
 
@@ -131,21 +131,21 @@ def save_modes(
 
 
 def load_modes(path: Path, branch: str, row: int) -> Modes:
-    """Modes of a saved state; raises :class:`SceneError` where the file has none, or has another or a newer format."""
+    """Modes of a saved state; raises :class:`InputError` where the file has none, or has another or a newer format."""
     try:
         with h5py.File(path, "r") as file:
             MODES.check_hdf5(file, ("branches",))
             group = file[f"branches/{branch}/{row}"]
             missing = [name for name in Modes.__dataclass_fields__ if name not in group]
             if missing:
-                raise SceneError(
+                raise InputError(
                     f"{path} has modes of row {row} of the branch {branch!r} without {', '.join(missing)}: another "
                     "version of rodfem wrote it; run the scene again."
                 )
             arrays = {name: group[name][()] for name in Modes.__dataclass_fields__ if name != "motion"}
             motion = tuple(group["motion"].asstr()[()])
     except (OSError, KeyError) as trouble:
-        raise SceneError(f"{path} has no modes of row {row} of a branch {branch!r}: {_contents(path)}.") from trouble
+        raise InputError(f"{path} has no modes of row {row} of a branch {branch!r}: {_contents(path)}.") from trouble
     arrays["load"] = float(arrays["load"])
     return Modes(motion=motion, **arrays)
 
@@ -168,4 +168,4 @@ def _contents(path: Path) -> str:
         with h5py.File(path, "r") as file:
             return "it has " + "; ".join(f"{name}, row {', '.join(rows)}" for name, rows in file["branches"].items())
     except (OSError, KeyError):
-        return "run a scene with --modes and --at"
+        return f"run a scene with {Argument('Plan', 'modes')} and {Argument('Plan', 'at')}"

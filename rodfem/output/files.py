@@ -20,7 +20,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, Special, not_followed
 from rodfem.continuation.solvers import Equilibria
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.fem.fields import Fields
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM, STATES, read_json
@@ -178,7 +178,7 @@ def save_json(data: dict[str, Any], path: Path) -> None:
 
 
 def load_json(path: Path) -> dict[str, Any]:
-    """Read a diagram; raises :class:`SceneError` where there is none, or one of a newer format."""
+    """Read a diagram; raises :class:`InputError` where there is none, or one of a newer format."""
     return read_json(path, DIAGRAM, ("scene", "parameter", "branches"))
 
 
@@ -242,7 +242,7 @@ def _trimmed(row: Any) -> Any:
 def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc.Vec:
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
-    Raises :class:`SceneError` where the file has another or a newer format, or no such row, has it in the other
+    Raises :class:`InputError` where the file has another or a newer format, or no such row, has it in the other
     formulation, or lacks an unknown of the follower's scene.
     """
     import h5py
@@ -252,22 +252,22 @@ def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc
         with h5py.File(path, "r") as file:
             STATES.check_hdf5(file, ("formulation", "branches"))
             if file.attrs["formulation"] != wanted:
-                raise SceneError(
+                raise InputError(
                     f"{path} holds states of the {file.attrs['formulation']} formulation: choose that, not {wanted}."
                 )
             group = file[f"branches/{branch}"]
             sample = {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
     except (OSError, KeyError, IndexError, ValueError) as trouble:
-        if isinstance(trouble, SceneError):
+        if isinstance(trouble, InputError):
             raise
-        raise SceneError(
+        raise InputError(
             f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it."
         ) from trouble
     system = follower.system
     wanted_names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]
     missing = [name for name in ("s", "elements", *wanted_names) if name not in sample]
     if missing:
-        raise SceneError(
+        raise InputError(
             f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
             "another scene, or by another version of rodfem; run the scene again."
         )

@@ -20,9 +20,10 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-from rodfem.errors import SceneError
+from rodfem.continuation.kinds import IMPERFECT, KINDS
+from rodfem.errors import InputError
 from rodfem.file_format import DIAGRAM, read_json
-from rodfem.output.plot_pieces import COUNTED, IMPERFECT, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
+from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
 
 __all__ = ["draw_diagram", "main"]
 
@@ -36,13 +37,8 @@ PALETTE = (  # after Okabe and Ito: hues safe for the colour-blind, then the sam
 )
 UNEXPLAINED = "index change unexplained"
 SINGULAR = "singular first state, not located"
-MARKERS: dict[str, dict[str, Any]] = {
-    "branch point": {"marker": "o", "ms": 7.5, "mfc": "white", "mec": "black", "mew": 1.5},
-    "fold": {"marker": "D", "ms": 6.0, "mfc": "black", "mec": "black"},
-    IMPERFECT: {"marker": "P", "ms": 9.5, "mfc": "white", "mec": "black", "mew": 1.3},
-    "flutter": {"marker": "*", "ms": 13.0, "mfc": "#F0E442", "mec": "black", "mew": 1.1},
-    "event": {"marker": "+", "ms": 8.5, "mec": "black", "mew": 1.6},
-    "user": {"marker": "x", "ms": 6.5, "mec": "black", "mew": 1.6, "label": "requested load"},
+MARKERS: dict[str, Mapping[str, Any]] = {
+    **{name: kind.marker for name, kind in KINDS.items() if kind.marker},
     UNEXPLAINED: {"marker": "^", "ms": 10.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
     SINGULAR: {"marker": "s", "ms": 8.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
 }
@@ -71,7 +67,7 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
 
     Raises
     ------
-    SceneError
+    InputError
         If these are contents of another or a newer format.
     ValueError
         If there are no branches, if columns of one differ in length, or if the format is unknown.
@@ -293,7 +289,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         diagram = read_json(options.diagram, DIAGRAM, ("title", "parameter_label", "ordinate", "branches"))
         print(draw_diagram(diagram, options.output or options.diagram.with_suffix(".png")))
-    except SceneError as error:
+    except InputError as error:
         print(error, file=sys.stderr)
         return 2
     except (KeyError, OSError, ValueError) as error:

@@ -14,15 +14,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from rodfem.continuation.kinds import FLUTTER, FREQUENCY, KINDS
 from rodfem.file_format import DIAGRAM
-from rodfem.output.plot_diagram import DPI, HALO, MARKERS, PALETTE, SIZE, STYLE, at_most
+from rodfem.output.plot_diagram import DPI, HALO, PALETTE, SIZE, STYLE, at_most
 
 COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5}
 """Places in the palette."""
-SPECIAL: dict[str, dict[str, Any]] = {
-    "flutter": MARKERS["flutter"],
-    "divergence": {"marker": "v", "ms": 10.0, "mfc": "#F0E442", "mec": "black", "mew": 1.1},
-}
+SPECIAL = {name: kind.marker for name, kind in KINDS.items() if kind.test == FREQUENCY}
 """Markers of the special points of a sweep."""
 REAL = 1e-6
 """An imaginary part smaller than this is none, relative to the root."""
@@ -66,7 +64,7 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
     One line a curve, one colour a kind of motion: eigenvalues that are double are two lines on each other, of one
     colour.  Real frequencies are dots, a complex pair is a cross (real part) and a plus (imaginary part), what has
     diverged is a plus; flutter loads are stars, divergence loads triangles.  The axis shows the ``most`` left-most
-    eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any ``omega2``, and SceneError for
+    eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any ``omega2``, and InputError for
     contents of another or a newer format.
     """
     figure = figure_of(diagram, most)
@@ -135,7 +133,7 @@ def _mark(axes: Axes, special: Mapping[str, Any]) -> None:
     """Mark a flutter or divergence load, and write it beside: of divergence above the axis, where its frequency is."""
     omega = abs(complex(special["omega2"])) ** 0.5
     axes.plot(special["load"], omega, ls="none", zorder=5, clip_on=False, **SPECIAL[special["kind"]])
-    place = (8, -16) if special["kind"] == "flutter" and omega else (0, 14)
+    place = (8, -16) if special["kind"] == FLUTTER and omega else (0, 14)
     text = axes.annotate(f"{special['load']:.6g}", (special["load"], omega), place, textcoords="offset points")
     text.set(path_effects=HALO, ha="left" if place[0] else "center", zorder=6)
 

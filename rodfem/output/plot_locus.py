@@ -10,18 +10,14 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from rodfem.continuation.kinds import BRANCH_POINT, KINDS, USER
 from rodfem.file_format import LOCUS
-from rodfem.output.plot_diagram import DPI, FONT, HALO, MARKERS, PALETTE, SIZE, STYLE, _tex
+from rodfem.output.plot_diagram import DPI, FONT, HALO, PALETTE, SIZE, STYLE, _tex
 
-COLORS = {"branch point": PALETTE[1], "fold": PALETTE[2], "flutter": PALETTE[3], "divergence": PALETTE[4]}
-STYLES = {
-    "branch point": "-",
-    "fold": (0, (5.0, 1.5)),
-    "flutter": (0, (5.0, 1.2, 1.0, 1.2)),
-    "divergence": (0, (2.0, 1.0)),
-}
+LINES = {name: (PALETTE[kind.line[0]], kind.line[1]) for name, kind in KINDS.items() if kind.line is not None}
+"""Colour and dashes by kind."""
 POINTS: dict[str, dict[str, Any]] = {
-    "start": {**MARKERS["user"], "label": "start"},
+    "start": {**USER.marker, "label": "start"},
     "turns": {"marker": "|", "ms": 9.0, "mec": "black", "mew": 1.4, "label": "turning point"},
     "cusp": {"marker": "^", "ms": 7.5, "mfc": "white", "mec": "black", "mew": 1.4, "label": "cusp"},
     "ends": {"marker": "o", "ms": 6.5, "mfc": "white", "mec": "black", "mew": 1.4, "label": "fold meets branch point"},
@@ -49,7 +45,7 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
 
     Raises
     ------
-    SceneError
+    InputError
         For contents of another or a newer format.
     ValueError
         Without any locus, or if they are not of the same parameters.
@@ -69,15 +65,16 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
         for one in loci:
             kind, columns = one["kind"], one["columns"]
             x, y = (np.asarray(columns[name], dtype=float) for name in reversed(names))
-            axes.plot(x, y, color=COLORS[kind], linestyle=STYLES[kind], linewidth=2.2, label=kind)
+            colour, dashes = LINES[kind]
+            axes.plot(x, y, color=colour, linestyle=dashes, linewidth=2.2, label=kind)
             for row, what in [(one["start"], "start"), *((m["row"], m["kind"]) for m in one["marks"])]:
-                style = POINTS.get("ends" if "branch point" in what else what.split()[0])
+                style = POINTS.get("ends" if BRANCH_POINT in what else what.split()[0])
                 if style:
                     axes.plot(x[row], y[row], linestyle="none", zorder=5, path_effects=HALO, **style)
             low, high = columns["index"][len(x) // 2]
             if low >= 0:
                 place = (x[len(x) // 2], y[len(x) // 2])
-                text = axes.annotate(f"{low}|{high}", place, (6, 6), textcoords="offset points", color=COLORS[kind])
+                text = axes.annotate(f"{low}|{high}", place, (6, 6), textcoords="offset points", color=colour)
                 text.set(weight="bold", path_effects=HALO)
         axes.set_xlabel(_tex(loci[0]["labels"][1], always=True), fontsize=FONT + 3)
         axes.set_ylabel(_tex(loci[0]["labels"][0], always=True), fontsize=FONT + 3)

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
 from rodfem.output.glyphs import glyphs_of
 from rodfem.output.plot_diagram import DPI, STYLE
@@ -66,14 +66,14 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
 
     Raises
     ------
-    SceneError
+    InputError
         If the file has no such modes.
     """
     modes, setting, output = load_modes(path, branch, row), load_setting(path, branch, row), Path(output)
     count = len(modes.value)
     for number in chosen:
         if not 1 <= number <= count:
-            raise SceneError(f"There is no mode {number} of {branch!r}, row {row}: choose 1 to {count}.")
+            raise InputError(f"There is no mode {number} of {branch!r}, row {row}: choose 1 to {count}.")
     numbers = [n - 1 for n in chosen] or list(range(count))
     columns = min(COLUMNS, len(numbers)) if len(numbers) != 4 else 2
     rows = ceil(len(numbers) / columns)
@@ -279,7 +279,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         print(draw_modes(options.modes, options.branch, options.row, options.output, options.mode))
-    except (SceneError, OSError, ValueError) as error:
+    except (InputError, OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 2
     return 0

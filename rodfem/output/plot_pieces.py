@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rodfem.continuation.kinds import KINDS
+
 Floats = NDArray[np.float64]
 
 STABLE, PLANAR, UNSTABLE = "stable", "stable in the plane, unstable in space", "unstable"
@@ -17,9 +19,7 @@ STYLES: dict[str, dict[str, Any]] = {
     PLANAR: {"linestyle": (0, (3.2, 1.0)), "linewidth": 2.4},
     UNSTABLE: {"linestyle": (0, (1.0, 1.3)), "linewidth": 1.9},
 }
-IMPERFECT = "imperfect bifurcation"
-COUNTED = ("branch point", "fold", IMPERFECT)
-"""Kinds of special points whose index before and after is that of the segments beside them."""
+COUNTED = {name for name, kind in KINDS.items() if kind.counted}
 SAME = 2.0
 """Distance in pixels up to which two lines lie on each other."""
 APART = 30.0

@@ -66,7 +66,7 @@ def draw_shape(
     Raises
     ------
     ValueError
-        If the file, the branch or the row does not exist, an argument has no meaning, or (:class:`SceneError`) the
+        If the file, the branch or the row does not exist, an argument has no meaning, or (:class:`InputError`) the
         file has another or a newer format.
     ImportError
         If PyVista or one of the libraries it needs is missing.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from rodfem.errors import SceneError
+from rodfem.errors import InputError
 
 INSIDE = 0.6
 """Where on a piece of a branch the state is taken, as a share of the piece's length along the branch."""
@@ -48,12 +48,12 @@ def typical_state(data: Mapping[str, Any]) -> tuple[str, int, str]:
 
     Where none is stable there, one of another branch but the first; else one of least index on a branch that leaves the
     first, said to be unstable; on the first branch only where there is no other.  Never a special point at which the
-    second variation is singular, nor the row in which a branch leaves another.  Raises :class:`SceneError` for a
+    second variation is singular, nor the row in which a branch leaves another.  Raises :class:`InputError` for a
     diagram without states.
     """
     found = [stretch for branch in data["branches"] for stretch in _stretches(branch, data["branches"][0]["name"])]
     if not found:
-        raise SceneError("The diagram has no states to draw.")
+        raise InputError("The diagram has no states to draw.")
     best = max(found, key=lambda stretch: stretch.rank)
     columns = next(b["columns"] for b in data["branches"] if b["name"] == best.branch)
     words = "stable" if best.negative == 0 else f"unstable, index {best.negative}"

@@ -10,7 +10,7 @@ import ufl
 
 from forms.kinematics import UNDEFORMED
 from forms.rotation import IDENTITY, rotation
-from rodfem.errors import SceneError
+from rodfem.errors import POINTWISE, SceneError
 from rodfem.problem.roles import functions_of
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class Reduced(Known):
     def __getattr__(self, name: str) -> Any:
         """Raise :class:`NoCentreline` for ``r`` and ``dr``."""
         if name in ("r", "dr"):
-            raise NoCentreline("The reduced formulation has no centreline here: use --formulation pointwise.")
+            raise NoCentreline("The reduced formulation has no centreline here", POINTWISE)
         return super().__getattr__(name)
 
 

@@ -42,7 +42,7 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from rodfem.errors import SceneError
+from rodfem.errors import POINTWISE, InputError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import block_matrix, first_of, local_rows, petsc_matrix
@@ -98,11 +98,11 @@ class Blocks:
     """
 
     def __init__(self, system: System, coordinates: str = "tangent") -> None:
-        """Number rows and columns; raises :class:`SceneError` for coordinates that the formulation does not have."""
+        """Number rows and columns; raises :class:`InputError` for coordinates that the formulation does not have."""
         if coordinates not in COORDINATES:
-            raise SceneError(f"Unknown coordinates {coordinates!r}: choose one of {', '.join(COORDINATES)}.")
+            raise InputError(f"Unknown coordinates {coordinates!r}: choose one of {', '.join(COORDINATES)}.")
         if coordinates == "compatible" and system.fields.discretization.formulation != "pointwise":
-            raise SceneError("Compatible coordinates need the centreline: use --formulation pointwise.")
+            raise InputError("Compatible coordinates need the centreline", POINTWISE)
         self.system, self.coordinates = system, coordinates
         self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
         fields = system.fields

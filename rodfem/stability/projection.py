@@ -27,7 +27,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.linalg.matrices import gathered, petsc_matrix
 from rodfem.linalg.null_space import kernel
 from rodfem.linalg.selection import factors_of
@@ -48,7 +48,7 @@ class Projection:
     """Blocks ``K``, ``C``, ``M`` of all ranks (scipy) and the kernel of ``C^t``."""
 
     def __init__(self, pencil: Pencil) -> None:
-        """Gather the blocks and factor ``C``; raises :class:`SceneError` for dependent constraints."""
+        """Gather the blocks and factor ``C``; raises :class:`InputError` for dependent constraints."""
         self.K, self.C, self.M = gathered(pencil.K), gathered(pencil.C), gathered(pencil.M)
         self.kernel = kernel(self.C, pencil.place)
 
@@ -74,10 +74,10 @@ class ShiftedInverse:
     def __init__(self, projection: Projection, sigma: float, inverse: str = "saddle") -> None:
         """Factor at ``sigma``.
 
-        Raises :class:`SceneError` for an unknown formula, :class:`ConvergenceError` where it does not apply.
+        Raises :class:`InputError` for an unknown formula, :class:`ConvergenceError` where it does not apply.
         """
         if inverse not in INVERSES:
-            raise SceneError(f"Unknown inverse {inverse!r}: choose one of {', '.join(INVERSES)}.")
+            raise InputError(f"Unknown inverse {inverse!r}: choose one of {', '.join(INVERSES)}.")
         r = self.projection = projection
         self.inverse = inverse
         self.sigma = sigma

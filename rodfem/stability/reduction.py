@@ -23,11 +23,13 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.stability.blocks import Pencil
 from rodfem.stability.projection import INVERSES, Projection, ShiftedInverse
 
 TRANSFORMS = ("shift-invert", "cayley")
+FACTORISATIONS = 3
+"""Of the eigenvalues of a symmetric pencil near a shift: there, and to count on both sides of it."""
 TOLERANCE = 1e-13
 SPURIOUS = 1e-8
 """A vector of an infinite eigenvalue (no mass) comes with an arbitrary value, and a residual greater than this."""
@@ -61,9 +63,9 @@ class Reduction:
     """The reduced eigenproblem of a :class:`~rodfem.stability.blocks.Pencil`."""
 
     def __init__(self, pencil: Pencil, inverse: str = "saddle") -> None:
-        """Gather the blocks and factor ``C``; raises :class:`SceneError` for dependent constraints."""
+        """Gather the blocks and factor ``C``; raises :class:`InputError` for dependent constraints."""
         if inverse not in INVERSES:
-            raise SceneError(f"Unknown inverse {inverse!r}: choose one of {', '.join(INVERSES)}.")
+            raise InputError(f"Unknown inverse {inverse!r}: choose one of {', '.join(INVERSES)}.")
         self.inverse, self.symmetric = inverse, pencil.symmetric
         self.projection = Projection(pencil)
 
@@ -74,14 +76,14 @@ class Reduction:
 
         With a target below the spectrum they are the left-most ones.  ``antishift`` is the zero ``a2`` of the Cayley
         transform ``(mu - a2)/(mu - target)``, by default ``-target``: poor where the target is small.  Raises
-        :class:`SceneError` for an unknown transform or for more eigenvalues than there are, :class:`ConvergenceError`
+        :class:`InputError` for an unknown transform or for more eigenvalues than there are, :class:`ConvergenceError`
         where SLEPc finds fewer or where the shifted matrix is singular.
         """
         if transform not in TRANSFORMS:
-            raise SceneError(f"Unknown transform {transform!r}: choose one of {', '.join(TRANSFORMS)}.")
+            raise InputError(f"Unknown transform {transform!r}: choose one of {', '.join(TRANSFORMS)}.")
         n = self.projection.kernel.dimension
         if number > n:
-            raise SceneError(f"{number} eigenvalues of a reduced pencil of size {n}: ask for at most {n}.")
+            raise InputError(f"{number} eigenvalues of a reduced pencil of size {n}: ask for at most {n}.")
         shifted = ShiftedInverse(self.projection, target, self.inverse)
         found = Reduced(np.array([]), np.array([]), np.array([]), False)
         for extra in (2, 6, 14) if self.symmetric else (0,):
@@ -124,12 +126,12 @@ class Reduction:
         spectral.setShift(target)
         if transform == "cayley":
             if not self.symmetric:
-                raise SceneError(
+                raise InputError(
                     "SLEPc does not transform complex eigenvalues back from Cayley's transform: use shift-invert."
                 )
             a2 = -target if antishift is None else antishift
             if a2 == target:
-                raise SceneError(f"A Cayley transform with shift and antishift {target:g} is constant: change one.")
+                raise InputError(f"A Cayley transform with shift and antishift {target:g} is constant: change one.")
             spectral.setCayleyAntishift(-a2)
         ksp = spectral.getKSP()
         ksp.setType("preonly")

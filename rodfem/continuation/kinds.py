@@ -1,0 +1,111 @@
+"""The kinds of special points: each is a name with what is to be known of it; pictures read this without PETSc.
+
+A kind is added here.  What finds its points makes :class:`~rodfem.continuation.branch.Special` of that kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+EIGENVALUE, UNFOLDING, FREQUENCY, NUMBER, LOAD = "eigenvalue", "unfolding", "frequency", "number", "load"
+"""Test functions, which vanish at a special point: an eigenvalue of the second variation, or the slope of the load; the
+unfolding parameter of a branch point, nearly; the square of a frequency, or the difference of two; any number of the
+state (:mod:`rodfem.problem.events`); the distance from a load asked for."""
+Line = tuple[int, Any]
+
+
+class Kind(str):
+    """Name of a kind of special point.
+
+    Attributes
+    ----------
+    code
+        Two letters for the terminal, AUTO's where it has some.
+    test
+        Test function; empty for none.
+    branches
+        Whether other branches leave there.
+    marker
+        Style of its mark in a picture, in matplotlib's words; empty for none.
+    line
+        Place in the palette and dashes of its locus in the plane of two parameters; None where it has none.
+    """
+
+    code: str
+    test: str
+    branches: bool
+    marker: Mapping[str, Any]
+    line: Line | None
+
+    def __new__(
+        cls,
+        name: str,
+        code: str = "",
+        test: str = "",
+        branches: bool = False,
+        marker: Mapping[str, Any] | None = None,
+        line: Line | None = None,
+    ) -> Kind:
+        """Make a string that knows more than its letters."""
+        kind = super().__new__(cls, name)
+        kind.code, kind.test, kind.branches, kind.marker, kind.line = code, test, branches, marker or {}, line
+        return kind
+
+    @property
+    def singular(self) -> bool:
+        """Whether the second variation is singular there, so that there are null vectors."""
+        return self.test == EIGENVALUE
+
+    @property
+    def counted(self) -> bool:
+        """Whether the index before and after belongs to the segments of a branch beside it."""
+        return self.test in (EIGENVALUE, UNFOLDING)
+
+    @property
+    def given(self) -> bool:
+        """Whether its load is given, and nothing happens there."""
+        return self.test in (LOAD, "")
+
+    @property
+    def solved(self) -> bool:
+        """Whether its load is solved for on any mesh, by the test function at the equilibria there."""
+        return self.test in (EIGENVALUE, NUMBER)
+
+
+YELLOW = "#F0E442"
+BRANCH_POINT = Kind(
+    *("branch point", "BP", EIGENVALUE, True),
+    marker={"marker": "o", "ms": 7.5, "mfc": "white", "mec": "black", "mew": 1.5},
+    line=(1, "-"),
+)
+FOLD = Kind(
+    *("fold", "LP", EIGENVALUE),
+    marker={"marker": "D", "ms": 6.0, "mfc": "black", "mec": "black"},
+    line=(2, (0, (5.0, 1.5))),
+)
+IMPERFECT = Kind(
+    *("imperfect bifurcation", "IB", UNFOLDING),
+    marker={"marker": "P", "ms": 9.5, "mfc": "white", "mec": "black", "mew": 1.3},
+)
+"""A branch point that an imperfection has taken apart, where steps of continuation do not resolve its pieces."""
+FLUTTER = Kind(
+    *("flutter", "HB", FREQUENCY),
+    marker={"marker": "*", "ms": 13.0, "mfc": YELLOW, "mec": "black", "mew": 1.1},
+    line=(3, (0, (5.0, 1.2, 1.0, 1.2))),
+)
+"""Under loads without a potential: a pair of frequencies becomes complex."""
+DIVERGENCE = Kind(
+    *("divergence", "BP", FREQUENCY),
+    marker={"marker": "v", "ms": 10.0, "mfc": YELLOW, "mec": "black", "mew": 1.1},
+    line=(4, (0, (2.0, 1.0))),
+)
+"""Under loads without a potential: a frequency becomes imaginary."""
+EVENT = Kind("event", "UZ", NUMBER, marker={"marker": "+", "ms": 8.5, "mec": "black", "mew": 1.6})
+USER = Kind(
+    *("user", "UZ", LOAD),
+    marker={"marker": "x", "ms": 6.5, "mec": "black", "mew": 1.6, "label": "requested load"},
+)
+END = Kind("end", "EP")
+KINDS = {str(kind): kind for kind in (BRANCH_POINT, FOLD, IMPERFECT, FLUTTER, DIVERGENCE, EVENT, USER, END)}
+"""By name, in the order of legends."""

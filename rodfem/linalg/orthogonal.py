@@ -1,0 +1,33 @@
+"""Orthogonal vectors in a metric, by Gram-Schmidt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from petsc4py import PETSc
+
+TINY = 1e-300
+"""A vector smaller than this is scaled as if it were of this size."""
+
+
+def project_out(vector: PETSc.Vec, basis: Iterable[PETSc.Vec], metric: PETSc.Mat, times: int = 1) -> None:
+    """Make ``vector`` orthogonal to orthonormal ones, in place; done ``times`` two also where little of it is left."""
+    known = list(basis)
+    for _ in range(times):
+        for other in known:
+            vector.axpy(-(metric * other).dot(vector), other)
+
+
+def normalize(vector: PETSc.Vec, metric: PETSc.Mat) -> None:
+    """Give a vector unit length in a metric, in place."""
+    vector.scale(1.0 / max(np.sqrt(max(vector.dot(metric * vector), 0.0)), TINY))
+
+
+def orthonormalize(vectors: list[PETSc.Vec], metric: PETSc.Mat) -> None:
+    """Make vectors orthonormal in a metric, in place, by Gram-Schmidt twice."""
+    for _ in range(2):
+        for i, v in enumerate(vectors):
+            normalize(v, metric)
+            project_out(v, vectors[:i], metric)
+            normalize(v, metric)

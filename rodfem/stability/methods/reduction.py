@@ -1,0 +1,25 @@
+"""Shift-invert on the pencil reduced to the kernel of its constraints, as in the paper."""
+
+from __future__ import annotations
+
+from petsc4py import PETSc
+
+from rodfem.stability import reduction
+from rodfem.stability.method import NEAR_ZERO, Found, Interval, Method
+
+
+class Reduction(Method):
+    """A Krylov space of the reduced pencil."""
+
+    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+        """With a shift below the spectrum."""
+        shift = self.work.below(x).shift
+        found = reduction.Reduction(self.work.pencil(x)).near(number, shift)
+        certified = self.work.certifies(found.values)
+        return Found(found.values, self.work.lift(found.vectors), found.errors, certified, reduction.FACTORISATIONS)
+
+    def nearest(self, x: PETSc.Vec, number: int) -> Found:
+        """With a shift near zero."""
+        target = NEAR_ZERO * self.work.system.stiffness_scale
+        found = reduction.Reduction(self.work.pencil(x)).near(number, target)
+        return Found(found.values, [], found.errors, factorisations=1)

@@ -1,0 +1,74 @@
+"""SLEPc's spectrum slicing in an interval that holds the eigenvalues wanted."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.errors import ConvergenceError, InputError
+from rodfem.stability.method import Found, Interval, SymmetricMethod
+from rodfem.stability.pencil import in_interval
+from rodfem.stability.symmetric import Spectrum
+
+WIDER = (0.0, 1e-9, 1e-7, 1e-5)
+"""By how much of itself an interval is widened where what SLEPc finds in it does not match the counts at its ends."""
+PETSC_ERR_PLIB = 77
+"""PETSc's error code for that."""
+STEP, CUT = 1.0371, 0.4931
+"""Factors of the ends tried, no simple numbers: an end on an eigenvalue is unlikely."""
+HALVINGS = 20
+"""Most steps that shorten an interval which holds too many eigenvalues."""
+FACTORISATIONS = 3
+"""Those of SLEPc, at least."""
+
+
+class Slicing(SymmetricMethod):
+    """All eigenvalues in an interval."""
+
+    def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
+        """In the ``interval``, or in one found by counting that holds ``number`` of them and few more."""
+        spectrum = self.work.below(x)
+        low, high = interval or enclose(spectrum, number)
+        if not low < high:
+            raise InputError(f"An interval from {low:g} to {high:g} is empty: give its lower end first.")
+        for wider in WIDER:  # an end on an eigenvalue is moved off it
+            low, high = low - wider * (high - low), high + wider * (high - low)
+            wanted = spectrum.below(high) - spectrum.below(low)
+            try:
+                solver = in_interval(spectrum.matrix, spectrum.mass, low, high)
+                solver.solve()
+            except PETSc.Error as trouble:
+                if trouble.ierr != PETSC_ERR_PLIB:
+                    raise
+            else:
+                break
+        else:
+            raise ConvergenceError(f"An end of the interval from {low:.6g} to {high:.6g} is an eigenvalue: move it.")
+        values = np.array([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
+        complete = len(values) == wanted
+        order = np.argsort(values)[: None if interval else number]
+        vectors = [self.work.system.new_vector() for _ in order]
+        for i, vector in zip(order, vectors, strict=True):
+            solver.getEigenvector(int(i), vector)
+        solver.destroy()
+        values = values[order]
+        return Found(values, vectors, spectrum.backward_errors(values, vectors), complete, FACTORISATIONS)
+
+
+def enclose(spectrum: Spectrum, number: int) -> Interval:
+    """Interval from below the spectrum that holds at least ``number`` eigenvalues, and not many more."""
+    low, step = spectrum.shift, max(abs(spectrum.shift), spectrum.inertia.scale) * STEP
+    high = low + step
+    inside = low
+    while spectrum.below(high) < number:
+        inside, step = high, 2 * step
+        high = inside + step
+    for _ in range(HALVINGS):
+        if spectrum.below(high) <= 2 * number:
+            break
+        middle = inside + CUT * (high - inside)
+        if spectrum.below(middle) < number:
+            inside = middle
+        else:
+            high = middle
+    return low, high

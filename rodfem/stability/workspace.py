@@ -1,0 +1,110 @@
+"""What the methods for stability share on one system: matrices, symbolic factorisations, coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from rodfem.fem.system import System
+from rodfem.linalg.matrices import first_of, gathered, local_rows
+from rodfem.stability.blocks import Blocks, Pencil
+from rodfem.stability.inertia import Inertia
+from rodfem.stability.nonsymmetric import Vibration
+from rodfem.stability.pencil import symmetry_modes, weighed_modes
+from rodfem.stability.symmetric import Spectrum
+
+DISTINCT = 1e-6
+"""Eigenvalues closer than this, relative to the greatest, are one where the values found are counted."""
+
+
+class Workspace:
+    """Matrices and factorisations, made when they are asked for and kept for the next state."""
+
+    def __init__(self, source: Any) -> None:
+        """Take a :class:`~rodfem.fem.system.System`, or what has one (a follower)."""
+        self.system: System = source if isinstance(source, System) else source.system
+        self.conservative = self.system.scene.conservative
+        given = getattr(source, "inertia", None)
+        self.inertia: Inertia | None = (given or Inertia(self.system)) if self.conservative else None
+        self._blocks: Blocks | None = None
+        self._map: sp.csr_matrix | None = None
+
+    @cached_property
+    def spectrum(self) -> Spectrum:
+        """Left-most eigenvalues of conservative states."""
+        assert self.inertia is not None
+        return Spectrum(self.inertia)
+
+    @cached_property
+    def vibration(self) -> Vibration:
+        """Eigenvalues of states under loads without a potential."""
+        assert not self.conservative
+        return Vibration(self.system)
+
+    def factorisations(self) -> int:
+        """Number of those of the symmetric pencil, so far."""
+        return self.spectrum.factorisations if "spectrum" in vars(self) else 0
+
+    def below(self, x: PETSc.Vec) -> Spectrum:
+        """Symmetric pencil at ``x``, its shift below all eigenvalues."""
+        self.spectrum.assemble(x)
+        self.spectrum.go_below()
+        return self.spectrum
+
+    def certifies(self, values: np.ndarray) -> bool:
+        """Whether counts find none below the least of ``values``, and as many as there are below the greatest."""
+        spectrum = self.spectrum
+        small = DISTINCT * max(abs(values).max(), spectrum.inertia.scale)
+        distinct = values < values[-1] - small
+        return (
+            spectrum.below(values[0] - small) == 0
+            and spectrum.below(values[-1] - small) == distinct.sum()
+            and spectrum.below(values[-1] + small) >= len(values)
+        )
+
+    def pencil(self, x: PETSc.Vec, coordinates: str = "tangent") -> Pencil:
+        """Blocks at ``x``, with a constraint ``g.Mx = 0`` more for each symmetry mode ``g``."""
+        if self._blocks is None or self._blocks.coordinates != coordinates:
+            self._blocks = Blocks(self.system, coordinates)
+        blocks = self._blocks
+        modes = symmetry_modes(self.system, x)
+        pencil = blocks.assemble(x)
+        self._map = gathered(pencil.T) if pencil.T is not None else None
+        if not modes:
+            return pencil
+        comm = self.system.comm
+        images = []
+        for _, weighed in weighed_modes(self.system, modes, blocks.mass).values():
+            full = weighed.array_r[blocks.rows - self.system.fields.offset].copy()
+            image = PETSc.Vec().createWithArray(full, comm=comm)
+            if pencil.T is not None:
+                image, product = pencil.T.createVecRight(), image
+                pencil.T.multTranspose(product, image)
+            images.append(image.array_r.copy())
+        last = comm.rank == comm.size - 1
+        local = sp.hstack([local_rows(pencil.C), np.stack(images, axis=1)]).tocsr()
+        local.sort_indices()
+        rows, columns = pencil.C.getLocalSize()
+        size = ((rows, PETSc.DETERMINE), (columns + len(modes) * last, PETSc.DETERMINE))
+        csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
+        C = PETSc.Mat().createAIJ(size, csr=csr, comm=comm)
+        return replace(pencil, C=C, place=np.append(pencil.place, np.full(len(modes), np.nan)))
+
+    def lift(self, vectors: np.ndarray) -> list[PETSc.Vec]:
+        """Vectors of the system from columns in the pencil's coordinates."""
+        blocks = self._blocks
+        assert blocks is not None
+        full: Any = vectors if self._map is None else self._map @ vectors
+        first = first_of(self.system.comm, len(blocks.rows))
+        out = []
+        for column in full.T:
+            vector = self.system.new_vector()
+            vector.array[blocks.rows - self.system.fields.offset] = column[first : first + len(blocks.rows)]
+            vector.assemble()
+            out.append(vector)
+        return out
