@@ -189,7 +189,7 @@ class Judge:
         """Count; where that breaks down, name the constraints that depend on each other."""
         assert self.inertia is not None
         try:
-            found = decide(self.inertia, x)
+            found = decide(self.inertia.at(x))
         except ConvergenceError:
             rank_of(self._pencil(x, "full"))
             raise

@@ -55,7 +55,7 @@ class InSpace:
         settled = state.copy()
         if correct(self.system, settled, self.system.load_axis(), most=6, reach=NEAR).converged:
             state = settled  # else the state is so near a singular one that its own error decides as well
-        return self.inertia.count(state)
+        return self.inertia.at(state).count()
 
     def _moments(self, state: State) -> dict[str, float]:
         """Moments that hold or close the rod in space, from the one about the normal."""
