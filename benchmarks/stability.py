@@ -87,22 +87,21 @@ def task(method: str, system: Any, x: PETSc.Vec) -> Callable[[], Any]:
     to_judge = Judge(system)
     assert to_judge.inertia is not None
     if method == "factorisation":
-        inertia = to_judge.inertia
-        inertia.assemble(x)
-        return lambda: inertia.below(inertia.shift + 1e-3)
+        found = to_judge.inertia.at(x)
+        return lambda: found.below(found.shift + 1e-3)
     if method == "index":
         corrector = Corrector(to_judge.inertia)
         return lambda: corrector.factor(x)
     if method == "assembly":
-        return lambda: to_judge.inertia.assemble(x)
+        return lambda: to_judge.inertia.at(x)
     if method == "solves":
-        to_judge.inertia.assemble(x)
-        to_judge.inertia.below(0.0)
+        found = to_judge.inertia.at(x)
+        found.below(0.0)
         right = PETSc.Mat().createDense(((len(x.array_r), None), (None, 2)), comm=PETSc.COMM_WORLD)
         right.setUp()
         right.assemble()
         solved = right.duplicate()
-        return lambda: to_judge.inertia.factors.solve_all(right, solved)
+        return lambda: found.factors.solve_all(right, solved)
     spectrum = to_judge.spectrum if method in ("eigenvalues", "proof", "scipy", "dense QZ") else None
     if spectrum is not None and method in ("eigenvalues", "proof"):
         to_judge.system.set_phase(x)
@@ -298,9 +297,10 @@ def bands() -> str:
         for formulation in ("reduced", "pointwise"):
             system, x = state(formulation, elements, degree)
             inertia = Inertia(system)
-            decide(inertia, x)
-            _, vectors = inertia.nearest(1)
-            row += [f"{inertia.resolution:.1e}", f"{quotient_error(inertia.matrix, vectors[0]):.1e}"]
+            found = inertia.at(x)
+            decide(found)
+            _, vectors = found.nearest(1)
+            row += [f"{inertia.resolution:.1e}", f"{quotient_error(found.matrix, vectors[0]):.1e}"]
         rows.append(row)
     return table(["elements", "degree", "band, reduced", "quotient", "band, pointwise", "quotient"], rows)
 

@@ -31,7 +31,7 @@ def test_index_is_that_of_two_shifts_at_every_point(name: str, formulation: str)
     for branch in branches:
         for point in branch.points:
             follower.system.set_phase(point.x)
-            index = follower.inertia.count(point.x)
+            index = follower.inertia.at(point.x).count()
             if point is not branch.points[0] and not any(s.point is point for s in branch.special):
                 assert (index.negative, index.zero) == (point.negative, point.zero), (branch.name, point.load)
 
@@ -48,12 +48,13 @@ def test_state_and_tangent_are_those_of_lu_factors(name: str) -> None:
     guess.axpy(1e-3, system.metric * follower.inertia.seed(0))
     system.set_phase(guess)
     ours, theirs = guess.copy(), guess.copy()
-    outcome = follower.corrector.correct(ours, row)
-    assert outcome is not None and outcome.converged and correct(system, theirs, row).converged
+    corrected = follower.corrector.correct(ours, row)
+    assert corrected is not None and corrected[0].converged and correct(system, theirs, row).converged
     ours.axpy(-1.0, theirs)
     assert system.norm(ours) < TOLERANCE
     tangent = follower.tangent(row, at=theirs)
-    assert follower.corrector.regular
+    regular = follower.corrector.factor(theirs)
+    assert regular is not None and system.norm(regular.along(row) - tangent) < 1e-12
     image = system.at(theirs).jacobian(row) * tangent  # J t = (0, row . t)
     system.set_load(image, 0.0)
     assert image.norm() < 1e-9 * system.matrix.norm()
@@ -67,8 +68,10 @@ def test_near_singular_states_are_left_to_others(name: str) -> None:
     for s in special:
         follower.system.set_phase(s.point.x)
         follower.corrector.restart()
-        assert not follower.corrector.factor(s.point.x)
-        assert follower.corrector.nearest < NEAR * follower.inertia.scale
+        assert follower.corrector.factor(s.point.x) is None
+        found = follower.inertia.at(s.point.x)
+        found.count()
+        assert abs(found.nearest(1)[0][0]) < NEAR * follower.inertia.scale
 
 
 def test_nearest_eigenvalue_of_the_straight_cord_is_estimated() -> None:
@@ -79,10 +82,12 @@ def test_nearest_eigenvalue_of_the_straight_cord_is_estimated() -> None:
     follower.corrector.restart()
     for point in straight[1:20]:
         follower.system.set_phase(point.x)
-        if not any(s.point is point for s in branches[0].special) and follower.corrector.factor(point.x):
-            follower.inertia.count(point.x)
-            exact = abs(follower.inertia.nearest(1, accuracy=1e-6)[0][0])
-            assert follower.corrector.nearest > (1 - 1e-6) * exact  # an upper bound
-            seen.append(follower.corrector.nearest / exact)
+        special = any(s.point is point for s in branches[0].special)
+        if not special and (regular := follower.corrector.factor(point.x)):
+            factored = follower.inertia.at(point.x)
+            factored.count()
+            exact = abs(factored.nearest(1, accuracy=1e-6)[0][0])
+            assert regular.nearest > (1 - 1e-6) * exact  # an upper bound
+            seen.append(regular.nearest / exact)
     assert len(seen) > 5
     assert np.median(seen) < 1.5

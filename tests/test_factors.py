@@ -58,10 +58,10 @@ def test_inertia_and_solutions(name: str, state: str, formulation: str, load: fl
     inertia, factors = Inertia(system), symmetric(system, shared)
     right, out = inertia.seed(1), system.new_vector()
     for sigma in SIGMAS:
-        inertia.assemble(x)
-        inertia.matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        dense = gathered(inertia.matrix).toarray()
-        factors(inertia.matrix)
+        matrix = inertia.at(x).matrix
+        matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        dense = gathered(matrix).toarray()
+        factors(matrix)
         assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
         factors.solve(right, out)
         expected = np.linalg.solve(dense, whole(right))
@@ -75,10 +75,10 @@ def test_inertia_beside_a_branch_point(formulation: str, shared: str) -> None:
     system, x = at("hemitropic", "plain", formulation, 0.1143042145)
     inertia, factors = Inertia(system), symmetric(system, shared)
     for sigma in (-1e-5, 1e-5):
-        inertia.assemble(x)
-        inertia.matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        factors(inertia.matrix)
-        negative = (np.linalg.eigvalsh(gathered(inertia.matrix).toarray()) < 0).sum()
+        matrix = inertia.at(x).matrix
+        matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        factors(matrix)
+        negative = (np.linalg.eigvalsh(gathered(matrix).toarray()) < 0).sum()
         assert factors.inertia() == (negative, 0)
 
 
@@ -86,9 +86,9 @@ def test_inertia_beside_a_branch_point(formulation: str, shared: str) -> None:
 def test_many_right_hand_sides(shared: str) -> None:
     system, x = at("hemitropic", "buckled", "pointwise", 0.2)
     inertia, factors = Inertia(system), symmetric(system, shared)
-    inertia.assemble(x)
-    inertia.matrix.axpy(1.0, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    factors(inertia.matrix)
+    matrix = inertia.at(x).matrix
+    matrix.axpy(1.0, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    factors(matrix)
     rows = (system.fields.local_unknowns, system.fields.unknowns)
     right = PETSc.Mat().createDense((rows, (None, 3)), comm=system.comm)
     right.setUp()
@@ -174,8 +174,9 @@ def test_long_rods_are_cut(formulation: str, elements: int) -> None:
         assert outcome.converged
         verdict = Judge(solver)(x, number=3)
         assert verdict.certified
-        solver.inertia.count(x)
-        nearest, _ = solver.inertia.nearest(1, accuracy=1e-9)
+        factored = solver.inertia.at(x)
+        factored.count()
+        nearest, _ = factored.nearest(1, accuracy=1e-9)
         found.append([verdict.negative, verdict.zero, *nearest, *verdict.values])
     np.testing.assert_allclose(*found, rtol=1e-7)
 

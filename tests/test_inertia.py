@@ -68,9 +68,8 @@ def eigenvalues(S: np.ndarray, M: np.ndarray, f: Follower) -> np.ndarray:
 def test_index_is_that_of_dense_matrices(formulation: str, branch: int, load: float) -> None:
     f, p = follower(formulation, *SMALL), state(formulation, branch, load)
     f.system.set_phase(p.x)
-    found = f.inertia.count(p.x)
-    f.inertia.assemble(p.x)
-    mu = eigenvalues(dense(f.inertia.matrix), dense(f.system.metric), f)
+    found = f.inertia.at(p.x).count()
+    mu = eigenvalues(dense(f.inertia.at(p.x).matrix), dense(f.system.metric), f)
     assert found.negative == p.negative == (mu < -f.inertia.tolerance).sum()
     assert found.zero == p.zero == (abs(mu) < f.inertia.tolerance).sum() == (0 if branch == 0 else 1)
 
@@ -80,10 +79,10 @@ def test_index_is_that_of_dense_matrices(formulation: str, branch: int, load: fl
 def test_eigenvalues_nearest_zero(formulation: str, branch: int, load: float) -> None:
     f, p = follower(formulation, *SMALL), state(formulation, branch, load)
     f.system.set_phase(p.x)
-    f.inertia.count(p.x)
-    values, vectors = f.inertia.nearest(3, accuracy=1e-9)
-    f.inertia.assemble(p.x)
-    mu = eigenvalues(dense(f.inertia.matrix), dense(f.system.metric), f)
+    factored = f.inertia.at(p.x)
+    factored.count()
+    values, vectors = factored.nearest(3, accuracy=1e-9)
+    mu = eigenvalues(dense(f.inertia.at(p.x).matrix), dense(f.system.metric), f)
     mu = mu[abs(mu) > f.inertia.tolerance]
     expected = mu[np.argsort(abs(mu))[:3]]
     np.testing.assert_allclose(sorted(values), sorted(expected), rtol=1e-6)
@@ -95,20 +94,20 @@ def test_eigenvalues_nearest_zero(formulation: str, branch: int, load: float) ->
 def test_counts_below_any_value(formulation: str, branch: int, load: float) -> None:
     f, p = follower(formulation, *SMALL), state(formulation, branch, load)
     f.system.set_phase(p.x)
-    f.inertia.assemble(p.x)
-    mu = eigenvalues(dense(f.inertia.matrix), dense(f.system.metric), f)
+    factored = f.inertia.at(p.x)
+    mu = eigenvalues(dense(factored.matrix), dense(f.system.metric), f)
     mu = mu[abs(mu) > f.inertia.tolerance]
     for sigma in (-3.0, -0.3, -0.03, 0.03, 0.3):
-        assert f.inertia.below(sigma) == (mu < sigma).sum()
+        assert factored.below(sigma) == (mu < sigma).sum()
 
 
 def test_counts_below_large_values() -> None:
     f, p = follower("reduced", *SMALL), state("reduced", 1, 0.5)
     f.system.set_phase(p.x)
-    f.inertia.assemble(p.x)
-    mu = eigenvalues(dense(f.inertia.matrix), dense(f.system.metric), f)
+    factored = f.inertia.at(p.x)
+    mu = eigenvalues(dense(factored.matrix), dense(f.system.metric), f)
     for sigma in (3.0, 30.0):
-        assert f.inertia.below(sigma) == (mu < sigma).sum() - 1  # without the symmetry's
+        assert factored.below(sigma) == (mu < sigma).sum() - 1  # without the symmetry's
 
 
 @FORMULATIONS

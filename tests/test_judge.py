@@ -334,8 +334,9 @@ def test_exact_zero() -> None:
     count = Count(solver.system)
 
     def lowest(load: float) -> float:
-        count.count(solver.at_load(solver.start(load), load)[0])
-        return float(count.nearest(1, accuracy=1e-9)[0][0])
+        found = count.at(solver.at_load(solver.start(load), load)[0])
+        found.count()
+        return float(found.nearest(1, accuracy=1e-9)[0][0])
 
     a, b = 49.0, 50.0
     f, g = lowest(a), lowest(b)
@@ -359,17 +360,17 @@ def test_small_eigenvalues_on_many_elements(formulation: str) -> None:
     count = Count(solver.system)
 
     def decision(load: float):  # type: ignore[no-untyped-def]
-        return decide(count, solver.at_load(solver.start(load), load)[0])
+        return decide(count.at(solver.at_load(solver.start(load), load)[0]))
 
     loads = 49.348 + np.array([-0.5, 0.5])
     values = []
     for load in loads:
         decision(load)
-        values.append(count.nearest(1, accuracy=1e-8)[0][0])
+        values.append(count.held.nearest(1, accuracy=1e-8)[0][0])
     slope = (values[1] - values[0]) / 1.0
     solver_state, _ = solver.at_load(solver.start(49.348), 49.348)
-    decide(count, solver_state)
-    middle = count.nearest(1, accuracy=1e-8)[0][0]
+    decide(count.at(solver_state))
+    middle = count.held.nearest(1, accuracy=1e-8)[0][0]
     critical = 49.348 - middle / slope
     for mu in (1e-3, -1e-4, 1e-5, -3e-6, 3e-6, -1e-8, 1e-10, -1e-12):
         found = decision(critical + mu / slope)

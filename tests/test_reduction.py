@@ -292,7 +292,7 @@ def test_negative_eigenvalues_are_those_of_the_index() -> None:
     for name, load, bent in STATES[:4]:
         system, x = (buckled if bent else plain)(name, "pointwise", *SMALL, load)
         system.set_phase(x)
-        index = Index(system).count(x)
+        index = Index(system).at(x).count()
         values = Reduction(Blocks(system).assemble(x)).near(5, -10.0).values
         assert (values < -1e-6).sum() == index.negative
         assert (abs(values) < 1e-6).sum() == index.zero == (1 if name == "hemitropic" and bent else 0)

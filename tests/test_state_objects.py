@@ -19,6 +19,7 @@ from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.problem.ends import clamped
 from rodfem.problem.scene import Ordinate, Parameter, Scene
+from rodfem.stability.inertia import Inertia
 
 SOURCES = Path(__file__).parents[1] / "rodfem"
 
@@ -89,3 +90,35 @@ def test_only_states_write_where_forms_read() -> None:
         inside = [f for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) and f.name == "__post_init__"]
         allowed = sum(ast.unparse(f).count("object.__setattr__") for f in inside)
         assert ast.unparse(tree).count("object.__setattr__") == allowed, where
+
+
+@pytest.mark.short
+def test_stale_factors_refuse() -> None:
+    """Rather than tell a number of the state that took their place; so do those that were never made."""
+    system, x = plain("cord", "reduced", 6, 3, 20.0)
+    y, inertia = x.copy(), Inertia(system)
+    system.set_load(y, 60.0)
+    first = inertia.at(x)
+    with pytest.raises(RuntimeError, match="not factored"):
+        first.nearest(1)
+    index, values = first.count(), first.nearest(1)[0]
+    second = inertia.at(y)
+    with pytest.raises(RuntimeError, match="not factored"):
+        second.response(inertia.seed(0))
+    assert second.count() != index
+    asked = {
+        "below": lambda: first.below(0.0),
+        "count": first.count,
+        "nearest": lambda: first.nearest(1),
+        "response": lambda: first.response(inertia.seed(0)),
+        "noise": lambda: first.noise(inertia.seed(0)),
+        "matrix": lambda: first.matrix,
+        "border": lambda: first.border,
+        "factors": lambda: first.factors,
+    }
+    for name, ask in asked.items():
+        with pytest.raises(RuntimeError, match="another state"):
+            pytest.fail(f"{name} returned {ask()}")
+    again = inertia.at(x)
+    assert again.count() == index
+    assert again.nearest(1)[0] == pytest.approx(values, rel=1e-3)

@@ -90,7 +90,7 @@ def measure(state: str, formulation: str, elements: int, comm: MPI.Comm) -> dict
         "ranks": COMM.size,
         **setup,
         **timed("equilibrium", equilibrium),
-        **timed("count", lambda: index.append(solver.inertia.count(x).negative)),
+        **timed("count", lambda: index.append(solver.inertia.at(x).count().negative)),
         "corrections": corrections[-1],
         "index": index[-1],
         "ordinate": solver.shape.ordinate(x),

@@ -163,12 +163,13 @@ class Watch:
         if negative != point.negative and point.arclength > self.excused:
             follower = self.meshes.followers[point.mesh]
             follower.system.set_phase(point.x)
-            follower.inertia.count(point.x)
-            modes = follower.inertia.nearest(abs(negative - point.negative), accuracy=1e-2)[1]
+            found = follower.inertia.at(point.x)
+            found.count()
+            modes = found.nearest(abs(negative - point.negative), accuracy=1e-2)[1]
             raise TooCoarse(
                 point,
                 float("inf"),
-                [m.copy() for m in modes],
+                modes,
                 why=f"index {point.negative}, {negative} on a richer mesh",
             )
         values = point.load, point.ordinate
@@ -182,9 +183,9 @@ class Watch:
         One factorisation tells that it is the same; only where it does not a second tells zero eigenvalues from others.
         """
         inertia, drifts = richer.follower.inertia, richer.system.active_drifts()
-        inertia.assemble(again.x)
-        below = inertia.below(-inertia.tolerance)
+        found = inertia.at(again.x)
+        below = found.below(-inertia.tolerance)
         if below < point.negative:
-            index = inertia.count(again.x)
+            index = found.count()
             return point.negative if point.negative <= index.negative + max(index.zero - drifts, 0) else index.negative
         return point.negative if below <= point.negative + max(point.zero - drifts, 0) else below

@@ -213,7 +213,7 @@ class Richer:
         ordinate = follower.shape.ordinate(found.x)
         slope = ordinate_along(follower, found.x, found.tangent)
         left = abs(slope) * found.along + ROUND_OFF * max(1.0, abs(ordinate))
-        sharp, gauge = follower.inertia.sharpened(mode), self._gauges[1]
+        sharp, gauge = follower.inertia.held.sharpened(mode), self._gauges[1]  # by the factors of a state nearby
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(gauge.changed(x, found.x, state=True), gauge.changed(mode, sharp, state=False))
         self._origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))

@@ -47,7 +47,7 @@ from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import ROUND_OFF, TOLERANCE
 from rodfem.stability.bordered import Bordered
-from rodfem.stability.inertia import Inertia, combine, orthonormalize
+from rodfem.stability.inertia import Factored, Inertia, combine, orthonormalize
 
 DIFFERENCE = 1e-4
 """Step of the central differences for the third derivatives, in the metric: their errors do not enter the result."""
@@ -94,12 +94,12 @@ class Singular:
         self.saddle = solver.inertia if isinstance(solver, Follower) else Inertia(solver.system)
         self.metric = self.saddle.metric
         self._adopt(vectors, left or [])
-        self.saddle.assemble(vectors[0])  # for its pattern
+        matrix = self.saddle.at(vectors[0]).matrix  # for its pattern
         constraints = None if left else self.saddle.constraints
-        self.bordered = Bordered(self.system, self.saddle.matrix, len(vectors), constraints)
+        self.bordered = Bordered(self.system, matrix, len(vectors), constraints)
         self.turned: Bordered | None = None
         if left:
-            self._transposed = self.saddle.matrix.transpose(PETSc.Mat())
+            self._transposed = matrix.transpose(PETSc.Mat())
             self.turned = Bordered(self.system, self._transposed, len(vectors), None)
 
     def _adopt(self, vectors: list[PETSc.Vec], left: list[PETSc.Vec]) -> None:
@@ -209,8 +209,8 @@ class Singular:
         right.scale(-1.0)
         if not np.isfinite(right.norm()):
             raise ConvergenceError("the stored energy is not defined there")
-        self.saddle.assemble(x)
-        rest = bordered.factor(self.psi, self.phi)
+        saddle = self.saddle.at(x)
+        rest = bordered.factor(saddle.matrix, self.psi, self.phi)
         gauge = np.zeros(k)
         if not self.fold:
             gone = x.copy()
@@ -227,17 +227,17 @@ class Singular:
         for column in columns:
             column.scale(-1.0)
             responses.append(bordered.solve(column, np.zeros(k)))
-        w = self._left(v)
+        w = self._left(saddle, v)
         grad_x, grad_p = self._gradient(p, x, v, w)
         b = np.array([row for _, row in responses])
         return _Linear(s0, b0, [y for y, _ in responses], b, v, w, g, spread, grad_x, grad_p, rest)
 
-    def _left(self, v: list[PETSc.Vec]) -> list[PETSc.Vec]:
-        """Left null vectors at the state last factored, those of the columns of ``psi``; the right ones by symmetry."""
+    def _left(self, saddle: Factored, v: list[PETSc.Vec]) -> list[PETSc.Vec]:
+        """Left null vectors of a state, those of the columns of ``psi``; the right ones ``v`` by symmetry."""
         if self.turned is None:
             return v
-        self.saddle.matrix.transpose(self._transposed)
-        self.turned.factor(self.phi, self.psi)
+        saddle.matrix.transpose(self._transposed)
+        self.turned.factor(self._transposed, self.phi, self.psi)
         return [self.turned.solve(None, e)[0] for e in np.eye(len(self.psi))]
 
     def _gradient(
@@ -302,16 +302,16 @@ def null_vectors(saddle: Inertia, x: PETSc.Vec, number: int) -> tuple[list[PETSc
     the right one of the same number as far as it can be: where a symmetry relates them ``G`` is a multiple of one.
     """
     system, metric = saddle.system, saddle.metric
-    saddle.assemble(x)
-    transposed = saddle.matrix.transpose(PETSc.Mat())
-    straight, turned = (Bordered(system, matrix, number, None) for matrix in (saddle.matrix, transposed))
+    matrix = saddle.at(x).matrix
+    transposed = matrix.transpose(PETSc.Mat())
+    straight, turned = (Bordered(system, side, number, None) for side in (matrix, transposed))
     right = left = [saddle.seed(i) for i in range(number)]
     for _ in range(3):
         orthonormalize(right, metric)
         orthonormalize(left, metric)
         phi, psi = ([metric * v for v in side] for side in (right, left))
-        straight.factor(psi, phi)
-        turned.factor(phi, psi)
+        straight.factor(matrix, psi, phi)
+        turned.factor(transposed, phi, psi)
         right, left = ([one.solve(None, e)[0] for e in np.eye(number)] for one in (straight, turned))
     orthonormalize(right, metric)
     orthonormalize(left, metric)

@@ -25,6 +25,7 @@ prediction is that of the equilibrium only where the distance of all eigenvalues
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
@@ -34,7 +35,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import Outcome, iterate
 from rodfem.fem.state import State
 from rodfem.fem.system import dense_columns
-from rodfem.stability.inertia import Index, Inertia
+from rodfem.stability.inertia import Factored, Index, Inertia
 
 BLOCK = 2
 """Number of vectors that are iterated along a branch."""
@@ -50,18 +51,41 @@ SAFE = 10.0
 """Least distance of all eigenvalues from zero, over the measured change of those carried along."""
 
 
-class Corrector:
-    """Newton's method with the factors of ``S`` at the states of one :class:`~rodfem.stability.inertia.Inertia`.
+@dataclass(frozen=True)
+class Regular:
+    """A state ``x`` whose factors serve: no eigenvalue is near zero.
 
     Attributes
     ----------
-    tangent
-        Unit tangent at the state last factored, on the side of increasing load.
+    found
+        The factors.
+    below
+        Its index.
     nearest
-        Estimated distance of the eigenvalue nearest zero from zero, at the state last factored.
-    regular
-        Whether that is far enough for the factors to serve.
+        Estimated distance of the eigenvalue nearest zero from zero.
+    tangent
+        Unit tangent, on the side of increasing load.
+    projected
+        Products of the block with ``S y`` for its first vector ``y``, (BLOCK,).
     """
+
+    x: PETSc.Vec
+    found: Factored
+    below: int
+    nearest: float
+    tangent: PETSc.Vec
+    projected: np.ndarray
+
+    def along(self, row: PETSc.Vec) -> PETSc.Vec:
+        """Unit tangent on the side to which ``row`` points."""
+        tangent = self.tangent.copy()
+        if row.dot(tangent) < 0:
+            tangent.scale(-1.0)
+        return tangent
+
+
+class Corrector:
+    """Newton's method with the factors of ``S`` at the states of one :class:`~rodfem.stability.inertia.Inertia`."""
 
     def __init__(self, inertia: Inertia) -> None:
         """Allocate right-hand sides, solutions and the block of vectors."""
@@ -69,14 +93,9 @@ class Corrector:
         system = self.system
         self._right, self._solved = dense_columns(system, BLOCK + 2), dense_columns(system, BLOCK + 2)
         self._step, self._image = system.new_vector(), system.new_vector()
-        self._factored, self._beside = system.new_vector(), system.new_vector()
+        self._beside = system.new_vector()
         self._fresh = [inertia.seed(i) for i in range(BLOCK)]
         self._fresh_images = [inertia.metric * v for v in self._fresh]
-        self._below = 0
-        self._projected = np.zeros(BLOCK)
-        self.tangent = system.new_vector()
-        self.nearest = 0.0
-        self.regular = False
         self.restart()
 
     def restart(self) -> None:
@@ -85,37 +104,31 @@ class Corrector:
         self._images = [v.copy() for v in self._fresh_images]
         self._started = False
 
-    def factor(self, x: PETSc.Vec, right: PETSc.Vec | None = None) -> bool:
+    def factor(self, x: PETSc.Vec, right: PETSc.Vec | None = None) -> Regular | None:
         """Factor ``S`` at ``x``; solve for the tangent, the block, and ``right`` (into ``_step``).
 
-        False where they do not serve: an eigenvalue is too near zero, or a load has no potential.
+        None where they do not serve: an eigenvalue is too near zero, or a load has no potential.
         """
-        inertia, self.regular = self.inertia, False
+        inertia = self.inertia
         if not self.system.scene.conservative:  # S is not symmetric
-            return False
-        inertia.assemble(x, right)
+            return None
+        found = inertia.at(x, right)
         try:
-            self._below = inertia.below(0.0)
+            below = found.below(0.0)
         except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong
-            self.nearest = 0.0
-            return False
-        x.copy(self._factored)
+            return None
         for _ in range(1 if self._started else 3):
             for i in range(BLOCK):
                 self._block[i].axpy(FRESH, self._fresh[i])
                 self._images[i].axpy(FRESH, self._fresh_images[i])
-            self._solve(right)
-        self._started = self.regular = self.nearest > NEAR * inertia.scale
-        if self.regular:
-            self._projected = self._project()
-        else:
+            tangent, nearest = self._solve(found, right)
+        self._started = nearest > NEAR * inertia.scale
+        if not self._started:
             self.restart()
-        return self.regular
-
-    def _project(self) -> np.ndarray:
-        """Products of the block with ``S y`` for its first vector ``y``, of the matrix last assembled: (BLOCK,)."""
-        self.inertia.matrix.mult(self._block[0], self._image)
-        return np.array([self._image.dot(v) for v in self._block])
+            return None
+        found.matrix.mult(self._block[0], self._image)
+        projected = np.array([self._image.dot(v) for v in self._block])
+        return Regular(x.copy(), found, below, nearest, tangent, projected)
 
     def _project_at(self, x: PETSc.Vec, step: float) -> np.ndarray:
         """The same of ``S`` at the equilibrium ``x``, by a difference of the equations over ``step``."""
@@ -123,23 +136,27 @@ class Corrector:
         self.system.at(self._beside).residual(self._image)
         return np.array([self._image.dot(v) for v in self._block]) / step
 
-    def _solve(self, right: PETSc.Vec | None) -> None:
-        """Solve for all right-hand sides at once: the cost is that of the call, hardly of a column."""
+    def _solve(self, found: Factored, right: PETSc.Vec | None) -> tuple[PETSc.Vec, float]:
+        """Solve for all right-hand sides at once: the cost is that of the call, hardly of a column.
+
+        Returns the tangent, and the estimated distance of the eigenvalue nearest zero from zero.
+        """
         system, inertia = self.system, self.inertia
         with system.clock("solve"):
             columns = self._right.getDenseArray()
             columns[:, 0] = 0.0 if right is None else right.array_r
-            columns[:, 1] = inertia.border.array_r
+            columns[:, 1] = found.border.array_r
             sizes = []
             for i, (v, image) in enumerate(zip(self._block, self._images, strict=True)):
                 columns[:, 2 + i] = image.array_r
                 sizes.append(image.dot(v) ** 0.5)
-            inertia.factors.solve_all(self._right, self._solved)
+            found.factors.solve_all(self._right, self._solved)
             solved = self._solved.getDenseArray()
             self._step.array[:] = solved[:, 0]
-            self.tangent.array[:] = -solved[:, 1]
-            system.set_load(self.tangent, 1.0)
-            self.tangent.scale(1.0 / system.norm(self.tangent))
+            tangent = system.new_vector()
+            tangent.array[:] = -solved[:, 1]
+            system.set_load(tangent, 1.0)
+            tangent.scale(1.0 / system.norm(tangent))
             growth = 0.0
             for i, (v, image, size) in enumerate(zip(self._block, self._images, sizes, strict=True)):
                 v.array[:] = solved[:, 2 + i]
@@ -152,57 +169,53 @@ class Corrector:
                     along = image.dot(self._block[j])
                     v.axpy(-along, self._block[j])
                     image.axpy(-along, self._images[j])
-            self.nearest = 1.0 / growth
-
-    def _chord(self, right: PETSc.Vec) -> None:
-        with self.system.clock("solve"):
-            self.inertia.factors.solve(right, self._step)
+        return tangent, 1.0 / growth
 
     def correct(
         self, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3, tolerance: float = 0.0
-    ) -> Outcome | None:
+    ) -> tuple[Outcome, Regular | None] | None:
         """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
 
-        As :func:`rodfem.fem.newton.iterate`.  None, with ``x`` as it was, where ``S`` is too near singular.
+        As :func:`rodfem.fem.newton.iterate`; also the state whose factors served last, on the way.  None, with ``x`` as
+        it was, where ``S`` is too near singular.
         """
-        origin, singular = x.copy(), False
+        origin, singular, at = x.copy(), False, None
 
         def solve(state: State, equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
-            nonlocal singular
-            if not fresh:
-                self._chord(equations)
-            elif not self.factor(x, equations):
+            nonlocal singular, at
+            if fresh:
+                at = self.factor(x, equations)
+            if at is None:
                 singular = True
                 return None
-            self._step.axpy(-row.dot(self._step) / row.dot(self.tangent), self.tangent)
+            if not fresh:
+                with self.system.clock("solve"):
+                    at.found.factors.solve(equations, self._step)
+            self._step.axpy(-row.dot(self._step) / row.dot(at.tangent), at.tangent)
             return self._step
 
         outcome = iterate(self.system, x, solve, most, reach, tolerance)
         if singular:
             origin.copy(x)
             return None
-        return outcome
+        return outcome, at
 
-    def tangent_along(self, row: PETSc.Vec) -> PETSc.Vec:
-        """Unit tangent at the state last factored, on the side to which ``row`` points."""
-        tangent = self.tangent.copy()
-        if row.dot(tangent) < 0:
-            tangent.scale(-1.0)
-        return tangent
-
-    def index(self, x: PETSc.Vec) -> Index | None:
-        """Index of ``x``, a state near the one last factored; None where one of its eigenvalues may be zero.
+    def index(self, x: PETSc.Vec, at: Regular) -> Index | None:
+        """Index of ``x``, a state near the one factored last, ``at``; None where one of its eigenvalues may be zero.
 
         The count of the factors holds where no eigenvalue can have crossed zero on the way to ``x``; else ``S`` is
         factored at ``x``.
         """
         inertia, drifts = self.inertia, self.system.active_drifts()
-        self._image.waxpy(-1.0, self._factored, x)
+        self._image.waxpy(-1.0, at.x, x)
         moved = self.system.norm(self._image)
         least = NEAR * inertia.scale + 10 * inertia.tolerance
         if moved:
             projected = self._project_at(x, max(DIFFERENCE * moved, 1e-7))
-            change = float(np.linalg.norm(projected - self._projected))
-            if self.nearest < least + SENSITIVE * moved * inertia.scale + SAFE * change and not self.factor(x):
-                return None
-        return Index(self._below, drifts) if self.nearest >= least else None
+            change = float(np.linalg.norm(projected - at.projected))
+            if at.nearest < least + SENSITIVE * moved * inertia.scale + SAFE * change:
+                there = self.factor(x)
+                if there is None:
+                    return None
+                at = there
+        return Index(at.below, drifts, at.found.factors.determinant()) if at.nearest >= least else None

@@ -21,6 +21,7 @@ from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.system import System, combine
 from rodfem.problem.events import Event
+from rodfem.stability.inertia import Factored
 
 NODES, FEWER = 6, 4
 """Number of nodes of an interpolant, and of one over a very short piece."""
@@ -45,13 +46,17 @@ Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
 
 @dataclass
 class Sample:
-    """A solved point of a piece of a branch: parameter ``s``, state, load, the eigenvalue looked at, and the index."""
+    """A solved point of a piece of a branch: parameter ``s``, state, load, the eigenvalue looked at, and the index.
+
+    ``found`` are its factors, until the next sample.
+    """
 
     s: float
     x: PETSc.Vec
     load: float
     mu: float
     below: int
+    found: Factored
 
 
 def solve_at(follower: Follower, curve: Curve, s: float) -> PETSc.Vec:
@@ -97,10 +102,11 @@ def eigenvalue(
 
     Eigenvalues of the vectors ``still``, zero on the whole branch, are not numbered.
     """
-    below = follower.inertia.count(x).negative
+    found = follower.inertia.at(x)
+    below = found.count().negative
     position = order - below if order >= below else below - 1 - order
     for wanted in (position + 1, position + 3, position + 6, position + 12):
-        values, vectors = follower.inertia.nearest(wanted + len(still), accuracy=1e-4)
+        values, vectors = found.nearest(wanted + len(still), accuracy=1e-4)
         if still:
             moving = [i for i, v in enumerate(vectors) if across(follower.system, [v], still)]
             values, vectors = values[moving], [vectors[i] for i in moving]
@@ -109,7 +115,7 @@ def eigenvalue(
         )
         if len(side) > position:
             chosen = side[np.argsort(abs(values[side]))[position]]
-            return float(values[chosen]), vectors[chosen].copy()
+            return float(values[chosen]), vectors[chosen]
     raise ConvergenceError(f"Eigenvalue number {order} is not among those nearest zero", SMALLER_STEPS)
 
 
@@ -123,15 +129,15 @@ def sample(
     singular.  Eigenvalues within the tolerance of zero, of which ``persistent`` stay zero, count by its sign.  Unless
     ``counted``, they are among those below: one factorisation instead of two.
     """
-    x, inertia = solve_at(follower, curve, s), follower.inertia
+    x = solve_at(follower, curve, s)
+    found = follower.inertia.at(x)
     if not counted:
-        inertia.assemble(x)
-        below = inertia.below(inertia.tolerance)
-        return Sample(s, x, follower.system.scalar(x), inertia.response(mode), below)
-    index = inertia.count(x)
-    mu = inertia.response(mode)
+        below = found.below(follower.inertia.tolerance)
+        return Sample(s, x, follower.system.scalar(x), found.response(mode), below, found)
+    index = found.count()
+    mu = found.response(mode)
     crossing = index.zero - follower.system.active_drifts() - persistent  # small ones take the sign of this one
-    return Sample(s, x, follower.system.scalar(x), mu, index.negative + (crossing if mu < 0 else 0))
+    return Sample(s, x, follower.system.scalar(x), mu, index.negative + (crossing if mu < 0 else 0), found)
 
 
 @dataclass
@@ -232,7 +238,7 @@ def refine(
     for _ in range(10):
         nodes = center + half * np.cos(np.pi * (np.arange(count)[::-1] + 0.5) / count)
         samples = [sample(follower, curve, s, mode, persistent, counted=beside is None) for s in nodes]
-        located = interpolate(samples, zero_of, center, follower.inertia.noise(mode))
+        located = interpolate(samples, zero_of, center, samples[-1].found.noise(mode))
         if located is not None and abs(located.s - center) <= half:
             sharp = SHARP if beside is None else max(SHARP, PART * abs(located.load - beside))
             settled = best is not None and located.uncertainty > 0.1 * best.uncertainty
@@ -297,7 +303,7 @@ def bracket(
     h = high - low
 
     def passed(s: float) -> bool:
-        return follower.inertia.count(solve_beside(follower, curve, s, 1e-3 * h)[0]).negative > order
+        return follower.inertia.at(solve_beside(follower, curve, s, 1e-3 * h)[0]).count().negative > order
 
     first = passed(low)
     if first == passed(high):
@@ -322,8 +328,9 @@ def locate(
     h = b.arclength - a.arclength
     if zero_of == "slope":
         x, guess = solve_beside(follower, curve, a.arclength + h * a.slope / (a.slope - b.slope), 1e-3 * h)
-        follower.inertia.count(x)
-        mode = follower.inertia.nearest(1, accuracy=1e-2)[1][0].copy()
+        found = follower.inertia.at(x)
+        found.count()
+        mode = found.nearest(1, accuracy=1e-2)[1][0]
     else:
         piece = a.arclength + 1e-3 * h, b.arclength - 1e-3 * h
         guess, mode = crossing_mode(follower, curve, piece, order, still)

@@ -160,14 +160,14 @@ class Follower(Equilibria):
 
     def is_stable(self, x: PETSc.Vec) -> bool:
         """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
-        return self.inertia.count(x).negative == 0
+        return self.inertia.at(x).count().negative == 0
 
     def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, Outcome]:
         """As for any equilibria, but with the symmetric factors where they serve."""
         x = guess.copy()
         self.system.set_load(x, load)
-        outcome = self.corrector.correct(x, self.axis, reach=reach)
-        return (x, outcome) if outcome is not None else super().at_load(guess, load, reach)
+        corrected = self.corrector.correct(x, self.axis, reach=reach)
+        return (x, corrected[0]) if corrected is not None else super().at_load(guess, load, reach)
 
     def point(
         self,
@@ -180,8 +180,7 @@ class Follower(Equilibria):
         """Evaluate all records of the equilibrium ``x``; its index is counted unless given."""
         system = self.system
         if index is None:
-            index = decide(self.inertia, x).index
-        determinant = self.inertia.factors.determinant()
+            index = decide(self.inertia.at(x)).index
         return Point(
             x=x,
             tangent=tangent,
@@ -198,7 +197,7 @@ class Follower(Equilibria):
             spectrum=self._leftmost(x, index),
             negative_in_space=None if self.space is None else self.space.count(x).negative,
             mesh=self.mesh,
-            determinant=determinant,
+            determinant=index.determinant,
         )
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:
@@ -225,18 +224,16 @@ class Follower(Equilibria):
         ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at ``x``
         itself and not at the prediction.
         """
-        outcome = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)
-        regular = outcome is not None
-        if outcome is None:
-            outcome = correct(self.system, x, row, most=8, reach=reach)
+        corrected = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)
+        outcome, at = corrected or (correct(self.system, x, row, most=8, reach=reach), None)
         if not outcome.converged:
             return outcome, None, None
-        tangent = self.corrector.tangent_along(row) if regular else self.tangent(row)
+        tangent = at.along(row) if at else self._tangent(row)
         new, span = self.system.scalar(tangent), abs(self.system.scene.span[1] - self.system.scene.span[0])
         if new * slope <= 0 or abs(new) < min(LEVEL, SENSITIVE * outcome.moved) * span:
-            tangent = self.tangent(row, at=x)
-            regular = self.corrector.regular
-        return outcome, tangent, self.corrector.index(x) if regular else None
+            at = self.corrector.factor(x)
+            tangent = at.along(row) if at else self._tangent(row, x)
+        return outcome, tangent, self.corrector.index(x, at) if at else None
 
     def damp(self, freedoms: int) -> None:
         """Keep Newton's method from moving along families of equilibria at one load, where there are any."""
@@ -254,9 +251,12 @@ class Follower(Equilibria):
         From the LU factors of the last correction, which belong to a state nearby; with ``at`` from new ones at that
         very state, symmetric where they serve.
         """
+        regular = None if at is None else self.corrector.factor(at)
+        return regular.along(row) if regular else self._tangent(row, at)
+
+    def _tangent(self, row: PETSc.Vec, at: PETSc.Vec | None = None) -> PETSc.Vec:
+        """The same by LU factors."""
         if at is not None:
-            if self.corrector.factor(at):
-                return self.corrector.tangent_along(row)
             self.system.at(at).factor(row)
         tangent = self.system.new_vector()
         solved = self.system.solve(self.axis, tangent)

@@ -47,13 +47,14 @@ def special_at(follower: Follower, located: Located, arclength: float, still: Se
     system.set_phase(x)
     tangent = located.tangent
     tangent.scale(1.0 / system.norm(tangent))
-    point = follower.point(x, arclength, tangent)
+    found = inertia.at(x)
+    point = follower.point(x, arclength, tangent, index=decide(found).index)
     null_count = point.zero - system.active_drifts()
     if null_count < 1:  # what was interpolated has no zero there: two branches were taken for one
         raise ConvergenceError(
             f"No eigenvalue vanishes at load {point.load:.8g}, where one was expected to", SMALLER_STEPS
         )
-    _, vectors = inertia.nearest(null_count, accuracy=1e-8)
+    _, vectors = found.nearest(null_count, accuracy=1e-8)
     vectors = across(system, vectors, still)
     if not vectors:
         raise ConvergenceError(
@@ -112,7 +113,7 @@ def renew(follower: Follower, point: Point, *, turning: bool) -> None:
     The recorded ones may have been told from a prediction near by.
     """
     follower.system.set_phase(point.x)
-    index = decide(follower.inertia, point.x).index
+    index = decide(follower.inertia.at(point.x)).index
     point.negative, point.zero = index.negative, index.zero
     if turning and point.tangent is not None:
         point.tangent = follower.tangent(follower.row(point.tangent), at=point.x)
@@ -129,7 +130,7 @@ def _count_between(follower: Follower, a: Point, b: Point, found: list[Special])
         if q.point.arclength - p.point.arclength > APART:
             s = (p.point.arclength + q.point.arclength) / 2
             x = solve_at(follower, lambda t: hermite(a, b, t), s)
-            between = decide(follower.inertia, x).index.negative
+            between = decide(follower.inertia.at(x)).index.negative
         else:
             rising = b.negative > a.negative
             between = p.negative_before + (p.multiplicity if rising else -p.multiplicity)
@@ -158,8 +159,9 @@ def _persistent(follower: Follower, a: Point, count: int) -> list[PETSc.Vec]:
     if not count:
         return []
     follower.system.set_phase(a.x)
-    follower.inertia.count(a.x)
-    return [v.copy() for v in follower.inertia.nearest(count, accuracy=1e-8)[1]]
+    found = follower.inertia.at(a.x)
+    found.count()
+    return found.nearest(count, accuracy=1e-8)[1]
 
 
 def _special(

@@ -73,14 +73,12 @@ def unfold(follower: Follower, special: Special) -> Unfolded | None:
     system, inertia = follower.system, follower.inertia
     k, x = len(special.null_vectors), special.point.x.copy()
     system.set_phase(x)
-    inertia.assemble(x)
-    bordered = Bordered(system, inertia.matrix, k, inertia.constraints)
+    bordered = Bordered(system, inertia.at(x).matrix, k, inertia.constraints)
     psi = [inertia.metric * v for v in special.null_vectors]
     equations = system.new_vector()
     moved, before = 0.0, np.inf
     for _ in range(MOST):
         system.at(x).residual(equations)
-        inertia.assemble(x)
         try:
             step, beta, v, directions = _step(follower, bordered, psi, x, equations)
         except (ConvergenceError, np.linalg.LinAlgError):
@@ -91,8 +89,8 @@ def unfold(follower: Follower, special: Special) -> Unfolded | None:
             return None
         x.axpy(1.0, step)
         if size < TOLERANCE or (size < 1e-7 and size > 0.5 * before):
-            inertia.assemble(x)
-            noise = NOISE * max(_rounding(inertia.matrix, w, x) for w in v)
+            matrix = inertia.at(x).matrix
+            noise = NOISE * max(_rounding(matrix, w, x) for w in v)
             return Unfolded(x, system.scalar(x), beta, noise + LEAST * inertia.scale, directions)
         before = size
     return None
@@ -101,10 +99,10 @@ def unfold(follower: Follower, special: Special) -> Unfolded | None:
 def _step(
     follower: Follower, bordered: Bordered, psi: list[PETSc.Vec], x: PETSc.Vec, equations: PETSc.Vec
 ) -> tuple[PETSc.Vec, np.ndarray, list[PETSc.Vec], list[PETSc.Vec]]:
-    """Newton's step, the unfolding parameters after it, null vectors and directions; ``S`` must have been assembled."""
-    system, inertia, k = follower.system, follower.inertia, len(psi)
-    bordered.factor(psi)
-    right, slope = equations.copy(), inertia.border.copy()
+    """Newton's step, the unfolding parameters after it, null vectors and directions."""
+    system, found, k = follower.system, follower.inertia.at(x), len(psi)
+    bordered.factor(found.matrix, psi)
+    right, slope = equations.copy(), found.border.copy()
     right.scale(-1.0)
     slope.scale(-1.0)
     s, c = bordered.solve(right, np.zeros(k))
@@ -155,9 +153,9 @@ def _differences(
     beside, there = system.new_vector(), system.new_vector()
     for sign in (1.0, -1.0):
         beside.waxpy(sign * h, direction, x)
-        inertia.assemble(beside)
+        matrix = inertia.at(beside).matrix
         for image, v in zip(out, vectors, strict=True):
-            image.axpy(sign / (2 * h), inertia.matrix * v)
+            image.axpy(sign / (2 * h), matrix * v)
         if equations is not None:
             system.at(beside).residual(there)
             bend.axpy(1.0 / h**2, there)

@@ -141,18 +141,19 @@ class Explorer(Tracer):
         load does no work on the free motion, and the branch goes on with the tangent ``(w, 1)``, across the family.
         """
         follower, system = self.follower, self.follower.system
-        follower.inertia.count(point.x)
-        vectors = [v.copy() for v in follower.inertia.nearest(freedoms, accuracy=1e-8)[1]]
+        found = follower.inertia.at(point.x)
+        found.count()
+        vectors = found.nearest(freedoms, accuracy=1e-8)[1]
         if max(coupling_of(follower, point.x, v) for v in vectors) > COUPLED:
             raise SceneError(
                 f"The first state, at {self.scene.load} = {point.load:g}, may move freely at this load, and is not the "
                 f"state that a small {self.scene.load} leads on from: start the range at another load, or give the "
                 "scene a start that is in equilibrium under the load, too."
             )
-        follower.inertia.assemble(point.x)
-        bordered = Bordered(system, follower.inertia.matrix, freedoms, follower.inertia.constraints)
-        bordered.factor([follower.inertia.metric * v for v in vectors])
-        right = follower.inertia.border.copy()
+        found = follower.inertia.at(point.x)
+        bordered = Bordered(system, found.matrix, freedoms, follower.inertia.constraints)
+        bordered.factor(found.matrix, [follower.inertia.metric * v for v in vectors])
+        right = found.border.copy()
         right.scale(-1.0)
         tangent, _ = bordered.solve(right, np.zeros(freedoms))
         system.set_load(tangent, 1.0)

@@ -149,8 +149,9 @@ def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[E
         special.law = Law(**{name: _number(v) for name, v in entry["law"].items() if name in known})
     if isinstance(solver, Follower) and special.kind.singular and entry["multiplicity"]:
         solver.system.set_phase(point.x)
-        solver.inertia.count(point.x)
-        special.null_vectors = [v.copy() for v in solver.inertia.nearest(entry["multiplicity"], accuracy=1e-8)[1]]
+        found = solver.inertia.at(point.x)
+        found.count()
+        special.null_vectors = found.nearest(entry["multiplicity"], accuracy=1e-8)[1]
     return special
 
 

@@ -117,7 +117,7 @@ class SpecialSearch:
         if point.zero <= self.level:
             return Row(point, point.negative, point.negative)
         self.follower.system.set_phase(point.x)
-        return Row(point, *resolve(self.follower.inertia, point.x))
+        return Row(point, *resolve(self.follower.inertia.at(point.x)))
 
     def _on(self, point: Point) -> None:
         self.follower = self.meshes.followers[point.mesh]

@@ -405,7 +405,7 @@ class Tracer:
         own = point.zero - system.active_drifts() - extra
         for p in (before, point):
             system.set_phase(p.x)
-            low, high = resolve(inertia, p.x)
+            low, high = resolve(inertia.at(p.x))
             still = min(max(still, high - low - own), extra)
         if still:
             self.observer.note(

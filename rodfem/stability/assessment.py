@@ -144,7 +144,7 @@ class Judge(Workspace):
         """Count; where that breaks down, name the constraints that depend on each other."""
         assert self.inertia is not None
         try:
-            return decide(self.inertia, x)
+            return decide(self.inertia.at(x))
         except ConvergenceError:
             rank_of(self.pencil(x, "full"))
             raise

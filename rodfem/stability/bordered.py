@@ -20,11 +20,11 @@ class Bordered:
 
     def __init__(self, system: System, matrix: PETSc.Mat, borders: int, constraints: int | None) -> None:
         """Allocate for a number of borders of a matrix that was assembled once."""
-        self.system, self.given, self.k, self.constraints = system, matrix, borders, constraints
+        self.system, self.k, self.constraints = system, borders, constraints
         self.comm, self.last = system.comm, system.has_scalars
         self.extra = borders if self.last else 0
         self.n = system.fields.unknowns
-        start, columns, _ = self.given.getValuesCSR()
+        start, columns, _ = matrix.getValuesCSR()
         rows = len(start) - 1
         lengths = np.concatenate([np.diff(start) + borders, np.full(self.extra, self.n + borders)])
         self.start = np.concatenate([[0], np.cumsum(lengths)]).astype(PETSc.IntType)
@@ -46,12 +46,12 @@ class Bordered:
             self.factors = inertia_factors(self.comm, *sizes)
         self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))
 
-    def factor(self, columns: list[PETSc.Vec], rows: list[PETSc.Vec] | None = None) -> int:
-        """Factor with the matrix as last assembled; its negative eigenvalues off the borders, -1 without a count.
+    def factor(self, matrix: PETSc.Mat, columns: list[PETSc.Vec], rows: list[PETSc.Vec] | None = None) -> int:
+        """Factor with a matrix of the same pattern; its negative eigenvalues off the borders, -1 without a count.
 
         The ``rows`` of the borders are the same as the ``columns`` unless given.
         """
-        self.values[: self.own][~self._border] = self.given.getValuesCSR()[2].real
+        self.values[: self.own][~self._border] = matrix.getValuesCSR()[2].real
         local = [np.stack([v.array_r.real for v in side], axis=1) for side in (columns, rows or columns)]
         self.values[: self.own][self._border] = local[0].ravel()
         parts = self.comm.gather(local[1], root=self.comm.size - 1)

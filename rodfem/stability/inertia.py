@@ -12,7 +12,7 @@ disturb: the phase condition counts as one more constraint, and takes the zero m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from mpi4py import MPI
@@ -31,10 +31,14 @@ NOISE = 8.0
 
 @dataclass(frozen=True)
 class Index:
-    """Number of negative and of zero eigenvalues (symmetry modes included) of the constrained second variation."""
+    """Number of negative and of zero eigenvalues (symmetry modes included) of the constrained second variation.
+
+    ``determinant`` is the logarithm of the size of that of the matrix that was counted.
+    """
 
     negative: int
     zero: int
+    determinant: float = field(default=float("nan"), compare=False)
 
 
 def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
@@ -50,11 +54,11 @@ def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
 
 
 class Inertia:
-    """Counts eigenvalues and finds the ones nearest zero, at states of one :class:`~rodfem.fem.system.System`.
+    """Matrix ``S`` and its factors, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`.
 
     Eigenvalues ``mu`` are relative to the system's metric.  ``tolerance`` is the half width of what counts as zero, the
     larger of 1e-7 of the rod's lowest bending eigenvalue and of ``resolution``: what the arithmetic resolves.
-    ``border`` is the derivative of the equations in the load at the state last assembled.
+    ``vectors`` are those that :meth:`Factored.nearest` found last.
     """
 
     def __init__(self, system: System) -> None:
@@ -75,10 +79,11 @@ class Inertia:
         self.scale = system.stiffness_scale
         self.tolerance = 1e-7 * self.scale
         self.resolution = 0.0
-        self._vectors: list[PETSc.Vec] = []
+        self.vectors: list[PETSc.Vec] = []
+        self.shift, self.filled, self.factored = 0.0, 0, 0
 
-    def assemble(self, x: PETSc.Vec, equations: PETSc.Vec | None = None) -> None:
-        """Assemble ``S`` at ``x``, with the phase conditions that are active, and ``border``.
+    def at(self, x: PETSc.Vec, equations: PETSc.Vec | None = None) -> Factored:
+        """Assemble ``S`` at ``x``, with the phase conditions that are active.
 
         The symmetries are verified there; ``equations`` are those at ``x``, None at an equilibrium.
         """
@@ -88,6 +93,13 @@ class Inertia:
             sound = self.system.verify(self.matrix, state, equations)
         if not sound:
             self._assemble(state)
+        self.filled += 1
+        return Factored(self)
+
+    @property
+    def held(self) -> Factored:
+        """Whatever state the matrix holds."""
+        return Factored(self)
 
     def _assemble(self, state: State) -> None:
         system = self.system
@@ -108,87 +120,6 @@ class Inertia:
             self.resolution = 10 * EPS * self.matrix.norm(PETSc.NormType.INFINITY) / smallest
             self.tolerance = max(self.tolerance, self.resolution)
 
-    def below(self, sigma: float) -> int:
-        """Number of eigenvalues below ``sigma`` at the state last assembled; symmetry modes not counted."""
-        with self.system.clock("stability"):
-            if sigma != self.shift:
-                self.matrix.axpy(self.shift - sigma, self.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            self.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
-            self.shift = sigma
-            self.factors(self.matrix)
-            negative, zero = self.factors.inertia()
-        below = negative - self.constraints - self.system.active_drifts()
-        if zero or below < 0:
-            raise ConvergenceError(
-                f"The count of eigenvalues below {sigma:.2g} broke down ({zero} zero pivots, {negative} negative ones "
-                f"for {self.constraints} constraints): the constraints depend on each other."
-            )
-        return int(below)
-
-    def count(self, x: PETSc.Vec) -> Index:
-        """Index of the state ``x``; two factorisations, the last of which serves :meth:`nearest`."""
-        self.assemble(x)
-        negative = self.below(-self.tolerance)
-        return Index(negative, self.below(self.tolerance) - negative + self.system.active_drifts())
-
-    def nearest(
-        self, number: int, accuracy: float = 1e-3, most: int = 60, spare: int = 1
-    ) -> tuple[np.ndarray, list[PETSc.Vec]]:
-        """Return the eigenvalues nearest zero of the matrix last factored, and their vectors (metric norm 1).
-
-        Block inverse iteration from the vectors of the last call, with a Rayleigh-Ritz projection of ``S``, until the
-        ``number`` wanted values change by less than ``accuracy`` relative to themselves (or by what the arithmetic
-        resolves).  The block has ``spare`` more vectors.
-        """
-        metric, block = self.metric, number + spare
-        while len(self._vectors) < block:
-            self._vectors.append(self.seed(len(self._vectors)))
-        del self._vectors[block:]
-        values = np.full(block, np.inf)
-        for i, v in enumerate(self._vectors):
-            v.axpy(1e-3, self.seed(i))  # the old vectors may span an invariant space that misses the nearest one
-        with self.system.clock("stability"):
-            for _ in range(most):
-                solved = [v.duplicate() for v in self._vectors]
-                for v, out in zip(self._vectors, solved, strict=True):
-                    self.factors.solve(metric * v, out)
-                orthonormalize(solved, metric)
-                images = [self.matrix * y for y in solved]
-                theta, z = np.linalg.eigh(np.array([[y.dot(w) for w in images] for y in solved]))
-                order = np.argsort(abs(theta + self.shift))
-                last, values = values, theta[order] + self.shift
-                self._vectors = [combine(solved, z[:, j]) for j in order]
-                change = abs(values - last)[:number]
-                if np.all(change <= np.maximum(accuracy * abs(values[:number]), self.resolution)):
-                    break
-        return values[:number], self._vectors[:number]
-
-    def response(self, mode: PETSc.Vec) -> float:
-        """Return ``1 / (mode . M S^-1 M mode)`` for a vector of metric norm 1: that of an eigenvector."""
-        with self.system.clock("stability"):
-            image = self.metric * mode
-            self.factors.solve(image, self.system.workspace)
-            return 1.0 / image.dot(self.system.workspace) + self.shift
-
-    def sharpened(self, mode: PETSc.Vec) -> PETSc.Vec:
-        """Vector of metric norm 1 by one step of inverse iteration from ``mode``, with the factors last made."""
-        out = self.system.new_vector()
-        self.factors.solve(self.metric * mode, out)
-        out.scale(1.0 / np.sqrt(out.dot(self.metric * out).real))
-        return out
-
-    def noise(self, mode: PETSc.Vec) -> float:
-        r"""Round-off in the eigenvalue of a ``mode`` of metric norm 1, of the matrix last assembled.
-
-        First-order perturbation theory: entries ``S_ij`` that err by ``eps |S_ij|`` each, at random, move it by
-        ``eps sqrt(sum (S_ij mode_i mode_j)^2)``; :data:`NOISE` times that is returned.
-        """
-        first, columns, values = self.matrix.getValuesCSR()
-        every = np.concatenate(self.system.comm.allgather(mode.array_r.real))
-        rows = np.repeat(mode.array_r.real, np.diff(first))
-        squares = float(np.sum((values.real * rows * every[columns]) ** 2))
-        return float(NOISE * EPS * np.sqrt(self.system.comm.allreduce(squares)))
-
     def seed(self, i: int) -> PETSc.Vec:
         """Generic vector: components along all unknowns of fields, none along scalars."""
         vector = self.system.new_vector()
@@ -196,6 +127,132 @@ class Inertia:
         numbers = np.arange(begin, min(end, self.system.fields.field_unknowns))
         vector.array[: len(numbers)] = np.sin((1.0 + i) * (1.0 + 0.731 * numbers)) + 0.3
         return vector
+
+
+class Factored:
+    """``S`` at one state, and what its factors tell: a count, the eigenvalues nearest zero, solutions.
+
+    Raises :class:`RuntimeError` where the matrix holds another state by now, or what is asked for needs factors
+    (:meth:`below`, :meth:`count`) that were not made: a number of another state is never returned.
+    """
+
+    def __init__(self, inertia: Inertia) -> None:
+        """Be the state that the matrix was just filled for."""
+        self.inertia, self._filled = inertia, inertia.filled
+
+    def _own(self) -> Inertia:
+        """Matrix and factors, while they are those of this state."""
+        if self.inertia.filled != self._filled:
+            raise RuntimeError("The matrix holds another state by now: ask for this one again, by Inertia.at.")
+        return self.inertia
+
+    @property
+    def factors(self) -> Factors:
+        """Factors of ``S - shift M``."""
+        inertia = self._own()
+        if inertia.factored != self._filled:
+            raise RuntimeError("The matrix of this state was not factored: count first.")
+        return inertia.factors
+
+    @property
+    def matrix(self) -> PETSc.Mat:
+        """``S - shift M``."""
+        return self._own().matrix
+
+    @property
+    def border(self) -> PETSc.Vec:
+        """Derivative of the equations in the load."""
+        return self._own().border
+
+    @property
+    def shift(self) -> float:
+        """What the last count was below."""
+        return self._own().shift
+
+    def below(self, sigma: float) -> int:
+        """Number of eigenvalues below ``sigma``; symmetry modes not counted."""
+        own = self._own()
+        with own.system.clock("stability"):
+            if sigma != own.shift:
+                own.matrix.axpy(own.shift - sigma, own.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            own.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
+            own.shift = sigma
+            own.factors(own.matrix)
+            own.factored = self._filled
+            negative, zero = own.factors.inertia()
+        below = negative - own.constraints - own.system.active_drifts()
+        if zero or below < 0:
+            raise ConvergenceError(
+                f"The count of eigenvalues below {sigma:.2g} broke down ({zero} zero pivots, {negative} negative ones "
+                f"for {own.constraints} constraints): the constraints depend on each other."
+            )
+        return int(below)
+
+    def count(self) -> Index:
+        """Index; two factorisations, the last of which serves :meth:`nearest`."""
+        own = self._own()
+        negative = self.below(-own.tolerance)
+        zero = self.below(own.tolerance) - negative + own.system.active_drifts()
+        return Index(negative, zero, own.factors.determinant())
+
+    def nearest(
+        self, number: int, accuracy: float = 1e-3, most: int = 60, spare: int = 1
+    ) -> tuple[np.ndarray, list[PETSc.Vec]]:
+        """Return the eigenvalues nearest zero, and their vectors (metric norm 1).
+
+        Block inverse iteration from the vectors of the last call, with a Rayleigh-Ritz projection of ``S``, until the
+        ``number`` wanted values change by less than ``accuracy`` relative to themselves (or by what the arithmetic
+        resolves).  The block has ``spare`` more vectors.
+        """
+        own, factors, block = self._own(), self.factors, number + spare
+        vectors = own.vectors[:block] + [own.seed(i) for i in range(len(own.vectors), block)]
+        values = np.full(block, np.inf)
+        for i, v in enumerate(vectors):
+            v.axpy(1e-3, own.seed(i))  # the old vectors may span an invariant space that misses the nearest one
+        with own.system.clock("stability"):
+            for _ in range(most):
+                solved = [v.duplicate() for v in vectors]
+                for v, out in zip(vectors, solved, strict=True):
+                    factors.solve(own.metric * v, out)
+                orthonormalize(solved, own.metric)
+                images = [own.matrix * y for y in solved]
+                theta, z = np.linalg.eigh(np.array([[y.dot(w) for w in images] for y in solved]))
+                order = np.argsort(abs(theta + own.shift))
+                last, values = values, theta[order] + own.shift
+                vectors = [combine(solved, z[:, j]) for j in order]
+                change = abs(values - last)[:number]
+                if np.all(change <= np.maximum(accuracy * abs(values[:number]), own.resolution)):
+                    break
+        own.vectors = vectors
+        return values[:number], [v.copy() for v in vectors[:number]]
+
+    def response(self, mode: PETSc.Vec) -> float:
+        """Return ``1 / (mode . M S^-1 M mode)`` for a vector of metric norm 1: that of an eigenvector."""
+        system = self._own().system
+        with system.clock("stability"):
+            image = self.inertia.metric * mode
+            self.factors.solve(image, system.workspace)
+            return 1.0 / image.dot(system.workspace) + self.shift
+
+    def sharpened(self, mode: PETSc.Vec) -> PETSc.Vec:
+        """Vector of metric norm 1 by one step of inverse iteration from ``mode``."""
+        out, metric = mode.duplicate(), self._own().metric
+        self.factors.solve(metric * mode, out)
+        out.scale(1.0 / np.sqrt(out.dot(metric * out).real))
+        return out
+
+    def noise(self, mode: PETSc.Vec) -> float:
+        r"""Round-off in the eigenvalue of a ``mode`` of metric norm 1.
+
+        First-order perturbation theory: entries ``S_ij`` that err by ``eps |S_ij|`` each, at random, move it by
+        ``eps sqrt(sum (S_ij mode_i mode_j)^2)``; :data:`NOISE` times that is returned.
+        """
+        first, columns, values = self.matrix.getValuesCSR()
+        comm = self._own().system.comm
+        every = np.concatenate(comm.allgather(mode.array_r.real))
+        rows = np.repeat(mode.array_r.real, np.diff(first))
+        squares = float(np.sum((values.real * rows * every[columns]) ** 2))
+        return float(NOISE * EPS * np.sqrt(comm.allreduce(squares)))
 
 
 def orthonormalize(vectors: list[PETSc.Vec], metric: PETSc.Mat) -> None:

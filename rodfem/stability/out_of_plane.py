@@ -55,7 +55,7 @@ class InSpace:
         settled = state.copy()
         if correct(self.system, settled, self.system.load_axis(), most=6, reach=NEAR).converged:
             state = settled  # else the state is so near a singular one that its own error decides as well
-        return self.inertia.count(state)
+        return self.inertia.at(state).count()
 
     def _scalars(self, state: State) -> dict[str, float]:
         """Scalar unknowns in space from those in the plane, vectors by their components along new directions."""

@@ -13,12 +13,12 @@ where ten times this does not tell them from zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.stability.inertia import EPS, Index, Inertia
+from rodfem.stability.inertia import EPS, Factored, Index
 
 SPARE = 2
 """Vectors more than there are eigenvalues in the band."""
@@ -44,40 +44,41 @@ class Decision:
     uncertainty: np.ndarray
 
 
-def decide(inertia: Inertia, x: PETSc.Vec) -> Decision:
-    """Count at the state ``x``; eigenvalues within the band are decided by their Rayleigh quotients.
+def decide(found: Factored) -> Decision:
+    """Count at a state; eigenvalues within the band are decided by their Rayleigh quotients.
 
-    Factorisations are those of the count alone, the last of which serves :meth:`~Inertia.nearest` here and afterwards.
+    Factorisations are those of the count alone, the last of which serves :meth:`~Factored.nearest` here and afterwards.
     """
-    index = inertia.count(x)
+    index, inertia = found.count(), found.inertia
     known = inertia.system.active_drifts()
     inside = index.zero - known
     least = 1e-7 * inertia.scale
     if inside == 0 or inertia.resolution <= least:
         return Decision(index, inertia.tolerance, np.zeros(0), np.zeros(0))
-    theta, vectors = inertia.nearest(inside + SPARE)
+    theta, vectors = found.nearest(inside + SPARE)
     nearest = np.argsort(abs(theta))[:inside]
-    doubt = np.array([max(quotient_error(inertia.matrix, vectors[i]), least) for i in nearest])
-    theta = np.array([vectors[i].dot(inertia.matrix * vectors[i]) for i in nearest]) + inertia.shift
+    doubt = np.array([max(quotient_error(found.matrix, vectors[i]), least) for i in nearest])
+    theta = np.array([vectors[i].dot(found.matrix * vectors[i]) for i in nearest]) + found.shift
     negative = int((theta < -doubt).sum())
     zero = int((abs(theta) <= doubt).sum())
-    return Decision(Index(index.negative + negative, zero + known), inertia.tolerance, theta, doubt)
+    index = replace(index, negative=index.negative + negative, zero=zero + known)
+    return Decision(index, inertia.tolerance, theta, doubt)
 
 
-def resolve(inertia: Inertia, x: PETSc.Vec) -> tuple[int, int]:
-    """Least and greatest index of the state ``x``, small eigenvalues judged by their Rayleigh quotients.
+def resolve(found: Factored) -> tuple[int, int]:
+    """Least and greatest index of a state, small eigenvalues judged by their Rayleigh quotients.
 
     Those within the tolerance of zero are told from zero down to their round-off; what is left open between the two
     numbers is zero to working accuracy.  Modes of symmetries are left out.
     """
-    index = inertia.count(x)
-    near = index.zero - inertia.system.active_drifts()
+    index = found.count()
+    near = index.zero - found.inertia.system.active_drifts()
     if near <= 0:
         return index.negative, index.negative
-    theta, vectors = inertia.nearest(near + SPARE, accuracy=1e-8)
+    theta, vectors = found.nearest(near + SPARE, accuracy=1e-8)
     chosen = np.argsort(abs(theta))[:near]
-    doubt = np.array([quotient_error(inertia.matrix, vectors[i]) for i in chosen])
-    theta = np.array([vectors[i].dot(inertia.matrix * vectors[i]) for i in chosen]) + inertia.shift
+    doubt = np.array([quotient_error(found.matrix, vectors[i]) for i in chosen])
+    theta = np.array([vectors[i].dot(found.matrix * vectors[i]) for i in chosen]) + found.shift
     return index.negative + int((theta < -doubt).sum()), index.negative + int((theta <= doubt).sum())
 
 
