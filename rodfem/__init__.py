@@ -23,8 +23,9 @@ finds and classifies the points where it is lost, follows what branches off, and
 
 * **Rod**: ``flexible``, ``unshearable``, ``inextensible`` or both; any stored energy ``W(v, k, c)`` that returns a UFL
   expression of the strains, the constants and the arclength ``c.s`` (:mod:`forms.energy` has a few).
-* **Ends**: :func:`clamped`, :func:`pinned`, :func:`sliding`, :func:`hinged`, :func:`free`, :func:`elastic`, or in full
-  :class:`End`; a closed rod is a :class:`Ring`.  Positions and rotations may be functions of the constants.
+* **Ends**: :func:`clamped`, :func:`pinned`, :func:`sliding`, :func:`hinged`, :func:`sliding_hinge`, :func:`free`,
+  :func:`elastic`, or in full :class:`End`; a closed rod is a :class:`Ring`.  Positions and rotations may be functions
+  of the constants.
 * **Loads**: forces and moments of an :class:`End`; ``distributed``, ``follower`` and ``potential`` of a :class:`Scene`;
   an :class:`Attachment` at any point (:mod:`forms.loads` has potentials).  Loads without a potential make
   ``Scene.conservative`` False: then frequencies are computed, and flutter.
@@ -71,7 +72,7 @@ _HOMES = {
         ("End", "clamped", "pinned", "sliding", "hinged", "free", "elastic", "Ring", "Attachment", "Constraint"),
         "problem.ends",
     ),
-    **dict.fromkeys(("integral", "at", "everywhere"), "problem.ends"),
+    **dict.fromkeys(("integral", "at", "everywhere", "sliding_hinge"), "problem.ends"),
     "Scene": "problem.scene",
     "Parameter": "problem.scene",
     "Ordinate": "problem.scene",

@@ -60,6 +60,13 @@ def sprung() -> Scene:
     return replace(known["untwistable"], ends=(spring, spring), name="sprung")
 
 
+def guided() -> Scene:
+    """A guide at either end, the left one with a spring that keeps the rod from turning."""
+    left = rodfem.sliding_hinge((0.0, 1.0, 0.0), (0.6, 0.0, -0.8))
+    spring = replace(left, energy=lambda x, c: page()["loads"].rotational_spring(x.q, 5.0))
+    return replace(scenes()["euler"], ends=(spring, page()["guided"]), name="guided")
+
+
 QUICK = {"error_bars": False, "depth": 0}
 RUNS: dict[str, tuple[Callable[[], Scene], Discretization, Plan]] = {
     "pinned": (lambda: scenes()["euler"], MESH, Plan((0.0, 12.0), at=(11.0,), depth=1, spectrum=2, modes=2)),
@@ -71,6 +78,7 @@ RUNS: dict[str, tuple[Callable[[], Scene], Discretization, Plan]] = {
     "foundation": (lambda: scenes()["winkler"], MESH, Plan((0.0, 1.0), at=(0.5,), modes=1, **QUICK)),
     "stretched": (lambda: scenes()["pressed"], MESH, Plan((1.0, 0.99), at=(0.995,), modes=1, **QUICK)),
     "held": (held, MESH, Plan((0.0, 0.2), **QUICK)),
+    "guided": (guided, MESH, Plan((0.0, 0.2), **QUICK)),
     "sprung": (sprung, MESH, Plan((0.0, 0.2), **QUICK)),
 }
 

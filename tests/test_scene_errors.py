@@ -348,11 +348,9 @@ EVERY = sorted({(owner.__name__, name) for owner in STATED for name in takes_fun
 def with_function(owner: str, name: str) -> Scene:
     """A scene with a function that raises in one field of one of its parts."""
     moving = clamped(rotation=lambda c: (1, 0, 0, 0))
-    if owner == "End":
-        of = {name: raising}
-        return Scene(
-            **(GOOD | {"ends": (clamped(), End(**of))} | ({"ends": (End(**of), moving)} if "tion" in name else {}))
-        )  # type: ignore[arg-type]
+    if owner in ("End", "SlidingHinge"):
+        end = getattr(ends, owner)(**{name: raising})
+        return Scene(**(GOOD | {"ends": (end, moving) if "tion" in name else (clamped(), end)}))
     parts: dict[str, Any] = {
         "Inertia": lambda: {"inertia": Inertia(**{name: raising})},
         "Ordinate": lambda: {"ordinate": Ordinate("nothing", 0.0, raising)},

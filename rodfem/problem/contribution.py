@@ -124,11 +124,6 @@ class Site:
     second: Any
     whole: Any = None
 
-    @property
-    def has_position(self) -> bool:
-        """Whether the position is known there: in the reduced formulation at some ends only."""
-        return "r" in vars(self.x)
-
 
 class Contribution:
     """Part of a scene; one without unknowns contributes its loads (:mod:`rodfem.problem.load`), and nothing else."""

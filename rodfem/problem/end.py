@@ -80,11 +80,8 @@ class End(Contribution):
 
     closed = False
     """Whether it is joined to the other end."""
-
-    @property
-    def sign(self) -> float:
-        """Factor between the quaternion of an end and of that which it is joined to."""
-        return 1.0
+    sign = 1.0
+    """Factor between the quaternions of two ends that are joined, the right one's over the left one's."""
 
     @property
     def guide(self) -> Direction:

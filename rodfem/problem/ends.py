@@ -22,6 +22,7 @@ from rodfem.problem.constraint import Constraint, Integral, at, everywhere, inte
 from rodfem.problem.end import End
 from rodfem.problem.local_state import Constants, OfConstants, OfPlace, Place, Quaternion
 from rodfem.problem.ring import Ring
+from rodfem.problem.sliding_hinge import SlidingHinge, sliding_hinge
 
 __all__ = [
     "Attachment",
@@ -30,6 +31,7 @@ __all__ = [
     "End",
     "Integral",
     "Ring",
+    "SlidingHinge",
     "at",
     "clamped",
     "elastic",
@@ -39,6 +41,7 @@ __all__ = [
     "integral",
     "pinned",
     "sliding",
+    "sliding_hinge",
 ]
 
 

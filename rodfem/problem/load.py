@@ -45,7 +45,7 @@ class Load:
 
 def _felt(at: Site, force: Any) -> Any:
     """Potential of a dead force in the free directions; None where it is the contact force of the reduced rod."""
-    return -sum(force[i] * at.x.r[i] for i in at.free) if at.has_position and at.free else None
+    return -sum(force[i] * at.x.r[i] for i in at.free) if "r" in vars(at.x) and at.free else None
 
 
 def _about_normal(at: Site, moment: Any) -> Any:

@@ -34,8 +34,8 @@ class Ring:
 
     def __iter__(self) -> Iterator[End]:
         """Yield the left and the right end."""
-        yield JoinedEnd(odd=self.odd)
-        yield JoinedEnd(odd=self.odd, last=True)
+        for last in (False, True):
+            yield JoinedEnd(sign=-1.0 if self.odd else 1.0, last=last)
 
 
 @dataclass(frozen=True)
@@ -46,14 +46,9 @@ class JoinedEnd(End):
     whole number of turns that the scene's start makes.
     """
 
-    odd: bool = True
+    sign: float = 1.0
     last: bool = False
     closed = True
-
-    @property
-    def sign(self) -> float:
-        """Return ``q(l) / q(0)``."""
-        return -1.0 if self.odd else 1.0
 
     def clamps(self, block: Block, c: Constants) -> list[bool]:
         """Nothing but one multiplier of the unit norm: that of ``q(l) = +-q(0)`` is that of ``q(0)``."""
@@ -86,7 +81,7 @@ class JoinedEnd(End):
         if self.sign * (first @ last) <= 0:
             raise SceneError(
                 f"The start of the ring does not end as it begins: make q(l) = {self.sign:+g} q(0), or choose "
-                f"Ring(odd={not self.odd})."
+                f"Ring(odd={self.sign > 0})."
             )
 
 

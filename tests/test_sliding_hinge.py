@@ -1,0 +1,148 @@
+"""A hinge that slides along any direction: against closed forms, the elastica by shooting, and the plain hinge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos, hypot, pi, radians, sin
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
+from scipy.spatial.transform import Rotation
+
+from forms.energy import bending
+from rodfem import Discretization, Ordinate, Plan, Scene, SceneError, Solver, clamped, hinged, run, sliding_hinge, trace
+from rodfem.output.glyphs import STEEL
+from rodfem.output.render import _read
+from rodfem.problem.end import End
+
+E2 = (0.0, 1.0, 0.0)
+TAN = 4.493409457909064**2
+"""Load of a clamped and hinged column, with tan x = x: times EI / l^2."""
+TILT = radians(35.0)
+BENT = 2.0
+"""Curvature of a rod that is bent from the start."""
+INCLINED = (sin(TILT), 0.0, cos(TILT))
+
+
+def push(c: Any) -> Any:
+    return -c.P
+
+
+def column(left: End, right: End, span: tuple[float, float] = (0.0, 30.0), **more: Any) -> Scene:
+    energy = more.pop("energy", lambda v, k, c: bending(k, (10.0, 1.0, 1.0)))
+    return Scene("column", (0.0, 1.0), "unshearable and inextensible", energy, {"P": 0.0}, "P", (left, right),
+                 Ordinate("middle", s=0.5, of=lambda r, q: hypot(r[0], r[1])), span, **more)  # fmt: skip
+
+
+def critical(scene: Scene, formulation: str) -> float:
+    plan = Plan(depth=0, error_bars=False)
+    (straight,) = trace(scene, Discretization(formulation, 8, 6), plan).branches
+    return next(float(s.point.load) for s in straight.special if s.kind == "branch point")
+
+
+def top(c: Any) -> tuple[float, float, float]:
+    return (0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+@pytest.mark.parametrize("planar", [None, "e2"])
+@pytest.mark.parametrize(("left", "expected"), [(clamped(), TAN), (hinged(E2), pi**2)], ids=["clamped", "hinged"])
+def test_inclined_guide(left: End, expected: float, planar: str | None, formulation: str) -> None:
+    """The rod is straight under a thrust ``N`` with ``N cos(tilt) = P``, and its tip cannot move across to first order:
+    it buckles where ``N`` is that of a guide along the rod."""
+    scene = column(left, sliding_hinge(E2, INCLINED, top, force=push), planar=planar)
+    assert critical(scene, formulation) == pytest.approx(expected * cos(TILT), rel=1e-8)
+
+
+def test_along_an_axis_it_is_the_plain_hinge() -> None:
+    plain = column(clamped(), hinged(E2, lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, -c.P)))
+    slides = column(clamped(), sliding_hinge(E2, (1e-17, 0.0, 2.0), force=push))
+    found = [critical(scene, "reduced") for scene in (plain, slides)]
+    assert found[0] == found[1] == pytest.approx(TAN, rel=1e-9)
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_a_turned_frame_gives_equal_numbers(formulation: str) -> None:
+    """All is turned: the clamp, the held directors and the guide, which has three components then."""
+    turn = Rotation.from_rotvec([-0.5, 0.4, 0.3])
+    q: Any = tuple(np.roll(turn.as_quat(), 1).tolist())
+    along: Any = tuple(turn.apply(INCLINED).tolist())
+    at: Any = tuple(turn.apply([0.0, 0.0, 1.0]).tolist())
+    assert min(map(abs, along)) > 0.1
+    right = sliding_hinge(E2, along, lambda c: at, q, force=push)
+    scene = column(clamped(rotation=q), right, start=lambda s: np.tile(q, (len(s), 1)))
+    assert critical(scene, formulation) == pytest.approx(TAN * cos(TILT), rel=1e-8)
+
+
+def shot(P: float, bent: float, guess: np.ndarray) -> np.ndarray:
+    """Tip ``(r1, r3)`` of the elastica ``B (theta' - bent)' = n3 sin - n1 cos`` on the guide, B = 1."""
+
+    def end(unknown: np.ndarray) -> np.ndarray:
+        k, across = unknown
+        n = -P * np.array([sin(TILT), cos(TILT)]) + across * np.array([cos(TILT), -sin(TILT)])
+
+        def slope(s: float, y: np.ndarray) -> list[float]:
+            return [y[1], n[1] * sin(y[0]) - n[0] * cos(y[0]), sin(y[0]), cos(y[0])]
+
+        return np.asarray(solve_ivp(slope, (0.0, 1.0), [0.0, k, 0.0, 0.0], rtol=1e-11, atol=1e-12).y[:, -1])
+
+    def miss(unknown: np.ndarray) -> list[float]:
+        _, k, x, z = end(unknown)
+        return [k - bent, x * cos(TILT) - (z - 1.0) * sin(TILT)]
+
+    return end(fsolve(miss, guess, xtol=1e-12))[2:]
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_bent_rod_on_an_inclined_guide(formulation: str) -> None:
+    """Curved in its undeformed state, so that it bends from the start: against shooting."""
+    scene = column(
+        clamped(), sliding_hinge(E2, INCLINED, top, force=push), (0.0, 12.0), planar="e2",
+        energy=lambda v, k, c: bending((k[0], k[1] - BENT, k[2]), (10.0, 1.0, 1.0)),
+    )  # fmt: skip
+    solver = Solver(scene, Discretization(formulation, 8, 6))
+    point = solver.equilibrium(2.0)
+    for load in (4.0, 6.0, 8.0):
+        point = solver.equilibrium(load, guess=point)
+    sample = solver.equilibria.shape.sample(point.x)
+    expected = shot(8.0, BENT, np.array([BENT, 0.0]))
+    assert abs(expected - [0.0, 1.0]).max() > 1e-2
+    np.testing.assert_allclose(sample["r"][-1, [0, 2]], expected, atol=1e-8)
+
+
+def test_it_is_stored_and_drawn_as_what_it_is(folder: Path) -> None:
+    right = sliding_hinge((0.0, 2.0, 0.0), INCLINED, top, force=push)
+    run(column(clamped(), right, (0.0, 1.0)), Discretization("reduced", 4, 4), Plan(error_bars=False), folder,
+        figures=False, quiet=True)  # fmt: skip
+    with h5py.File(folder / "states.h5") as file:
+        end = file["branches/straight/supports/right end"]
+        assert end.attrs["kind"] == "hinge" and end.attrs["held"].tolist() == [False, True, False]
+        np.testing.assert_allclose(end.attrs["guide"], INCLINED)
+        np.testing.assert_allclose(end["force"][-1], -np.array(INCLINED))
+        assert file["branches/straight/fb1"][-1] == pytest.approx(np.tan(TILT))
+    state = _read(folder / "states.h5", "straight", 0)
+    rails = [x.points for x in state.solids(0.01, state.view()) if x.color == STEEL]
+    assert len(rails) == 2
+    for points in rails:
+        longest = np.linalg.svd(points - points.mean(axis=0))[2][0]
+        assert abs(longest @ INCLINED) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: sliding_hinge(E2, (0.0, 0.0, 0.0)), "slides is zero"),
+        (lambda: sliding_hinge(E2, (0.0, 1.0)), "along is .*: give 3 numbers"),  # type: ignore[arg-type]
+        (lambda: column(clamped(), sliding_hinge(E2, (0.0, 0.6, 0.8), top), planar="e2"), "leaves the plane across e2"),
+        (lambda: column(clamped(), sliding_hinge(E2, INCLINED, lambda c: (0.0, None, 1.0))), "has no place"),
+        (lambda: column(*[sliding_hinge(E2, INCLINED, force=push)] * 2), "can drift away along e1"),
+    ],
+)
+def test_mistakes(make: Callable[[], object], words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        make()
