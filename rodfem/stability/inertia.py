@@ -21,6 +21,7 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System, combine
 from rodfem.linalg.factorization import Factors
+from rodfem.linalg.orthogonal import orthonormalize
 from rodfem.linalg.selection import factors_of
 
 EPS = float(np.finfo(float).eps)
@@ -195,13 +196,3 @@ class Inertia:
         numbers = np.arange(begin, min(end, self.system.fields.field_unknowns))
         vector.array[: len(numbers)] = np.sin((1.0 + i) * (1.0 + 0.731 * numbers)) + 0.3
         return vector
-
-
-def orthonormalize(vectors: list[PETSc.Vec], metric: PETSc.Mat) -> None:
-    """Make vectors orthonormal in a metric, in place, by Gram-Schmidt twice."""
-    for _ in range(2):
-        for i, v in enumerate(vectors):
-            v.scale(1.0 / max(np.sqrt(max(v.dot(metric * v), 0.0)), 1e-300))
-            for w in vectors[:i]:
-                v.axpy(-v.dot(metric * w), w)
-            v.scale(1.0 / max(np.sqrt(max(v.dot(metric * v), 0.0)), 1e-300))
