@@ -18,8 +18,9 @@ from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.link import link
-from rodfem.output.plot_diagram import PALETTE, SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram
+from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram
 from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE, hidden, pieces_of
+from rodfem.output.sheet import PALETTE
 from rodfem.problem.scene import Ordinate
 
 

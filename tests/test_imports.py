@@ -28,6 +28,7 @@ MATRICES = {
     "rodfem.linalg.matrices",
     "rodfem.linalg.householder",
     "rodfem.linalg.null_space",
+    "rodfem.linalg.orthogonal",
 }
 """Linear algebra, which knows nothing of rods."""
 BELOW_MATRICES = {"rodfem.errors", "rodfem.compat"}

@@ -65,7 +65,8 @@ def test_words_of_python_and_of_the_command_line() -> None:
     assert str(trouble) == "It did not: try Steps(largest=...) or Plan(depth=3)."
     assert parser().in_options(f"So ({trouble})") == "So (It did not: try --step or --depth 3.)"
     assert parser().in_options(str(POINTWISE)) == "use --formulation pointwise"
-    assert parser().in_options("use Event(name=...)") == "use Event(name=...)"
+    for unknown in ("use Event(name=...)", "use Steps(smallest=...)"):
+        assert parser().in_options(unknown) == unknown
 
 
 def test_classes_of_errors() -> None:

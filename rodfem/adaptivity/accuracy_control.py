@@ -20,6 +20,7 @@ from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import Follower
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
+from rodfem.tolerances import unit
 
 SHARP = 1e-9
 """For a better accuracy than this points get one more step of Newton's method, to round-off."""
@@ -87,7 +88,7 @@ class Watch:
     def judge(self, special: Special) -> None:
         """Raise :class:`TooCoarse` for a special point with too large an error, where another mesh may help."""
         error = self._error_of(special)
-        located = special.located_to / max(1.0, abs(special.point.load))
+        located = special.located_to / unit(special.point.load)
         if error > self.accuracy > located and special.point.arclength > self.excused:
             raise TooCoarse(special.point, error, special.null_vectors, 2.0 if special.zero_of == "stretch" else 1.0)
 
@@ -107,7 +108,7 @@ class Watch:
             return
         special.point.estimate = error = self._error_of(special)
         if error > self.accuracy and not special.note:
-            located = special.located_to / max(1.0, abs(special.point.load)) > self.accuracy
+            located = special.located_to / unit(special.point.load) > self.accuracy
             why = f"located to {special.located_to:.0e} only" if located else "finer meshes did not lower the error"
             special.note = f"accuracy {self.accuracy:g} not reached: {why}"
 
@@ -173,7 +174,7 @@ class Watch:
                 why=f"index {point.negative}, {negative} on a richer mesh",
             )
         values = point.load, point.ordinate
-        error = max(e / max(1.0, abs(v)) for e, v in zip(again.errors(point), values, strict=True))
+        error = max(e / unit(v) for e, v in zip(again.errors(point), values, strict=True))
         return error if again.resolved else max(error, GROWN * self.accuracy)
 
     @staticmethod

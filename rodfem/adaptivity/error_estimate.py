@@ -28,12 +28,13 @@ from rodfem.adaptivity.grading import Gauge, weights_of
 from rodfem.continuation.branch import Law, Point, Special
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.locate import WINDOW, locate_event, refine
-from rodfem.continuation.normal_form import ROUND_OFF, Origin, law_of, ordinate_along
+from rodfem.continuation.normal_form import Origin, law_of, ordinate_along
 from rodfem.continuation.solvers import Follower
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.problem.events import Event
+from rodfem.tolerances import ROUND_OFF, round_off
 
 AMPLE, MOST = 2.0, 0.75
 """Safety factor on the ratio of the last coefficients, which may be small by coincidence; and the largest ratio of
@@ -183,8 +184,8 @@ class Richer:
         load, ordinate = self.system.scalar(found), self.follower.shape.ordinate(found)
         slope = abs(ordinate_along(self.follower, found, tangent))
         left = (
-            abs(point.slope) * along + ROUND_OFF * max(1.0, abs(load)),
-            slope * along + ROUND_OFF * max(1.0, abs(ordinate)),
+            abs(point.slope) * along + round_off(load),
+            slope * along + round_off(ordinate),
         )
         changed = self._gauges[1].changed(x, found, state=True)
         return Again(found, load, ordinate, *left, self.rho([point.x], [found]), changed)
@@ -212,7 +213,7 @@ class Richer:
             found = refine(follower, curve, 0.0, WINDOW, mode, zero_of, beside=point.load)
         ordinate = follower.shape.ordinate(found.x)
         slope = ordinate_along(follower, found.x, found.tangent)
-        left = abs(slope) * found.along + ROUND_OFF * max(1.0, abs(ordinate))
+        left = abs(slope) * found.along + round_off(ordinate)
         sharp, gauge = follower.inertia.held.sharpened(mode), self._gauges[1]  # by the factors of a state nearby
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(gauge.changed(x, found.x, state=True), gauge.changed(mode, sharp, state=False))

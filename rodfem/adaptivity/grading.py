@@ -32,7 +32,7 @@ KEEP = 0.15
 LARGEST = 3.0
 """No element grows by more than this factor at a time: the decay was measured on the element that there is."""
 LEAST_DECAY, MOST_DECAY = 1.5, 1e3
-ROUND_OFF = 1e-12
+NEGLIGIBLE = 1e-12
 """Coefficients below this, of the largest, are round-off."""
 
 
@@ -142,7 +142,7 @@ def _decay(vertices: np.ndarray, coefficients: np.ndarray) -> Smoothness:
     """Fit ``A rho^-j`` to the monotone envelope of the last coefficients of each element above round-off."""
     elements, degree = coefficients.shape
     envelope = np.maximum.accumulate(coefficients[:, ::-1], axis=1)[:, ::-1]
-    floor = max(ROUND_OFF * coefficients.max(), 1e-300)
+    floor = max(NEGLIGIBLE * coefficients.max(), 1e-300)
     amplitude, decay = np.full(elements, floor), np.full(elements, MOST_DECAY)
     for e, row in enumerate(envelope):
         last = int(np.count_nonzero(row > floor))

@@ -23,6 +23,7 @@ from rodfem.fem.newton import correct
 from rodfem.fem.symmetries import may_slide
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
+from rodfem.tolerances import unit
 
 FINEST, COARSEST = 1e-10, 1e-1
 """Least and greatest accuracy that can be asked for; the former is near round-off."""
@@ -98,9 +99,9 @@ class Meshes:
 
     def error_of(self, special: Special) -> float:
         """Estimated error of a special point in load and ordinate, relative to those that exceed one."""
-        error = special.ordinate_error / max(1.0, abs(special.point.ordinate))
+        error = special.ordinate_error / unit(special.point.ordinate)
         if special.kind.singular or special.zero_of == "stretch":
-            error = max(error, special.error_estimate / max(1.0, abs(special.point.load)))
+            error = max(error, special.error_estimate / unit(special.point.load))
         return error
 
     def raised(self, trouble: TooCoarse, tries: int) -> Follower:

@@ -15,6 +15,7 @@ from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import HIGHEST
 from rodfem.fem.system import System
+from rodfem.tolerances import unit
 
 
 def zero_stretch(follower: Follower, coarse: Point) -> Special:
@@ -47,7 +48,7 @@ def zero_stretch(follower: Follower, coarse: Point) -> Special:
     (load2, ordinate2, *_), (load, ordinate, energy, last) = found
     x = follower.shape.restore(sample)
     point = replace(coarse, x=x, load=load, ordinate=ordinate, energy=energy, stretch=last)
-    special = Special(END, point, point.negative, point.negative, 1e-10 * max(1.0, abs(load)), zero_of="stretch")
+    special = Special(END, point, point.negative, point.negative, 1e-10 * unit(load), zero_of="stretch")
     left = 1.0 if d.degree == 1 else 0.25
     special.error_estimate = max(left * abs(load - load2), special.located_to)
     special.ordinate_error = max(left * abs(ordinate - ordinate2), special.located_to)

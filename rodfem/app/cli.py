@@ -45,13 +45,16 @@ class Parser(argparse.ArgumentParser):
     """
 
     def option(self, name: str) -> str:
-        """Option for an argument, or the argument where there is none."""
-        return next((action.option_strings[0] for action in self._actions if action.dest == name), name)
+        """Option for an argument."""
+        return next(action.option_strings[0] for action in self._actions if action.dest == name)
 
     def in_options(self, text: str) -> str:
-        """Text in which options stand for arguments of Python: ``--depth 1`` for ``Plan(depth=1)``."""
+        """Text in which options stand for arguments of Python that have one: ``--depth 1`` for ``Plan(depth=1)``."""
+        known = {action.dest for action in self._actions}
 
         def option(found: re.Match[str]) -> str:
+            if found[1] not in known:
+                return found[0]
             return self.option(found[1]) + ("" if found[2] == "..." else " " + found[2].strip("'"))
 
         return ARGUMENT.sub(option, text)
@@ -93,114 +96,54 @@ def parser_for(
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="Options for PETSc and SLEPc go after a lone --, as in: -- -log_view",
     )
-    group = parser.add_argument_group("discretisation")
-    group.add_argument(
-        "--elements",
-        type=int,
-        default=elements,
-        metavar="N",
-        help=f"number of finite elements along the rod (default {elements})",
-    )
-    group.add_argument(
-        "--degree",
-        type=int,
-        default=degree,
-        metavar="K",
-        help=f"polynomial degree; the error falls as h^(2K) (default {degree})",
-    )
-    group.add_argument(
-        "--formulation",
-        default=formulation,
-        metavar="{auto,reduced,pointwise}",
-        help="reduced: no centreline, the contact force as scalars; pointwise: all fields "
+    words = {
+        "--elements": f"number of finite elements along the rod (default {elements})",
+        "--degree": f"polynomial degree; the error falls as h^(2K) (default {degree})",
+        "--formulation": "reduced: no centreline, the contact force as scalars; pointwise: all fields "
         f"(default {formulation}: reduced where the scene allows it)",
-    )
-    group.add_argument(
-        "--accuracy",
-        type=float,
-        default=None,
-        metavar="EPS",
-        help="instead of elements and degree: choose meshes on the way such that loads and ordinates are in error by "
-        "less than EPS (relative to values greater than one)",
-    )
-    group = parser.add_argument_group("what to compute")
-    group.add_argument(
-        "--range",
-        dest="span",
-        type=float,
-        nargs=2,
-        default=span,
-        metavar=("A", "B"),
-        help=f"start at {load} = A, stay between A and B (default {span[0]:g} {span[1]:g})",
-    )
-    group.add_argument(
-        "--at",
-        type=float,
-        nargs="+",
-        default=[],
-        metavar="LOAD",
-        help=f"compute every branch also at exactly these values of {load}",
-    )
-    group.add_argument(
-        "--step",
-        dest="largest",
-        type=float,
-        default=0.05,
-        metavar="S",
-        help="largest step along a branch, in radian of rotation (root mean square; default 0.05)",
-    )
-    group.add_argument(
-        "--depth",
-        type=int,
-        default=2,
-        metavar="D",
-        help="follow what leaves from branch points of branches of a depth less than D; the first branch has depth 0, "
-        "what leaves from it 1, and so on (default 2)",
-    )
-    group.add_argument(
-        "--spectrum",
-        type=int,
-        default=0,
-        metavar="K",
-        help="also compute the K left-most eigenvalues of every state with SLEPc",
-    )
-    group.add_argument(
-        "--method",
-        default="",
-        metavar="NAME",
-        help=f"judge the states at the loads of --at by {', '.join((AUTO, *METHODS))}, and print all that it says",
-    )
-    group.add_argument(
-        "--modes",
-        type=int,
-        default=0,
-        metavar="K",
-        help="find and draw the K left-most modes of the states at the loads of --at",
-    )
-    group.add_argument(
-        "--search",
-        dest="tries",
-        type=int,
-        default=0,
-        metavar="TRIES",
-        help="at each load of --at also look for equilibria that no branch has reached, with that many tries",
-    )
-    group.add_argument(
-        "--locus",
-        nargs=3,
-        default=None,
-        metavar=("NAME", "LOW", "HIGH"),
-        help="follow every special point in the plane of the load and the constant NAME from LOW to HIGH",
-    )
-    group = parser.add_argument_group("output")
-    group.add_argument(
-        "--output",
-        type=Path,
-        default=Path("results") / name,
-        metavar="DIR",
-        help=f"folder for files and pictures (default results/{name})",
-    )
-    group.add_argument("--no-figures", dest="figures", action="store_false", help="draw nothing")
+        "--accuracy": "instead of elements and degree: choose meshes on the way such that loads and ordinates are in "
+        "error by less than EPS (relative to values greater than one)",
+        "--range": f"start at {load} = A, stay between A and B (default {span[0]:g} {span[1]:g})",
+        "--at": f"compute every branch also at exactly these values of {load}",
+        "--step": "largest step along a branch, in radian of rotation (root mean square; default 0.05)",
+        "--depth": "follow what leaves from branch points of branches of a depth less than D; the first branch has "
+        "depth 0, what leaves from it 1, and so on (default 2)",
+        "--spectrum": "also compute the K left-most eigenvalues of every state with SLEPc",
+        "--method": "judge the states at the loads of --at, and print all that is said, by "
+        f"{', '.join((AUTO, *METHODS))}",
+        "--modes": "find and draw the K left-most modes of the states at the loads of --at",
+        "--search": "at each load of --at also look for equilibria that no branch has reached, with that many tries",
+        "--locus": "follow every special point in the plane of the load and the constant NAME from LOW to HIGH",
+        "--output": f"folder for files and pictures (default results/{name})",
+        "--no-figures": "draw nothing",
+    }
+    groups: dict[str, dict[str, dict[str, Any]]] = {
+        "discretisation": {
+            "--elements": {"type": int, "default": elements, "metavar": "N"},
+            "--degree": {"type": int, "default": degree, "metavar": "K"},
+            "--formulation": {"default": formulation, "metavar": "{auto,reduced,pointwise}"},
+            "--accuracy": {"type": float, "metavar": "EPS"},
+        },
+        "what to compute": {
+            "--range": {"dest": "span", "type": float, "nargs": 2, "default": span, "metavar": ("A", "B")},
+            "--at": {"type": float, "nargs": "+", "default": [], "metavar": "LOAD"},
+            "--step": {"dest": "largest", "type": float, "default": 0.05, "metavar": "S"},
+            "--depth": {"type": int, "default": 2, "metavar": "D"},
+            "--spectrum": {"type": int, "default": 0, "metavar": "K"},
+            "--method": {"default": "", "metavar": "NAME"},
+            "--modes": {"type": int, "default": 0, "metavar": "K"},
+            "--search": {"dest": "tries", "type": int, "default": 0, "metavar": "TRIES"},
+            "--locus": {"nargs": 3, "metavar": ("NAME", "LOW", "HIGH")},
+        },
+        "output": {
+            "--output": {"type": Path, "default": Path("results") / name, "metavar": "DIR"},
+            "--no-figures": {"dest": "figures", "action": "store_false"},
+        },
+    }
+    for title, options in groups.items():
+        group = parser.add_argument_group(title)
+        for option, how in options.items():
+            group.add_argument(option, help=words[option], **how)
     return parser
 
 

@@ -18,6 +18,7 @@ from rodfem.continuation.solvers import Equilibria
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure
 from rodfem.stability.nonsymmetric import Vibration
+from rodfem.tolerances import ROUND_OFF
 
 FIRST = 1e-4
 """First step of the secants, relative to the bounds."""
@@ -66,7 +67,7 @@ class Collision:
         dq = dq if dq @ forward >= 0 else -dq
         system.line = self.plane.along(p, 0)
         system.set_load(x, float(p[0]))
-        located = np.maximum(last * abs(across) * width, 1e-12 * np.maximum(1.0, abs(p)))
+        located = np.maximum(last * abs(across) * width, ROUND_OFF * np.maximum(1.0, abs(p)))
         ordinate = self.solver.shape.ordinate(x)
         still, modes = system.new_vector(), as_vectors(system, clearest.cluster.basis)
         return Node(p, x, dq * width, still, located, ordinate=ordinate, omega2=omega2, modes=modes)

@@ -34,7 +34,7 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.file_format import LOCUS
 from rodfem.output.digits import number
-from rodfem.output.files import save_json
+from rodfem.output.files import mesh_of, save_json
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.inertia import Inertia
 
@@ -224,7 +224,6 @@ def locus(
             rows = np.linspace(0, len(nodes) - 1, error_bars).round().astype(int).tolist()
             _estimate(solver, special.kind, plane, nodes, sorted({*rows, *marks}), error)
     rest, k = np.array([n.rest for n in nodes]), special.multiplicity
-    d = system.fields.discretization
     return Locus(
         scene=scene.name,
         title=scene.title or scene.name,
@@ -243,12 +242,7 @@ def locus(
         start=start,
         ended=(backwards.ended, onwards.ended),
         constants={name: v.value for name, v in scene.parameters.items() if name not in plane.names},
-        discretization={
-            "formulation": d.formulation,
-            "elements": d.elements,
-            "degree": d.degree,
-            "unknowns": system.fields.unknowns,
-        },
+        discretization=mesh_of(system),
         states=[n.x for n in nodes],
         crossings=crossings,
     )

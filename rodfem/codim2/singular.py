@@ -45,9 +45,11 @@ from petsc4py import PETSc
 from rodfem.codim2.parameter_plane import Node, Plane
 from rodfem.continuation.solvers import Equilibria, Follower
 from rodfem.errors import ConvergenceError
-from rodfem.fem.newton import ROUND_OFF, TOLERANCE
+from rodfem.fem.newton import STALLED, TOLERANCE
+from rodfem.linalg.orthogonal import orthonormalize, project_out
 from rodfem.stability.bordered import Bordered
-from rodfem.stability.inertia import Factored, Inertia, combine, orthonormalize
+from rodfem.stability.inertia import Factored, Inertia, combine
+from rodfem.tolerances import ROUND_OFF
 
 DIFFERENCE = 1e-4
 """Step of the central differences for the third derivatives, in the metric: their errors do not enter the result."""
@@ -112,8 +114,7 @@ class Singular:
         for vector in vectors:
             v = vector.copy()
             self.system.set_load(v, 0.0)
-            for other in done:
-                v.axpy(-(self.metric * other).dot(v), other)
+            project_out(v, done, self.metric)
             v.scale(1.0 / self.system.norm(v))
             done.append(v)
         return done
@@ -152,7 +153,7 @@ class Singular:
             x.axpy(1.0, dx)
             if not np.isfinite(size) or total > reach:
                 break
-            if size < TOLERANCE or (ROUND_OFF > size > 0.5 * before):
+            if size < TOLERANCE or (STALLED > size > 0.5 * before):
                 return self._node(p, x, tangent, abs(dp))
             old = now if size < 0.1 * before and size < 0.02 else None
             before = size
@@ -279,7 +280,7 @@ class Singular:
         forward = along[0] / width**2 @ dp + ((self.metric * dx).dot(along[1]) if along[1] else 0.0)
         size = size if forward >= 0 else -size
         dx.scale(1.0 / size)
-        located = np.maximum(last, 1e-12 * np.maximum(1.0, abs(p)))
+        located = np.maximum(last, ROUND_OFF * np.maximum(1.0, abs(p)))
         return Node(
             p,
             x,

@@ -10,6 +10,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.kinds import Kind
 from rodfem.errors import SMALLER_STEPS
+from rodfem.tolerances import round_off
 
 if TYPE_CHECKING:
     from rodfem.problem.events import Event
@@ -125,6 +126,11 @@ class Special:
     unfolding: float = float("nan")
     cluster: Cluster | None = None
     event: Event | None = None
+
+    @classmethod
+    def given(cls, kind: Kind, point: Point) -> Special:
+        """One at a load that is given: nothing changes there."""
+        return cls(kind, point, point.negative, point.negative, round_off(point.load))
 
     def __repr__(self) -> str:
         """Kind, load and change of the index."""

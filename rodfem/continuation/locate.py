@@ -20,20 +20,22 @@ from rodfem.continuation.solvers import Follower, hermite
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.system import System, combine
+from rodfem.linalg.orthogonal import project_out
 from rodfem.problem.events import Event
 from rodfem.stability.inertia import Factored
+from rodfem.tolerances import round_off
 
 NODES, FEWER = 6, 4
 """Number of nodes of an interpolant, and of one over a very short piece."""
 WINDOW = 0.02
 """Half length, in the metric, of the interval of a branch on which a special point is interpolated."""
-ROUND_OFF = 1e-12
-"""Uncertainty of a load, relative to it or to one, by Newton's tolerance and the conditioning near a singular point."""
 SHARP = 1e-11
 """Uncertainty of a load on the given mesh below which the interpolation is not refined further."""
 PART = 0.02
 """Relative uncertainty at which the difference of two loads is accepted."""
 
+OFF = 1e-3
+"""Distance beside a singular state at which one is solved for instead, relative to the piece."""
 ASIDE = 1e-6
 """Distance beside a singular point at which an event's equations are solved, relative to the piece."""
 ALONG = 1e-13
@@ -85,9 +87,7 @@ def across(system: System, vectors: Sequence[PETSc.Vec], still: Sequence[PETSc.V
     known, out = list(still), []
     for vector in vectors:
         rest = vector.copy()
-        for _ in range(2):
-            for k in known:
-                rest.axpy(-(system.metric * k).dot(rest), k)
+        project_out(rest, known, system.metric, times=2)
         if (size := system.norm(rest)) > 0.5 * system.norm(vector) or not still:
             rest.scale(1.0 / size)
             out.append(rest)
@@ -181,7 +181,7 @@ def interpolate(samples: list[Sample], zero_of: str, guess: float, noise: float 
     slope_at = float(chebyshev.chebval(root, slope))
     left = zero_uncertainty(f, root)
     tail = abs(load[-1]) + abs(slope_at) * left
-    floor = ROUND_OFF * max(1.0, abs(load_at))
+    floor = round_off(load_at)
     moved = abs(noise / float(chebyshev.chebval(root, chebyshev.chebder(f)))) if zero_of == "mu" else 0.0
     arithmetic = floor + abs(slope_at) * moved
     weights, slopes = _barycentric(t, root)
@@ -273,7 +273,7 @@ def crossing_mode(
     """
     width = 0.1 * min(WINDOW, ends[1] - ends[0])
     for _ in range(NARROWER):
-        x, s = solve_beside(follower, curve, bracket(follower, curve, ends, order, still, width), 1e-3 * width)
+        x, s = solve_beside(follower, curve, bracket(follower, curve, ends, order, still, width), OFF * width)
         try:
             return s, eigenvalue(follower, x, order, still)[1]
         except ConvergenceError:
@@ -303,12 +303,12 @@ def bracket(
     h = high - low
 
     def passed(s: float) -> bool:
-        return follower.inertia.at(solve_beside(follower, curve, s, 1e-3 * h)[0]).count().negative > order
+        return follower.inertia.at(solve_beside(follower, curve, s, OFF * h)[0]).count().negative > order
 
     first = passed(low)
     if first == passed(high):
         left, right = (
-            eigenvalue(follower, solve_beside(follower, curve, s, 1e-3 * h)[0], order, still)[0] for s in ends
+            eigenvalue(follower, solve_beside(follower, curve, s, OFF * h)[0], order, still)[0] for s in ends
         )
         return low if abs(left) < abs(right) else high
     while high - low > width:
@@ -327,12 +327,12 @@ def locate(
 
     h = b.arclength - a.arclength
     if zero_of == "slope":
-        x, guess = solve_beside(follower, curve, a.arclength + h * a.slope / (a.slope - b.slope), 1e-3 * h)
+        x, guess = solve_beside(follower, curve, a.arclength + h * a.slope / (a.slope - b.slope), OFF * h)
         found = follower.inertia.at(x)
         found.count()
         mode = found.nearest(1, accuracy=1e-2)[1][0]
     else:
-        piece = a.arclength + 1e-3 * h, b.arclength - 1e-3 * h
+        piece = a.arclength + OFF * h, b.arclength - OFF * h
         guess, mode = crossing_mode(follower, curve, piece, order, still)
     return refine(follower, curve, guess, min(WINDOW, 0.45 * h), mode, zero_of, len(still))
 

@@ -17,11 +17,10 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Law, Special
 from rodfem.continuation.solvers import VERTICAL, Follower
 from rodfem.fem.newton import correct
+from rodfem.tolerances import round_off
 
 AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 """Amplitudes, in the metric, at which the branch is solved: the positive half of eight Chebyshev nodes."""
-ROUND_OFF = 1e-12
-"""Least uncertainty of an ordinate by round-off, relative to it or to one."""
 BESIDE = 1e-3
 """Distance along a branch, in the metric, over which the slope of the ordinate is taken."""
 
@@ -40,7 +39,7 @@ class Origin:
 def origin_of(follower: Follower, special: Special) -> Origin:
     """Branch point of a mesh; along a branch its ordinate is as uncertain as its load, times the ratio of slopes."""
     p = special.point
-    left = ROUND_OFF * max(1.0, abs(p.ordinate))
+    left = round_off(p.ordinate)
     if p.tangent is not None and p.slope:
         left += abs(ordinate_along(follower, p.x, p.tangent) / p.slope) * special.located_to
     return Origin(p.x, p.load, p.ordinate, special.located_to, left)

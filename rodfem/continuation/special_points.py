@@ -21,13 +21,16 @@ from rodfem.continuation.locate import Located, across, locate, solve_at
 from rodfem.continuation.solvers import VERTICAL, Follower, distance, hermite
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
+from rodfem.linalg.orthogonal import project_out
 from rodfem.stability.round_off import decide
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
 UNCOUPLED = 1e-9
 """Below this it is round-off.  Between the two the index tells, and then the unfolding parameters."""
-ROUND_OFF = 1e-10
+LEVEL = 1e-3
+"""Slope of the load, relative to its span, below which it is taken for zero."""
+INSENSITIVE = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
 FIRST, NEAREST = 0.05, 1e-3
 """Distance of the first point of a branch from the branch point that it leaves: usually, and at least."""
@@ -62,7 +65,7 @@ def special_at(follower: Follower, located: Located, arclength: float, still: Se
             SMALLER_STEPS,
         )
     coupling = max(coupling_of(follower, x, v) for v in vectors)
-    turning = abs(system.scalar(tangent)) < 1e-3 * abs(system.scene.span[1] - system.scene.span[0])
+    turning = abs(system.scalar(tangent)) < LEVEL * abs(system.scene.span[1] - system.scene.span[0])
     kind = FOLD if turning and coupling > COUPLED else BRANCH_POINT
     return Special(
         kind, point, located.before, located.after, located.uncertainty, [v.copy() for v in vectors], coupling
@@ -75,7 +78,7 @@ def coupling_of(follower: Follower, x: PETSc.Vec, null_vector: PETSc.Vec) -> flo
     matrix = system.at(x).jacobian(follower.axis)
     derivative = matrix * follower.axis
     system.set_load(derivative, 0.0)
-    if derivative.norm() < ROUND_OFF * matrix.norm():  # a trivial state: its equations do not feel the load
+    if derivative.norm() < INSENSITIVE * matrix.norm():  # a trivial state: its equations do not feel the load
         return 0.0
     return float(abs(derivative.dot(null_vector)) / (derivative.norm() * null_vector.norm()))
 
@@ -192,13 +195,11 @@ def directions(follower: Follower, special: Special) -> list[PETSc.Vec]:
     system.set_phase(special.point.x)
     out: list[PETSc.Vec] = []
     candidates = list(special.null_vectors)
-    if abs(special.point.slope) < 1e-3 * abs(system.scene.span[1] - system.scene.span[0]):
+    if abs(special.point.slope) < LEVEL * abs(system.scene.span[1] - system.scene.span[0]):
         candidates.append(_load_response(follower, special))
     for candidate in candidates:
         d = candidate.copy()
-        for _ in range(2):
-            for k in known:
-                d.axpy(-(system.metric * k).dot(d), k)
+        project_out(d, known, system.metric, times=2)
         size = system.norm(d)
         if size < 0.1 * max(system.norm(candidate), 1e-300):
             continue
@@ -224,8 +225,7 @@ def _load_response(follower: Follower, special: Special) -> PETSc.Vec:
     system.set_phase(x)
     system.at(x).factor(follower.axis, SHIFT * system.stiffness_scale)
     system.solve(follower.axis, out)
-    for v in special.null_vectors:
-        out.axpy(-(system.metric * v).dot(out), v)
+    project_out(out, special.null_vectors, system.metric)
     return out
 
 

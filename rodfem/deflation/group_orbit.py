@@ -18,7 +18,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.system import System, combine
-from rodfem.stability.inertia import orthonormalize
+from rodfem.linalg.orthogonal import orthonormalize
 
 FREQUENCIES = (0.5, 1.0)
 AMOUNTS = np.linspace(-2 * np.pi, 2 * np.pi, 96, endpoint=False)

@@ -8,9 +8,10 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point, Special
 from rodfem.continuation.kinds import EVENT
-from rodfem.continuation.locate import ROUND_OFF, event_at, locate_event
+from rodfem.continuation.locate import event_at, locate_event
 from rodfem.continuation.solvers import Follower, hermite
 from rodfem.problem.events import Event
+from rodfem.tolerances import INSIDE, round_off
 
 
 class Events:
@@ -39,12 +40,12 @@ def _special(follower: Follower, event: Event, a: Point, b: Point) -> Special:
     def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
         return hermite(a, b, s)
 
-    margin = 1e-9 * (b.arclength - a.arclength)
+    margin = INSIDE * (b.arclength - a.arclength)
     s, x, along = locate_event(follower, event, curve, a.arclength + margin, b.arclength - margin)
     follower.system.set_phase(x)
     tangent = follower.tangent(follower.row(curve(s)[1]), at=x)
     point = follower.point(x, s, tangent)
-    left = abs(point.slope) * along + ROUND_OFF * max(1.0, abs(point.load))
+    left = abs(point.slope) * along + round_off(point.load)
     special = Special(EVENT, point, point.negative, point.negative, left, note=event.name)
     special.event = event
     return special

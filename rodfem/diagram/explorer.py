@@ -23,6 +23,7 @@ from rodfem.fem.link import link
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.rank import rank_of
+from rodfem.tolerances import SAME_SPECIAL, SAME_STATE
 
 TAIL = 8
 """Rows before the end of a side branch among which its mirror image is recognised."""
@@ -252,21 +253,21 @@ class Explorer(Tracer):
             there = states_at(self.follower, [piece], inner.load)
         except ConvergenceError:  # nothing of the one branch is at the other's load
             return False
-        return any(self.alike(self.here(inner), p, 1e-7) for p in there)
+        return any(self.alike(self.here(inner), p, SAME_STATE) for p in there)
 
     def _came_from(self, parent: Branch, special: Special, point: Point) -> bool:
         """Whether what leaves the end of a side branch is that branch again, or its mirror image."""
         if special.zero_of != "slope":
             return False
         tail = replace(parent, points=[self.here(p) for p in parent.points[-TAIL:]])
-        return any(equivalent(point, other, 1e-7) for other in states_at(self.follower, [tail], point.load))
+        return any(equivalent(point, other, SAME_STATE) for other in states_at(self.follower, [tail], point.load))
 
     def _traced_already(self, branch: Branch, special: Special) -> bool:
         """Whether another branch ended at this branch point coming along the same way."""
         a, b = branch.points[1], special.point
         for other in self.branches:
             for end in other.special:
-                if end.meets is not None and self.alike(end.point, b, 1e-6):
+                if end.meets is not None and self.alike(end.point, b, SAME_SPECIAL):
                     before = other.points[max(end.row - 2, 0) : end.row]
                     if any(near(a, p) for p in before):
                         return True

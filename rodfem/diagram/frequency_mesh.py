@@ -22,6 +22,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.stability.nonsymmetric import Vibration
+from rodfem.tolerances import unit
 
 MARGIN = 10.0
 """Frequencies are to be better than asked for by this factor: flutter loads depend on two that are near each other."""
@@ -76,4 +77,4 @@ def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndar
 
 def _change(values: np.ndarray, richer: np.ndarray) -> float:
     """Largest relative distance of values from the nearest of the richer ones."""
-    return max(float(abs(richer - v).min() / max(1.0, abs(v))) for v in values)
+    return max(float(abs(richer - v).min() / unit(v)) for v in values)

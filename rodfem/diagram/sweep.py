@@ -24,7 +24,6 @@ from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER, Kind
 from rodfem.continuation.locate import real_root, zero_uncertainty
-from rodfem.continuation.normal_form import ROUND_OFF
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import Equilibria
 from rodfem.diagram.plan import Plan
@@ -32,6 +31,7 @@ from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
 from rodfem.stability.nonsymmetric import EPS, MULTIPLE, NEAR_ZERO, REAL, Frequencies, Vibration
+from rodfem.tolerances import ROUND_OFF, round_off, unit
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
@@ -113,11 +113,11 @@ class Sweep:
             branch.points.append(point)
             grid.append(point)
             if load in self.plan.at:
-                self._special(branch, Special(USER, point, point.negative, point.negative, 1e-12 * max(1.0, abs(load))))
+                self._special(branch, Special.given(USER, point))
             self.observer.progress(branch, point)
         branch.ended = "end of range"
         last = branch.points[-1]
-        branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
+        branch.special.append(Special.given(END, last))
         branch.renumber()
         if self.plan.error_bars:
             self._error_bars(branch)
@@ -182,7 +182,7 @@ class Sweep:
             ):
                 both = [(value, vector), (value.conjugate(), vector.conj())]
                 for v, x_v in both if abs(value.imag) > REAL * abs(value) else both[:1]:
-                    if all(abs(v - other) > 1e-7 * max(1.0, abs(v)) for other, *_ in found):
+                    if all(abs(v - other) > 1e-7 * unit(v) for other, *_ in found):
                         found.append((v, error, kind, x_v))
         real = [(complex(v.real) if abs(v.imag) < REAL * abs(v) else complex(v), *rest) for v, *rest in found]
         order = sorted(real, key=lambda f: (round(f[0].real, 6), f[0].imag))
@@ -240,7 +240,7 @@ class Sweep:
                 if event is None:
                     continue
                 event.change *= sign
-                same = [e for e in events if abs(e.load - event.load) < SAME * max(1.0, abs(e.load))]
+                same = [e for e in events if abs(e.load - event.load) < SAME * unit(e.load)]
                 if same:
                     same[0].change += event.change
                     if abs(event.omega2) < abs(same[0].omega2):
@@ -263,7 +263,7 @@ class Sweep:
                 f"the frequencies are double at {self._load} = {there.load:.6g} and become complex at once: "
                 f"flutter at every {self._load} {side} {there.load:.6g} next to it"
             )
-            floor = 1e-12 * max(1.0, abs(there.load))
+            floor = round_off(there.load)
             return _Event(FLUTTER, there.load, cluster.size, floor, other.cluster.mean, other.cluster, note)
         if other.discriminant < 0:
             return None
@@ -303,7 +303,7 @@ class Sweep:
                 return []
         together: list[list[float]] = []
         for load in sorted(found):
-            if together and abs(load - together[-1][0]) < TOGETHER * max(1.0, abs(load)):
+            if together and abs(load - together[-1][0]) < TOGETHER * unit(load):
                 together[-1].append(load)
             else:
                 together.append([load])
@@ -313,10 +313,10 @@ class Sweep:
         """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
         vibration, number = self.vibration, len(loads)
         vibration.assemble(self._state(guess, loads[0]))
-        found = vibration.near(number + 2, -1e-3)
+        found = vibration.near(number + 2, SHIFT)
         cluster = cluster_of(vibration, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
         load, uncertainty = _zero_between(self._measured(self.solver, vibration, guess), cluster, loads[0])
-        uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), 1e-11 * max(1.0, abs(load)))
+        uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), 1e-11 * unit(load))
         return _Event(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
@@ -337,7 +337,7 @@ class Sweep:
                 point = s.point
                 guess = transfer(point.x, state=True)
                 x = at_load(richer, guess, point.load)
-                left = ROUND_OFF * max(1.0, abs(point.ordinate))
+                left = round_off(point.ordinate)
                 s.ordinate_error = s.error_estimate = bound(point.ordinate, richer.shape.ordinate(x), left, rho)
                 if s.kind == FLUTTER:
                     load, left, mu = self._richer_flutter(richer, vibration, transfer, guess, s)
@@ -349,7 +349,7 @@ class Sweep:
                     load = _zero(measured, cluster, point.load)
                     s.error_estimate = max(bound(point.load, load, s.located_to, rho), s.located_to)
                 asked = self.plan.accuracy
-                if asked is not None and s.error_estimate > asked * max(1.0, abs(s.point.load)):
+                if asked is not None and s.error_estimate > asked * unit(s.point.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"
 
     def _transferred(self, transfer: Transfer, s: Special) -> Cluster:
@@ -402,7 +402,7 @@ def _zero_between(measured: AtLoad, cluster: Cluster, load: float) -> tuple[floa
 
     The mean is sampled over :data:`AROUND`, and interpolated: its scatter shows in the last coefficients.
     """
-    half = AROUND * max(1.0, abs(load))
+    half = AROUND * unit(load)
     nodes = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
     series = chebyshev.chebfit(nodes, [measured(load + half * t, cluster).cluster.mean for t in nodes.tolist()], 5)
     root = real_root(series, 0.0)
@@ -417,4 +417,4 @@ def _zero(measured: AtLoad, cluster: Cluster, load: float) -> float:
     def mean(load: float) -> float:
         return measured(load, cluster).cluster.mean
 
-    return float(newton(mean, load, x1=load + 1e-4 * max(1.0, abs(load)), tol=1e-12 * max(1.0, abs(load))))
+    return float(newton(mean, load, x1=load + 1e-4 * unit(load), tol=round_off(load)))

@@ -26,6 +26,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
 from rodfem.errors import ConvergenceError
 from rodfem.stability.round_off import resolve
+from rodfem.tolerances import INSIDE, SAME_SPECIAL, SAME_STATE, unit
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
@@ -76,12 +77,15 @@ class Tracer:
         self.watch = Watch(self.meshes, (self.low, self.high))
         self.follower.system.set_phase(branch.points[-1].x)
         self.follower.damp(self._extra(branch.points[-1]) if branch.parent else 0)
+        self._attempt(branch)
+        self._finish(branch)
+
+    def _attempt(self, branch: Branch) -> None:
         try:
             self._follow(branch)
         except ConvergenceError as trouble:
             branch.ended = f"no convergence: {trouble}"
             self.observer.warn(str(trouble))
-        self._finish(branch)
 
     def trace_whole(self, point: Point, name: str, depth: int) -> None:
         """Follow a branch through a point in both directions, as one."""
@@ -92,11 +96,7 @@ class Tracer:
         self.observer.branch(back)
         self.watch = Watch(self.meshes, (self.low, self.high))
         self.follower.damp(0)
-        try:
-            self._follow(back)
-        except ConvergenceError as trouble:
-            back.ended = f"no convergence: {trouble}"
-            self.observer.warn(str(trouble))
+        self._attempt(back)
         branch = reversed_branch(back)
         branch.ended = back.ended
         if back.ended == "closed loop":
@@ -104,7 +104,7 @@ class Tracer:
             self._finish(back)
             return
         first = branch.points[0]
-        branch.special.append(Special(END, first, first.negative, first.negative, 1e-12 * max(1.0, abs(first.load))))
+        branch.special.append(Special.given(END, first))
         branch.special[-1].note = f"begins here: {back.ended}"
         branch.renumber()
         self.trace(branch)
@@ -226,8 +226,7 @@ class Tracer:
                     if slope:
                         s = min(max(s + (load - self.follower.system.scalar(x)) / slope, p.arclength), q.arclength)
                 point = self._user_between(a, b, load, (p, q), s)
-                found.append(Special(USER, point, p.negative, q.negative, 1e-12 * max(1.0, abs(load))))
-                found[-1].negative_before = found[-1].negative_after = point.negative
+                found.append(Special.given(USER, point))
         return found
 
     def _first_users(self, branch: Branch) -> None:
@@ -259,7 +258,7 @@ class Tracer:
             def beyond(s: float) -> float:
                 return system.scalar(solve_at(self.follower, lambda t: hermite(a, b, t), s)) - load
 
-            margin = 1e-9 * (q.arclength - p.arclength)
+            margin = INSIDE * (q.arclength - p.arclength)
             s = brentq(beyond, p.arclength + margin, q.arclength - margin, xtol=1e-15)
             x = solve_at(self.follower, lambda t: hermite(a, b, t), s)
             system.set_load(x, load)
@@ -282,7 +281,7 @@ class Tracer:
             for i, known in enumerate(other.special):
                 if other is branch and special.point.arclength - known.point.arclength < 0.5:
                     continue  # a neighbour on this branch: a nearly double eigenvalue
-                if known.kind.branches and self.alike(known.point, special.point, 1e-6):
+                if known.kind.branches and self.alike(known.point, special.point, SAME_SPECIAL):
                     special.meets = (other.name, i)
                     special.switched = known.switched = True
                     if branch.parent == special.meets:
@@ -303,7 +302,7 @@ class Tracer:
             return shape.stretch(solve_at(self.follower, lambda t: hermite(a, b, t), s))
 
         h = b.arclength - a.arclength
-        s = brentq(stretch, a.arclength + 1e-9 * h, b.arclength, xtol=1e-11)
+        s = brentq(stretch, a.arclength + INSIDE * h, b.arclength, xtol=1e-11)
         x = solve_at(self.follower, lambda t: hermite(a, b, t), s)
         row = self.follower.row(hermite(a, b, s)[1])
         last = self.follower.point(x, s, self.follower.tangent(row))
@@ -371,7 +370,7 @@ class Tracer:
         x, outcome = self.follower.at_load(guess, first.load, reach=1.0)
         if not outcome.converged:  # beside a fold, say: not there
             return False
-        return self.alike(self.follower.point(x, s, None, outcome), first, 1e-7)
+        return self.alike(self.follower.point(x, s, None, outcome), first, SAME_STATE)
 
     def alike(self, a: Point, b: Point, tolerance: float) -> bool:
         """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
@@ -433,7 +432,7 @@ class Tracer:
             self._singular_end(branch, last)
             last = branch.points[-1]
         if not any(s.point is last for s in branch.special):
-            branch.special.append(Special(END, last, last.negative, last.negative, 1e-12 * max(1.0, abs(last.load))))
+            branch.special.append(Special.given(END, last))
             branch.renumber()
         if self.plan.error_bars or self.plan.accuracy:
             self._error_bars(branch)
@@ -456,7 +455,7 @@ def equivalent(a: Point, b: Point, tolerance: float = 1e-8, of_strain: float = 0
     """Whether two points agree in all that a symmetry leaves alone: load, energy and stretch."""
     strain = max(tolerance, of_strain)
     pairs = ((a.load, b.load, tolerance), (a.energy, b.energy, tolerance), (a.stretch, b.stretch, strain))
-    return all(abs(p - q) <= allowed * max(1.0, abs(p), abs(q)) for p, q, allowed in pairs)
+    return all(abs(p - q) <= allowed * unit(p, q) for p, q, allowed in pairs)
 
 
 def reversed_point(point: Point, total: float) -> Point:
@@ -484,6 +483,4 @@ def reversed_branch(branch: Branch) -> Branch:
 def near(a: Point, b: Point, steps: float = 2.0) -> bool:
     """Whether two points could be neighbours on one branch, seen through load and energy."""
     reach = 0.05 * steps
-    return abs(a.load - b.load) <= reach * max(1.0, abs(a.load)) and abs(a.energy - b.energy) <= reach * max(
-        1.0, abs(a.energy)
-    )
+    return abs(a.load - b.load) <= reach * unit(a.load) and abs(a.energy - b.energy) <= reach * unit(a.energy)

@@ -13,7 +13,7 @@ from rodfem.fem.system import System
 
 TOLERANCE = 1e-10
 """Size of the last correction of a converged state: rotations in radian, load over its span, all else relative."""
-ROUND_OFF = 1e-6
+STALLED = 1e-6
 """Below this a correction that no longer shrinks is round-off, not divergence; it is reported as the error."""
 
 
@@ -71,7 +71,7 @@ def iterate(
     makes exactly zero: one that no longer shrinks is accepted where that force is within the tolerance.
     """
     equations, origin = system.new_vector(), x.copy()
-    still = max(ROUND_OFF, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else ROUND_OFF
+    still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
     previous, size, refactor = float("inf"), float("inf"), True
     iteration = 0
     for iteration in range(1, most + 1):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from forms.rotation import IDENTITY, turn, turn_change
+from rodfem.problem.quaternions import of_vector, product
 
 Start = Callable[[np.ndarray], np.ndarray] | None
 TWICE = 4 * np.pi
@@ -44,11 +45,7 @@ class ByQuaternion:
 
     def turned(self, values: np.ndarray, vector: np.ndarray) -> np.ndarray:
         """Values (..., size) turned by rotation vectors (..., 3) along the directors."""
-        size = np.linalg.norm(vector, axis=-1, keepdims=True)
-        w, u = np.cos(size / 2), vector * np.sinc(size / (2 * np.pi)) / 2
-        q0, p = values[..., :1], values[..., 1:]
-        scalar = q0 * w - np.sum(p * u, axis=-1, keepdims=True)
-        return np.concatenate([scalar, q0 * u + w * p + np.cross(p, u)], axis=-1)
+        return product(values, of_vector(vector))
 
     def normalised(self, values: np.ndarray) -> np.ndarray:
         """Values of unit quaternions."""

@@ -21,28 +21,7 @@ from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
 from rodfem.problem.contribution import Motion
 from rodfem.problem.end import LETTERS
-
-
-def _euler_rodrigues() -> np.ndarray:
-    """Coefficients of ``|q|^2 R`` and of ``|q|^2`` in the products ``q_i q_j``: (16, 10)."""
-    out = np.zeros((4, 4, 10))
-    for i in range(4):
-        out[i, i, 9] = 1.0
-        out[i, i, [0, 4, 8]] = [1.0 if i in (0, k + 1) else -1.0 for k in range(3)]
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):  # R_ij = 2 (q_i q_j - q_0 q_k), R_ji = 2 (q_i q_j + q_0 q_k)
-        out[i + 1, j + 1, [3 * i + j, 3 * j + i]] = 2.0
-        out[0, k + 1, [3 * i + j, 3 * j + i]] = -2.0, 2.0
-    return out.reshape(16, 10)
-
-
-EULER_RODRIGUES = _euler_rodrigues()
-
-
-def directors(q: np.ndarray) -> np.ndarray:
-    """Rotation matrices of quaternions (..., 4), scalar first, of any length: (..., 3, 3)."""
-    q = np.asarray(q)
-    table = (q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16) @ EULER_RODRIGUES
-    return np.asarray((table[..., :9] / table[..., 9:]).reshape(*q.shape[:-1], 3, 3))
+from rodfem.problem.quaternions import directors
 
 
 def minimum(powers: list[float], t: float, spacing: float) -> float:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from rodfem.fem.system import System
 
 EPS = 100 * float(np.finfo(float).eps)
-ROUND_OFF = 1e-8
+RESIDUAL = 1e-8
 """Residual ``S g`` of a symmetry, relative to ``|S| |g|``."""
 ZERO = 1e-5
 """Eigenvalue that a symmetry may have, over the rod's lowest bending eigenvalue, beside round-off."""
@@ -127,7 +127,7 @@ class Verification:
         quotient = float(np.real(left.dot(g)))
         if generator.symmetry.along:
             return abs(quotient) <= zero or self._of_the_mesh(generator.symmetry, g, quotient, zero, state, equations)
-        small = ROUND_OFF * self._norm * (length + TINY)
+        small = RESIDUAL * self._norm * (length + TINY)
         if equations is not None:
             left.axpy(1.0, generator.pulled_back(self._unloaded(state, equations)))
             quotient = float(np.real(left.dot(g)))

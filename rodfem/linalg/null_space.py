@@ -27,7 +27,7 @@ from rodfem.linalg.householder import Reflections, factor
 
 DEPENDENT = 1e-12
 """A column whose part orthogonal to the others is smaller than this, relative to the largest entry, depends on them."""
-ROUND_OFF = 1e-14
+NEGLIGIBLE = 1e-14
 """Entries of ``C`` below this, relative to the largest, are zero."""
 
 
@@ -85,7 +85,7 @@ def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
     if p > m:
         raise InputError(f"{p} constraints on {m} unknowns leave no free unknown: use fewer constraints.")
     scale = float(abs(C.data).max()) if C.nnz else 1.0
-    C.data[abs(C.data) < ROUND_OFF * scale] = 0.0
+    C.data[abs(C.data) < NEGLIGIBLE * scale] = 0.0
     C.eliminate_zeros()
     dense = np.isnan(place)
     found = Kernel(m)

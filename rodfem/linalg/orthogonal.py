@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 import numpy as np
 from petsc4py import PETSc
@@ -11,11 +11,10 @@ TINY = 1e-300
 """A vector smaller than this is scaled as if it were of this size."""
 
 
-def project_out(vector: PETSc.Vec, basis: Iterable[PETSc.Vec], metric: PETSc.Mat, times: int = 1) -> None:
+def project_out(vector: PETSc.Vec, basis: Sequence[PETSc.Vec], metric: PETSc.Mat, times: int = 1) -> None:
     """Make ``vector`` orthogonal to orthonormal ones, in place; done ``times`` two also where little of it is left."""
-    known = list(basis)
     for _ in range(times):
-        for other in known:
+        for other in basis:
             vector.axpy(-(metric * other).dot(vector), other)
 
 

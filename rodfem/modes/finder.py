@@ -12,11 +12,11 @@ from rodfem.continuation.solvers import Equilibria
 from rodfem.errors import InputError
 from rodfem.fem.system import combine
 from rodfem.fem.transfer import Transfer, richer_system
+from rodfem.linalg.orthogonal import orthonormalize
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
 from rodfem.modes.perturbation import Motion, Motions
 from rodfem.stability import mode_type as character
 from rodfem.stability.assessment import Judge, Verdict
-from rodfem.stability.inertia import orthonormalize
 from rodfem.stability.left_right import both_sides
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
 

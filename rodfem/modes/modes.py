@@ -27,10 +27,10 @@ from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rodfem.errors import Argument, InputError
 from rodfem.file_format import MODES
+from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting, read
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class Modes:
     @property
     def rotation_body(self) -> np.ndarray:
         """Rotations by their components along the directors, (K, m, 3)."""
-        frames = Rotation.from_quat(self.q[:, [1, 2, 3, 0]]).as_matrix()
+        frames = directors(self.q)
         return np.einsum("mji,kmj->kmi", frames, self.rotation)
 
     def amplitude(self, displacement: np.ndarray, rotation: np.ndarray) -> np.ndarray:

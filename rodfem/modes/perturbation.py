@@ -17,8 +17,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.fields import end_positions
-from rodfem.fem.shape import Shape, directors
+from rodfem.fem.shape import Shape
 from rodfem.fem.values import NodalValues
+from rodfem.problem.quaternions import CONJUGATE, directors, product
 
 
 @dataclass(frozen=True)
@@ -107,5 +108,4 @@ class Motions(Shape):
 
 def spin(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
     """Infinitesimal rotation ``2 vec(dq conj(q)) / |q|^2`` in the space frame, (..., 4) -> (..., 3)."""
-    a, v, da, dv = q[..., :1], q[..., 1:], dq[..., :1], dq[..., 1:]
-    return np.asarray(2 * (a * dv - da * v + np.cross(v, dv)) / np.sum(q * q, axis=-1, keepdims=True))
+    return np.asarray(2 * product(dq, q * CONJUGATE)[..., 1:] / np.sum(q * q, axis=-1, keepdims=True))

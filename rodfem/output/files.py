@@ -62,7 +62,7 @@ def as_data(
     unknowns, and ``meshes`` has all.
     """
     system = max(systems, key=lambda s: s.fields.unknowns)
-    scene, d = system.scene, system.fields.discretization
+    scene = system.scene
     s = clock.seconds
     points = sum(len(b.points) for b in branches)
     work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
@@ -76,12 +76,7 @@ def as_data(
         "ordinate_label": scene.ordinate.label or scene.ordinate.name,
         "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
         "range": list(span),
-        "discretization": {
-            "formulation": d.formulation,
-            "elements": d.elements,
-            "degree": d.degree,
-            "unknowns": system.fields.unknowns,
-        },
+        "discretization": mesh_of(system),
         "accuracy": accuracy,
         "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
         "meaning": MEANING | ({} if scene.conservative else {"negative": UNSTABLE}),
@@ -237,6 +232,13 @@ def _trimmed(row: Any) -> Any:
         others = tuple(i for i in range(np.ndim(row)) if i != axis)
         row = np.compress(~np.isnan(row).all(axis=others), row, axis=axis)
     return row
+
+
+def mesh_of(system: System) -> dict[str, Any]:
+    """Discretisation, as files record it."""
+    d = system.fields.discretization
+    sizes = {"elements": d.elements, "degree": d.degree, "unknowns": system.fields.unknowns}
+    return {"formulation": d.formulation, **sizes}
 
 
 def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc.Vec:

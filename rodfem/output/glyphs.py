@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from rodfem.output.solids import Solid, ball, box, coil, profile_of, round_arrow, straight_arrow, sweep
+from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import AXIS, HELD, Setting, Support, Tie
 
 Floats = NDArray[np.float64]
@@ -93,7 +93,7 @@ def _body(support: Support, at: Floats, home: Floats, R: Floats, away: Floats, s
     free = support.slides
     if support.turning != HELD and len(free) == 3:
         return []
-    frame = Rotation.from_quat(support.frame[[1, 2, 3, 0]]).as_matrix()
+    frame = directors(support.frame)
     if support.turning == HELD:
         middle = at + 0.5 * size * frame[:, 2] * _sign(frame[:, 2] @ away)
         block = box(middle, frame, (size, size, 0.5 * size), GREY)

@@ -15,26 +15,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.mathtext import MathTextParser
-from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import IMPERFECT, KINDS
-from rodfem.errors import InputError
 from rodfem.file_format import DIAGRAM, read_json
 from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
+from rodfem.output.program import status_of
+from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, save, tex
 
 __all__ = ["draw_diagram", "main"]
 
 Floats = NDArray[np.float64]
 
-DPI, SIZE, FONT = 200, (7.5, 5.0), 11.0  # 1500 x 1000 pixels
-STYLE = {"font.size": FONT, "font.family": "DejaVu Sans", "axes.grid": True, "grid.color": "0.92"}
-PALETTE = (  # after Okabe and Ito: hues safe for the colour-blind, then the same once more and darker
-    *("#303030", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"),
-    *("#003F62", "#753400", "#00573F", "#70435C", "#2F6380", "#7E5700"),
-)
 UNEXPLAINED = "index change unexplained"
 SINGULAR = "singular first state, not located"
 MARKERS: dict[str, Mapping[str, Any]] = {
@@ -42,7 +35,6 @@ MARKERS: dict[str, Mapping[str, Any]] = {
     UNEXPLAINED: {"marker": "^", "ms": 10.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
     SINGULAR: {"marker": "s", "ms": 8.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
 }
-HALO = [withStroke(linewidth=3.2, foreground="white")]
 
 
 def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
@@ -74,11 +66,7 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     KeyError
         If an entry of ``diagram.json`` is missing.
     """
-    path, figure = Path(path), figure_of(diagram)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(path, dpi=DPI, format=path.suffix[1:] or "png")
-    return path
+    return save(figure_of(diagram), path)
 
 
 def figure_of(diagram: Mapping[str, Any]) -> Figure:
@@ -95,9 +83,9 @@ def figure_of(diagram: Mapping[str, Any]) -> Figure:
         axes.margins(0.05, 0.08)
         if not any(np.ptp(piece.curve[:, 1]) for piece in pieces):  # no more than the straight rod
             axes.set_ylim(-1.0, 1.0)
-        axes.set_xlabel(_tex(diagram["parameter_label"], always=True), fontsize=FONT + 3)
-        axes.set_ylabel(_tex(diagram.get("ordinate_label") or diagram["ordinate"]))
-        title = figure.suptitle(_tex(diagram["title"]), fontsize=FONT + 2)
+        axes.set_xlabel(tex(diagram["parameter_label"], always=True), fontsize=FONT + 3)
+        axes.set_ylabel(tex(diagram.get("ordinate_label") or diagram["ordinate"]))
+        title = figure.suptitle(tex(diagram["title"]), fontsize=FONT + 2)
         footer = figure.text(0.012, 0.013, _footer(diagram), color="0.4", fontsize=FONT - 3)
         for text in (title, footer):  # one line each: shrink what is too long
             width = text.get_window_extent().width / figure.bbox.width
@@ -174,28 +162,12 @@ def _uncover(axes: Axes, pieces: Sequence[Piece]) -> bool:
     return found
 
 
-def _tex(text: str, always: bool = False) -> str:
-    """Return text that matplotlib can set: TeX between dollars where it parses, else without its signs."""
-    text = f"${text}$" if "$" not in text and (always or "\\" in text) else text
-    try:
-        MathTextParser("path").parse(text)
-    except ValueError:
-        return text.replace("$", "").replace("\\", "")
-    return text
-
-
-def at_most(error: float) -> str:
-    """Return a bound with two digits, never smaller than it is."""
-    step = 10.0 ** (math.floor(math.log10(error)) - 1) if error > 0 else 1.0
-    return f"{math.ceil(error / step * (1 - 1e-12)) * step:.1e}".replace("e-0", "e-")
-
-
 def _footer(diagram: Mapping[str, Any]) -> str:
     """Return the line that names the discretisation and the accuracy of the special points."""
-    phrase = "{formulation} formulation, {elements} elements of degree {degree}, {unknowns} unknowns"
-    if diagram.get("accuracy"):
-        phrase = f"{{formulation}} formulation, {len(diagram['meshes'])} meshes of up to {{unknowns}} unknowns"
-    parts = [phrase.format(**diagram["discretization"])] if diagram.get("discretization") else []
+    d = diagram.get("discretization")
+    parts = [mesh_in_words(d)] if d else []
+    if d and diagram.get("accuracy"):
+        parts = [f"{d['formulation']} formulation, {len(diagram['meshes'])} meshes of up to {d['unknowns']} unknowns"]
     special = [point for branch in diagram["branches"] for point in branch.get("special", [])]
     counted = [point for point in special if point["kind"] in COUNTED]
     coarse = sum(point.get("resolved") is False for point in counted)
@@ -268,35 +240,19 @@ def _place_labels(axes: Axes, pieces: list[Piece], legend: Bbox, obstacles: Floa
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw the diagram named on the command line.
-
-    Parameters
-    ----------
-    arguments
-        Command line without the program's name; that of the process when omitted.
-
-    Returns
-    -------
-    status
-        0, or 2 after one sentence on standard error about bad input.
-    """
+    """Draw the diagram named on the command line, that of the process by default; returns 0, or 2 after a sentence."""
     parser = argparse.ArgumentParser(
         prog="python -m rodfem.output.plot_diagram", description="Draw a bifurcation diagram."
     )
     parser.add_argument("diagram", type=Path, help="diagram.json of a scene")
     parser.add_argument("--output", type=Path, help="picture to write (default: the same name with .png)")
-    options = parser.parse_args(arguments)
-    try:
-        diagram = read_json(options.diagram, DIAGRAM, ("title", "parameter_label", "ordinate", "branches"))
-        print(draw_diagram(diagram, options.output or options.diagram.with_suffix(".png")))
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return 2
-    except (KeyError, OSError, ValueError) as error:
-        reason = f"it has no {error}; try the diagram.json of a scene" if isinstance(error, KeyError) else error
-        print(f"cannot draw {options.diagram}: {reason}", file=sys.stderr)
-        return 2
-    return 0
+    given = parser.parse_args(arguments)
+
+    def draw() -> Path:
+        diagram = read_json(given.diagram, DIAGRAM, ("title", "parameter_label", "ordinate", "branches"))
+        return draw_diagram(diagram, given.output or given.diagram.with_suffix(".png"))
+
+    return status_of(draw, given.diagram)
 
 
 if __name__ == "__main__":

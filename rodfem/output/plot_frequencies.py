@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 
 from rodfem.continuation.kinds import FLUTTER, FREQUENCY, KINDS
 from rodfem.file_format import DIAGRAM
-from rodfem.output.plot_diagram import DPI, HALO, PALETTE, SIZE, STYLE, at_most
+from rodfem.output.sheet import DPI, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, save
 
 COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5}
 """Places in the palette."""
@@ -67,10 +67,7 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
     eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any ``omega2``, and InputError for
     contents of another or a newer format.
     """
-    figure = figure_of(diagram, most)
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(path)
-    return path
+    return save(figure_of(diagram, most), path)
 
 
 def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
@@ -149,8 +146,7 @@ def _top(columns: Mapping[str, Any], most: int) -> float:
 
 def _footer(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> str:
     """Discretisation, and the greatest bound of the errors of the special loads."""
-    d = diagram["discretization"]
-    text = f"{d['formulation']} formulation, {d['elements']} elements of degree {d['degree']}, {d['unknowns']} unknowns"
+    text = mesh_in_words(diagram["discretization"])
     found = [s for b in branches for s in b["special"] if s["kind"] in SPECIAL and s["error_estimate"] is not None]
     if found:
         kinds = " and ".join(kind for kind in SPECIAL if any(s["kind"] == kind for s in found))

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rodfem.continuation.kinds import BRANCH_POINT, KINDS, USER
 from rodfem.file_format import LOCUS
-from rodfem.output.plot_diagram import DPI, FONT, HALO, PALETTE, SIZE, STYLE, _tex
+from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, save, tex
 
 LINES = {name: (PALETTE[kind.line[0]], kind.line[1]) for name, kind in KINDS.items() if kind.line is not None}
 """Colour and dashes by kind."""
@@ -57,7 +57,6 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     names = loci[0]["parameters"]
     if any(one["parameters"] != names for one in loci):
         raise ValueError("The loci are of different parameters: draw them one by one.")
-    path = Path(path)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
         axes = figure.subplots()
@@ -76,27 +75,23 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
                 place = (x[len(x) // 2], y[len(x) // 2])
                 text = axes.annotate(f"{low}|{high}", place, (6, 6), textcoords="offset points", color=colour)
                 text.set(weight="bold", path_effects=HALO)
-        axes.set_xlabel(_tex(loci[0]["labels"][1], always=True), fontsize=FONT + 3)
-        axes.set_ylabel(_tex(loci[0]["labels"][0], always=True), fontsize=FONT + 3)
-        axes.set_title(_tex(loci[0]["title"]))
+        axes.set_xlabel(tex(loci[0]["labels"][1], always=True), fontsize=FONT + 3)
+        axes.set_ylabel(tex(loci[0]["labels"][0], always=True), fontsize=FONT + 3)
+        axes.set_title(tex(loci[0]["title"]))
         handles = {handle.get_label(): handle for handle in axes.get_lines()}
         axes.legend(handles=list(handles.values()), fontsize=8.5)
         figure.supxlabel(_footer(loci), fontsize=FONT - 3, color="0.4", x=0.012, ha="left")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=DPI, format=path.suffix[1:] or "png")
-    return path
+    return save(figure, path)
 
 
 def _footer(loci: Sequence[Mapping[str, Any]]) -> str:
     """Return the line that names the discretisation and the estimated error, and at how many points it was."""
-    d = loci[0]["discretization"]
     errors = [max(e) for one in loci for e in one["columns"]["error"] if e[0] is not None]
-    text = f"{d['formulation']} formulation, {d['elements']} elements of degree {d['degree']}, {d['unknowns']} unknowns"
+    text = mesh_in_words(loci[0]["discretization"])
     points = sum(len(one["columns"]["error"]) for one in loci)
     failed = sum(len(one.get("without_estimate", [])) for one in loci)
     if errors:
-        worst = f"{max(errors):.1e}".replace("e-0", "e-")
-        text += f"; curves accurate to {worst} (estimated at {len(errors)} of {points} points"
+        text += f"; curves accurate to {at_most(max(errors))} (estimated at {len(errors)} of {points} points"
         text += f", without success at {failed} more)" if failed else ")"
     elif failed:
         text += f"; the error could not be estimated at any of {failed} points"

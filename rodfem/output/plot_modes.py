@@ -23,9 +23,11 @@ from scipy.spatial.transform import Rotation
 from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
 from rodfem.output.glyphs import glyphs_of
-from rodfem.output.plot_diagram import DPI, STYLE
+from rodfem.output.program import status_of
+from rodfem.output.sheet import DPI, STYLE
 from rodfem.output.solids import Solid, profile_of
 from rodfem.output.view import view_of
+from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 
 __all__ = ["draw_modes", "main"]
@@ -127,7 +129,7 @@ class _Panel:
         turns = np.where(np.sum(modes.q[1:] * modes.q[:-1], axis=1) < 0, -1.0, 1.0)  # q and -q are the same rotation
         q = modes.q * np.append(1.0, np.cumprod(turns))[:, None]
         self.r = CubicSpline(s, modes.r)(fine)
-        self.frames = Rotation.from_quat(CubicSpline(s, q)(fine)[:, [1, 2, 3, 0]]).as_matrix()
+        self.frames = directors(CubicSpline(s, q)(fine))
         u, w = (CubicSpline(s, part[number].astype(complex))(fine) for part in (modes.displacement, modes.rotation))
         span = float(np.linalg.norm(np.ptp(self.r, axis=0)))
         moved, turned = (float(np.linalg.norm(abs(part), axis=1).max()) for part in (u, w))
@@ -276,13 +278,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--row", required=True, type=int, help="row of the state, as in states.h5")
     parser.add_argument("--mode", type=int, nargs="+", default=[], help="numbers of modes, from 1 on (default all)")
     parser.add_argument("--output", type=Path, default=Path("modes.png"), help=".png, .pdf, .svg; .gif: an animation")
-    options = parser.parse_args(arguments)
-    try:
-        print(draw_modes(options.modes, options.branch, options.row, options.output, options.mode))
-    except (InputError, OSError, ValueError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    given = parser.parse_args(arguments)
+    return status_of(lambda: draw_modes(given.modes, given.branch, given.row, given.output, given.mode), given.modes)
 
 
 if __name__ == "__main__":

@@ -15,12 +15,13 @@ import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
 from rodfem.file_format import STATES
 from rodfem.output.glyphs import DARK, LOAD, glyphs_of
+from rodfem.output.program import status_of
 from rodfem.output.solids import Solid, profile_of, rod, straight_arrow
 from rodfem.output.view import view_of
+from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
 
@@ -186,7 +187,7 @@ def _curve(group: Any, row: int, count: int) -> tuple[Floats, Floats, Floats]:
     opposite = np.sum(q[1:] * q[:-1], axis=1, keepdims=True) < 0.0  # q and -q are the same rotation
     q[1:] *= np.cumprod(np.where(opposite, -1.0, 1.0), axis=0)
     at = np.linspace(s[0], s[-1], count)
-    return at, CubicSpline(s, r)(at), Rotation.from_quat(CubicSpline(s, q)(at)[:, [1, 2, 3, 0]]).as_matrix()
+    return at, CubicSpline(s, r)(at), directors(CubicSpline(s, q)(at))
 
 
 def _import_pyvista() -> Any:
@@ -300,32 +301,16 @@ def draw_shape_safely(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw the shape named on the command line.
-
-    Parameters
-    ----------
-    arguments
-        Command line without the program's name; that of the process when omitted.
-
-    Returns
-    -------
-    status
-        0, or 2 after one sentence on standard error.
-    """
+    """Draw the shape named on the command line, that of the process by default; returns 0, or 2 after a sentence."""
     parser = argparse.ArgumentParser(prog="python -m rodfem.output.render", description="Draw a rod in space.")
     parser.add_argument("states", type=Path, help="states.h5 of a scene")
     parser.add_argument("--branch", required=True, help="name of the branch")
     parser.add_argument("--row", required=True, type=int, help="row of the state, counted from 0")
-    parser.add_argument("--output", type=Path, default=Path("shape.png"), help="picture to write")
+    parser.add_argument("--output", dest="path", type=Path, default=Path("shape.png"), help="picture to write")
     parser.add_argument("--caption", help="line at the foot of the picture")
     parser.add_argument("--radius", type=float, help="mean radius of the rod, nondimensional")
     options = vars(parser.parse_args(arguments))
-    try:
-        print(draw_shape(path=options.pop("output"), **options))
-    except (ImportError, OSError, RuntimeError, ValueError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    return status_of(lambda: draw_shape(**options), options["states"])
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from rodfem.stability.workspace import Workspace
 
 SMALL = 12
 """A system with fewer unknowns than this for each eigenvalue is solved by dense matrices."""
-ROUND_OFF = 1e-7
+ZERO = 1e-7
 """Real and imaginary parts of mu below this, relative to the stiffness over the length, are zero (no potential)."""
 
 
@@ -118,7 +118,7 @@ class Judge(Workspace):
         self.system.set_phase(x)
         if self.inertia is None:
             found = self._method(name).nearest(x, max(number, 1))
-            scale = ROUND_OFF * self.system.stiffness_scale / self.system.scene.length
+            scale = ZERO * self.system.stiffness_scale / self.system.scene.length
             bad = int(((found.values.real < -scale) | (abs(found.values.imag) > scale)).sum())
             index, zero, nothing = bad, self.system.active_drifts(), np.zeros(0)
             inside: tuple[float, np.ndarray, np.ndarray] = 0.0, nothing, nothing

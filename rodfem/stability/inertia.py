@@ -22,6 +22,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.state import State
 from rodfem.fem.system import System, combine
 from rodfem.linalg.factorization import Factors
+from rodfem.linalg.orthogonal import orthonormalize
 from rodfem.linalg.selection import factors_of
 
 EPS = float(np.finfo(float).eps)
@@ -253,13 +254,3 @@ class Factored:
         rows = np.repeat(mode.array_r.real, np.diff(first))
         squares = float(np.sum((values.real * rows * every[columns]) ** 2))
         return float(NOISE * EPS * np.sqrt(comm.allreduce(squares)))
-
-
-def orthonormalize(vectors: list[PETSc.Vec], metric: PETSc.Mat) -> None:
-    """Make vectors orthonormal in a metric, in place, by Gram-Schmidt twice."""
-    for _ in range(2):
-        for i, v in enumerate(vectors):
-            v.scale(1.0 / max(np.sqrt(max(v.dot(metric * v), 0.0)), 1e-300))
-            for w in vectors[:i]:
-                v.axpy(-v.dot(metric * w), w)
-            v.scale(1.0 / max(np.sqrt(max(v.dot(metric * v), 0.0)), 1e-300))

@@ -12,7 +12,7 @@ from rodfem.stability.nonsymmetric import Vibration
 SAME = 1e-6
 """Relative difference below which a left and a right eigenvalue are paired."""
 
-ROUND_OFF = 1e-10
+REAL = 1e-10
 """Relative imaginary part below which an eigenvalue counts as real."""
 
 
@@ -57,7 +57,7 @@ def both_sides(vibration: Vibration, number: int) -> BothSides:
     Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ vibration.weighed(X)).T)
     values = right.values[chosen]
     return BothSides(
-        np.where(abs(values.imag) < ROUND_OFF * abs(values), values.real, values),
+        np.where(abs(values.imag) < REAL * abs(values), values.real, values),
         right.errors[chosen],
         tuple(right.kinds[i] for i in chosen),
         X,

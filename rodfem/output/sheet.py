@@ -1,0 +1,51 @@
+"""What all plots share: size, fonts, colours, text, the line at the foot, and how they are written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.figure import Figure
+from matplotlib.mathtext import MathTextParser
+from matplotlib.patheffects import withStroke
+
+DPI, SIZE, FONT = 200, (7.5, 5.0), 11.0  # 1500 x 1000 pixels
+STYLE = {"font.size": FONT, "font.family": "DejaVu Sans", "axes.grid": True, "grid.color": "0.92"}
+PALETTE = (  # after Okabe and Ito: hues safe for the colour-blind, then the same once more and darker
+    *("#303030", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"),
+    *("#003F62", "#753400", "#00573F", "#70435C", "#2F6380", "#7E5700"),
+)
+HALO = [withStroke(linewidth=3.2, foreground="white")]
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure; the suffix decides the format, and the folder is created where it is missing."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(path, dpi=DPI, format=path.suffix[1:] or "png")
+    return path
+
+
+def tex(text: str, always: bool = False) -> str:
+    """Return text that matplotlib can set: TeX between dollars where it parses, else without its signs."""
+    text = f"${text}$" if "$" not in text and (always or "\\" in text) else text
+    try:
+        MathTextParser("path").parse(text)
+    except ValueError:
+        return text.replace("$", "").replace("\\", "")
+    return text
+
+
+def mesh_in_words(d: Mapping[str, Any]) -> str:
+    """Discretisation, as files record it, in words."""
+    return f"{d['formulation']} formulation, {d['elements']} elements of degree {d['degree']}, {d['unknowns']} unknowns"
+
+
+def at_most(error: float) -> str:
+    """Return a bound with two digits, never smaller than it is."""
+    step = 10.0 ** (math.floor(math.log10(error)) - 1) if error > 0 else 1.0
+    return f"{math.ceil(error / step * (1 - 1e-12)) * step:.1e}".replace("e-0", "e-")
