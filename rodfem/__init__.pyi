@@ -7,10 +7,10 @@ from rodfem.app.run import run as run
 from rodfem.codim2.locus import Locus as Locus
 from rodfem.continuation.branch import Branch as Branch
 from rodfem.continuation.branch import Point as Point
-from rodfem.continuation.branch import Special as Special
+from rodfem.continuation.branch import SpecialPoint as SpecialPoint
 from rodfem.continuation.observer import Observer as Observer
-from rodfem.continuation.step_control import IndexSteps as IndexSteps
-from rodfem.continuation.step_control import Steps as Steps
+from rodfem.continuation.step_control import IndexStepControl as IndexStepControl
+from rodfem.continuation.step_control import StepControl as StepControl
 from rodfem.diagram.diagram import Diagram as Diagram
 from rodfem.diagram.plan import Plan as Plan
 from rodfem.diagram.saved import load as load

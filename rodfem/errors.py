@@ -1,6 +1,6 @@
 """The errors that rodfem raises on purpose; each message is one sentence for a person, its remedy is data as well.
 
-A remedy names arguments of the interface in Python, as in ``Steps(largest=...)``.  The command line, which has an
+A remedy names arguments of the interface in Python, as in ``StepControl(largest=...)``.  The command line, which has an
 option for each, names that instead (:meth:`rodfem.app.cli.Parser.in_options`).
 """
 
@@ -34,7 +34,7 @@ class Remedy:
         return self.words.format(*self.arguments)
 
 
-SMALLER_STEPS = Remedy("use smaller steps ({})", Argument("Steps", "largest"))
+SMALLER_STEPS = Remedy("use smaller steps ({})", Argument("StepControl", "largest"))
 POINTWISE = Remedy("use {}", Argument("Discretization", "formulation", "pointwise"))
 
 

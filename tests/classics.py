@@ -28,7 +28,7 @@ from rodfem import (
     Plan,
     Ring,
     Scene,
-    Steps,
+    StepControl,
     at,
     clamped,
     elastic,
@@ -40,12 +40,12 @@ from rodfem import (
     sliding,
     trace,
 )
-from rodfem.continuation.branch import Special
+from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT
 
 RIGID = "unshearable and inextensible"
 FORMULATIONS = ("reduced", "pointwise")
-WIDE = Steps(first=0.05, largest=0.15)
+WIDE = StepControl(first=0.05, largest=0.15)
 BEAM = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0))
 Vector = Callable[[Any], tuple[Any, ...]]
 
@@ -59,7 +59,7 @@ class Found:
     def __init__(self, diagram: Diagram) -> None:
         self.solver, self.branches = diagram.solvers[0], diagram.branches
 
-    def special(self, kind: str = BRANCH_POINT, branch: int = 0) -> list[Special]:
+    def special(self, kind: str = BRANCH_POINT, branch: int = 0) -> list[SpecialPoint]:
         """Special points of one kind along a branch."""
         return [s for s in self.branches[branch].special if s.kind == kind]
 

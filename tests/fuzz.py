@@ -33,7 +33,7 @@ from rodfem import (
     Ring,
     Scene,
     Solver,
-    Steps,
+    StepControl,
     at,
     clamped,
     elastic,
@@ -46,7 +46,7 @@ from rodfem import (
 )  # fmt: skip
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
-from rodfem.continuation.solvers import Follower
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.diagram.explorer import Explorer
 from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.system import System
@@ -240,7 +240,7 @@ class Finding:
     said: list[str] = field(default_factory=list)
 
 
-def compare(follower: Follower, branch: Branch, finding: Finding) -> None:
+def compare(follower: BranchSolver, branch: Branch, finding: Finding) -> None:
     """Compare index and zeros of each row with the oracle's."""
     oracle = Oracle(follower.system)
     special = {id(s.point) for s in branch.special if s.kind in ("fold", "branch point")}
@@ -282,7 +282,7 @@ def chain(branch: Branch, finding: Finding) -> None:
 def examine(scene: Scene, depth: int = 0, elements: int = 6, degree: int = 5) -> Finding:
     """Trace a scene coarsely and compare all of its rows."""
     finding, text = Finding(scene.name), StringIO()
-    plan = Plan(scene.span, depth=depth, steps=Steps(first=0.05, largest=0.2, most=40), error_bars=False)
+    plan = Plan(scene.span, depth=depth, steps=StepControl(first=0.05, largest=0.2, most=40), error_bars=False)
     branches: list[Branch] = []
     try:
         follower = Solver(scene, Discretization("auto", elements, degree)).equilibria

@@ -14,7 +14,7 @@ import test_classics
 import test_docs
 
 import rodfem
-from rodfem.continuation.branch import Branch, Special
+from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.kinds import FLUTTER
 from rodfem.diagram.plan import Plan
 from rodfem.fem.fields import Discretization
@@ -72,7 +72,7 @@ def record(scene: Scene) -> list[dict[str, Any]]:
     ]
 
 
-def _point(s: Special) -> dict[str, Any]:
+def _point(s: SpecialPoint) -> dict[str, Any]:
     out = {
         "kind": s.kind,
         "load": s.point.load,

@@ -12,10 +12,10 @@ from types import ModuleType
 
 from rows import verify
 
-from rodfem.continuation.branch import Branch, Point, Special
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import Follower
-from rodfem.continuation.step_control import Steps
+from rodfem.continuation.solvers import BranchSolver
+from rodfem.continuation.step_control import StepControl
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
@@ -60,7 +60,7 @@ def scene(constants: Constants = DEFAULT, span: tuple[float, float] = SPAN) -> S
 @cache
 def follower(
     formulation: str = "reduced", elements: int = 8, degree: int = 6, constants: Constants = DEFAULT
-) -> Follower:
+) -> BranchSolver:
     """The demo on one discretisation."""
     return Solver(scene(constants), Discretization(formulation, elements, degree)).equilibria
 
@@ -76,7 +76,7 @@ def explored(
     at: tuple[float, ...] = (),
     depth: int = 2,
     error_bars: bool = False,
-    steps: Steps = Steps(),  # noqa: B008, it is frozen
+    steps: StepControl = StepControl(),  # noqa: B008, it is frozen
 ) -> list[Branch]:
     """Branches of the demo; all that are explored on one discretisation share what is set up for it."""
     plan = Plan(span, at=at, depth=depth, steps=steps, error_bars=error_bars)
@@ -86,7 +86,7 @@ def explored(
     return branches
 
 
-def specials(branch: Branch, kind: str) -> list[Special]:
+def specials(branch: Branch, kind: str) -> list[SpecialPoint]:
     """Special points of one kind, in order along the branch."""
     return [s for s in branch.special if s.kind == kind]
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.solvers import Follower
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.stability.assessment import judge
 
 
-def verify(follower: Follower, branches: Sequence[Branch], explained: bool = True) -> None:
+def verify(follower: BranchSolver, branches: Sequence[Branch], explained: bool = True) -> None:
     """Assert that each recorded index is that of two shifts at the row's own state, and that all changes are explained.
 
     What the prediction's factors tell and what these tell is independent: other matrices, other factors, other code.

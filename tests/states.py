@@ -10,7 +10,7 @@ import rods
 import scenes
 from petsc4py import PETSc
 
-from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
@@ -25,7 +25,7 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def solver(name: str, formulation: str, elements: int, degree: int) -> Equilibria:
+def solver(name: str, formulation: str, elements: int, degree: int) -> StaticSolver:
     return Solver(scene(name), Discretization(formulation, elements, degree)).equilibria
 
 

@@ -29,7 +29,7 @@ from rodfem import (
     Ring,
     Scene,
     Solver,
-    Steps,
+    StepControl,
     clamped,
     free,
     pinned,
@@ -160,7 +160,7 @@ def test_a_fold_and_a_branch_point_of_opposite_sign_in_one_step(largest: float) 
     """
     scene = winkler()
     scene = replace(scene, parameters={**scene.parameters, "k": Parameter(240.0)})
-    plan = Plan(depth=1, steps=Steps(largest=largest), error_bars=False)
+    plan = Plan(depth=1, steps=StepControl(largest=largest), error_bars=False)
     branch = trace(scene, Discretization("auto", 8, 6), plan)[2]
     found = [(s.kind, s.negative_before, s.negative_after) for s in branch.special[1:3]]
     assert found == [(BRANCH_POINT, 3, 4), (FOLD, 4, 3)]
@@ -177,7 +177,7 @@ def test_an_eigenvalue_that_passes_zero_twice_in_one_step(longer: float, apart: 
     constants = (0.0, 1.0, 1.0, meet + longer)
     first = brentq(lambda lam: buckling(lam, *constants), 0.4, 0.5, xtol=1e-15)
     assert 1 - 2 * first == pytest.approx(apart, rel=5e-3)
-    mesh, plan = Discretization("reduced", 16, 6), Plan(depth=0, steps=Steps(largest=0.1), error_bars=False)
+    mesh, plan = Discretization("reduced", 16, 6), Plan(depth=0, steps=StepControl(largest=0.1), error_bars=False)
     (straight,) = trace(rods.scene(constants), mesh, plan)
     pair = straight.special[1:3]
     assert [(s.negative_before, s.negative_after) for s in pair] == [(2, 4), (4, 2)]
@@ -191,7 +191,7 @@ def test_a_row_beside_a_pair_of_crossings() -> None:
     """A step of 0.3 ends 6e-4 beyond two double branch points that are 4e-3 apart, and tells nothing of them."""
     constants = (0.554629, 1.0, 1.0, 2.851609)
     expected = buckling_loads(*constants)
-    plan = Plan(depth=0, steps=Steps(largest=0.3), error_bars=False)
+    plan = Plan(depth=0, steps=StepControl(largest=0.3), error_bars=False)
     (straight,) = trace(rods.scene(constants), Discretization("reduced", 16, 6), plan)
     found = [s for s in straight.special if s.kind == BRANCH_POINT]
     assert [s.point.load for s in found] == pytest.approx(expected, abs=1e-9)
@@ -246,7 +246,7 @@ def test_steps_that_do_not_explain_are_repeated() -> None:
         potential=lambda x, c: loads.pressure(x.r, x.dr, c.P), **ROUND,
         energy=lambda v, k, c: (1 + c.e * ufl.cos(2 * c.s)) * bending(k, (c.B1, c.B2, c.C)),
     )  # fmt: skip
-    plan = Plan(depth=0, steps=Steps(largest=0.1), error_bars=False)
+    plan = Plan(depth=0, steps=StepControl(largest=0.1), error_bars=False)
     (branch,) = trace(scene, Discretization("auto", 12, 6), plan)
     assert {p.negative for p in branch.points} == {0}
     assert not branch.unexplained

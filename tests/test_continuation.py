@@ -15,7 +15,7 @@ from rods import DEFAULT, explored, follower, specials, user_points
 
 import rodfem
 from rodfem import Branch, Discretization, Plan, Point
-from rodfem.continuation.step_control import IndexSteps, Steps
+from rodfem.continuation.step_control import IndexStepControl, StepControl
 from rodfem.errors import InputError, SceneError
 from rodfem.output.files import load_state, save_states
 
@@ -85,7 +85,7 @@ def test_loads_are_located_as_precisely_as_they_claim(start: float) -> None:
 
 @pytest.mark.alone
 def test_special_points_do_not_depend_on_the_steps() -> None:
-    coarse = explored("reduced", 12, 6, span=(0.0, 0.6), steps=Steps(first=0.05, largest=0.25, aim=2e-2))
+    coarse = explored("reduced", 12, 6, span=(0.0, 0.6), steps=StepControl(first=0.05, largest=0.25, aim=2e-2))
     found = [s.point.load for b in coarse for s in b.special if s.kind in ("branch point", "fold")]
     np.testing.assert_allclose(found, [*closed_form.loads(*DEFAULT), shooting.FOLD[0]], rtol=0, atol=1e-10)
     assert max(len(b.points) for b in coarse) < 20
@@ -159,15 +159,15 @@ def test_steps_that_bound_the_change_of_the_index() -> None:
     )  # fmt: skip
     found = {
         kind: rodfem.trace(rod, plan=Plan(depth=0, steps=kind(largest=0.2, first=0.2), error_bars=False))[0]
-        for kind in (Steps, IndexSteps)
+        for kind in (StepControl, IndexStepControl)
     }
     changes = {kind: {abs(a.index - b.index) for a, b in pairwise(_rows(b))} for kind, b in found.items()}
-    assert changes == {Steps: {0, 2}, IndexSteps: {0, 1}}
+    assert changes == {StepControl: {0, 2}, IndexStepControl: {0, 1}}
     for branch in found.values():
         loads = [s.point.load for s in branch.special if s.kind == "branch point"]
         assert loads == pytest.approx([np.pi**2, 1.004 * np.pi**2], rel=1e-9)
     with pytest.raises(InputError, match="A change of the index of 0 leads nowhere: give change=1 or more"):
-        IndexSteps(change=0)
+        IndexStepControl(change=0)
 
 
 def _rows(branch: Branch) -> list[Point]:

@@ -10,14 +10,14 @@ import scenes
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.corrector import NEAR
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.solvers import Follower
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.fem.newton import TOLERANCE, correct
 
 BENT = {"hemitropic": ("branch 1", 0.5), "cord": ("branch 2", 30.0), "ruler": ("branch 1", 8.0)}
 
 
-def demo(name: str, formulation: str) -> tuple[Follower, list[Branch]]:
-    """Follower and branches of a demo."""
+def demo(name: str, formulation: str) -> tuple[BranchSolver, list[Branch]]:
+    """Solver and branches of a demo."""
     if name == "hemitropic":
         return rods.follower(formulation, 8, 6), rods.explored(formulation, 8, 6)
     found = scenes.explored(name, formulation)

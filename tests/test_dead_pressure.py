@@ -14,8 +14,8 @@ import ufl
 
 import rodfem.fem.system
 from forms.energy import bending
-from rodfem import Discretization, Observer, Plan, Ring, Scene, Solver, Steps, trace
-from rodfem.continuation.solvers import Equilibria
+from rodfem import Discretization, Observer, Plan, Ring, Scene, Solver, StepControl, trace
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.fem.newton import relax
 from rodfem.fem.symmetries import Symmetry, elementary_generators
 from rodfem.fem.system import System
@@ -36,7 +36,7 @@ def ring(planar: str | None = None, B2: float = 1.0, C: float = 1.0, load: Any =
 
 
 @cache
-def solver(planar: str | None, B2: float, C: float) -> Equilibria:
+def solver(planar: str | None, B2: float, C: float) -> StaticSolver:
     return Solver(ring(planar, B2, C), Discretization("pointwise", 8, 6)).equilibria
 
 
@@ -72,7 +72,7 @@ def ritz(p: float, B: tuple[float, float, float], planar: bool, modes: int = 12)
     return np.linalg.eigvalsh(np.linalg.solve(root, half.T))
 
 
-def circle_at(found: Equilibria, p: float) -> Any:
+def circle_at(found: StaticSolver, p: float) -> Any:
     """The circle under the load p, to which Newton's method leads from the start."""
     x = found.start(p)
     found.system.set_phase(x)
@@ -96,7 +96,7 @@ def test_index_of_the_circle(planar: str | None, B2: float, C: float, p: float) 
 
 def test_special_points_of_the_circle() -> None:
     """It buckles in its plane at n^2, on top of the rotation."""
-    plan = Plan((0.3, 9.5), depth=0, steps=Steps(first=0.05, largest=0.15), error_bars=False)
+    plan = Plan((0.3, 9.5), depth=0, steps=StepControl(first=0.05, largest=0.15), error_bars=False)
     branch = trace(ring("e2"), Discretization("pointwise", 8, 6), plan)[0]
     points = [s for s in branch.special if s.kind == "branch point"]
     assert [s.point.load for s in points] == pytest.approx([4.0, 9.0], abs=1e-7)
@@ -143,7 +143,7 @@ def test_a_false_symmetry_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
         def system(self, system: System, accuracy: float | None = None) -> None:
             claimed.extend(map(str, system.symmetries))
 
-    plan = Plan((0.5, 3.0), depth=0, steps=Steps(first=0.05, largest=0.15), error_bars=False)
+    plan = Plan((0.5, 3.0), depth=0, steps=StepControl(first=0.05, largest=0.15), error_bars=False)
     diagram = trace(ring("e2"), Discretization("pointwise", 8, 6), plan, Ear())
     assert "rotation about e2" in claimed
     assert {(p.negative, p.zero) for p in diagram[0].points} == {(1, 2)}

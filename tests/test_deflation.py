@@ -15,11 +15,11 @@ from scenes import Found, explored, scene
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Point
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import Follower, distance
+from rodfem.continuation.solvers import BranchSolver, distance
 from rodfem.deflation.discrete_symmetries import mirrors
 from rodfem.deflation.group_orbit import Orbit
 from rodfem.deflation.guesses import turned_state
-from rodfem.deflation.search import NEW, SAME, Deflation, further, starts, states_at
+from rodfem.deflation.search import NEW, SAME, Deflation, equilibria_at, find_equilibria, starts
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
@@ -44,7 +44,7 @@ def only(points: list[Point], **values: float) -> Point:
     return p
 
 
-def force(follower: Follower, x: object) -> float:
+def force(follower: BranchSolver, x: object) -> float:
     """Size of the equations' residual at a state, without phase conditions."""
     out = follower.system.new_vector()
     follower.system.set_phase(None)
@@ -56,7 +56,7 @@ def force(follower: Follower, x: object) -> float:
 def test_cord() -> None:
     """From the straight state alone: all that exploring finds, and whatever else is found is an equilibrium."""
     found = cord()
-    known = states_at(found.follower, found.branches, 40.0)
+    known = equilibria_at(found.follower, found.branches, 40.0)
     assert len(known) == 4
     search = Deflation(found.follower, 40.0, [p for p in known if abs(p.ordinate) < 1e-9])
     new = search.run(24)
@@ -78,8 +78,8 @@ def test_cord() -> None:
 def test_cord_beyond_what_was_explored() -> None:
     """With all explored states given, only others are found: they are on branches that exploring did not reach."""
     found = cord()
-    known = states_at(found.follower, found.branches, 40.0)
-    for p in further(found.follower, 40.0, known, tries=12):
+    known = equilibria_at(found.follower, found.branches, 40.0)
+    for p in find_equilibria(found.follower, 40.0, known, tries=12):
         assert min(abs(p.energy - k.energy) for k in known) > 1e-3
         assert (p.load, p.error < 1e-9) == (40.0, True)
 
@@ -142,7 +142,7 @@ def test_nothing_to_find() -> None:
     """Under a small load there is one equilibrium: it is found, nothing else is, and the report says so."""
     follower = Solver(scene("ruler", direction="e2"), Discretization()).equilibria
     out = StringIO()
-    (only_one,) = further(follower, 0.2, tries=1)
+    (only_one,) = find_equilibria(follower, 0.2, tries=1)
     search = Deflation(follower, 0.2, [only_one])
     assert search.run(10) == []
     assert len(search.tally.tries) == 10

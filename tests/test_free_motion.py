@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rodfem import Discretization, End, Plan, Scene, SceneError, Solver, trace
-from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram import sweep
 from rodfem.stability.assessment import judge
 
@@ -28,11 +28,11 @@ def scene(kind: str, balanced: bool = True) -> Scene:
 
 
 @cache
-def solver(kind: str) -> Equilibria:
+def solver(kind: str) -> StaticSolver:
     return Solver(scene(kind), Discretization("auto", 4, 6)).equilibria
 
 
-def straight(found: Equilibria, load: float) -> Any:
+def straight(found: StaticSolver, load: float) -> Any:
     x, outcome = found.first(load)
     assert outcome.converged
     return x

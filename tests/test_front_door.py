@@ -43,7 +43,7 @@ def test_nothing_outside_the_package_assembles_what_traces() -> None:
     home = Path(__file__).parents[1]
     files = [*home.glob("demos/*.py"), *home.glob("benchmarks/**/*.py"), home / "docs" / "rods.md", home / "README.md"]
     assert len(files) > 20
-    inside = re.compile(r"\b(Explorer|Follower|System)\b")
+    inside = re.compile(r"\b(Explorer|BranchSolver|System)\b")
     assert {(str(f), found) for f in files for found in inside.findall(f.read_text())} == set()
 
 

@@ -12,7 +12,7 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc
 
 from rodfem import Discretization, Ordinate, Plan, Scene, Solver, clamped, free, pinned, sliding, trace
-from rodfem.continuation.branch import Special
+from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.unfolding import unfold
 
@@ -166,7 +166,7 @@ def test_folds_that_are_nearly_uncoupled_from_the_load() -> None:
     the first branch lies below it by the e^(2/3) of Koiter (1945).
     """
 
-    def special(e: float) -> Special:
+    def special(e: float) -> SpecialPoint:
         scene = column(
             "turned", (clamped(), sliding(ON_AXIS, turned)), (12.5, 13.2), load="phi",
             constants={"phi": 12.5, "B2": 1.02, "C": 0.7, "e": e}, distributed=lambda c: (c.e, 0.3 * c.e, 0.0),

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from rods import DEFAULT, explored, follower, user_points
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.solvers import Follower
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.stability.symmetric import Spectrum
 
 SMALL = (6, 3)
@@ -38,7 +38,7 @@ def dense(matrix: PETSc.Mat) -> np.ndarray:
     return sp.vstack(blocks).toarray()
 
 
-def unknowns(f: Follower) -> tuple[np.ndarray, np.ndarray]:
+def unknowns(f: BranchSolver) -> tuple[np.ndarray, np.ndarray]:
     """Global numbers of the state's unknowns and of the constraints' multipliers."""
     fields = f.system.fields
     mine = [fields.number[fields.dofs[b.name]].ravel() for b in fields.blocks if b.multiplier]
@@ -49,7 +49,7 @@ def unknowns(f: Follower) -> tuple[np.ndarray, np.ndarray]:
     return np.setdiff1d(np.arange(fields.field_unknowns), constraints), constraints
 
 
-def eigenvalues(S: np.ndarray, M: np.ndarray, f: Follower) -> np.ndarray:
+def eigenvalues(S: np.ndarray, M: np.ndarray, f: BranchSolver) -> np.ndarray:
     """Finite eigenvalues of K relative to M on the kernel of C, where S = (K C; C^t 0), by dense linear algebra."""
     state, constraints = unknowns(f)
     Z = scipy.linalg.null_space(S[np.ix_(constraints, state)])

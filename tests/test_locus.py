@@ -24,9 +24,9 @@ from scipy.optimize import brentq
 
 from forms.energy import bending
 from rodfem.codim2.locus import Locus, locus
-from rodfem.continuation.branch import Branch, Special
-from rodfem.continuation.solvers import Equilibria
-from rodfem.continuation.step_control import Steps
+from rodfem.continuation.branch import Branch, SpecialPoint
+from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.step_control import StepControl
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
@@ -39,7 +39,7 @@ from rodfem.problem.scene import Ordinate, Parameter, Scene
 pytestmark = pytest.mark.alone
 
 PLANE = ((0.01, 0.9), (-3.1, 1.0))
-WIDE = Steps(first=0.05, largest=0.15)
+WIDE = StepControl(first=0.05, largest=0.15)
 
 
 @cache
@@ -178,7 +178,7 @@ def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None
     assert abs(found.values[-1, 0] - double(20.0, 120.0, 0.004)[0]) <= 10 * found.error[-1].max() <= 1e-9
 
 
-def swept(scene: Scene) -> tuple[Equilibria, Branch]:
+def swept(scene: Scene) -> tuple[StaticSolver, Branch]:
     """Frequencies over the range of a scene, and what computed them."""
     diagram = trace(scene, Discretization("pointwise", 4, 6), Plan(error_bars=False))
     return diagram.solvers[0], diagram[0]
@@ -281,6 +281,6 @@ def test_mistakes(parameter: str, bounds: tuple, message: str) -> None:
 
 
 def test_no_locus_of_an_end() -> None:
-    end: Special = specials(explored()[0], "end")[0]
+    end: SpecialPoint = specials(explored()[0], "end")[0]
     with pytest.raises(InputError, match="has no locus"):
         locus(follower(), end, "A", ((0.01, 0.96), (-3.1, 1.0)))

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from states import buckled, plain, scene
 from states import solver as solver_of
 
-from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
@@ -32,7 +32,7 @@ pytestmark = pytest.mark.short
 FINE = Discretization("reduced", 6, 6)
 
 
-def state(given: Scene, discretization: Discretization, load: float, steps: int = 1) -> tuple[Equilibria, PETSc.Vec]:
+def state(given: Scene, discretization: Discretization, load: float, steps: int = 1) -> tuple[StaticSolver, PETSc.Vec]:
     """Equilibrium that Newton's method finds from the scene's start, in ``steps`` of the load."""
     solver = Solver(given, discretization).equilibria
     x, outcome = solver.first(load / steps)
@@ -42,7 +42,7 @@ def state(given: Scene, discretization: Discretization, load: float, steps: int 
     return solver, x
 
 
-def modes_of(solver: Equilibria, x: PETSc.Vec, number: int, method: str = "auto", error_bars: bool = False) -> Modes:
+def modes_of(solver: StaticSolver, x: PETSc.Vec, number: int, method: str = "auto", error_bars: bool = False) -> Modes:
     return ModeFinder(solver, error_bars)(x, number, method)[1]
 
 

@@ -42,7 +42,7 @@ def named() -> set[tuple[str, str]]:
 
 
 def test_every_argument_exists_and_has_an_option() -> None:
-    assert {("Steps", "largest"), ("Plan", "depth"), ("Discretization", "elements"), ("run", "output")} <= named()
+    assert {("StepControl", "largest"), ("Plan", "depth"), ("Discretization", "elements"), ("run", "output")} <= named()
     for owner, name in named():
         assert name in inspect.signature(getattr(rodfem, owner)).parameters, (owner, name)
         assert ARGUMENT.fullmatch(str(Argument(owner, name))), (owner, name)
@@ -59,13 +59,13 @@ def test_no_other_module_knows_options() -> None:
 
 
 def test_words_of_python_and_of_the_command_line() -> None:
-    steps, depth = Argument("Steps", "largest"), Argument("Plan", "depth", 3)
+    steps, depth = Argument("StepControl", "largest"), Argument("Plan", "depth", 3)
     trouble = ConvergenceError("It did not", Remedy("try {} or {}", steps, depth))
     assert trouble.remedy is not None and trouble.remedy.arguments == (steps, depth)
-    assert str(trouble) == "It did not: try Steps(largest=...) or Plan(depth=3)."
+    assert str(trouble) == "It did not: try StepControl(largest=...) or Plan(depth=3)."
     assert parser().in_options(f"So ({trouble})") == "So (It did not: try --step or --depth 3.)"
     assert parser().in_options(str(POINTWISE)) == "use --formulation pointwise"
-    for unknown in ("use Event(name=...)", "use Steps(smallest=...)"):
+    for unknown in ("use Event(name=...)", "use StepControl(smallest=...)"):
         assert parser().in_options(unknown) == unknown
 
 

@@ -16,7 +16,7 @@ from rods import run_demo
 
 from rodfem import trace
 from rodfem.app.run import run
-from rodfem.continuation.step_control import Steps
+from rodfem.continuation.step_control import StepControl
 from rodfem.diagram.plan import Plan
 from rodfem.errors import InputError, SceneError
 from rodfem.fem.fields import Discretization, Fields
@@ -388,11 +388,11 @@ NAN = float("nan")
         (lambda: Discretization(elements=np.bool_(True)), "elements is .*True.*: give a whole"),  # type: ignore[arg-type]
         (lambda: Discretization(elements=1, vertices=("0", "1")), r"vertices\[0\] is '0': give a number"),  # type: ignore[arg-type]
         (lambda: Discretization(elements=1, vertices=1.0), "vertices is 1.0: give a tuple of numbers"),  # type: ignore[arg-type]
-        (lambda: Steps(largest="0.1"), "largest is '0.1': give a number, as in largest=0.05"),  # type: ignore[arg-type]
-        (lambda: Steps(most=10.5), "most is 10.5: give a whole number, as in most=2000"),  # type: ignore[arg-type]
-        (lambda: Steps(first=NAN), "first = nan lead nowhere"),
-        (lambda: Steps(aim=0.0), "aim = 0 lead nowhere"),
-        (lambda: Steps(most=0), "most is 0: a branch has at least one point"),
+        (lambda: StepControl(largest="0.1"), "largest is '0.1': give a number, as in largest=0.05"),  # type: ignore[arg-type]
+        (lambda: StepControl(most=10.5), "most is 10.5: give a whole number, as in most=2000"),  # type: ignore[arg-type]
+        (lambda: StepControl(first=NAN), "first = nan lead nowhere"),
+        (lambda: StepControl(aim=0.0), "aim = 0 lead nowhere"),
+        (lambda: StepControl(most=0), "most is 0: a branch has at least one point"),
         (lambda: Plan(1.0), "span is 1.0: give 2 numbers"),  # type: ignore[arg-type]
         (lambda: Plan((0.0, 1.0, 2.0)), "span is .*: give 2 numbers"),  # type: ignore[arg-type]
         (lambda: Plan(at=0.5), "at is 0.5: give a tuple of numbers"),  # type: ignore[arg-type]
@@ -403,7 +403,7 @@ NAN = float("nan")
         (lambda: Plan(accuracy="1e-8"), "accuracy is '1e-8': give a number"),  # type: ignore[arg-type]
         (lambda: Plan(locus=("A",)), "locus is .*: give a name and an interval"),  # type: ignore[arg-type]
         (lambda: Plan(locus=("A", 0, "b")), r"locus\[1:\]\[1\] is .b.: give a number"),  # type: ignore[arg-type]
-        (lambda: Plan(steps=0.1), r"steps is 0.1: give Steps"),  # type: ignore[arg-type]
+        (lambda: Plan(steps=0.1), r"steps is 0.1: give StepControl"),  # type: ignore[arg-type]
         (lambda: Plan(method=3), "method is 3: give the name"),  # type: ignore[arg-type]
     ],
 )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rods import DEFAULT, Constants, explored, specials
 
-from rodfem.continuation.branch import Special
+from rodfem.continuation.branch import SpecialPoint
 
 REFERENCE: dict[Constants, list[float]] = {
     DEFAULT: [0.114304214520030, 0.332039079723330],
@@ -22,7 +22,7 @@ REFERENCE: dict[Constants, list[float]] = {
 """Roots of the closed form in (0, 0.95), computed apart with 30 digits."""
 
 
-def buckling_points(formulation: str, elements: int, degree: int, constants: Constants = DEFAULT) -> list[Special]:
+def buckling_points(formulation: str, elements: int, degree: int, constants: Constants = DEFAULT) -> list[SpecialPoint]:
     straight = explored(formulation, elements, degree, constants, depth=0)[0]
     return specials(straight, "branch point")
 

@@ -31,7 +31,7 @@ def rotated(q: np.ndarray, a: np.ndarray, sign: float = 1.0) -> np.ndarray:
     return a + q[0] * t + np.cross(sign * q[1:], t, axis=0)
 
 
-Law = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+NormalForm = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Rod:
     first end) start the integration of a first guess at load ``at``; ``across(r)`` is the ordinate at ``place``.
     """
 
-    law: Law
+    law: NormalForm
     interval: tuple[float, float]
     force: Callable[[float, np.ndarray], list[float]]
     residual: Callable[[np.ndarray, np.ndarray, float], np.ndarray]
@@ -85,7 +85,7 @@ class Rod:
         return x, solve_ivp(slope, (a, b), start, t_eval=x, rtol=1e-8, atol=1e-10).y, p
 
 
-def diagonal(stiffness: tuple[float, float, float], k2: float = 0.0, stretching: float = np.inf) -> Law:
+def diagonal(stiffness: tuple[float, float, float], k2: float = 0.0, stretching: float = np.inf) -> NormalForm:
     """Uncoupled law with intrinsic curvature k2, and v = exp(n3/stretching)."""
     B, k0 = np.array(stiffness)[:, None], np.array([[0.0], [k2], [0.0]])
     return lambda m, n3: (m / B + k0, np.exp(n3 / stretching))

@@ -13,11 +13,11 @@ from math import isfinite, isnan
 
 import numpy as np
 
-from rodfem.adaptivity.error_estimate import Again, Richer
+from rodfem.adaptivity.error_estimate import Again, Enriched
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
-from rodfem.continuation.branch import Branch, Point, Special
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import Follower
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.tolerances import unit
@@ -58,41 +58,43 @@ class Watch:
         """The accuracy asked for, infinite without one."""
         return self.meshes.accuracy or np.inf
 
-    def row(self, point: Point, follower: Follower) -> None:
+    def row(self, point: Point, solver: BranchSolver) -> None:
         """Estimate the error of a point, by computation where need be; raises :class:`TooCoarse`."""
         if self.meshes.accuracy is None:
             return
         if self.accuracy < SHARP:
-            self._polish(point, follower)
-        indicator = self.meshes.gauge(follower.mesh)(point.x).indicator
+            self._polish(point, solver)
+        indicator = self.meshes.gauge(solver.mesh)(point.x).indicator
         last = self.checked
         if last is not None and last.since < SELDOM and not self._at_bound(point):
             point.estimate = last.error * max(1.0, indicator / last.indicator)
             if indicator < GROWN * last.indicator or point.estimate * SURE < self.accuracy:
                 last.since += 1
                 return
-        with follower.system.clock.purpose("error bars"):
+        with solver.system.clock.purpose("error bars"):
             point.estimate = self._computed(point)
         self.checked = Checked(max(indicator, 1e-30), point.estimate)
         if point.estimate * GROWN > self.accuracy and point.arclength > self.excused:
             raise TooCoarse(point, point.estimate)
 
-    def special(self, special: Special) -> None:
+    def special(self, special: SpecialPoint) -> None:
         """Estimate the errors of a special point; raises :class:`TooCoarse` where another mesh may help."""
         if self.meshes.accuracy is None:
             return
-        with self.meshes.followers[special.point.mesh].system.clock.purpose("error bars"):
+        with self.meshes.solvers[special.point.mesh].system.clock.purpose("error bars"):
             self.meshes.richer(special.point.mesh).estimate(special)
         self.judge(special)
 
-    def judge(self, special: Special) -> None:
+    def judge(self, special: SpecialPoint) -> None:
         """Raise :class:`TooCoarse` for a special point with too large an error, where another mesh may help."""
         error = self._error_of(special)
         located = special.located_to / unit(special.point.load)
         if error > self.accuracy > located and special.point.arclength > self.excused:
-            raise TooCoarse(special.point, error, special.null_vectors, 2.0 if special.zero_of == "stretch" else 1.0)
+            raise TooCoarse(
+                special.point, error, special.null_vectors, 2.0 if special.test_function == "stretch" else 1.0
+            )
 
-    def _error_of(self, special: Special) -> float:
+    def _error_of(self, special: SpecialPoint) -> float:
         """Estimated error of a special point; never within the accuracy where the mesh does not resolve its state."""
         error = self.meshes.error_of(special)
         return max(error, GROWN * self.accuracy) if special.resolved is False else error
@@ -102,7 +104,7 @@ class Watch:
         if self.meshes.accuracy is not None and point.arclength > self.excused:
             raise TooCoarse(point, float("inf"), why="the mesh breaks a symmetry")
 
-    def label(self, special: Special) -> None:
+    def label(self, special: SpecialPoint) -> None:
         """Say at a special point whether the accuracy was not reached, and why."""
         if self.meshes.accuracy is None:
             return
@@ -116,12 +118,12 @@ class Watch:
         """Say on which meshes a branch was traced, and the largest error of its points."""
         if self.meshes.accuracy is None:
             return
-        used = [self.meshes.followers[number].system for number in sorted({p.mesh for p in branch.points})]
+        used = [self.meshes.solvers[number].system for number in sorted({p.mesh for p in branch.points})]
         worst = max(p.estimate for p in branch.points if not isnan(p.estimate))
         observer.accuracy(used, worst, self.meshes.accuracy)
 
-    def another(self, trouble: TooCoarse, observer: Observer) -> Follower | None:
-        """Follower on a mesh for the state that was too coarse; None, which is reported, where no mesh helps there."""
+    def another(self, trouble: TooCoarse, observer: Observer) -> BranchSolver | None:
+        """Solver on a mesh for the state that was too coarse; None, which is reported, where no mesh helps there."""
         if abs(trouble.point.arclength - self.place) < NEAR:
             self.tries += 1
             helps = not isfinite(trouble.error) or trouble.error < 0.5 * self.error
@@ -129,25 +131,25 @@ class Watch:
             self.tries, helps = 0, True
         self.place, self.error = trouble.point.arclength, trouble.error
         self.checked = None
-        if not helps or self.tries >= TRIES or len(self.meshes.followers) >= MOST:
+        if not helps or self.tries >= TRIES or len(self.meshes.solvers) >= MOST:
             self.excused = trouble.point.arclength + NEAR
             why = "finer meshes do not lower the error" if not helps else f"{self.tries + 1} finer meshes did not do"
-            if len(self.meshes.followers) >= MOST:
+            if len(self.meshes.solvers) >= MOST:
                 why = f"{MOST} meshes are the most"
             observer.warn(f"The accuracy is not reached near load {trouble.point.load:.6g} ({trouble}): {why}.")
             return None
         return self.meshes.raised(trouble, self.tries)
 
-    def _polish(self, point: Point, follower: Follower) -> None:
+    def _polish(self, point: Point, solver: BranchSolver) -> None:
         """Solve a point once more where its last correction was not far below the accuracy."""
         if point.tangent is None or point.error < 0.01 * self.accuracy or point.error == 0.0:
             return
-        system = follower.system
-        row = follower.axis if self._at_bound(point) else follower.row(point.tangent)
+        system = solver.system
+        row = solver.axis if self._at_bound(point) else solver.row(point.tangent)
         system.set_phase(point.x)
         point.error = correct(system, point.x, row, reach=1e-3).error
-        point.load, point.ordinate = system.scalar(point.x), follower.shape.ordinate(point.x)
-        point.energy, point.stretch = follower.energy(point.x), follower.shape.stretch(point.x)
+        point.load, point.ordinate = system.scalar(point.x), solver.shape.ordinate(point.x)
+        point.energy, point.stretch = solver.energy(point.x), solver.shape.stretch(point.x)
 
     def _at_bound(self, point: Point) -> bool:
         return min(abs(point.load - bound) for bound in self.bounds) < 1e-9 * abs(self.bounds[1] - self.bounds[0])
@@ -155,16 +157,16 @@ class Watch:
     def _computed(self, point: Point) -> float:
         """Error of a point across its branch, or at its load on a bound; :class:`TooCoarse` where its index errs."""
         richer = self.meshes.richer(point.mesh)
-        richer.follower.damp(self.meshes.followers[point.mesh].system.damping > 0)
+        richer.solver.damp(self.meshes.solvers[point.mesh].system.damping > 0)
         try:
             again = richer.again(point, fixed_load=self._at_bound(point))
         except ConvergenceError:
             return float("inf")
         negative = self._index(point, richer, again)
         if negative != point.negative and point.arclength > self.excused:
-            follower = self.meshes.followers[point.mesh]
-            follower.system.set_phase(point.x)
-            found = follower.inertia.at(point.x)
+            solver = self.meshes.solvers[point.mesh]
+            solver.system.set_phase(point.x)
+            found = solver.inertia.at(point.x)
             found.count()
             modes = found.nearest(abs(negative - point.negative), accuracy=1e-2)[1]
             raise TooCoarse(
@@ -178,12 +180,12 @@ class Watch:
         return error if again.resolved else max(error, GROWN * self.accuracy)
 
     @staticmethod
-    def _index(point: Point, richer: Richer, again: Again) -> int:
+    def _index(point: Point, richer: Enriched, again: Again) -> int:
         """Index on the richer mesh; the point's own where eigenvalues that are zero on one of the two make up for it.
 
         One factorisation tells that it is the same; only where it does not a second tells zero eigenvalues from others.
         """
-        inertia, drifts = richer.follower.inertia, richer.system.active_drifts()
+        inertia, drifts = richer.solver.inertia, richer.system.active_drifts()
         found = inertia.at(again.x)
         below = found.below(-inertia.tolerance)
         if below < point.negative:

@@ -24,12 +24,12 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.grading import Gauge, weights_of
-from rodfem.continuation.branch import Law, Point, Special
+from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
+from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.locate import WINDOW, locate_event, refine
-from rodfem.continuation.normal_form import Origin, law_of, ordinate_along
-from rodfem.continuation.solvers import Follower
+from rodfem.continuation.normal_form import Origin, normal_form_of, ordinate_along
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.transfer import Transfer, richer_system
@@ -87,17 +87,17 @@ class Again:
         return load, bound(point.ordinate, self.ordinate, self.ordinate_left, self.rho)
 
 
-class Richer:
-    """A second, richer discretisation of the system of a follower, and its estimates."""
+class Enriched:
+    """A second, richer discretisation of the system of a solver, and its estimates."""
 
-    def __init__(self, follower: Follower) -> None:
+    def __init__(self, solver: BranchSolver) -> None:
         """Compile and allocate the richer system."""
-        self.coarse, self.system = follower, richer_system(follower.system)
-        self.follower = Follower(self.system)
-        self.transfer = Transfer(follower.system, self.system)
-        self._origins: list[tuple[Special, Origin, float]] = []
+        self.coarse, self.system = solver, richer_system(solver.system)
+        self.solver = BranchSolver(self.system)
+        self.transfer = Transfer(solver.system, self.system)
+        self._origins: list[tuple[SpecialPoint, Origin, float]] = []
         weights = weights_of(self.system.scene)
-        self._gauges = Gauge(follower, weights), Gauge(self.follower, weights)
+        self._gauges = SmoothnessIndicator(solver, weights), SmoothnessIndicator(self.solver, weights)
 
     def rho(self, before: Sequence[PETSc.Vec], after: Sequence[PETSc.Vec]) -> float:
         """Ratio of the errors of a state (and its null vector) on the richer discretisation and on the first."""
@@ -107,13 +107,13 @@ class Richer:
             return halved(degree)
         return max(halved(degree), min(AMPLE * last / max(first, RESOLVED), MOST))
 
-    def estimate(self, special: Special) -> None:
+    def estimate(self, special: SpecialPoint) -> None:
         """Set ``error_estimate`` and ``ordinate_error`` of a special point, bounds of its errors in load and ordinate.
 
         They are infinite where the richer discretisation does not find the point, and no bounds where the point is not
         ``resolved``, which is set, too.
         """
-        if special.zero_of == "stretch":
+        if special.test_function == "stretch":
             return  # it has its own estimate: see :mod:`rodfem.adaptivity.zero_stretch`
         point, at_a_load = special.point, not special.kind.solved
         self.system.damping = self.coarse.system.damping
@@ -139,32 +139,32 @@ class Richer:
         """
         system, x = self.system, self.transfer(point.x, state=True)
         first = x.copy()
-        row = self.follower.axis
+        row = self.solver.axis
         if not fixed_load and point.tangent is not None:
-            row = self.follower.row(self.transfer(point.tangent, state=False))
+            row = self.solver.row(self.transfer(point.tangent, state=False))
         system.set_phase(x)
         if not correct(system, x, row, reach=1.0).converged:
             raise ConvergenceError(
                 f"the richer discretisation has no equilibrium near load {point.load:.8g}: use more elements"
             )
-        load, ordinate = system.scalar(x), self.follower.shape.ordinate(x)
+        load, ordinate = system.scalar(x), self.solver.shape.ordinate(x)
         equations, step = system.new_vector(), system.new_vector()
         system.at(x).residual(equations)
         system.solve(equations, step)
         x.axpy(-1.0, step)
-        last = system.scalar(x), self.follower.shape.ordinate(x)
+        last = system.scalar(x), self.solver.shape.ordinate(x)
         moved = np.abs(np.subtract(last, (load, ordinate)))
         left = STEADY * moved + ROUND_OFF * np.maximum(1.0, np.abs(last))
         changed = self._gauges[1].changed(first, x, state=True)
         return Again(x, *last, float(left[0]), float(left[1]), self.rho([point.x], [x]), changed)
 
-    def law(self, special: Special, direction: PETSc.Vec, law: Law) -> None:
+    def law(self, special: SpecialPoint, direction: PETSc.Vec, law: NormalForm) -> None:
         """Set the uncertainty of a law of the first discretisation: that of the rod's law, infinite without another."""
         self.system.damping = self.coarse.system.damping
         way, again, rho = self.transfer(direction, state=False), None, 0.0
         for known, origin, left in self._origins:
             if known is special:
-                again, rho = law_of(self.follower, origin, way), left
+                again, rho = normal_form_of(self.solver, origin, way), left
         if again is None or (again.kind, again.power) != (law.kind, law.power):
             law.uncertainty = float("inf")
         else:
@@ -180,9 +180,9 @@ class Richer:
             y.axpy(s, tangent)
             return y, tangent
 
-        _, found, along = locate_event(self.follower, event, curve, -WINDOW, WINDOW)
-        load, ordinate = self.system.scalar(found), self.follower.shape.ordinate(found)
-        slope = abs(ordinate_along(self.follower, found, tangent))
+        _, found, along = locate_event(self.solver, event, curve, -WINDOW, WINDOW)
+        load, ordinate = self.system.scalar(found), self.solver.shape.ordinate(found)
+        slope = abs(ordinate_along(self.solver, found, tangent))
         left = (
             abs(point.slope) * along + round_off(load),
             slope * along + round_off(ordinate),
@@ -190,9 +190,9 @@ class Richer:
         changed = self._gauges[1].changed(x, found, state=True)
         return Again(found, load, ordinate, *left, self.rho([point.x], [found]), changed)
 
-    def _located(self, special: Special) -> Again:
+    def _located(self, special: SpecialPoint) -> Again:
         """The fold or branch point on the richer discretisation, and its ordinate."""
-        follower, point = self.follower, special.point
+        solver, point = self.solver, special.point
         if point.tangent is None:
             raise ConvergenceError("the branch has no tangent there")
         x = self.transfer(point.x, state=True)
@@ -206,15 +206,15 @@ class Richer:
             return y, tangent
 
         # few nodes tell where an eigenvalue crosses zero better than where the load has its extremum
-        zero_of = "mu" if special.kind == FOLD else special.zero_of
+        test_function = "mu" if special.kind == FOLD else special.test_function
         try:
-            found = refine(follower, curve, 0.0, NARROW * WINDOW, mode, zero_of, beside=point.load)
+            found = refine(solver, curve, 0.0, NARROW * WINDOW, mode, test_function, beside=point.load)
         except ConvergenceError:  # it lies farther away
-            found = refine(follower, curve, 0.0, WINDOW, mode, zero_of, beside=point.load)
-        ordinate = follower.shape.ordinate(found.x)
-        slope = ordinate_along(follower, found.x, found.tangent)
+            found = refine(solver, curve, 0.0, WINDOW, mode, test_function, beside=point.load)
+        ordinate = solver.shape.ordinate(found.x)
+        slope = ordinate_along(solver, found.x, found.tangent)
         left = abs(slope) * found.along + round_off(ordinate)
-        sharp, gauge = follower.inertia.held.sharpened(mode), self._gauges[1]  # by the factors of a state nearby
+        sharp, gauge = solver.inertia.held.sharpened(mode), self._gauges[1]  # by the factors of a state nearby
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(gauge.changed(x, found.x, state=True), gauge.changed(mode, sharp, state=False))
         self._origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))

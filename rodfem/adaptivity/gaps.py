@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rodfem.adaptivity.mesh_sequence import Meshes
-from rodfem.continuation.branch import Point, Special
-from rodfem.continuation.solvers import Follower
+from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.continuation.unfolding import Unfolded, unfold
 from rodfem.fem.newton import correct
 
@@ -28,7 +28,7 @@ DIFFERS = 0.5
 class Gap(Exception):
     """A step of continuation has jumped from one branch to another, across the gap at this special point."""
 
-    def __init__(self, special: Special, unfolded: Unfolded) -> None:
+    def __init__(self, special: SpecialPoint, unfolded: Unfolded) -> None:
         """Keep what was found."""
         super().__init__(f"imperfect, unfolding {unfolded.size:.0e}")
         self.special, self.unfolded = special, unfolded
@@ -43,51 +43,51 @@ class Gaps:
         self.meshes = meshes
         self.known: list[Gap] = []
 
-    def examine(self, follower: Follower, special: Special) -> Gap | None:
+    def examine(self, solver: BranchSolver, special: SpecialPoint) -> Gap | None:
         """Solve for a branch point with unfolding parameters, and record their size; the gap, if it is taken apart.
 
         The load and the state of a branch point are then those that solve its equations.
         """
-        found = unfold(follower, special)
+        found = unfold(solver, special)
         if found is None:
             return None
         special.unfolding = found.size
         if found.size <= found.noise:
-            sharpen(follower, special, found)
+            sharpen(solver, special, found)
             return None
         return None if self._of_the_mesh(special, found) else Gap(special, found)
 
-    def _of_the_mesh(self, special: Special, found: Unfolded) -> bool:
+    def _of_the_mesh(self, special: SpecialPoint, found: Unfolded) -> bool:
         """Whether the mesh takes the branch point apart, not the rod: a mesh need not have a symmetry of the scene."""
         richer = self.meshes.richer(special.point.mesh)
         point = replace(special.point, x=richer.transfer(found.x, state=True))
         modes = [richer.transfer(v, state=False) for v in special.null_vectors]
         for mode in modes:
             mode.scale(1.0 / richer.system.norm(mode))
-        again = unfold(richer.follower, replace(special, point=point, null_vectors=modes))
+        again = unfold(richer.solver, replace(special, point=point, null_vectors=modes))
         return again is not None and again.size < DIFFERS * found.size + again.noise
 
-    def open(self, gap: Gap, follower: Follower) -> bool:
+    def open(self, gap: Gap, solver: BranchSolver) -> bool:
         """Add a gap; False where it is known already, so that smaller steps have not resolved it."""
         for known in self.known:
-            apart = self.meshes.here(known.point, follower).x.copy()
+            apart = self.meshes.here(known.point, solver).x.copy()
             apart.axpy(-1.0, gap.point.x)
-            if follower.system.norm(apart) < LEAST:
+            if solver.system.norm(apart) < LEAST:
                 return False
         self.known.append(gap)
         return True
 
-    def reach(self, follower: Follower, point: Point) -> float:
+    def reach(self, solver: BranchSolver, point: Point) -> float:
         """Largest step from a point: in proportion to the distance from the nearest gap."""
         least = float("inf")
         for gap in self.known:
-            apart = self.meshes.here(gap.point, follower).x.copy()
+            apart = self.meshes.here(gap.point, solver).x.copy()
             apart.axpy(-1.0, point.x)
-            least = min(least, follower.system.norm(apart))
+            least = min(least, solver.system.norm(apart))
         return max(SHARE * least, LEAST)
 
 
-def sharpen(follower: Follower, special: Special, found: Unfolded) -> None:
+def sharpen(solver: BranchSolver, special: SpecialPoint, found: Unfolded) -> None:
     """Give a branch point the state and the load that solve its equations, where they are those that were located."""
     if abs(found.load - special.point.load) > 10 * special.located_to:
         return
@@ -95,22 +95,22 @@ def sharpen(follower: Follower, special: Special, found: Unfolded) -> None:
         special.point,
         x=found.x,
         load=found.load,
-        ordinate=follower.shape.ordinate(found.x),
-        energy=follower.energy(found.x),
-        stretch=follower.shape.stretch(found.x),
+        ordinate=solver.shape.ordinate(found.x),
+        energy=solver.energy(found.x),
+        stretch=solver.shape.stretch(found.x),
     )
 
 
-def arms(follower: Follower, gap: Gap) -> list[Point]:
+def arms(solver: BranchSolver, gap: Gap) -> list[Point]:
     """Equilibria on the branches that would cross at a gap, a little away from it: up to four."""
-    system, out = follower.system, []
+    system, out = solver.system, []
     for direction in gap.unfolded.directions:
-        row = follower.row(direction)
+        row = solver.row(direction)
         for sign in (1.0, -1.0):
             x = gap.unfolded.x.copy()
             x.axpy(sign * ARM, direction)
             system.set_phase(x)
             outcome = correct(system, x, row, reach=ARM)
             if outcome.converged:
-                out.append(follower.point(x, 0.0, follower.tangent(row, at=x), outcome))
+                out.append(solver.point(x, 0.0, solver.tangent(row, at=x), outcome))
     return out

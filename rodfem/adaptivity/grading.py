@@ -19,7 +19,7 @@ from numpy.polynomial import legendre
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.fem.fields import Discretization, Fields, turning_of
 from rodfem.problem.scene import Scene
 
@@ -72,10 +72,10 @@ class Smoothness:
         return True
 
 
-class Gauge:
+class SmoothnessIndicator:
     """Measures how smooth the states of one discretisation are; collective."""
 
-    def __init__(self, solver: Equilibria, weights: list[tuple[str, np.ndarray]]) -> None:
+    def __init__(self, solver: StaticSolver, weights: list[tuple[str, np.ndarray]]) -> None:
         """Tabulate the transformation from nodal values to Legendre coefficients; ``weights`` by :func:`weights_of`."""
         self.solver, self.weights = solver, weights
         fields = solver.system.fields
@@ -188,7 +188,7 @@ def cost(fields: Fields, elements: int, degree: int) -> float:
     return FIXED + unknowns * (1 + PER_DEGREE * degree)
 
 
-def cheapest(solver: Equilibria, found: Smoothness, indicator: float) -> Discretization:
+def cheapest(solver: StaticSolver, found: Smoothness, indicator: float) -> Discretization:
     """Cheapest discretisation with which the indicator of a state falls to that value: degree, number, vertices."""
     fields = solver.system.fields
     present = fields.discretization

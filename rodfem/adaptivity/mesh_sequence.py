@@ -13,10 +13,10 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import Richer
-from rodfem.adaptivity.grading import Gauge, cheapest, cost, first_mesh, weights_of
-from rodfem.continuation.branch import Point, Special
-from rodfem.continuation.solvers import Follower
+from rodfem.adaptivity.error_estimate import Enriched
+from rodfem.adaptivity.grading import SmoothnessIndicator, cheapest, cost, first_mesh, weights_of
+from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.newton import correct
@@ -74,40 +74,40 @@ class TooCoarse(Exception):
 
 
 class Meshes:
-    """The followers of one run, by the number of their mesh, and their richer companions."""
+    """The solvers of one run, by the number of their mesh, and their richer companions."""
 
-    def __init__(self, follower: Follower, accuracy: float | None) -> None:
+    def __init__(self, solver: BranchSolver, accuracy: float | None) -> None:
         """Begin with one mesh; None as accuracy: no other is made."""
-        self.followers = [follower]
-        self.accuracy = None if accuracy is None else internal_accuracy(follower.system.scene, accuracy)
-        self._richer: dict[int, Richer] = {}
-        self._gauges: dict[int, Gauge] = {}
+        self.solvers = [solver]
+        self.accuracy = None if accuracy is None else internal_accuracy(solver.system.scene, accuracy)
+        self._richer: dict[int, Enriched] = {}
+        self._gauges: dict[int, SmoothnessIndicator] = {}
         if accuracy is not None:
-            self._weights = weights_of(follower.system.scene)
+            self._weights = weights_of(solver.system.scene)
 
-    def gauge(self, number: int) -> Gauge:
+    def gauge(self, number: int) -> SmoothnessIndicator:
         """Gauge of the smoothness of states on a mesh."""
         if number not in self._gauges:
-            self._gauges[number] = Gauge(self.followers[number], self._weights)
+            self._gauges[number] = SmoothnessIndicator(self.solvers[number], self._weights)
         return self._gauges[number]
 
-    def richer(self, number: int) -> Richer:
+    def richer(self, number: int) -> Enriched:
         """Companion of a mesh, on halves of its elements one degree richer, made when it is first asked for."""
         if number not in self._richer:
-            self._richer[number] = Richer(self.followers[number])
+            self._richer[number] = Enriched(self.solvers[number])
         return self._richer[number]
 
-    def error_of(self, special: Special) -> float:
+    def error_of(self, special: SpecialPoint) -> float:
         """Estimated error of a special point in load and ordinate, relative to those that exceed one."""
         error = special.ordinate_error / unit(special.point.ordinate)
-        if special.kind.singular or special.zero_of == "stretch":
+        if special.kind.singular or special.test_function == "stretch":
             error = max(error, special.error_estimate / unit(special.point.load))
         return error
 
-    def raised(self, trouble: TooCoarse, tries: int) -> Follower:
-        """Follower on the cheapest mesh for the state that was too coarse: one that there is, or a new one."""
+    def raised(self, trouble: TooCoarse, tries: int) -> BranchSolver:
+        """Solver on the cheapest mesh for the state that was too coarse: one that there is, or a new one."""
         assert self.accuracy is not None
-        old = self.followers[trouble.point.mesh]
+        old = self.solvers[trouble.point.mesh]
         error = trouble.error if isfinite(trouble.error) else 1e3 * self.accuracy
         found = self.gauge(old.mesh)(trouble.point.x, trouble.directions)
         gain = self.accuracy / (error * MARGIN * FURTHER**tries)
@@ -115,7 +115,7 @@ class Meshes:
         mesh = cheapest(old, found, indicator)
         fields = old.system.fields
         affordable = 1.2 * cost(fields, mesh.elements, mesh.degree)
-        for known in self.followers:
+        for known in self.solvers:
             d = known.system.fields.discretization
             vertices = self.vertices(known.mesh)
             if known is not old and cost(fields, d.elements, d.degree) <= affordable:
@@ -123,22 +123,22 @@ class Meshes:
                     return known
         s = old.system
         with s.clock("setup"):
-            new = Follower(System(s.scene, mesh, s.comm, s.clock, symmetries=s.symmetries), old.modes)
-        new.mesh = len(self.followers)
-        self.followers.append(new)
+            new = BranchSolver(System(s.scene, mesh, s.comm, s.clock, symmetries=s.symmetries), old.modes)
+        new.mesh = len(self.solvers)
+        self.solvers.append(new)
         return new
 
     def vertices(self, number: int) -> np.ndarray:
         """Arclengths at which the elements of a mesh meet, (E + 1,)."""
-        return self.followers[number].system.fields.all_vertices()
+        return self.solvers[number].system.fields.all_vertices()
 
     # --- points on another mesh --------------------------------------------------------------------------------
 
-    def state(self, x: PETSc.Vec, source: int, target: Follower) -> PETSc.Vec:
+    def state(self, x: PETSc.Vec, source: int, target: BranchSolver) -> PETSc.Vec:
         """State of one mesh interpolated on another."""
-        return target.shape.restore(self.followers[source].shape.sample(x))
+        return target.shape.restore(self.solvers[source].shape.sample(x))
 
-    def direction(self, d: PETSc.Vec, x: PETSc.Vec, source: int, target: Follower) -> PETSc.Vec:
+    def direction(self, d: PETSc.Vec, x: PETSc.Vec, source: int, target: BranchSolver) -> PETSc.Vec:
         """Change of the state ``x`` of one mesh interpolated on another: the difference of two states."""
         moved = x.copy()
         moved.axpy(1.0, d)
@@ -146,7 +146,7 @@ class Meshes:
         out.axpy(-1.0, self.state(x, source, target))
         return out
 
-    def here(self, point: Point, target: Follower) -> Point:
+    def here(self, point: Point, target: BranchSolver) -> Point:
         """Point with its state and tangent interpolated, not solved, on another mesh; itself if it is on that."""
         if point.mesh == target.mesh:
             return point
@@ -154,7 +154,7 @@ class Meshes:
         tangent = None if point.tangent is None else self.direction(point.tangent, point.x, point.mesh, target)
         return replace(point, x=x, tangent=tangent, mesh=target.mesh)
 
-    def carried(self, point: Point, target: Follower, fixed_load: bool) -> Point | None:
+    def carried(self, point: Point, target: BranchSolver, fixed_load: bool) -> Point | None:
         """Point solved on another mesh, on the plane across its tangent or at its load; None where that fails."""
         guess = self.here(point, target)
         if guess.tangent is None:
@@ -170,7 +170,9 @@ class Meshes:
         side = target.row(guess.tangent)
         return target.point(x, point.arclength, target.tangent(side, at=x), outcome)
 
-    def carry(self, history: Sequence[Point], target: Follower, from_branch_point: bool) -> list[tuple[Point, Point]]:
+    def carry(
+        self, history: Sequence[Point], target: BranchSolver, from_branch_point: bool
+    ) -> list[tuple[Point, Point]]:
         """Last points of a branch solved on another mesh: pairs of old and new, in order.
 
         Points whose index is another there are left out, so that an eigenvalue that passes zero is met again.  The

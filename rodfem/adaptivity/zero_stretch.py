@@ -9,31 +9,31 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.continuation.branch import Point, Special
+from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import END
-from rodfem.continuation.solvers import Equilibria, Follower
+from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import HIGHEST
 from rodfem.fem.system import System
 from rodfem.tolerances import unit
 
 
-def zero_stretch(follower: Follower, coarse: Point) -> Special:
+def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
     """Sharpen the point at which the smallest stretch vanishes; raises :class:`ConvergenceError` where that fails.
 
     A strain converges like ``h^k`` only, far slower than a load does.  The point is computed on meshes two and
-    four times as fine, one degree richer (the forms of :class:`Richer` serve); the finer one is kept.  Its error is a
+    four times as fine, one degree richer (the forms of :class:`Enriched` serve); the finer one is kept.  Its error is a
     quarter of their difference at most, all of it for linear elements.
     """
-    system, d = follower.system, follower.system.fields.discretization
-    sample = follower.shape.sample(coarse.x)
+    system, d = solver.system, solver.system.fields.discretization
+    sample = solver.shape.sample(coarse.x)
     found: list[tuple[float, float, float, float]] = []
     for factor in (2, 4):
         mesh = d.finer(factor, richer=int(d.degree < HIGHEST))
-        fine = Equilibria(System(system.scene, mesh, system.comm, system.clock, symmetries=system.symmetries))
+        fine = StaticSolver(System(system.scene, mesh, system.comm, system.clock, symmetries=system.symmetries))
         state = fine.shape.restore(sample)
 
-        def stretch(load: float, fine: Equilibria = fine, guess: PETSc.Vec = state) -> float:
+        def stretch(load: float, fine: StaticSolver = fine, guess: PETSc.Vec = state) -> float:
             fine.system.set_phase(guess)
             x, outcome = fine.at_load(guess, load, reach=1.0)
             if not outcome.converged:
@@ -46,9 +46,9 @@ def zero_stretch(follower: Follower, coarse: Point) -> Special:
         found.append((load, fine.shape.ordinate(state), fine.energy(state), last))
         sample = fine.shape.sample(state)
     (load2, ordinate2, *_), (load, ordinate, energy, last) = found
-    x = follower.shape.restore(sample)
+    x = solver.shape.restore(sample)
     point = replace(coarse, x=x, load=load, ordinate=ordinate, energy=energy, stretch=last)
-    special = Special(END, point, point.negative, point.negative, 1e-10 * unit(load), zero_of="stretch")
+    special = SpecialPoint(END, point, point.negative, point.negative, 1e-10 * unit(load), test_function="stretch")
     left = 1.0 if d.degree == 1 else 0.25
     special.error_estimate = max(left * abs(load - load2), special.located_to)
     special.ordinate_error = max(left * abs(ordinate - ordinate2), special.located_to)

@@ -10,7 +10,7 @@ from pathlib import Path
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import USER
-from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.system import System
@@ -26,7 +26,7 @@ def check_method(system: System, plan: Plan) -> None:
 
 
 def judge_users(
-    branches: list[Branch], solvers: Sequence[Equilibria], plan: Plan, output: Path, report: Report, figures: bool
+    branches: list[Branch], solvers: Sequence[StaticSolver], plan: Plan, output: Path, report: Report, figures: bool
 ) -> None:
     """Judge the states at the loads of the plan; save and draw their modes, if they are wanted.
 

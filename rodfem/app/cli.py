@@ -34,7 +34,7 @@ def check_installation() -> None:
 check_installation()
 
 
-ARGUMENT = re.compile(r"\b(?:Discretization|Plan|Steps|run)\((\w+)=([^()]*)\)")
+ARGUMENT = re.compile(r"\b(?:Discretization|Plan|StepControl|run)\((\w+)=([^()]*)\)")
 """An :class:`~rodfem.errors.Argument` in a sentence: its name and its value."""
 
 
@@ -180,7 +180,7 @@ def main(
 
     try:
         from rodfem.app.run import run
-        from rodfem.continuation.step_control import Steps
+        from rodfem.continuation.step_control import StepControl
         from rodfem.diagram.plan import Plan
         from rodfem.fem.fields import Discretization
 
@@ -195,7 +195,7 @@ def main(
         discretization = Discretization(options.formulation, options.elements, options.degree)
         scene = scene_of(options)
         span = tuple(options.span)
-        steps = Steps(largest=options.largest)
+        steps = StepControl(largest=options.largest)
         at = tuple(options.at)
         plan = Plan(
             span,

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from rodfem import compat
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
-from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
@@ -121,7 +121,7 @@ class Terminal(Report):
 
 
 def _loci(
-    branches: list[Branch], solvers: Sequence[Equilibria], plan: Plan, output: Path, report: Report, figures: bool
+    branches: list[Branch], solvers: Sequence[StaticSolver], plan: Plan, output: Path, report: Report, figures: bool
 ) -> None:
     """Follow all special points in the plane of two parameters; each into a file of its own, all into one picture.
 
@@ -139,7 +139,7 @@ def _loci(
     for branch in branches:
         known: list[Locus] = []
         for special in branch.special:
-            if not (special.kind.counted or special.kind.line) or special.meets is not None:
+            if not (special.kind.counted or special.kind.line) or special.connects_to is not None:
                 continue
             if any(found.passes(special) for found in known):
                 report.say(f"\nThe {special.kind} of {branch.name} at {special.point.load:.8g} is on a locus above")

@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from forms.kinematics import RODS
-from rodfem.continuation.branch import Branch, Law, Point, Special, not_followed
+from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint, not_followed
 from rodfem.continuation.kinds import END, FLUTTER
 from rodfem.continuation.observer import Observer
 from rodfem.errors import Argument
@@ -28,7 +28,7 @@ INDEX, UNSTABLE = "index", "unstable"
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
 
 
-def _law(law: Law, resolved: bool | None) -> str:
+def _law(law: NormalForm, resolved: bool | None) -> str:
     """Local law of a branch point, whose state the mesh has ``resolved`` or not, in words."""
     if law.side == 0:
         return f"{law.kind}: a family of equilibria at one and the same load"
@@ -149,20 +149,20 @@ class Report(Observer):
                 end="",
             )
 
-    def special(self, branch: Branch, special: Special) -> None:
+    def special(self, branch: Branch, special: SpecialPoint) -> None:
         """Print a special point as it is found, as AUTO does."""
         self.say("  " + self._line(special))
 
-    def _line(self, special: Special) -> str:
+    def _line(self, special: SpecialPoint) -> str:
         p = special.point
-        meets = f"  meets {special.meets[0]}" if special.meets else ""
+        connects_to = f"  meets {special.connects_to[0]}" if special.connects_to else ""
         return (
             f"{special.kind.code}   {round(p.load, 10) + 0.0:<14.10f} {round(p.ordinate, 9) + 0.0:<14.9f} "
             f"{p.energy:<10.6f} "
-            f"{index_in_words(special):>{max(6, len(self.count))}} {p.zero:>5}  {special.located_to:.0e}{meets}"
+            f"{index_in_words(special):>{max(6, len(self.count))}} {p.zero:>5}  {special.located_to:.0e}{connects_to}"
         )
 
-    def law(self, special: Special) -> None:
+    def law(self, special: SpecialPoint) -> None:
         """Print the local law of a branch point, if it has one."""
         if special.law is not None:
             law = _law(special.law, special.resolved)
@@ -181,7 +181,7 @@ class Report(Observer):
         self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
         for branch in branches:
             for s in branch.special:
-                exact = s.kind.given and s.zero_of != "stretch"
+                exact = s.kind.given and s.test_function != "stretch"
                 load = f"{s.point.load:.10g}" if exact else number(s.point.load, s.error_estimate, s.resolved)
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
                 ordinate = number(s.point.ordinate, s.ordinate_error, s.resolved)

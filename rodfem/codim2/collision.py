@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.parameter_plane import Node, Plane
-from rodfem.continuation.solvers import Equilibria
+from rodfem.codim2.parameter_plane import LocusPoint, Plane
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure
 from rodfem.stability.nonsymmetric import Vibration
@@ -31,7 +31,7 @@ DIFFERENCE = 1e-3
 class Collision:
     """Corrects points of the plane to where two eigenvalues near ``omega2`` collide."""
 
-    def __init__(self, solver: Equilibria, plane: Plane) -> None:
+    def __init__(self, solver: StaticSolver, plane: Plane) -> None:
         """Allocate the pencil."""
         self.solver, self.plane = solver, plane
         self.vibration = Vibration(solver.system)
@@ -41,8 +41,13 @@ class Collision:
         return float(np.linalg.norm(dp / self.plane.width))
 
     def correct(
-        self, p: np.ndarray, x: PETSc.Vec, tangent: tuple[np.ndarray, PETSc.Vec | None], near: Node, reach: float = 1.0
-    ) -> Node:
+        self,
+        p: np.ndarray,
+        x: PETSc.Vec,
+        tangent: tuple[np.ndarray, PETSc.Vec | None],
+        near: LocusPoint,
+        reach: float = 1.0,
+    ) -> LocusPoint:
         """Point of the curve on the line through ``p`` across ``tangent``; raises :class:`ConvergenceError`.
 
         ``near`` is a point of the curve whose double eigenvalue and invariant subspace (``modes``) are close by.
@@ -70,7 +75,7 @@ class Collision:
         located = np.maximum(last * abs(across) * width, ROUND_OFF * np.maximum(1.0, abs(p)))
         ordinate = self.solver.shape.ordinate(x)
         still, modes = system.new_vector(), as_vectors(system, clearest.cluster.basis)
-        return Node(p, x, dq * width, still, located, ordinate=ordinate, omega2=omega2, modes=modes)
+        return LocusPoint(p, x, dq * width, still, located, ordinate=ordinate, omega2=omega2, modes=modes)
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> tuple[float, float, Measured, PETSc.Vec]:
         """Zero of ``D`` on the system's line of parameters, by secants: t, its last change, the cluster, state.

@@ -10,9 +10,9 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.codim2.parameter_plane import Node, Plane, between, predict
+from rodfem.codim2.parameter_plane import LocusPoint, Plane, between, predict
 from rodfem.codim2.singular import Destroyed
-from rodfem.continuation.step_control import Steps
+from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 
 LOCATED = 1e-8
@@ -26,8 +26,13 @@ class Criterion(Protocol):
         """Size of a step."""
 
     def correct(
-        self, p: np.ndarray, x: PETSc.Vec, tangent: tuple[np.ndarray, PETSc.Vec | None], near: Node, reach: float = 1.0
-    ) -> Node:
+        self,
+        p: np.ndarray,
+        x: PETSc.Vec,
+        tangent: tuple[np.ndarray, PETSc.Vec | None],
+        near: LocusPoint,
+        reach: float = 1.0,
+    ) -> LocusPoint:
         """Point of the locus on the plane through ``(p, x)`` across ``tangent``."""
 
 
@@ -35,7 +40,7 @@ class Criterion(Protocol):
 class Half:
     """One direction of a curve: nodes, marked ones by number, why it ended."""
 
-    nodes: list[Node]
+    nodes: list[LocusPoint]
     marks: dict[int, str] = field(default_factory=dict)
     ended: str = ""
 
@@ -43,11 +48,11 @@ class Half:
 class Tracer:
     """Follows a curve from a node in the direction of its tangent."""
 
-    def __init__(self, criterion: Criterion, plane: Plane, steps: Steps) -> None:
+    def __init__(self, criterion: Criterion, plane: Plane, steps: StepControl) -> None:
         """Steps are relative to the bounds of the plane."""
         self.criterion, self.plane, self.steps = criterion, plane, steps
 
-    def run(self, start: Node) -> Half:
+    def run(self, start: LocusPoint) -> Half:
         """Follow to an end."""
         half, history, step = Half([start]), [start], self.steps.first
         ahead = start.p + 1e-9 * start.dp
@@ -85,7 +90,7 @@ class Tracer:
         half.ended = f"{self.steps.most} points reached"
         return half
 
-    def _next(self, history: list[Node], step: float) -> tuple[Node, float, str]:
+    def _next(self, history: list[LocusPoint], step: float) -> tuple[LocusPoint, float, str]:
         """Next node, how far it is from its prediction, and the bound that it is on; ConvergenceError to retry."""
         last = history[-1]
         p, x, dp, dx = predict(history, last.s + step)
@@ -117,13 +122,13 @@ class Tracer:
     def _bound(self, which: int, bound: float) -> str:
         return f"{self.plane.names[which]} = {bound:g}, its bound"
 
-    def _after(self, last: Node, node: Node) -> Node:
+    def _after(self, last: LocusPoint, node: LocusPoint) -> LocusPoint:
         change = node.x.copy()
         change.axpy(-1.0, last.x)
         node.s = last.s + self.criterion.length(node.p - last.p, change)
         return node
 
-    def _cosine(self, node: Node, dp: np.ndarray, dx: PETSc.Vec) -> float:
+    def _cosine(self, node: LocusPoint, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Cosine between a node's tangent and a direction."""
         plus, minus = node.dx.copy(), node.dx.copy()
         size = self.criterion.length(dp, dx)
@@ -132,14 +137,14 @@ class Tracer:
         a, b = (self.criterion.length(node.dp + s * dp / size, v) for s, v in ((1, plus), (-1, minus)))
         return (a * a - b * b) / 4
 
-    def _between(self, half: Half, a: Node, b: Node) -> str:
+    def _between(self, half: Half, a: LocusPoint, b: LocusPoint) -> str:
         """Insert what lies between two nodes; a reason if the curve ends there."""
         names = self.plane.names
         if a.coupling @ b.coupling < 0:
             return self._last(half, a, b, lambda n: float(n.coupling @ a.coupling), "the fold ends on a branch point")
         if a.omega2 * b.omega2 < 0:
             return self._last(half, a, b, lambda n: n.omega2, "the double eigenvalue vanishes: divergence")
-        found: list[tuple[Node, str]] = []
+        found: list[tuple[LocusPoint, str]] = []
         if a.curvature * b.curvature < 0:
             found = self._located(a, b, lambda n: n.curvature, "cusp")
         else:
@@ -152,10 +157,12 @@ class Tracer:
             half.marks[len(half.nodes)] = "another eigenvalue has vanished since the row before, seen from the start"
         return ""
 
-    def _located(self, a: Node, b: Node, f: Callable[[Node], float], kind: str) -> list[tuple[Node, str]]:
-        """Node between two others at which ``f`` vanishes; none where it cannot be located."""
+    def _located(
+        self, a: LocusPoint, b: LocusPoint, f: Callable[[LocusPoint], float], kind: str
+    ) -> list[tuple[LocusPoint, str]]:
+        """Point between two others at which ``f`` vanishes; none where it cannot be located."""
 
-        def at(s: float) -> Node:
+        def at(s: float) -> LocusPoint:
             p, x, dp, dx = between(a, b, s)
             return self.criterion.correct(p, x, (dp, dx), a)
 
@@ -167,11 +174,11 @@ class Tracer:
         node.s = s
         return [(node, kind)]
 
-    def crossed(self, a: Node, b: Node, which: int, value: float) -> list[Node]:
-        """Node between two neighbours at which a parameter has a value; none where it cannot be located."""
+    def crossed(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
+        """Point between two neighbours at which a parameter has a value; none where it cannot be located."""
         return [node for node, _ in self._located(a, b, lambda n: float(n.p[which]) - value, "")]
 
-    def _last(self, half: Half, a: Node, b: Node, f: Callable[[Node], float], sentence: str) -> str:
+    def _last(self, half: Half, a: LocusPoint, b: LocusPoint, f: Callable[[LocusPoint], float], sentence: str) -> str:
         """End at a node where ``f`` vanishes."""
         found = self._located(a, b, f, sentence)
         where = (a.p + b.p) / 2
@@ -181,7 +188,7 @@ class Tracer:
             where = found[0][0].p
         return f"{sentence} near {', '.join(f'{n} = {v:.8g}' for n, v in zip(self.plane.names, where, strict=True))}"
 
-    def _closes(self, start: Node, a: Node, b: Node) -> bool:
+    def _closes(self, start: LocusPoint, a: LocusPoint, b: LocusPoint) -> bool:
         """Whether the curve passes its beginning again between two nodes."""
         whole, part = (b.p - a.p) / self.plane.width, (start.p - a.p) / self.plane.width
         size = float(np.linalg.norm(whole))

@@ -21,15 +21,15 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import Richer
+from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.codim2.collision import Collision
 from rodfem.codim2.curve import Criterion, Half, Tracer
-from rodfem.codim2.parameter_plane import Interval, Node, Plane
+from rodfem.codim2.parameter_plane import Interval, LocusPoint, Plane
 from rodfem.codim2.singular import Singular, null_vectors
-from rodfem.continuation.branch import Special
+from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FOLD, KINDS
-from rodfem.continuation.solvers import Equilibria, Follower
-from rodfem.continuation.step_control import Steps
+from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.file_format import LOCUS
@@ -38,7 +38,7 @@ from rodfem.output.files import mesh_of, save_json
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.inertia import Inertia
 
-STEPS = Steps(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
+STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
 SAME = 1e-6
 """Loads of special points that differ by less than this, relative, may be one and the same point of a curve."""
@@ -111,7 +111,7 @@ class Locus:
     states: list[PETSc.Vec] = field(default_factory=list)
     crossings: list[tuple[float, float]] = field(default_factory=list)
 
-    def passes(self, special: Special) -> bool:
+    def passes(self, special: SpecialPoint) -> bool:
         """Whether the curve passes the line of its start again at another special point of that scene."""
         here = np.array([special.point.load, special.point.ordinate])
         near = SAME * np.maximum(1.0, abs(here))
@@ -161,11 +161,11 @@ class Locus:
 
 
 def locus(
-    solver: Equilibria,
-    special: Special,
+    solver: StaticSolver,
+    special: SpecialPoint,
     parameter: str,
     bounds: tuple[Interval, Interval],
-    steps: Steps = STEPS,
+    steps: StepControl = STEPS,
     error_bars: int = 5,
 ) -> Locus:
     """Follow a special point in the plane of the scene's load and a second parameter, to both sides.
@@ -173,8 +173,8 @@ def locus(
     Parameters
     ----------
     solver
-        The :class:`~rodfem.continuation.solvers.Follower` that found the special point, or for flutter and divergence
-        the :class:`~rodfem.continuation.solvers.Equilibria` of the sweep.  It is left as it was found.
+        The :class:`~rodfem.continuation.solvers.BranchSolver` that found the special point, or for flutter and
+        divergence the :class:`~rodfem.continuation.solvers.StaticSolver` of the sweep.  It is left as it was found.
     special
         A fold, a branch point, a flutter load or a divergence load.
     parameter
@@ -248,13 +248,13 @@ def locus(
     )
 
 
-def _guess(solver: Equilibria, special: Special, p: np.ndarray) -> Node:
+def _guess(solver: StaticSolver, special: SpecialPoint, p: np.ndarray) -> LocusPoint:
     """The special point as a point of the plane; raises :class:`InputError` for a kind that has no locus."""
     if special.kind.line is None:
         kinds = ", ".join(name for name, kind in KINDS.items() if kind.line is not None)
         raise InputError(f"A point of the kind {special.kind!r} has no locus: choose one of {kinds}.")
-    if special.kind.singular and not isinstance(solver, Follower):
-        raise InputError("The locus of a fold or a branch point needs the follower that found it.")
+    if special.kind.singular and not isinstance(solver, BranchSolver):
+        raise InputError("The locus of a fold or a branch point needs the solver that found it.")
     x, left = special.point.x, list[PETSc.Vec]()
     modes = list(special.null_vectors)
     if special.kind == FLUTTER:
@@ -265,10 +265,12 @@ def _guess(solver: Equilibria, special: Special, p: np.ndarray) -> Node:
         number = abs(special.negative_after - special.negative_before)
         solver.system.set_phase(x)
         modes, left = null_vectors(Inertia(solver.system), x, number)
-    return Node(p, x, p, x, p, omega2=special.omega2 if special.kind == FLUTTER else np.nan, modes=modes, left=left)
+    return LocusPoint(
+        p, x, p, x, p, omega2=special.omega2 if special.kind == FLUTTER else np.nan, modes=modes, left=left
+    )
 
 
-def _criterion(solver: Equilibria, plane: Plane, kind: str, near: Node) -> Criterion:
+def _criterion(solver: StaticSolver, plane: Plane, kind: str, near: LocusPoint) -> Criterion:
     """What defines the locus of a kind of special points, one of which is ``near``."""
     if kind == FLUTTER:
         return Collision(solver, plane)
@@ -276,15 +278,15 @@ def _criterion(solver: Equilibria, plane: Plane, kind: str, near: Node) -> Crite
 
 
 def _estimate(
-    solver: Equilibria, kind: str, plane: Plane, nodes: Sequence[Node], rows: list[int], error: np.ndarray
+    solver: StaticSolver, kind: str, plane: Plane, nodes: Sequence[LocusPoint], rows: list[int], error: np.ndarray
 ) -> None:
     """Fill ``rows`` of ``error`` with the distance, across the curve, to that of a richer discretisation."""
-    richer: Equilibria
-    if isinstance(solver, Follower):
-        found = Richer(solver)
-        richer, transfer = found.follower, found.transfer
+    richer: StaticSolver
+    if isinstance(solver, BranchSolver):
+        found = Enriched(solver)
+        richer, transfer = found.solver, found.transfer
     else:
-        richer = Equilibria(richer_system(solver.system))
+        richer = StaticSolver(richer_system(solver.system))
         transfer = Transfer(solver.system, richer.system)
     other = Plane(richer.system, plane.names[1], (tuple(plane.bounds[0]), tuple(plane.bounds[1])))
     criterion: Criterion | None = None
@@ -292,7 +294,7 @@ def _estimate(
         node = nodes[row]
         x = transfer(node.x, state=True)
         modes, left = ([transfer(v, state=False) for v in side] for side in (node.modes, node.left))
-        near = Node(node.p, x, node.dp, x, node.p, omega2=node.omega2, modes=modes, left=left)
+        near = LocusPoint(node.p, x, node.dp, x, node.p, omega2=node.omega2, modes=modes, left=left)
         if criterion is None:
             criterion = _criterion(richer, other, kind, near)
         along = node.dp

@@ -19,7 +19,7 @@ Interval = tuple[float, float]
 
 
 @dataclass
-class Node:
+class LocusPoint:
     """A point of a locus: parameters ``p`` (2,), state ``x``, and its unit tangent ``dp``, ``dx`` at arclength ``s``.
 
     ``rest`` counts the negative eigenvalues other than those that vanish here (-1: not counted).  At folds ``coupling``
@@ -42,7 +42,7 @@ class Node:
     modes: list[PETSc.Vec] = field(default_factory=list)
     left: list[PETSc.Vec] = field(default_factory=list)
 
-    def reversed(self) -> Node:
+    def reversed(self) -> LocusPoint:
         """The same point with the opposite tangent."""
         dx = self.dx.copy()
         dx.scale(-1.0)
@@ -104,7 +104,7 @@ class Plane:
             system.line, system.phases[:], system.phase_offsets[:] = before
 
 
-def predict(nodes: list[Node], s: float) -> tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]:
+def predict(nodes: list[LocusPoint], s: float) -> tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]:
     """Extrapolate a locus to arclength ``s``: parameters, state, and their derivatives in ``s``."""
     last = nodes[-1]
     if len(nodes) < 3:
@@ -117,7 +117,7 @@ def predict(nodes: list[Node], s: float) -> tuple[np.ndarray, PETSc.Vec, np.ndar
     return value @ p, combine(x, value), slope @ p, combine(x, slope)
 
 
-def between(a: Node, b: Node, s: float) -> tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]:
+def between(a: LocusPoint, b: LocusPoint, s: float) -> tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]:
     """Cubic through two nodes with their tangents at arclength ``s``: parameters, state, and their derivatives."""
     h = b.s - a.s
     t = (s - a.s) / h

@@ -42,8 +42,8 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.parameter_plane import Node, Plane
-from rodfem.continuation.solvers import Equilibria, Follower
+from rodfem.codim2.parameter_plane import LocusPoint, Plane
+from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import STALLED, TOLERANCE
 from rodfem.linalg.orthogonal import orthonormalize, project_out
@@ -85,7 +85,7 @@ class Singular:
 
     def __init__(
         self,
-        solver: Equilibria,
+        solver: StaticSolver,
         plane: Plane,
         vectors: list[PETSc.Vec],
         fold: bool,
@@ -93,7 +93,7 @@ class Singular:
     ) -> None:
         """Take the null vectors of a special point, and the ``left`` ones where the matrix is not symmetric."""
         self.solver, self.system, self.plane, self.fold = solver, solver.system, plane, fold
-        self.saddle = solver.inertia if isinstance(solver, Follower) else Inertia(solver.system)
+        self.saddle = solver.inertia if isinstance(solver, BranchSolver) else Inertia(solver.system)
         self.metric = self.saddle.metric
         self._adopt(vectors, left or [])
         matrix = self.saddle.at(vectors[0]).matrix  # for its pattern
@@ -127,8 +127,13 @@ class Singular:
         return float(max((self.metric * d).dot(d), 0.0)) ** 0.5
 
     def correct(
-        self, p: np.ndarray, x: PETSc.Vec, tangent: tuple[np.ndarray, PETSc.Vec | None], near: Node, reach: float = 1.0
-    ) -> Node:
+        self,
+        p: np.ndarray,
+        x: PETSc.Vec,
+        tangent: tuple[np.ndarray, PETSc.Vec | None],
+        near: LocusPoint,
+        reach: float = 1.0,
+    ) -> LocusPoint:
         """Point of the locus on the plane through ``(p, x)`` across ``tangent``; raises :class:`ConvergenceError`.
 
         With None for the state's part of the tangent the plane is that of the parameters alone: a line of theirs.
@@ -256,7 +261,9 @@ class Singular:
                 grad_p += factor * np.array([column.dot(left) for column in columns])
         return grad_x, grad_p
 
-    def _node(self, p: np.ndarray, x: PETSc.Vec, along: tuple[np.ndarray, PETSc.Vec | None], last: np.ndarray) -> Node:
+    def _node(
+        self, p: np.ndarray, x: PETSc.Vec, along: tuple[np.ndarray, PETSc.Vec | None], last: np.ndarray
+    ) -> LocusPoint:
         """Evaluate tangent, count and records at a point of the locus, and border with its null vectors."""
         at = self._linear(p, x, x, None)
         scale = self.saddle.scale
@@ -281,7 +288,7 @@ class Singular:
         size = size if forward >= 0 else -size
         dx.scale(1.0 / size)
         located = np.maximum(last, ROUND_OFF * np.maximum(1.0, abs(p)))
-        return Node(
+        return LocusPoint(
             p,
             x,
             dp / size,

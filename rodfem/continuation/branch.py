@@ -71,7 +71,7 @@ class Point:
 
 
 @dataclass
-class Law:
+class NormalForm:
     """``load = load_b + coefficient x^power + ...``, a bound of the coefficient's error, and the kind of bifurcation.
 
     ``side`` is the sign of the load's change on the bifurcating branch.
@@ -91,7 +91,7 @@ class Law:
 
 
 @dataclass(repr=False)
-class Special:
+class SpecialPoint:
     """A special point: what it is, how precisely it was located, its null vectors, and the index on either side.
 
     ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` bounds its error, that of the
@@ -115,12 +115,12 @@ class Special:
     error_estimate: float = float("nan")
     ordinate_error: float = float("nan")
     resolved: bool | None = None
-    meets: tuple[str, int] | None = None
+    connects_to: tuple[str, int] | None = None
     switched: bool = False
     row: int = -1
-    zero_of: str = "mu"
+    test_function: str = "mu"
     note: str = ""
-    law: Law | None = None
+    law: NormalForm | None = None
     omega2: float = float("nan")
     omega2_error: float = float("nan")
     unfolding: float = float("nan")
@@ -128,7 +128,7 @@ class Special:
     event: Event | None = None
 
     @classmethod
-    def given(cls, kind: Kind, point: Point) -> Special:
+    def given(cls, kind: Kind, point: Point) -> SpecialPoint:
         """One at a load that is given: nothing changes there."""
         return cls(kind, point, point.negative, point.negative, round_off(point.load))
 
@@ -178,7 +178,7 @@ class Branch:
     parent: tuple[str, int] | None
     depth: int
     points: list[Point] = field(default_factory=list)
-    special: list[Special] = field(default_factory=list)
+    special: list[SpecialPoint] = field(default_factory=list)
     ended: str = NOT_TRACED
     unexplained: list[Unexplained] = field(default_factory=list)
     begins: int | None = None
@@ -197,7 +197,7 @@ class Branch:
             "vanish there that do not all along the branch. What else leaves it is not followed: begin before it."
         )
 
-    def insert(self, special: Special) -> None:
+    def insert(self, special: SpecialPoint) -> None:
         """Put a special point among the points by its arclength, and renumber the rows of all special points."""
         self.special.append(special)
         self.points.append(special.point)

@@ -32,7 +32,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.fem.newton import Outcome, iterate
+from rodfem.fem.newton import NewtonResult, iterate
 from rodfem.fem.state import State
 from rodfem.fem.system import dense_columns
 from rodfem.stability.inertia import Factored, Index, Inertia
@@ -173,7 +173,7 @@ class Corrector:
 
     def correct(
         self, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3, tolerance: float = 0.0
-    ) -> tuple[Outcome, Regular | None] | None:
+    ) -> tuple[NewtonResult, Regular | None] | None:
         """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
 
         As :func:`rodfem.fem.newton.iterate`; also the state whose factors served last, on the way.  None, with ``x`` as

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
 
-from rodfem.continuation.branch import Branch, Point, Special, Unexplained
+from rodfem.continuation.branch import Branch, Point, SpecialPoint, Unexplained
 from rodfem.continuation.kinds import BRANCH_POINT
 
 Interval = tuple[int, int]
@@ -37,7 +37,7 @@ class Row:
         return list(range(self.high, other.low)) or list(range(other.high, self.low))
 
 
-def chained(low: int, high: int, specials: Sequence[Special], last_low: int, last_high: int) -> bool:
+def chained(low: int, high: int, specials: Sequence[SpecialPoint], last_low: int, last_high: int) -> bool:
     """Whether special points in order lead from an index between ``low`` and ``high`` to one between the others."""
     intervals = [(low, high)]
     for special in specials:
@@ -46,7 +46,7 @@ def chained(low: int, high: int, specials: Sequence[Special], last_low: int, las
     return all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(intervals[::2], intervals[1::2], strict=True))
 
 
-def breaks(points: Sequence[Point], specials: Sequence[Special], begins: int | None = None) -> list[Unexplained]:
+def breaks(points: Sequence[Point], specials: Sequence[SpecialPoint], begins: int | None = None) -> list[Unexplained]:
     """Neighbours among rows in order of arclength, some of them special points, whose indices do not agree.
 
     ``begins`` is the index right after the first row, where it is known although it is none of these special points.
@@ -68,7 +68,7 @@ def persistent_zeros(points: Sequence[Point]) -> int:
     return min((p.zero for p in points), default=0)
 
 
-def _beside(point: Point, at: dict[int, Special], persistent: int, after: bool) -> Interval:
+def _beside(point: Point, at: dict[int, SpecialPoint], persistent: int, after: bool) -> Interval:
     """Least and greatest index right before or after a row."""
     special = at.get(id(point))
     if special is not None:
@@ -91,7 +91,7 @@ def merge_doubles(branch: Branch) -> None:
         apart = abs(p.point.load - q.point.load)
         if (
             p.kind == q.kind == BRANCH_POINT
-            and p.zero_of == q.zero_of == "mu"
+            and p.test_function == q.test_function == "mu"
             and p.point.mesh == q.point.mesh
             and apart <= p.error_estimate + q.error_estimate < inf
         ):

@@ -1,6 +1,6 @@
 """The kinds of special points: each is a name with what is to be known of it; pictures read this without PETSc.
 
-A kind is added here.  What finds its points makes :class:`~rodfem.continuation.branch.Special` of that kind.
+A kind is added here.  What finds its points makes :class:`~rodfem.continuation.branch.SpecialPoint` of that kind.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from scipy.optimize import brentq
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.solvers import Follower, hermite
+from rodfem.continuation.solvers import BranchSolver, hermite
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.system import System, combine
@@ -61,25 +61,25 @@ class Sample:
     found: Factored
 
 
-def solve_at(follower: Follower, curve: Curve, s: float) -> PETSc.Vec:
+def solve_at(solver: BranchSolver, curve: Curve, s: float) -> PETSc.Vec:
     """Equilibrium on the plane through ``curve(s)`` across its direction; raises :class:`ConvergenceError`."""
     x, direction = curve(s)
-    follower.system.set_phase(x)
-    outcome = correct(follower.system, x, follower.row(direction))
+    solver.system.set_phase(x)
+    outcome = correct(solver.system, x, solver.row(direction))
     if not outcome.converged:
         raise ConvergenceError(
-            f"No equilibrium near load {follower.system.scalar(x):.8g} while locating a special point",
+            f"No equilibrium near load {solver.system.scalar(x):.8g} while locating a special point",
             SMALLER_STEPS,
         )
     return x
 
 
-def solve_beside(follower: Follower, curve: Curve, s: float, aside: float) -> tuple[PETSc.Vec, float]:
+def solve_beside(solver: BranchSolver, curve: Curve, s: float, aside: float) -> tuple[PETSc.Vec, float]:
     """Solve at ``s``, or at ``s + aside`` if the bordered matrix is singular there; returns state and parameter."""
     try:
-        return solve_at(follower, curve, s), s
+        return solve_at(solver, curve, s), s
     except ConvergenceError:
-        return solve_at(follower, curve, s + aside), s + aside
+        return solve_at(solver, curve, s + aside), s + aside
 
 
 def across(system: System, vectors: Sequence[PETSc.Vec], still: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
@@ -96,22 +96,22 @@ def across(system: System, vectors: Sequence[PETSc.Vec], still: Sequence[PETSc.V
 
 
 def eigenvalue(
-    follower: Follower, x: PETSc.Vec, order: int, still: Sequence[PETSc.Vec] = ()
+    solver: BranchSolver, x: PETSc.Vec, order: int, still: Sequence[PETSc.Vec] = ()
 ) -> tuple[float, PETSc.Vec]:
     """Eigenvalue number ``order`` (0 is the left-most) of the state ``x``, one of those near zero, and its vector.
 
     Eigenvalues of the vectors ``still``, zero on the whole branch, are not numbered.
     """
-    found = follower.inertia.at(x)
+    found = solver.inertia.at(x)
     below = found.count().negative
     position = order - below if order >= below else below - 1 - order
     for wanted in (position + 1, position + 3, position + 6, position + 12):
         values, vectors = found.nearest(wanted + len(still), accuracy=1e-4)
         if still:
-            moving = [i for i, v in enumerate(vectors) if across(follower.system, [v], still)]
+            moving = [i for i, v in enumerate(vectors) if across(solver.system, [v], still)]
             values, vectors = values[moving], [vectors[i] for i in moving]
         side = np.flatnonzero(
-            values >= -follower.inertia.tolerance if order >= below else values < -follower.inertia.tolerance
+            values >= -solver.inertia.tolerance if order >= below else values < -solver.inertia.tolerance
         )
         if len(side) > position:
             chosen = side[np.argsort(abs(values[side]))[position]]
@@ -120,7 +120,7 @@ def eigenvalue(
 
 
 def sample(
-    follower: Follower, curve: Curve, s: float, mode: PETSc.Vec, persistent: int = 0, counted: bool = True
+    solver: BranchSolver, curve: Curve, s: float, mode: PETSc.Vec, persistent: int = 0, counted: bool = True
 ) -> Sample:
     """Solve at ``s`` and evaluate ``1 / (mode . M S^-1 M mode)`` there.
 
@@ -129,15 +129,15 @@ def sample(
     singular.  Eigenvalues within the tolerance of zero, of which ``persistent`` stay zero, count by its sign.  Unless
     ``counted``, they are among those below: one factorisation instead of two.
     """
-    x = solve_at(follower, curve, s)
-    found = follower.inertia.at(x)
+    x = solve_at(solver, curve, s)
+    found = solver.inertia.at(x)
     if not counted:
-        below = found.below(follower.inertia.tolerance)
-        return Sample(s, x, follower.system.scalar(x), found.response(mode), below, found)
+        below = found.below(solver.inertia.tolerance)
+        return Sample(s, x, solver.system.scalar(x), found.response(mode), below, found)
     index = found.count()
     mu = found.response(mode)
-    crossing = index.zero - follower.system.active_drifts() - persistent  # small ones take the sign of this one
-    return Sample(s, x, follower.system.scalar(x), mu, index.negative + (crossing if mu < 0 else 0), found)
+    crossing = index.zero - solver.system.active_drifts() - persistent  # small ones take the sign of this one
+    return Sample(s, x, solver.system.scalar(x), mu, index.negative + (crossing if mu < 0 else 0), found)
 
 
 @dataclass
@@ -160,7 +160,7 @@ class Located:
     arithmetic: float
 
 
-def interpolate(samples: list[Sample], zero_of: str, guess: float, noise: float = 0.0) -> Located | None:
+def interpolate(samples: list[Sample], test_function: str, guess: float, noise: float = 0.0) -> Located | None:
     """Zero of ``mu`` or of the load's slope by Chebyshev interpolation; None where it is not near the piece.
 
     The uncertainty of the load is what the last coefficients of the two interpolants can contribute at the zero, at
@@ -173,7 +173,7 @@ def interpolate(samples: list[Sample], zero_of: str, guess: float, noise: float 
     loads, values = np.array([p.load for p in samples]), np.array([p.mu for p in samples])
     load = chebyshev.chebfit(t, loads - loads[0], len(t) - 1)
     slope = chebyshev.chebder(load)
-    f = chebyshev.chebfit(t, values, len(t) - 1) if zero_of == "mu" else slope
+    f = chebyshev.chebfit(t, values, len(t) - 1) if test_function == "mu" else slope
     root = real_root(f, (guess - middle) / half)
     if root is None:
         return None
@@ -182,7 +182,7 @@ def interpolate(samples: list[Sample], zero_of: str, guess: float, noise: float 
     left = zero_uncertainty(f, root)
     tail = abs(load[-1]) + abs(slope_at) * left
     floor = round_off(load_at)
-    moved = abs(noise / float(chebyshev.chebval(root, chebyshev.chebder(f)))) if zero_of == "mu" else 0.0
+    moved = abs(noise / float(chebyshev.chebval(root, chebyshev.chebder(f)))) if test_function == "mu" else 0.0
     arithmetic = floor + abs(slope_at) * moved
     weights, slopes = _barycentric(t, root)
     states = [p.x for p in samples]
@@ -219,12 +219,12 @@ def _barycentric(nodes: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def refine(
-    follower: Follower,
+    solver: BranchSolver,
     curve: Curve,
     center: float,
     half: float,
     mode: PETSc.Vec,
-    zero_of: str,
+    test_function: str,
     persistent: int = 0,
     beside: float | None = None,
 ) -> Located:
@@ -237,8 +237,8 @@ def refine(
     count = NODES if beside is None else FEWER
     for _ in range(10):
         nodes = center + half * np.cos(np.pi * (np.arange(count)[::-1] + 0.5) / count)
-        samples = [sample(follower, curve, s, mode, persistent, counted=beside is None) for s in nodes]
-        located = interpolate(samples, zero_of, center, samples[-1].found.noise(mode))
+        samples = [sample(solver, curve, s, mode, persistent, counted=beside is None) for s in nodes]
+        located = interpolate(samples, test_function, center, samples[-1].found.noise(mode))
         if located is not None and abs(located.s - center) <= half:
             sharp = SHARP if beside is None else max(SHARP, PART * abs(located.load - beside))
             settled = best is not None and located.uncertainty > 0.1 * best.uncertainty
@@ -250,7 +250,7 @@ def refine(
         elif best is not None:
             return best
         else:
-            mu = [samples[0].mu, samples[-1].mu] if zero_of == "mu" else _slopes(samples)
+            mu = [samples[0].mu, samples[-1].mu] if test_function == "mu" else _slopes(samples)
             step = -mu[0] * (nodes[-1] - nodes[0]) / (mu[1] - mu[0]) if mu[1] != mu[0] else half
             center = nodes[0] + float(np.clip(step, -4 * half, 6 * half))
     if best is not None:
@@ -265,7 +265,7 @@ def _slopes(samples: list[Sample]) -> list[float]:
 
 
 def crossing_mode(
-    follower: Follower, curve: Curve, ends: tuple[float, float], order: int, still: Sequence[PETSc.Vec]
+    solver: BranchSolver, curve: Curve, ends: tuple[float, float], order: int, still: Sequence[PETSc.Vec]
 ) -> tuple[float, PETSc.Vec]:
     """Where on a piece of a branch eigenvalue ``order`` changes its sign, nearly, and its vector there.
 
@@ -273,19 +273,19 @@ def crossing_mode(
     """
     width = 0.1 * min(WINDOW, ends[1] - ends[0])
     for _ in range(NARROWER):
-        x, s = solve_beside(follower, curve, bracket(follower, curve, ends, order, still, width), OFF * width)
+        x, s = solve_beside(solver, curve, bracket(solver, curve, ends, order, still, width), OFF * width)
         try:
-            return s, eigenvalue(follower, x, order, still)[1]
+            return s, eigenvalue(solver, x, order, still)[1]
         except ConvergenceError:
             width /= 16
     raise ConvergenceError(
-        f"Eigenvalue number {order} is not among those nearest zero near load {follower.system.scalar(x):.8g}",
+        f"Eigenvalue number {order} is not among those nearest zero near load {solver.system.scalar(x):.8g}",
         SMALLER_STEPS,
     )
 
 
 def bracket(
-    follower: Follower,
+    solver: BranchSolver,
     curve: Curve,
     ends: tuple[float, float],
     order: int,
@@ -303,13 +303,11 @@ def bracket(
     h = high - low
 
     def passed(s: float) -> bool:
-        return follower.inertia.at(solve_beside(follower, curve, s, OFF * h)[0]).count().negative > order
+        return solver.inertia.at(solve_beside(solver, curve, s, OFF * h)[0]).count().negative > order
 
     first = passed(low)
     if first == passed(high):
-        left, right = (
-            eigenvalue(follower, solve_beside(follower, curve, s, OFF * h)[0], order, still)[0] for s in ends
-        )
+        left, right = (eigenvalue(solver, solve_beside(solver, curve, s, OFF * h)[0], order, still)[0] for s in ends)
         return low if abs(left) < abs(right) else high
     while high - low > width:
         middle = (low + high) / 2
@@ -318,7 +316,7 @@ def bracket(
 
 
 def locate(
-    follower: Follower, a: Point, b: Point, order: int, zero_of: str, still: Sequence[PETSc.Vec] = ()
+    solver: BranchSolver, a: Point, b: Point, order: int, test_function: str, still: Sequence[PETSc.Vec] = ()
 ) -> Located:
     """Locate the zero of eigenvalue ``order`` (or of the load's slope) between two points of a branch."""
 
@@ -326,24 +324,24 @@ def locate(
         return hermite(a, b, s)
 
     h = b.arclength - a.arclength
-    if zero_of == "slope":
-        x, guess = solve_beside(follower, curve, a.arclength + h * a.slope / (a.slope - b.slope), OFF * h)
-        found = follower.inertia.at(x)
+    if test_function == "slope":
+        x, guess = solve_beside(solver, curve, a.arclength + h * a.slope / (a.slope - b.slope), OFF * h)
+        found = solver.inertia.at(x)
         found.count()
         mode = found.nearest(1, accuracy=1e-2)[1][0]
     else:
         piece = a.arclength + OFF * h, b.arclength - OFF * h
-        guess, mode = crossing_mode(follower, curve, piece, order, still)
-    return refine(follower, curve, guess, min(WINDOW, 0.45 * h), mode, zero_of, len(still))
+        guess, mode = crossing_mode(solver, curve, piece, order, still)
+    return refine(solver, curve, guess, min(WINDOW, 0.45 * h), mode, test_function, len(still))
 
 
-def event_at(follower: Follower, event: Event, x: PETSc.Vec) -> float:
+def event_at(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:
     """Value of an event at a state; collective."""
-    return event(follower.shape.sample(x))
+    return event(solver.shape.sample(x))
 
 
 def locate_event(
-    follower: Follower, event: Event, curve: Curve, low: float, high: float
+    solver: BranchSolver, event: Event, curve: Curve, low: float, high: float
 ) -> tuple[float, PETSc.Vec, float]:
     """Parameter, state and uncertainty of the parameter of an event on a piece of a branch.
 
@@ -353,10 +351,10 @@ def locate_event(
     aside = ASIDE * (high - low)
 
     def value(s: float) -> float:
-        return event_at(follower, event, solve_beside(follower, curve, s, aside)[0])
+        return event_at(solver, event, solve_beside(solver, curve, s, aside)[0])
 
     if value(low) * value(high) > 0:
         raise ConvergenceError(f"The event {event.name!r} does not happen between the ends of the piece.")
     s = float(brentq(value, low, high, xtol=ALONG))
-    x, there = solve_beside(follower, curve, s, aside)
+    x, there = solve_beside(solver, curve, s, aside)
     return there, x, ALONG + 2 * abs(there - s)

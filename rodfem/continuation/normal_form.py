@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import Law, Special
-from rodfem.continuation.solvers import VERTICAL, Follower
+from rodfem.continuation.branch import NormalForm, SpecialPoint
+from rodfem.continuation.solvers import VERTICAL, BranchSolver
 from rodfem.fem.newton import correct
 from rodfem.tolerances import round_off
 
@@ -36,44 +36,44 @@ class Origin:
     ordinate_left: float
 
 
-def origin_of(follower: Follower, special: Special) -> Origin:
+def origin_of(solver: BranchSolver, special: SpecialPoint) -> Origin:
     """Branch point of a mesh; along a branch its ordinate is as uncertain as its load, times the ratio of slopes."""
     p = special.point
     left = round_off(p.ordinate)
     if p.tangent is not None and p.slope:
-        left += abs(ordinate_along(follower, p.x, p.tangent) / p.slope) * special.located_to
+        left += abs(ordinate_along(solver, p.x, p.tangent) / p.slope) * special.located_to
     return Origin(p.x, p.load, p.ordinate, special.located_to, left)
 
 
-def ordinate_along(follower: Follower, x: PETSc.Vec, direction: PETSc.Vec) -> float:
+def ordinate_along(solver: BranchSolver, x: PETSc.Vec, direction: PETSc.Vec) -> float:
     """Change of the ordinate of ``x`` along a direction, of unit size in the metric."""
     beside = x.copy()
-    beside.axpy(BESIDE / follower.system.norm(direction), direction)
-    return (follower.shape.ordinate(beside) - follower.shape.ordinate(x)) / BESIDE
+    beside.axpy(BESIDE / solver.system.norm(direction), direction)
+    return (solver.shape.ordinate(beside) - solver.shape.ordinate(x)) / BESIDE
 
 
-def law_of(follower: Follower, origin: Origin, direction: PETSc.Vec) -> Law | None:
-    """Law of the branch that leaves ``origin`` along ``direction``; None if it cannot be computed from nearby points.
+def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -> NormalForm | None:
+    """Normal form of the branch that leaves ``origin`` along ``direction``; None if nearby points do not tell it.
 
     At a pitchfork the load is an even function of the amplitude, and the ordinate an even or an odd one;
     polynomials through four amplitudes give their leading coefficients.  Uncertain is what those through three miss,
     what the load is odd by, and what the location of the branch point leaves open: of loads and ordinates that are
     measured from it, divided by the square of an amplitude.
     """
-    row = follower.row(direction)
-    near = [_near(follower, origin, direction, row, float(a)) for a in (*AMPLITUDES, -AMPLITUDES[-1])]
+    row = solver.row(direction)
+    near = [_near(solver, origin, direction, row, float(a)) for a in (*AMPLITUDES, -AMPLITUDES[-1])]
     if None in near:
         return None
     loads, ordinates = np.array(near, dtype=float).T
     plus, minus = loads[-2], loads[-1]
-    span = follower.system.scene.span
+    span = solver.system.scene.span
     if max(map(abs, loads)) < VERTICAL * abs(span[1] - span[0]):
-        return Law("vertical branch", 0.0, 1, max(map(abs, loads)) / max(map(abs, ordinates)), 0)
+        return NormalForm("vertical branch", 0.0, 1, max(map(abs, loads)) / max(map(abs, ordinates)), 0)
     uneven = abs(plus - minus) / (abs(plus) + abs(minus))
     if uneven > 0.1:
         best = _slope(loads, ordinates)
         left = abs(best - _slope(loads[[2, 4]], ordinates[[2, 4]])) + _left(_slope, loads, ordinates, origin)
-        return Law("transcritical", best, 1, left, int(np.sign(plus)))
+        return NormalForm("transcritical", best, 1, left, int(np.sign(plus)))
     growth = abs(ordinates[0] / ordinates[3]) if ordinates[3] else np.inf
     odd = growth < (AMPLITUDES[0] / AMPLITUDES[3]) ** 1.5
 
@@ -84,20 +84,20 @@ def law_of(follower: Follower, origin: Origin, direction: PETSc.Vec) -> Law | No
     if not np.isfinite(best):
         return None
     left = abs(best - leading(loads, ordinates, 3)) + uneven * abs(best) + _left(leading, loads, ordinates, origin)
-    return Law("pitchfork", best, 2 if odd else 1, left, int(np.sign(plus)))
+    return NormalForm("pitchfork", best, 2 if odd else 1, left, int(np.sign(plus)))
 
 
 def _near(
-    follower: Follower, origin: Origin, direction: PETSc.Vec, row: PETSc.Vec, amplitude: float
+    solver: BranchSolver, origin: Origin, direction: PETSc.Vec, row: PETSc.Vec, amplitude: float
 ) -> tuple[float, float] | None:
     """Changes of load and ordinate at an amplitude of the bifurcating branch; None where Newton's method fails."""
-    system = follower.system
+    system = solver.system
     x = origin.x.copy()
     x.axpy(amplitude, direction)
     system.set_phase(x)
     if not correct(system, x, row, reach=2.0 * abs(amplitude)).converged:
         return None
-    return system.scalar(x) - origin.load, follower.shape.ordinate(x) - origin.ordinate
+    return system.scalar(x) - origin.load, solver.shape.ordinate(x) - origin.ordinate
 
 
 def _left(

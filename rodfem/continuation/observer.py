@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rodfem.continuation.branch import Branch, Point, Special
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Discretization
@@ -38,10 +38,10 @@ class Observer:
     def progress(self, branch: Branch, point: Point) -> None:
         """A point has been added to a branch."""
 
-    def special(self, branch: Branch, special: Special) -> None:
+    def special(self, branch: Branch, special: SpecialPoint) -> None:
         """A special point has been located; its error bars come with the end of its branch."""
 
-    def law(self, special: Special) -> None:
+    def law(self, special: SpecialPoint) -> None:
         """The local law of a branch point is known."""
 
     def mesh(self, system: System, load: float, why: str) -> None:

@@ -19,11 +19,11 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.continuation.branch import Point
 from rodfem.continuation.corrector import SENSITIVE, Corrector
-from rodfem.continuation.step_control import Steps
+from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.fields import LOAD
-from rodfem.fem.newton import TOLERANCE, Outcome, correct, relax
+from rodfem.fem.newton import TOLERANCE, NewtonResult, correct, relax
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System, combine
 from rodfem.fem.values import NodalValues
@@ -52,7 +52,7 @@ ON_BOUND = 1e-8
 """Distance from a bound, in spans, below which a load counts as on it: branches of constant load may lie there."""
 
 
-class Equilibria:
+class StaticSolver:
     """Computes equilibria of one :class:`~rodfem.fem.system.System` at given loads, and their shapes."""
 
     def __init__(self, system: System) -> None:
@@ -76,7 +76,7 @@ class Equilibria:
         named = {f.turning.name: turned.reshape(*x.shape, -1), "v": undeformed, LOAD: load}
         return self.shape.with_centreline(NodalValues(f, f.filled(named), system.line))
 
-    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, Outcome]:
+    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, NewtonResult]:
         """Equilibrium at exactly ``load`` by Newton's method from ``guess``; the phase reference must be set."""
         x = guess.copy()
         self.system.set_load(x, load)
@@ -84,7 +84,7 @@ class Equilibria:
         self.system.set_load(x, load)  # steps at fixed load may have moved it by round-off
         return x, outcome
 
-    def first(self, load: float) -> tuple[PETSc.Vec, Outcome]:
+    def first(self, load: float) -> tuple[PETSc.Vec, NewtonResult]:
         """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill.
 
         Also where Newton's method ends at an unstable one that is nowhere near the start.
@@ -102,12 +102,12 @@ class Equilibria:
         other = self.downhill(load)
         return other if other[1].converged else (x, outcome)
 
-    def downhill(self, load: float) -> tuple[PETSc.Vec, Outcome]:
+    def downhill(self, load: float) -> tuple[PETSc.Vec, NewtonResult]:
         """Equilibrium at ``load`` by going downhill from the scene's start, and from there bent a little.
 
         From a symmetrical start the way down may end on a saddle: a stable state is preferred.
         """
-        first: tuple[PETSc.Vec, Outcome] | None = None
+        first: tuple[PETSc.Vec, NewtonResult] | None = None
         for bent in (0.0, 0.4, 0.8):
             x = self.start(load, bent)
             self.system.set_phase(x)
@@ -132,7 +132,7 @@ class Equilibria:
         return self.system.at(x).energy()
 
 
-class Follower(Equilibria):
+class BranchSolver(StaticSolver):
     """Computes equilibria along branches, with their index and records.
 
     It owns what such a computation needs once: Newton's factors (in the system), the stability matrix, the shape.
@@ -162,7 +162,7 @@ class Follower(Equilibria):
         """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
         return self.inertia.at(x).count().negative == 0
 
-    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, Outcome]:
+    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, NewtonResult]:
         """As for any equilibria, but with the symmetric factors where they serve."""
         x = guess.copy()
         self.system.set_load(x, load)
@@ -174,7 +174,7 @@ class Follower(Equilibria):
         x: PETSc.Vec,
         arclength: float,
         tangent: PETSc.Vec | None,
-        outcome: Outcome | None = None,
+        outcome: NewtonResult | None = None,
         index: Index | None = None,
     ) -> Point:
         """Evaluate all records of the equilibrium ``x``; its index is counted unless given."""
@@ -217,7 +217,7 @@ class Follower(Equilibria):
 
     def correct(
         self, x: PETSc.Vec, row: PETSc.Vec, reach: float, slope: float
-    ) -> tuple[Outcome, PETSc.Vec | None, Index | None]:
+    ) -> tuple[NewtonResult, PETSc.Vec | None, Index | None]:
         """Correct a prediction in place; also its unit tangent on the side of ``row``, and its index.
 
         The tangent is None without convergence, the index where the factors that served the correction do not tell it.
@@ -329,9 +329,9 @@ def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
 
 
 def follow(
-    follower: Follower,
+    solver: BranchSolver,
     points: list[Point],
-    steps: Steps,
+    steps: StepControl,
     bounds: tuple[float, float],
     reach: Callable[[Point], float] = lambda point: float("inf"),
 ) -> Iterator[Point | str]:
@@ -341,10 +341,10 @@ def follow(
     insert) points in ``points``.  The direction is that of the last point's tangent.  ``reach`` bounds the step from a
     point.
     """
-    system, step = follower.system, steps.begin()
+    system, step = solver.system, steps.begin()
     span = abs(system.scene.span[1] - system.scene.span[0])
     low, high = (bound + sign * ON_BOUND * span for bound, sign in zip(bounds, (-1, 1), strict=True))
-    follower.corrector.restart()
+    solver.corrector.restart()
     while len(points) < steps.most:
         last = points[-1]
         if len(points) % PILE == 0:
@@ -353,25 +353,25 @@ def follow(
         step = min(step, most)
         known = points
         if system.damping and last.tangent is not None:  # across a family, along which the path is not determined
-            known = [replace(last, tangent=follower.tangent(follower.row(last.tangent), at=last.x))]
+            known = [replace(last, tangent=solver.tangent(solver.row(last.tangent), at=last.x))]
         x, direction = predict(known, last.arclength + step)
         load, outcome, tangent, index = system.scalar(x), None, None, None
         if low <= load <= high:
-            row = follower.row(direction)
+            row = solver.row(direction)
             if last.tangent is None or row.dot(last.tangent) > 0:  # else an extrapolation that turns back
                 system.set_phase(x)
-                outcome, tangent, index = follower.correct(x, row, 0.5 * step, last.slope)
+                outcome, tangent, index = solver.correct(x, row, 0.5 * step, last.slope)
                 if outcome.converged:
                     load = system.scalar(x)
         if not low <= load <= high or _on_bound(load, last, bounds, span):
             bound = min(bounds, key=lambda bound: abs(bound - load))
-            point = _to_load(follower, points, load, bound, step, steps.smallest)
+            point = _to_load(solver, points, load, bound, step, steps.smallest)
             if point is not None:
                 yield point
                 yield "end of range"
                 return
         elif outcome is not None and tangent is not None and row.dot(tangent) > ALIGNED:
-            point = follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome, index)
+            point = solver.point(x, last.arclength + distance(system, last.x, x), tangent, outcome, index)
             if steps.accepts(last, point):
                 yield point
                 order = 2 if system.damping else min(len(points) - 1, 3) + 1
@@ -401,23 +401,23 @@ def _on_bound(load: float, last: Point, bounds: tuple[float, float], span: float
 
 
 def _to_load(
-    follower: Follower, points: list[Point], beyond: float, load: float, step: float, least: float
+    solver: BranchSolver, points: list[Point], beyond: float, load: float, step: float, least: float
 ) -> Point | None:
     """Last point of a branch, exactly at ``load``; None where it is not accepted as any other point of the branch is.
 
     ``beyond`` is the load that a whole step leads to.  The step to ``load`` is a part of it, of length ``least`` or
     more, and Newton's method may go half as far from the prediction.
     """
-    last, system = points[-1], follower.system
+    last, system = points[-1], solver.system
     fraction = (load - last.load) / (beyond - last.load)
     length = max(fraction * step, least)
     x, direction = predict(points, last.arclength + fraction * step)
-    row = follower.row(direction)
+    row = solver.row(direction)
     system.set_phase(x)
-    x, outcome = follower.at_load(x, load, reach=0.5 * length)
+    x, outcome = solver.at_load(x, load, reach=0.5 * length)
     if not outcome.converged:
         return None
-    tangent = follower.load_tangent(x, beyond > last.load)
+    tangent = solver.load_tangent(x, beyond > last.load)
     if not row.dot(tangent) > ALIGNED:
         return None
-    return follower.point(x, last.arclength + distance(system, last.x, x), tangent, outcome)
+    return solver.point(x, last.arclength + distance(system, last.x, x), tangent, outcome)

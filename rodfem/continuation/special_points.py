@@ -15,10 +15,10 @@ from itertools import pairwise
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import Branch, Point, Special
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.locate import Located, across, locate, solve_at
-from rodfem.continuation.solvers import VERTICAL, Follower, distance, hermite
+from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance, hermite
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import project_out
@@ -40,18 +40,20 @@ SHIFT = 1e-6
 """Shift of a singular Jacobian, in units of the lowest bending eigenvalue."""
 
 
-def special_at(follower: Follower, located: Located, arclength: float, still: Sequence[PETSc.Vec] = ()) -> Special:
+def special_at(
+    solver: BranchSolver, located: Located, arclength: float, still: Sequence[PETSc.Vec] = ()
+) -> SpecialPoint:
     """Evaluate and classify a located point: multiplicity, null vectors, coupling to the load, kind.
 
     Vectors of eigenvalues that are zero on the whole branch (``still``) are none of its null vectors.
     """
-    system, inertia = follower.system, follower.inertia
+    system, inertia = solver.system, solver.inertia
     x = located.x
     system.set_phase(x)
     tangent = located.tangent
     tangent.scale(1.0 / system.norm(tangent))
     found = inertia.at(x)
-    point = follower.point(x, arclength, tangent, index=decide(found).index)
+    point = solver.point(x, arclength, tangent, index=decide(found).index)
     null_count = point.zero - system.active_drifts()
     if null_count < 1:  # what was interpolated has no zero there: two branches were taken for one
         raise ConvergenceError(
@@ -64,26 +66,28 @@ def special_at(follower: Follower, located: Located, arclength: float, still: Se
             f"The null vector near load {located.load:.8g} is in the span of those that persist along the branch",
             SMALLER_STEPS,
         )
-    coupling = max(coupling_of(follower, x, v) for v in vectors)
+    coupling = max(coupling_of(solver, x, v) for v in vectors)
     turning = abs(system.scalar(tangent)) < LEVEL * abs(system.scene.span[1] - system.scene.span[0])
     kind = FOLD if turning and coupling > COUPLED else BRANCH_POINT
-    return Special(
+    return SpecialPoint(
         kind, point, located.before, located.after, located.uncertainty, [v.copy() for v in vectors], coupling
     )
 
 
-def coupling_of(follower: Follower, x: PETSc.Vec, null_vector: PETSc.Vec) -> float:
+def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> float:
     """Cosine between a null vector and ``F_lam``, the derivative of the equations in the load at ``x``."""
-    system = follower.system
-    matrix = system.at(x).jacobian(follower.axis)
-    derivative = matrix * follower.axis
+    system = solver.system
+    matrix = system.at(x).jacobian(solver.axis)
+    derivative = matrix * solver.axis
     system.set_load(derivative, 0.0)
     if derivative.norm() < INSENSITIVE * matrix.norm():  # a trivial state: its equations do not feel the load
         return 0.0
     return float(abs(derivative.dot(null_vector)) / (derivative.norm() * null_vector.norm()))
 
 
-def find_special(follower: Follower, a: Point, b: Point, orders: Sequence[int], persistent: int = 0) -> list[Special]:
+def find_special(
+    solver: BranchSolver, a: Point, b: Point, orders: Sequence[int], persistent: int = 0
+) -> list[SpecialPoint]:
     """All folds and branch points between two points of a branch, in order of arclength, with indices that chain.
 
     Where the load turns back there is a fold, or a branch point at which this branch ends on another one.  The
@@ -91,39 +95,39 @@ def find_special(follower: Follower, a: Point, b: Point, orders: Sequence[int], 
     explain do so at branch points, or further folds.  ``persistent`` eigenvalues are zero all along, beside those of
     symmetries, and are not numbered.
     """
-    found: list[Special] = []
+    found: list[SpecialPoint] = []
     rest = list(orders)
     low = min(a.negative, b.negative)
-    level = VERTICAL * abs(follower.system.scene.span[1] - follower.system.scene.span[0])
+    level = VERTICAL * abs(solver.system.scene.span[1] - solver.system.scene.span[0])
     if a.slope * b.slope < 0 and max(abs(a.slope), abs(b.slope)) > level:
-        found.append(_special(follower, a, b, low, "slope"))
+        found.append(_special(solver, a, b, low, "slope"))
         if found[0].kind == FOLD:
             own = min(found[0].negative_before, found[0].negative_after)
             rest = [order for order in rest if order != own]
-    still = _persistent(follower, a, persistent) if rest else []
+    still = _persistent(solver, a, persistent) if rest else []
     while rest:
-        special = _special(follower, a, b, rest[0], "mu", still)
+        special = _special(solver, a, b, rest[0], "mu", still)
         found.append(special)
         del rest[: special.multiplicity]
     found.sort(key=lambda s: s.point.arclength)
-    _count_between(follower, a, b, found)
+    _count_between(solver, a, b, found)
     return found
 
 
-def renew(follower: Follower, point: Point, *, turning: bool) -> None:
+def renew(solver: BranchSolver, point: Point, *, turning: bool) -> None:
     """Compute the index of a point anew, at its own state; also the tangent, where the load is ``turning`` beside it.
 
     The recorded ones may have been told from a prediction near by.
     """
-    follower.system.set_phase(point.x)
-    index = decide(follower.inertia.at(point.x)).index
+    solver.system.set_phase(point.x)
+    index = decide(solver.inertia.at(point.x)).index
     point.negative, point.zero = index.negative, index.zero
     if turning and point.tangent is not None:
-        point.tangent = follower.tangent(follower.row(point.tangent), at=point.x)
-        point.slope = follower.system.scalar(point.tangent)
+        point.tangent = solver.tangent(solver.row(point.tangent), at=point.x)
+        point.slope = solver.system.scalar(point.tangent)
 
 
-def _count_between(follower: Follower, a: Point, b: Point, found: list[Special]) -> None:
+def _count_between(solver: BranchSolver, a: Point, b: Point, found: list[SpecialPoint]) -> None:
     """Set the indices between neighbouring special points of one piece of a branch by counts half-way.
 
     Points too near to each other for a state between them have been told apart by their eigenvalues alone: there the
@@ -132,71 +136,71 @@ def _count_between(follower: Follower, a: Point, b: Point, found: list[Special])
     for p, q in pairwise(found):
         if q.point.arclength - p.point.arclength > APART:
             s = (p.point.arclength + q.point.arclength) / 2
-            x = solve_at(follower, lambda t: hermite(a, b, t), s)
-            between = decide(follower.inertia.at(x)).index.negative
+            x = solve_at(solver, lambda t: hermite(a, b, t), s)
+            between = decide(solver.inertia.at(x)).index.negative
         else:
             rising = b.negative > a.negative
             between = p.negative_before + (p.multiplicity if rising else -p.multiplicity)
         p.negative_after = q.negative_before = between
 
 
-def midpoint(follower: Follower, a: Point, b: Point) -> Point | None:
+def midpoint(solver: BranchSolver, a: Point, b: Point) -> Point | None:
     """Point half-way between two points of a branch; None where it is not between them."""
-    return point_between(follower, a, b, (a.arclength + b.arclength) / 2)
+    return point_between(solver, a, b, (a.arclength + b.arclength) / 2)
 
 
-def point_between(follower: Follower, a: Point, b: Point, s: float) -> Point | None:
+def point_between(solver: BranchSolver, a: Point, b: Point, s: float) -> Point | None:
     """Point of a branch at arclength ``s`` between two of its points; None where it is not between them."""
     try:
-        x = solve_at(follower, lambda t: hermite(a, b, t), s)
+        x = solve_at(solver, lambda t: hermite(a, b, t), s)
     except ConvergenceError:
         return None
-    whole = distance(follower.system, a.x, b.x)
-    if max(distance(follower.system, a.x, x), distance(follower.system, x, b.x)) > whole:
+    whole = distance(solver.system, a.x, b.x)
+    if max(distance(solver.system, a.x, x), distance(solver.system, x, b.x)) > whole:
         return None
-    return follower.point(x, s, follower.tangent(follower.row(hermite(a, b, s)[1]), at=x))
+    return solver.point(x, s, solver.tangent(solver.row(hermite(a, b, s)[1]), at=x))
 
 
-def _persistent(follower: Follower, a: Point, count: int) -> list[PETSc.Vec]:
+def _persistent(solver: BranchSolver, a: Point, count: int) -> list[PETSc.Vec]:
     """Vectors of the eigenvalues that are zero all along a branch, at the point ``a``."""
     if not count:
         return []
-    follower.system.set_phase(a.x)
-    found = follower.inertia.at(a.x)
+    solver.system.set_phase(a.x)
+    found = solver.inertia.at(a.x)
     found.count()
     return found.nearest(count, accuracy=1e-8)[1]
 
 
 def _special(
-    follower: Follower, a: Point, b: Point, order: int, zero_of: str, still: Sequence[PETSc.Vec] = ()
-) -> Special:
-    located = locate(follower, a, b, order, zero_of, still)
+    solver: BranchSolver, a: Point, b: Point, order: int, test_function: str, still: Sequence[PETSc.Vec] = ()
+) -> SpecialPoint:
+    located = locate(solver, a, b, order, test_function, still)
     margin = 0.01 * (b.arclength - a.arclength)
     if not a.arclength - margin <= located.s <= b.arclength + margin:
         raise ConvergenceError(
             f"A special point between loads {a.load:.8g} and {b.load:.8g} slipped out of its bracket",
             SMALLER_STEPS,
         )
-    special = special_at(follower, located, located.s, still)
-    special.zero_of = zero_of
-    if zero_of == "slope" and abs(located.after - located.before) == 1 and special.coupling > UNCOUPLED:
+    special = special_at(solver, located, located.s, still)
+    special.test_function = test_function
+    if test_function == "slope" and abs(located.after - located.before) == 1 and special.coupling > UNCOUPLED:
         special.kind = FOLD  # an eigenvalue crosses zero with the slope; where a side branch ends it only touches zero
     return special
 
 
-def directions(follower: Follower, special: Special) -> list[PETSc.Vec]:
+def directions(solver: BranchSolver, special: SpecialPoint) -> list[PETSc.Vec]:
     """Unit directions in which branches may leave a branch point, one for each circle of equivalent ones.
 
     In the plane of the null vectors and the branch's own tangent, what is orthogonal to the tangent; of the null
     vectors that a continuous symmetry carries into each other one is kept.
     """
-    system, tangent = follower.system, special.point.tangent
+    system, tangent = solver.system, special.point.tangent
     known = [] if tangent is None else [tangent.copy()]
     system.set_phase(special.point.x)
     out: list[PETSc.Vec] = []
     candidates = list(special.null_vectors)
     if abs(special.point.slope) < LEVEL * abs(system.scene.span[1] - system.scene.span[0]):
-        candidates.append(_load_response(follower, special))
+        candidates.append(_load_response(solver, special))
     for candidate in candidates:
         d = candidate.copy()
         project_out(d, known, system.metric, times=2)
@@ -213,32 +217,32 @@ def directions(follower: Follower, special: Special) -> list[PETSc.Vec]:
     return out
 
 
-def _load_response(follower: Follower, special: Special) -> PETSc.Vec:
+def _load_response(solver: BranchSolver, special: SpecialPoint) -> PETSc.Vec:
     """Change of state with the load off the null vectors: the other branch where a side branch ends.
 
     The Jacobian is singular there, and the load is orthogonal to its null vectors up to an error that its inverse would
     blow up: it is shifted, which changes the answer by about as much as the shift, :data:`SHIFT`, relative to it.
     """
-    system = follower.system
+    system = solver.system
     out = system.new_vector()
     x = special.point.x
     system.set_phase(x)
-    system.at(x).factor(follower.axis, SHIFT * system.stiffness_scale)
-    system.solve(follower.axis, out)
+    system.at(x).factor(solver.axis, SHIFT * system.stiffness_scale)
+    system.solve(solver.axis, out)
     project_out(out, special.null_vectors, system.metric)
     return out
 
 
-def leave(follower: Follower, special: Special, direction: PETSc.Vec, first: float) -> Point | None:
+def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, first: float) -> Point | None:
     """First point of the branch that leaves ``special`` along ``direction``, about ``first`` away, or None.
 
     The amplitude is halved until the point lies where the direction says, within half of its distance.  Where that
     fails, a family of equilibria may leave at once, at each of which the Jacobian is singular (an elastica whose ends
     meet turns as a rigid body about any axis): then Newton's method is damped along the family.
     """
-    system = follower.system
-    row, before = follower.row(direction), system.damping
-    for damping in dict.fromkeys((before, before or follower.inertia.tolerance)):
+    system = solver.system
+    row, before = solver.row(direction), system.damping
+    for damping in dict.fromkeys((before, before or solver.inertia.tolerance)):
         system.damping, amplitude = damping, first
         while amplitude > 1e-4:
             x = special.point.x.copy()
@@ -247,19 +251,19 @@ def leave(follower: Follower, special: Special, direction: PETSc.Vec, first: flo
             outcome = correct(system, x, row, reach=2.0 * amplitude)
             if outcome.converged:
                 apart = distance(system, special.point.x, x)
-                return follower.point(x, apart, follower.tangent(row, at=x), outcome)
+                return solver.point(x, apart, solver.tangent(row, at=x), outcome)
             amplitude /= 2
     system.damping = before
     return None
 
 
 def start_branch(
-    special: Special,
+    special: SpecialPoint,
     direction: PETSc.Vec,
     name: str,
     parent: tuple[str, int],
     depth: int,
-    follower: Follower,
+    solver: BranchSolver,
     ways: int,
     bounds: tuple[float, float],
 ) -> Branch | None:
@@ -270,45 +274,45 @@ def start_branch(
     Nor is it farther away than the branch that it leaves began: beside a nearly double point branches are short.
     """
     amplitude = FIRST if depth < 2 else max(min(FIRST, special.point.arclength), NEAREST)
-    first = leave(follower, special, direction, amplitude)
+    first = leave(solver, special, direction, amplitude)
     if first is None:
         return None
-    side = _side(follower, special, direction)
+    side = _side(solver, special, direction)
     while amplitude > NEAREST and (not bounds[0] <= first.load <= bounds[1] or _changed(special, side, ways, first)):
         amplitude /= 4
-        first = leave(follower, special, direction, amplitude) or first
-    origin = replace(special.point, tangent=direction, arclength=0.0, slope=follower.system.scalar(direction))
-    span = follower.system.scene.span
+        first = leave(solver, special, direction, amplitude) or first
+    origin = replace(special.point, tangent=direction, arclength=0.0, slope=solver.system.scalar(direction))
+    span = solver.system.scene.span
     vertical = abs(first.slope) < VERTICAL * abs(span[1] - span[0])  # the load changes by round-off
     begins = None if vertical else index_beside(special, first.load, ways)
     return Branch(name, parent, depth, [origin, first], begins=begins)
 
 
-def index_beside(special: Special, load: float, ways: int) -> int | None:
+def index_beside(special: SpecialPoint, load: float, ways: int) -> int | None:
     """Index with which a branch begins that leaves towards ``load``; None where the index of the trunk does not tell.
 
     By exchange of stability the eigenvalue that crosses zero has the sign opposite to that on the trunk at the same
     load.  Of one way to leave the eigenvalues of the other null vectors belong to a symmetry, and stay zero.
     """
     low, high = sorted((special.negative_before, special.negative_after))
-    if special.zero_of != "mu" or ways != 1 or high - low != special.multiplicity or not special.point.slope:
+    if special.test_function != "mu" or ways != 1 or high - low != special.multiplicity or not special.point.slope:
         return None
     ahead = (load - special.point.load) * special.point.slope > 0
     there = special.negative_after if ahead else special.negative_before
     return low if there == high else low + 1
 
 
-def _side(follower: Follower, special: Special, direction: PETSc.Vec) -> float:
+def _side(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec) -> float:
     """Sign of the load's change along a branch right after it leaves; zero where that is not asked for."""
-    if special.zero_of != "mu":
+    if special.test_function != "mu":
         return 0.0
     if special.law is not None:
         return special.law.side if "pitchfork" in special.law.kind else 0.0
-    near = leave(follower, special, direction, FIRST / 4)
+    near = leave(solver, special, direction, FIRST / 4)
     return 0.0 if near is None else float(np.sign(near.load - special.point.load))
 
 
-def _changed(special: Special, side: float, ways: int, first: Point) -> bool:
+def _changed(special: SpecialPoint, side: float, ways: int, first: Point) -> bool:
     """Whether the load has turned back before the point ``first`` of a branch, or its index is another one there."""
     begins = index_beside(special, first.load, ways)
     if special.law is not None and special.law.kind == "vertical branch":

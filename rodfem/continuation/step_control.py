@@ -15,7 +15,7 @@ NO_MOVE = 1e-12
 
 
 @dataclass(frozen=True)
-class Steps:
+class StepControl:
     """Steps by the size of the correction, in the metric (root mean square rotation in radian, load over its span).
 
     Attributes
@@ -41,8 +41,8 @@ class Steps:
     def __post_init__(self) -> None:
         """Check kinds and the largest step; raises :class:`InputError`."""
         for name in ("first", "largest", "smallest", "aim"):
-            real(name, getattr(self, name), getattr(Steps, name))
-        if whole("most", self.most, Steps.most) < 1:
+            real(name, getattr(self, name), getattr(StepControl, name))
+        if whole("most", self.most, StepControl.most) < 1:
             raise InputError(f"most is {self.most}: a branch has at least one point; give most=1 or more.")
         if not self.smallest < self.largest <= 1:
             raise InputError(
@@ -50,7 +50,7 @@ class Steps:
             )
         for name in ("first", "smallest", "aim"):
             if not getattr(self, name) > 0:
-                raise InputError(f"Steps with {name} = {getattr(self, name):g} lead nowhere: give more than 0.")
+                raise InputError(f"StepControl with {name} = {getattr(self, name):g} lead nowhere: give more than 0.")
 
     def begin(self) -> float:
         """Length of the first step."""
@@ -67,7 +67,7 @@ class Steps:
 
 
 @dataclass(frozen=True)
-class IndexSteps(Steps):
+class IndexStepControl(StepControl):
     """Steps over which the index changes by no more than a bound, so that there is a row between nearly equal points.
 
     Attributes
@@ -84,9 +84,9 @@ class IndexSteps(Steps):
     def __post_init__(self) -> None:
         """Check the bound, too; raises :class:`InputError`."""
         super().__post_init__()
-        if whole("change", self.change, IndexSteps.change) < 1:
+        if whole("change", self.change, IndexStepControl.change) < 1:
             raise InputError(f"A change of the index of {self.change} leads nowhere: give change=1 or more.")
-        real("resolved", self.resolved, IndexSteps.resolved)
+        real("resolved", self.resolved, IndexStepControl.resolved)
 
     def accepts(self, before: Point, after: Point) -> bool:
         """Whether the index has changed by no more than the bound, or the step is as short as it needs be."""

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from math import exp, inf, isfinite
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.solvers import Follower
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.continuation.special_points import point_between
 
 LOWER = 0.5
@@ -59,7 +59,7 @@ class Touching:
         self._begun = len(self._rows) < 2
         self._rows = [*self._rows[-1:], row]
 
-    def between(self, follower: Follower, a: Point, b: Point) -> list[Point]:
+    def between(self, solver: BranchSolver, a: Point, b: Point) -> list[Point]:
         """Rows to insert, in order of arclength, where an eigenvalue passes zero twice in the step from ``a`` to ``b``.
 
         The first step of a branch is looked at with the second: its row before that step then comes first.
@@ -69,27 +69,27 @@ class Touching:
         rows = [self._rows[-2], a, b]
         found = []
         if self._begun and rows[0].negative == a.negative:
-            early = inside(follower, rows, rows[0], a)
+            early = inside(solver, rows, rows[0], a)
             found += [rows[0], *early, a] if early else []
-        beside = around(follower, rows) if not found else []
+        beside = around(solver, rows) if not found else []
         if beside and beside[0].arclength < a.arclength:
             found = [rows[0], *beside, a]
             beside = []
-        return found + (beside or inside(follower, rows, a, b))
+        return found + (beside or inside(solver, rows, a, b))
 
 
-def inside(follower: Follower, rows: Sequence[Point], p: Point, q: Point) -> list[Point]:
+def inside(solver: BranchSolver, rows: Sequence[Point], p: Point, q: Point) -> list[Point]:
     """A state between the neighbours ``p`` and ``q`` among three rows whose index is not theirs, if there is one."""
     for multiplicity in MULTIPLICITIES:
         samples = [(row.arclength, relative(row, p, multiplicity)) for row in rows]
         if all(isfinite(value) for _, value in samples):
-            found = lowest(follower, samples, p, q, multiplicity)
+            found = lowest(solver, samples, p, q, multiplicity)
             if found is not None:
                 return [found]
     return []
 
 
-def around(follower: Follower, rows: Sequence[Point]) -> list[Point]:
+def around(solver: BranchSolver, rows: Sequence[Point]) -> list[Point]:
     """A state near the middle one of three rows whose index is not theirs, where that row's determinant is low."""
     p, a, b = rows
     if p.negative != a.negative or not relative(a, min(p, b, key=lambda row: row.determinant), 1) < DEEP:
@@ -97,7 +97,7 @@ def around(follower: Follower, rows: Sequence[Point]) -> list[Point]:
     step = min(a.arclength - p.arclength, b.arclength - a.arclength)
     size = step / NEARER
     while size > LEAST * step:
-        near = [point_between(follower, p, a, a.arclength - size), point_between(follower, a, b, a.arclength + size)]
+        near = [point_between(solver, p, a, a.arclength - size), point_between(solver, a, b, a.arclength + size)]
         before, after = near
         if before is None or after is None:
             return []
@@ -105,7 +105,7 @@ def around(follower: Follower, rows: Sequence[Point]) -> list[Point]:
             if differs(state, a):
                 return [state]
         closer = [before, a, after]
-        found = inside(follower, closer, before, a) or inside(follower, closer, a, after)
+        found = inside(solver, closer, before, a) or inside(solver, closer, a, after)
         if found or not relative(a, min(before, after, key=lambda row: row.determinant), 1) < DEEP:
             return found
         size /= NEARER
@@ -118,7 +118,7 @@ def relative(row: Point, other: Point, multiplicity: int) -> float:
     return float((-1) ** (row.negative - other.negative) * exp(min(exponent, 600.0)))
 
 
-def lowest(follower: Follower, samples: list[Sample], p: Point, q: Point, multiplicity: int) -> Point | None:
+def lowest(solver: BranchSolver, samples: list[Sample], p: Point, q: Point, multiplicity: int) -> Point | None:
     """State between two rows, towards the lowest value that the samples lead to, if its index differs from theirs."""
     known = [sample for sample in samples if sample[0] in (p.arclength, q.arclength)]
     least = min(value for _, value in known)
@@ -129,7 +129,7 @@ def lowest(follower: Follower, samples: list[Sample], p: Point, q: Point, multip
         if not p.arclength < s < q.arclength or (value > LOWER * least and not close):
             break
         s = min(max(s, p.arclength + margin), q.arclength - margin)
-        state = point_between(follower, p, q, s)
+        state = point_between(solver, p, q, s)
         if state is None or differs(state, p):
             return state
         size = relative(state, p, multiplicity)

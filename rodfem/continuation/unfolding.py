@@ -28,8 +28,8 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import Special
-from rodfem.continuation.solvers import Follower
+from rodfem.continuation.branch import SpecialPoint
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System, combine
@@ -68,9 +68,9 @@ class Unfolded:
         return float(np.linalg.norm(self.beta))
 
 
-def unfold(follower: Follower, special: Special) -> Unfolded | None:
+def unfold(solver: BranchSolver, special: SpecialPoint) -> Unfolded | None:
     """Solve for a branch point with unfolding parameters; None where there is none near the ``special`` point."""
-    system, inertia = follower.system, follower.inertia
+    system, inertia = solver.system, solver.inertia
     k, x = len(special.null_vectors), special.point.x.copy()
     system.set_phase(x)
     bordered = Bordered(system, inertia.at(x).matrix, k, inertia.constraints)
@@ -80,7 +80,7 @@ def unfold(follower: Follower, special: Special) -> Unfolded | None:
     for _ in range(MOST):
         system.at(x).residual(equations)
         try:
-            step, beta, v, directions = _step(follower, bordered, psi, x, equations)
+            step, beta, v, directions = _step(solver, bordered, psi, x, equations)
         except (ConvergenceError, np.linalg.LinAlgError):
             return None
         size = system.norm(step)
@@ -97,10 +97,10 @@ def unfold(follower: Follower, special: Special) -> Unfolded | None:
 
 
 def _step(
-    follower: Follower, bordered: Bordered, psi: list[PETSc.Vec], x: PETSc.Vec, equations: PETSc.Vec
+    solver: BranchSolver, bordered: Bordered, psi: list[PETSc.Vec], x: PETSc.Vec, equations: PETSc.Vec
 ) -> tuple[PETSc.Vec, np.ndarray, list[PETSc.Vec], list[PETSc.Vec]]:
     """Newton's step, the unfolding parameters after it, null vectors and directions."""
-    system, found, k = follower.system, follower.inertia.at(x), len(psi)
+    system, found, k = solver.system, solver.inertia.at(x), len(psi)
     bordered.factor(found.matrix, psi)
     right, slope = equations.copy(), found.border.copy()
     right.scale(-1.0)
@@ -111,8 +111,8 @@ def _step(
     v, G = [vector for vector, _ in solved], np.array([row for _, row in solved])
     system.set_load(w, 1.0)
     h = DIFFERENCE / system.norm(w)
-    r, bend = _differences(follower, x, w, h, v, equations)
-    y = [_differences(follower, x, vector, DIFFERENCE, [vector])[0][0] for vector in v]
+    r, bend = _differences(solver, x, w, h, v, equations)
+    y = [_differences(solver, x, vector, DIFFERENCE, [vector])[0][0] for vector in v]
     table, known = np.zeros((k + 1, k + 1)), np.zeros(k + 1)
     for i in range(k):
         known[i] = b[i] - s.dot(r[i])
@@ -140,7 +140,7 @@ def _crossing_directions(system: System, w: PETSc.Vec, v: list[PETSc.Vec], table
 
 
 def _differences(
-    follower: Follower,
+    solver: BranchSolver,
     x: PETSc.Vec,
     direction: PETSc.Vec,
     h: float,
@@ -148,7 +148,7 @@ def _differences(
     equations: PETSc.Vec | None = None,
 ) -> tuple[list[PETSc.Vec], PETSc.Vec]:
     """Derivatives of ``S v`` along a direction at ``x``, and the second one of ``F`` (from ``F``, if given)."""
-    system, inertia = follower.system, follower.inertia
+    system, inertia = solver.system, solver.inertia
     out, bend = [system.new_vector() for _ in vectors], system.new_vector()
     beside, there = system.new_vector(), system.new_vector()
     for sign in (1.0, -1.0):

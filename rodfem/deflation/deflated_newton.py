@@ -27,7 +27,7 @@ from math import isfinite
 
 from petsc4py import PETSc
 
-from rodfem.continuation.solvers import Follower
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.deflation.group_orbit import Orbits
 
 LARGEST = 0.4
@@ -43,9 +43,9 @@ FLOW = (10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
 class DeflatedNewton:
     """Iterates towards equilibria at a fixed load that are not among the ``known`` ones."""
 
-    def __init__(self, follower: Follower) -> None:
+    def __init__(self, solver: BranchSolver) -> None:
         """Start with nothing known."""
-        self.follower, self.system = follower, follower.system
+        self.solver, self.system = solver, solver.system
         self.known = Orbits(self.system)
 
     def flow(self, x: PETSc.Vec, alphas: Sequence[float] = FLOW) -> None:
@@ -56,8 +56,8 @@ class DeflatedNewton:
             system.set_phase(None)
             state = system.at(x)
             state.residual(equations)
-            matrix = state.jacobian(self.follower.axis)
-            shift = alpha * self.follower.inertia.scale
+            matrix = state.jacobian(self.solver.axis)
+            shift = alpha * self.solver.inertia.scale
             matrix.axpy(shift, system.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
             system.lu(matrix)
@@ -76,7 +76,7 @@ class DeflatedNewton:
             system.set_phase(x)
             state = system.at(x)
             state.residual(equations)
-            state.factor(self.follower.axis)
+            state.factor(self.solver.axis)
             if not system.solve(equations, step):
                 return MOST
             step.scale(-1.0)

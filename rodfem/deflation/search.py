@@ -6,7 +6,7 @@ makes of a known equilibrium is known too: a continuous symmetry makes it a circ
 (:mod:`rodfem.deflation.group_orbit`), discrete ones a few isolated images
 (:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain Newton method, and kept if it is
 new and admissible.  It is the start of branches (:func:`starts`), and states of known branches are found by
-:func:`states_at`.
+:func:`equilibria_at`.
 
 A search can show that there are more equilibria, and never that there are no more.
 """
@@ -23,7 +23,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import Follower, hermite
+from rodfem.continuation.solvers import BranchSolver, hermite
 from rodfem.deflation.deflated_newton import FLOW, MOST, DeflatedNewton
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
 from rodfem.deflation.guesses import turned_state
@@ -53,7 +53,7 @@ class Try:
 
 
 @dataclass
-class Tally:
+class SearchLog:
     """What a search did: the load in words, all tries in order, and the mirrors that the scene turned out to have.
 
     ``nearly`` counts equilibria that are nearly mirror images of others, which an imperfection makes different ones.
@@ -82,7 +82,7 @@ class Tally:
 
 
 class Deflation(DeflatedNewton):
-    """Search for equilibria of a :class:`~rodfem.continuation.solvers.Follower`'s scene at one load.
+    """Search for equilibria of a :class:`~rodfem.continuation.solvers.BranchSolver`'s scene at one load.
 
     Attributes
     ----------
@@ -94,9 +94,9 @@ class Deflation(DeflatedNewton):
         Discrete symmetries of the scene at this load.
     """
 
-    def __init__(self, follower: Follower, load: float, known: Sequence[Point] = (), seed: int = 0) -> None:
+    def __init__(self, solver: BranchSolver, load: float, known: Sequence[Point] = (), seed: int = 0) -> None:
         """Deflate the known equilibria and their images; :class:`InputError` where one is at another load."""
-        super().__init__(follower)
+        super().__init__(solver)
         self.load, self.seed = load, seed
         scene = self.system.scene
         scene.parameters[scene.load].check(scene.load, load)
@@ -106,7 +106,7 @@ class Deflation(DeflatedNewton):
                     f"A known equilibrium is at {scene.load} = {point.load:.8g}, not {load:.8g}: "
                     "give equilibria at the load of the search (diagram.at(load) computes them)."
                 )
-        self.start = follower.start(load)
+        self.start = solver.start(load)
         self.mirrors = mirrors(self.system, self.start)
         self.bases: list[PETSc.Vec] = []
         self.found: list[Point] = []
@@ -114,7 +114,7 @@ class Deflation(DeflatedNewton):
         self.slides = any(
             s.along for s in self.system.symmetries
         )  # then states shifted along the rod are one, and known by their energy
-        self.tally = Tally(f"{scene.load} = {load:.10g}", mirrors=[str(m) for m in self.mirrors])
+        self.tally = SearchLog(f"{scene.load} = {load:.10g}", mirrors=[str(m) for m in self.mirrors])
         for point in known:
             self._deflate(point.x)
 
@@ -147,7 +147,7 @@ class Deflation(DeflatedNewton):
     def _deflate(self, x: PETSc.Vec) -> None:
         """Add a state and its images to what is known."""
         self.bases.append(x)
-        self.energies.append(self.follower.energy(x))
+        self.energies.append(self.solver.energy(x))
         if self.nearest_known(x) > SAME:
             self.known.add(x)
         for mirror in list(self.mirrors):
@@ -162,7 +162,7 @@ class Deflation(DeflatedNewton):
         energy: a pole beside its root would hide it from Newton's method.
         """
         point, _ = self._judge(image)
-        scale = max(abs(energy), self.follower.inertia.scale)
+        scale = max(abs(energy), self.solver.inertia.scale)
         if point is not None and abs(point.energy - energy) > IMAGE * scale:
             self.found.append(point)
             self.tally.nearly += 1
@@ -174,9 +174,9 @@ class Deflation(DeflatedNewton):
 
     def _judge(self, x: PETSc.Vec) -> tuple[Point | None, str]:
         """Polish a candidate by the plain Newton method; the point, if it is a new equilibrium, and the outcome."""
-        system, follower = self.system, self.follower
+        system, solver = self.system, self.solver
         system.set_phase(x)
-        outcome = correct(system, x, follower.axis, reach=0.1)
+        outcome = correct(system, x, solver.axis, reach=0.1)
         system.set_load(x, self.load)  # steps at fixed load may have moved it by round-off
         if not outcome.converged:
             return None, FAILED
@@ -184,18 +184,18 @@ class Deflation(DeflatedNewton):
             return None, KNOWN
         system.set_phase(x)
         try:
-            point = follower.point(x, 0.0, follower.load_tangent(x, True), outcome)
+            point = solver.point(x, 0.0, solver.load_tangent(x, True), outcome)
         except ConvergenceError:  # an index that cannot be counted
             return None, FAILED
         if self.slides and any(abs(point.energy - e) <= 1e-6 * max(abs(e), 1e-12) for e in self.energies):
             return None, KNOWN
-        if point.drift > DRIFT * follower.inertia.scale or not point.stretch > 0:
+        if point.drift > DRIFT * solver.inertia.scale or not point.stretch > 0:
             return None, INADMISSIBLE
         return point, NEW
 
 
-def further(
-    follower: Follower,
+def find_equilibria(
+    solver: BranchSolver,
     load: float,
     known: Sequence[Point] = (),
     tries: int = 24,
@@ -208,14 +208,14 @@ def further(
     the direction of increasing load.  How the tries ended goes to the ``observer``; :class:`Deflation` has the numbers.
     Raises :class:`InputError` for a load that is not admissible, or known equilibria at another one.
     """
-    search = Deflation(follower, load, known, seed)
+    search = Deflation(solver, load, known, seed)
     found = search.run(tries)
     if observer is not None:
         observer.note(str(search.tally))
     return found
 
 
-def states_at(follower: Follower, branches: Sequence[Branch], load: float) -> list[Point]:
+def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float) -> list[Point]:
     """Equilibria of traced branches at exactly ``load``: what a search for further ones should know.
 
     Raises :class:`ConvergenceError` where there is none between two points on either side of the load.
@@ -233,11 +233,11 @@ def states_at(follower: Follower, branches: Sequence[Branch], load: float) -> li
             s = a.arclength + t * (b.arclength - a.arclength)
             smooth = a.tangent is not None and b.tangent is not None and b.arclength > a.arclength
             guess = hermite(a, b, s)[0] if smooth else combine([a.x, b.x], np.array([1 - t, t]))
-            follower.system.set_phase(guess)
-            x, outcome = follower.at_load(guess, load, reach=1.0)
+            solver.system.set_phase(guess)
+            x, outcome = solver.at_load(guess, load, reach=1.0)
             if not outcome.converged:
                 raise ConvergenceError(f"No equilibrium at load {load:g} between two points of {branch.name}.")
-            found.append(follower.point(x, s, follower.load_tangent(x, True), outcome))
+            found.append(solver.point(x, s, solver.load_tangent(x, True), outcome))
     return found
 
 

@@ -8,10 +8,10 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rodfem.continuation.branch import Branch, Point, Special
-from rodfem.continuation.solvers import Equilibria, Follower
-from rodfem.continuation.step_control import Steps
-from rodfem.deflation.search import states_at
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.continuation.step_control import StepControl
+from rodfem.deflation.search import equilibria_at
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
@@ -49,7 +49,7 @@ class Diagram:
         Where the time went.
     """
 
-    def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[Equilibria]) -> None:
+    def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[StaticSolver]) -> None:
         """Keep what was traced; ``solvers`` may grow."""
         self.scene, self.plan, self.branches, self.solvers = scene, plan, branches, solvers
         self.warnings: list[str] = []
@@ -85,7 +85,7 @@ class Diagram:
                 return branch
         raise KeyError(f"no branch {key!r}: there are {', '.join(repr(b.name) for b in self.branches)}")
 
-    def special(self, kind: str | None = None, branch: str | None = None) -> list[Special]:
+    def special(self, kind: str | None = None, branch: str | None = None) -> list[SpecialPoint]:
         """Special points, of one kind ("fold", "branch point", "flutter", "divergence", ...) or one branch if named.
 
         Without a kind those at which something happens: loads asked for and ends are left out.
@@ -107,35 +107,35 @@ class Diagram:
             )
         finest = self._finest()
         solver = self.solvers[finest]
-        if not isinstance(solver, Follower):
+        if not isinstance(solver, BranchSolver):
             guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
             return [self.solver(guess).equilibrium(load, guess)]
-        return states_at(solver, [replace(b, points=[self._on(p, finest) for p in b.points]) for b in self], load)
+        return equilibria_at(solver, [replace(b, points=[self._on(p, finest) for p in b.points]) for b in self], load)
 
-    def solver(self, point: Point | Special) -> Solver:
+    def solver(self, point: Point | SpecialPoint) -> Solver:
         """Return the solver of the mesh that a point belongs to."""
-        mesh = point.point.mesh if isinstance(point, Special) else point.mesh
+        mesh = point.point.mesh if isinstance(point, SpecialPoint) else point.mesh
         if mesh not in self._asked:
             self._asked[mesh] = Solver.of(self.solvers[mesh])
         return self._asked[mesh]
 
     # --- what it can be asked ------------------------------------------------------------------------------------
 
-    def assess(self, point: Point | Special, method: str = "auto", number: int = 4) -> Verdict:
+    def assess(self, point: Point | SpecialPoint, method: str = "auto", number: int = 4) -> Verdict:
         """Decide the stability of a point with a given method: see :meth:`rodfem.Solver.assess`."""
         return self.solver(point).assess(point, method, number)
 
-    def modes(self, point: Point | Special, number: int = 3, method: str = "auto") -> Modes:
+    def modes(self, point: Point | SpecialPoint, number: int = 3, method: str = "auto") -> Modes:
         """Left-most modes of a point: see :meth:`rodfem.Solver.modes`."""
         return self.solver(point).modes(point, number, method)
 
     def locus(
         self,
-        special: Special,
+        special: SpecialPoint,
         parameter: str,
         interval: tuple[float, float],
         load: tuple[float, float] | None = None,
-        steps: Steps | None = None,
+        steps: StepControl | None = None,
     ) -> Locus:
         """Follow a special point in the plane of the load and a second parameter.
 
@@ -216,14 +216,14 @@ class Diagram:
             figure.savefig(Path(path))
         return figure
 
-    def show(self, point: Point | Special, path: Path | str | None = None, caption: str | None = None) -> Snapshot:
+    def show(self, point: Point | SpecialPoint, path: Path | str | None = None, caption: str | None = None) -> Snapshot:
         """Draw the rod at a point, with its supports and loads; also into a file, if a ``path`` is given.
 
         A notebook shows what is returned.  Raises :class:`ImportError` where PyVista is missing.
         """
         from rodfem.output.snapshot import snapshot
 
-        shown = point.point if isinstance(point, Special) else point
+        shown = point.point if isinstance(point, SpecialPoint) else point
         return snapshot(self.branches, self.solvers, shown, path, caption)
 
     def __repr__(self) -> str:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import Point, Special
+from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import EVENT
 from rodfem.continuation.locate import event_at, locate_event
-from rodfem.continuation.solvers import Follower, hermite
+from rodfem.continuation.solvers import BranchSolver, hermite
 from rodfem.problem.events import Event
 from rodfem.tolerances import INSIDE, round_off
 
@@ -23,29 +23,29 @@ class Events:
         self._row: Point | None = None
         self._values: list[float] = []
 
-    def between(self, follower: Follower, a: Point, b: Point) -> list[Special]:
+    def between(self, solver: BranchSolver, a: Point, b: Point) -> list[SpecialPoint]:
         """Special points of the events that happen in the step from ``a`` to ``b``."""
         if not self.events:
             return []
-        before = self._values if self._row is a else [event_at(follower, event, a.x) for event in self.events]
-        self._row, self._values = b, [event_at(follower, event, b.x) for event in self.events]
+        before = self._values if self._row is a else [event_at(solver, event, a.x) for event in self.events]
+        self._row, self._values = b, [event_at(solver, event, b.x) for event in self.events]
         found = []
         for event, p, q in zip(self.events, before, self._values, strict=True):
             if p * q < 0:
-                found.append(_special(follower, event, a, b))
+                found.append(_special(solver, event, a, b))
         return found
 
 
-def _special(follower: Follower, event: Event, a: Point, b: Point) -> Special:
+def _special(solver: BranchSolver, event: Event, a: Point, b: Point) -> SpecialPoint:
     def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
         return hermite(a, b, s)
 
     margin = INSIDE * (b.arclength - a.arclength)
-    s, x, along = locate_event(follower, event, curve, a.arclength + margin, b.arclength - margin)
-    follower.system.set_phase(x)
-    tangent = follower.tangent(follower.row(curve(s)[1]), at=x)
-    point = follower.point(x, s, tangent)
+    s, x, along = locate_event(solver, event, curve, a.arclength + margin, b.arclength - margin)
+    solver.system.set_phase(x)
+    tangent = solver.tangent(solver.row(curve(s)[1]), at=x)
+    point = solver.point(x, s, tangent)
     left = abs(point.slope) * along + round_off(point.load)
-    special = Special(EVENT, point, point.negative, point.negative, left, note=event.name)
+    special = SpecialPoint(EVENT, point, point.negative, point.negative, left, note=event.name)
     special.event = event
     return special

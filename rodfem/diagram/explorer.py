@@ -11,12 +11,12 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.gaps import Gap, arms
-from rodfem.continuation.branch import Branch, Point, Special
-from rodfem.continuation.normal_form import law_of, origin_of
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.normal_form import normal_form_of, origin_of
 from rodfem.continuation.solvers import ON_BOUND
 from rodfem.continuation.special_points import COUPLED, coupling_of, directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
-from rodfem.deflation.search import SAME, further, states_at
+from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
 from rodfem.diagram.tracer import Tracer, equivalent, near
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
@@ -52,11 +52,11 @@ class Explorer(Tracer):
     def _search(self, load: float) -> None:
         """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
         self.observer.note("")
-        with self.follower.system.clock.purpose("search"):
-            self.use(max(self.meshes.followers, key=lambda f: f.system.fields.unknowns).mesh)
+        with self.solver.system.clock.purpose("search"):
+            self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
             here = [replace(b, points=[self.here(p) for p in b.points]) for b in self.branches]
-            known = states_at(self.follower, here, load)
-            found = further(self.follower, load, known, self.plan.tries, observer=self.observer)
+            known = equilibria_at(self.solver, here, load)
+            found = find_equilibria(self.solver, load, known, self.plan.tries, observer=self.observer)
         before = len(self.branches)
         for i, point in enumerate(found):
             if not self._on_branch(point, before):
@@ -67,15 +67,15 @@ class Explorer(Tracer):
         """Whether a point is on one of the branches traced, from number ``first`` on."""
         self.use(point.mesh)
         here = [replace(b, points=[self.here(p) for p in b.points]) for b in self.branches[first:]]
-        known = Orbits(self.follower.system)
-        for other in states_at(self.follower, here, point.load):
+        known = Orbits(self.solver.system)
+        for other in equilibria_at(self.solver, here, point.load):
             known.add(other.x)
         return any(apart < SAME for apart, _ in known.nearest(point.x))
 
     def _detached(self, gap: Gap, depth: int) -> None:
         """Trace the branch on the other side of a gap: what no step from this side reaches."""
         self.use(gap.point.mesh)
-        for point in arms(self.follower, gap):
+        for point in arms(self.solver, gap):
             if self.low < point.load < self.high and not self._on_branch(point):
                 number = 1 + sum(b.name.startswith("detached") for b in self.branches)
                 self.trace_whole(point, f"detached {number}", depth)
@@ -97,7 +97,7 @@ class Explorer(Tracer):
         try:
             point = self._first()
         except ConvergenceError:
-            self._check_rank(self.follower.start(start))
+            self._check_rank(self.solver.start(start))
             raise
         if point.stretch < COLLAPSED:
             raise SceneError(
@@ -105,7 +105,7 @@ class Explorer(Tracer):
                 f"{start:g}: write the energy of stretch in v[2] - 1 (zero in the undeformed rod), or push less."
             )
         if self.scene.closed:
-            number, Tw, Wr = link(self.follower.shape.sample(point.x))
+            number, Tw, Wr = link(self.solver.shape.sample(point.x))
             self.observer.note(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
         if point.negative:
             self.observer.note(
@@ -115,22 +115,22 @@ class Explorer(Tracer):
 
     def _first(self) -> Point:
         start, stop = self.span
-        follower = self.follower
-        x, outcome = follower.first(start)
+        solver = self.solver
+        x, outcome = solver.first(start)
         if not outcome.converged:
             raise ConvergenceError(
                 f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: start at another "
                 "load, give the scene a start nearer to one, or see whether constraints repeat each other or what an "
                 "end holds."
             )
-        if follower.convexity is not None and follower.convexity.lowest(x) <= 0:
+        if solver.convexity is not None and solver.convexity.lowest(x) <= 0:
             raise SceneError(
                 f"The stored energy is not convex somewhere along the first state, at {self.scene.load} = {start:g}: "
                 "choose constants that make it so."
             )
-        follower.system.set_phase(x)
-        point = follower.point(x, 0.0, follower.load_tangent(x, stop > start), outcome)
-        family = point.zero - follower.system.active_drifts()
+        solver.system.set_phase(x)
+        point = solver.point(x, 0.0, solver.load_tangent(x, stop > start), outcome)
+        family = point.zero - solver.system.active_drifts()
         if family > 0:
             self._leave_family(point, family, stop > start)
         return point
@@ -141,19 +141,19 @@ class Explorer(Tracer):
         With the null vectors ``phi`` of ``S`` as borders, ``S w = -F_lam`` is solvable where ``phi . F_lam = 0``: the
         load does no work on the free motion, and the branch goes on with the tangent ``(w, 1)``, across the family.
         """
-        follower, system = self.follower, self.follower.system
-        found = follower.inertia.at(point.x)
+        solver, system = self.solver, self.solver.system
+        found = solver.inertia.at(point.x)
         found.count()
         vectors = found.nearest(freedoms, accuracy=1e-8)[1]
-        if max(coupling_of(follower, point.x, v) for v in vectors) > COUPLED:
+        if max(coupling_of(solver, point.x, v) for v in vectors) > COUPLED:
             raise SceneError(
                 f"The first state, at {self.scene.load} = {point.load:g}, may move freely at this load, and is not the "
                 f"state that a small {self.scene.load} leads on from: start the range at another load, or give the "
                 "scene a start that is in equilibrium under the load, too."
             )
-        found = follower.inertia.at(point.x)
-        bordered = Bordered(system, found.matrix, freedoms, follower.inertia.constraints)
-        bordered.factor(found.matrix, [follower.inertia.metric * v for v in vectors])
+        found = solver.inertia.at(point.x)
+        bordered = Bordered(system, found.matrix, freedoms, solver.inertia.constraints)
+        bordered.factor(found.matrix, [solver.inertia.metric * v for v in vectors])
         right = found.border.copy()
         right.scale(-1.0)
         tangent, _ = bordered.solve(right, np.zeros(freedoms))
@@ -163,16 +163,16 @@ class Explorer(Tracer):
 
     def _check_rank(self, x: PETSc.Vec) -> None:
         """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others."""
-        scalars = [u for u in self.follower.system.fields.unknown_scalars if u.multiplier]
+        scalars = [u for u in self.solver.system.fields.unknown_scalars if u.multiplier]
         names = [u.group.equation.format(u.component + 1) for u in scalars]
-        rank_of(Blocks(self.follower.system, "full").assemble(x), names)
+        rank_of(Blocks(self.solver.system, "full").assemble(x), names)
 
-    def _switch(self, parent: Branch, i: int, special: Special) -> None:
+    def _switch(self, parent: Branch, i: int, special: SpecialPoint) -> None:
         special.switched = True
         self.use(special.point.mesh)
-        self.follower.damp(special.point.zero - self.follower.system.active_drifts() - special.multiplicity)
+        self.solver.damp(special.point.zero - self.solver.system.active_drifts() - special.multiplicity)
         try:
-            ways = directions(self.follower, special)
+            ways = directions(self.solver, special)
         except ConvergenceError as trouble:
             self.observer.warn(f"No branch could be followed from {parent.name} at {special.point.load:.8g}: {trouble}")
             return
@@ -188,7 +188,7 @@ class Explorer(Tracer):
                 name = self._name(parent)
                 origin = parent.name, i
                 branch = start_branch(
-                    special, way, name, origin, parent.depth + 1, self.follower, len(ways), self._bounds()
+                    special, way, name, origin, parent.depth + 1, self.solver, len(ways), self._bounds()
                 )
                 if branch is None:
                     self.observer.warn(
@@ -201,7 +201,7 @@ class Explorer(Tracer):
                 if first is not None and self._mirrored(special, first, branch.points[1]):
                     continue  # the mirror image of the branch just traced
                 first = branch.points[1]
-                if special.meets is None and self._traced_already(branch, special):
+                if special.connects_to is None and self._traced_already(branch, special):
                     continue
                 if self._came_from(parent, special, first):
                     continue
@@ -213,26 +213,26 @@ class Explorer(Tracer):
         margin = ON_BOUND * (self.high - self.low)
         return self.low - margin, self.high + margin
 
-    def _law(self, special: Special, direction: PETSc.Vec) -> None:
+    def _law(self, special: SpecialPoint, direction: PETSc.Vec) -> None:
         """Find the local law at a branch point: of what leaves, or of this branch where it ends on another."""
         if special.law is not None:
             return
-        from_the_side = special.zero_of == "slope"
-        with self.follower.system.clock.purpose("location"):
+        from_the_side = special.test_function == "slope"
+        with self.solver.system.clock.purpose("location"):
             way = special.null_vectors[0] if from_the_side else direction
-            special.law = law_of(self.follower, origin_of(self.follower, special), way)
+            special.law = normal_form_of(self.solver, origin_of(self.solver, special), way)
         if special.law is not None and isfinite(special.error_estimate):
-            with self.follower.system.clock.purpose("error bars"):
+            with self.solver.system.clock.purpose("error bars"):
                 self.meshes.richer(special.point.mesh).law(special, way, special.law)
         if special.law is not None and not from_the_side:
             indices = special.negative_before, special.negative_after
             special.law.judge(*(indices if special.point.slope > 0 else reversed(indices)))
             self.observer.law(special)
 
-    def _judge_from_the_side(self, special: Special, trunk: Sequence[Branch]) -> None:
+    def _judge_from_the_side(self, special: SpecialPoint, trunk: Sequence[Branch]) -> None:
         """Name a pitchfork that was reached along its side branch, from the branch that it ends on, now traced."""
         index = {branch.points[1].load > special.point.load: branch.points[1].negative for branch in trunk}
-        if special.law is not None and special.zero_of == "slope" and len(index) == 2:
+        if special.law is not None and special.test_function == "slope" and len(index) == 2:
             special.law.judge(index[False], index[True])
             self.observer.law(special)
 
@@ -240,7 +240,7 @@ class Explorer(Tracer):
         siblings = sum(b.parent is not None and b.parent[0] == parent.name for b in self.branches)
         return f"{parent.name + '.' if parent.depth else 'branch '}{siblings + 1}"
 
-    def _mirrored(self, special: Special, a: Point, b: Point) -> bool:
+    def _mirrored(self, special: SpecialPoint, a: Point, b: Point) -> bool:
         """Whether first points of the two branches that leave in opposite ways are of mirror images, at one load.
 
         The metric need not share the symmetry: points at one distance in it need not be mirror images themselves.
@@ -250,24 +250,24 @@ class Explorer(Tracer):
         inner, outer = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
         piece = Branch("", None, 0, [self.here(replace(special.point, arclength=0.0)), self.here(outer)])
         try:
-            there = states_at(self.follower, [piece], inner.load)
+            there = equilibria_at(self.solver, [piece], inner.load)
         except ConvergenceError:  # nothing of the one branch is at the other's load
             return False
         return any(self.alike(self.here(inner), p, SAME_STATE) for p in there)
 
-    def _came_from(self, parent: Branch, special: Special, point: Point) -> bool:
+    def _came_from(self, parent: Branch, special: SpecialPoint, point: Point) -> bool:
         """Whether what leaves the end of a side branch is that branch again, or its mirror image."""
-        if special.zero_of != "slope":
+        if special.test_function != "slope":
             return False
         tail = replace(parent, points=[self.here(p) for p in parent.points[-TAIL:]])
-        return any(equivalent(point, other, SAME_STATE) for other in states_at(self.follower, [tail], point.load))
+        return any(equivalent(point, other, SAME_STATE) for other in equilibria_at(self.solver, [tail], point.load))
 
-    def _traced_already(self, branch: Branch, special: Special) -> bool:
+    def _traced_already(self, branch: Branch, special: SpecialPoint) -> bool:
         """Whether another branch ended at this branch point coming along the same way."""
         a, b = branch.points[1], special.point
         for other in self.branches:
             for end in other.special:
-                if end.meets is not None and self.alike(end.point, b, SAME_SPECIAL):
+                if end.connects_to is not None and self.alike(end.point, b, SAME_SPECIAL):
                     before = other.points[max(end.row - 2, 0) : end.row]
                     if any(near(a, p) for p in before):
                         return True

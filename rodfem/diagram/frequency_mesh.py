@@ -15,7 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rodfem.adaptivity.mesh_sequence import start_mesh
-from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.sweep import at_load
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
@@ -60,7 +60,7 @@ def frequency_mesh(
 
 def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndarray]:
     """Eigenvalues mu nearest the origin at each of the loads, two more than ``number``."""
-    solver = Equilibria(system)
+    solver = StaticSolver(system)
     vibration = Vibration(solver.system)
     x, _ = solver.first(float(loads[0]))
     found = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from rodfem.adaptivity.mesh_sequence import check_accuracy
-from rodfem.continuation.step_control import Steps
+from rodfem.continuation.step_control import StepControl
 from rodfem.errors import Argument, InputError, Remedy
 from rodfem.problem.events import Event
 from rodfem.problem.kinds import real, reals, whole
@@ -43,7 +43,7 @@ class Plan:
     span: tuple[float, float] | None = None
     at: tuple[float, ...] = ()
     depth: int = 2
-    steps: Steps = field(default_factory=Steps)
+    steps: StepControl = field(default_factory=StepControl)
     error_bars: bool = True
     spectrum: int = 0
     tries: int = 0
@@ -60,8 +60,8 @@ class Plan:
         object.__setattr__(self, "at", reals("at", self.at, (0.5, 1.0)))
         for name, example in (("depth", 2), ("spectrum", 4), ("tries", 24), ("modes", 3)):
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
-        if not isinstance(self.steps, Steps):
-            raise InputError(f"steps is {self.steps!r}: give Steps, as in steps=Steps(largest=0.02).")
+        if not isinstance(self.steps, StepControl):
+            raise InputError(f"steps is {self.steps!r}: give StepControl, as in steps=StepControl(largest=0.02).")
         if not isinstance(self.method, str):
             raise InputError(f"method is {self.method!r}: give the name of one, as in method='auto'.")
         if self.method not in ("", methods.AUTO):

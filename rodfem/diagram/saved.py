@@ -10,9 +10,9 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import Branch, Law, Point, Special
+from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.kinds import KINDS
-from rodfem.continuation.solvers import Equilibria, Follower
+from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
@@ -93,18 +93,18 @@ def _check(data: dict[str, Any], scene: Scene, folder: Path) -> None:
             )
 
 
-def _solver(scene: Scene, formulation: str, mesh: dict[str, Any], comm: MPI.Comm) -> Equilibria:
+def _solver(scene: Scene, formulation: str, mesh: dict[str, Any], comm: MPI.Comm) -> StaticSolver:
     vertices = None if mesh["vertices"] is None else tuple(mesh["vertices"])
     made = Discretization(formulation, mesh["elements"], mesh["degree"], vertices)
     return Solver(scene, made, comm).equilibria
 
 
-def _branch(entry: dict[str, Any], solvers: Sequence[Equilibria], states: Path) -> Branch:
+def _branch(entry: dict[str, Any], solvers: Sequence[StaticSolver], states: Path) -> Branch:
     columns, parent = entry["columns"], entry["parent"]
     points = [_point(columns, row, entry["name"], solvers, states) for row in range(len(columns["load"]))]
     for before, point, after in zip([*points[:1], *points[:-1]], points, [*points[1:], *points[-1:]], strict=True):
         solver = solvers[point.mesh]
-        if isinstance(solver, Follower) and before.mesh == point.mesh == after.mesh and len(points) > 1:
+        if isinstance(solver, BranchSolver) and before.mesh == point.mesh == after.mesh and len(points) > 1:
             point.tangent = _chord(solver, before.x, after.x)
     branch = Branch(entry["name"], (parent[0], parent[1]) if parent else None, 0, points, ended=entry["ended"])
     branch.depth = len(entry["name"].split(".")) if parent else 0
@@ -113,7 +113,7 @@ def _branch(entry: dict[str, Any], solvers: Sequence[Equilibria], states: Path) 
     return branch
 
 
-def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[Equilibria], states: Path) -> Point:
+def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[StaticSolver], states: Path) -> Point:
     values = {name: columns[name][row] for name in COLUMNS}
     values = {name: float("nan") if value is None else value for name, value in values.items()}
     solver = solvers[values["mesh"]]
@@ -124,7 +124,7 @@ def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[Equ
     return Point(x=load_state(states, branch, row, solver), tangent=None, **values)
 
 
-def _chord(solver: Follower, before: PETSc.Vec, after: PETSc.Vec) -> PETSc.Vec:
+def _chord(solver: BranchSolver, before: PETSc.Vec, after: PETSc.Vec) -> PETSc.Vec:
     """Unit chord from the row before to the row after, which is the tangent to second order of the step."""
     chord = after.copy()
     chord.axpy(-1.0, before)
@@ -132,11 +132,11 @@ def _chord(solver: Follower, before: PETSc.Vec, after: PETSc.Vec) -> PETSc.Vec:
     return chord
 
 
-def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[Equilibria]) -> Special:
+def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[StaticSolver]) -> SpecialPoint:
     """Special point of a row; its null vectors are those of the eigenvalues nearest zero there."""
     point = points[entry["row"]]
     solver = solvers[point.mesh]
-    special = Special(
+    special = SpecialPoint(
         KINDS[entry["kind"]], point, entry["negative_before"], entry["negative_after"], entry["located_to"],
         coupling=entry["coupling"], error_estimate=_number(entry["error_estimate"]),
         ordinate_error=_number(entry["ordinate_error_estimate"]), resolved=entry.get("resolved"), row=entry["row"],
@@ -144,11 +144,11 @@ def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[E
         omega2=_number(entry["omega2"]),
     )  # fmt: skip
     if entry["meets"]:
-        special.meets = (entry["meets"][0], entry["meets"][1])
+        special.connects_to = (entry["meets"][0], entry["meets"][1])
     if entry["law"]:
-        known = {f.name for f in fields(Law)}
-        special.law = Law(**{name: _number(v) for name, v in entry["law"].items() if name in known})
-    if isinstance(solver, Follower) and special.kind.singular and entry["multiplicity"]:
+        known = {f.name for f in fields(NormalForm)}
+        special.law = NormalForm(**{name: _number(v) for name, v in entry["law"].items() if name in known})
+    if isinstance(solver, BranchSolver) and special.kind.singular and entry["multiplicity"]:
         solver.system.set_phase(point.x)
         found = solver.inertia.at(point.x)
         found.count()

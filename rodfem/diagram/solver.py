@@ -10,10 +10,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.continuation.branch import Point, Special
+from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import Equilibria, Follower
-from rodfem.deflation.search import further
+from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.deflation.search import find_equilibria
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import ConvergenceError, InputError
@@ -33,8 +33,8 @@ class Solver:
     Attributes
     ----------
     equilibria
-        What the numerics work with: a :class:`~rodfem.continuation.solvers.Follower`, or an
-        :class:`~rodfem.continuation.solvers.Equilibria` where a load has no potential.
+        What the numerics work with: a :class:`~rodfem.continuation.solvers.BranchSolver`, or an
+        :class:`~rodfem.continuation.solvers.StaticSolver` where a load has no potential.
     """
 
     def __init__(
@@ -66,10 +66,10 @@ class Solver:
         if scene.conservative:
             compat.require_real_petsc()
         system = System(scene, discretization or Discretization(), comm, clock)
-        self.equilibria = Follower(system, spectrum) if scene.conservative else Equilibria(system)
+        self.equilibria = BranchSolver(system, spectrum) if scene.conservative else StaticSolver(system)
 
     @classmethod
-    def of(cls, equilibria: Equilibria) -> Solver:
+    def of(cls, equilibria: StaticSolver) -> Solver:
         """Solver that shares what another computation has set up."""
         solver = cls.__new__(cls)
         solver.equilibria = equilibria
@@ -98,7 +98,7 @@ class Solver:
 
     def point(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of the equilibrium ``x``: ordinate, energy, index; frequencies without a potential."""
-        if not isinstance(self.equilibria, Follower):
+        if not isinstance(self.equilibria, BranchSolver):
             return self._sweep.at(x)
         self.equilibria.system.set_phase(x)
         return self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True))
@@ -132,7 +132,7 @@ class Solver:
             )
         return self.point(x)
 
-    def assess(self, point: Point | Special | PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
+    def assess(self, point: Point | SpecialPoint | PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
         """Decide the stability of an equilibrium on this mesh by a given method.
 
         Parameters
@@ -149,7 +149,7 @@ class Solver:
         """
         return judge(self.equilibria, state_of(point), method, number)
 
-    def modes(self, point: Point | Special | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
+    def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
         """Left-most modes of an equilibrium on this mesh, each with its value, motion and error."""
         if isinstance(number, bool) or not isinstance(number, int) or number < 1:
             raise InputError(f"{number!r} modes cannot be computed: ask for 1 or more, as in modes(point, 3).")
@@ -169,16 +169,16 @@ class Solver:
         Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, for known equilibria at another
         one, and where a load has no potential.
         """
-        if not isinstance(self.equilibria, Follower):
+        if not isinstance(self.equilibria, BranchSolver):
             raise InputError(
                 "A search by deflation needs a scene whose loads all have a potential: "
                 f"{', '.join(self.scene.without_potential())} has none."
             )
-        return further(self.equilibria, load, known, tries, seed)
+        return find_equilibria(self.equilibria, load, known, tries, seed)
 
 
-def state_of(point: Point | Special | PETSc.Vec) -> PETSc.Vec:
+def state_of(point: Point | SpecialPoint | PETSc.Vec) -> PETSc.Vec:
     """State vector of a point, of a special point, or itself."""
-    if isinstance(point, Special):
+    if isinstance(point, SpecialPoint):
         return point.point.x
     return point.x if isinstance(point, Point) else point

@@ -8,7 +8,7 @@ from math import inf
 
 from rodfem.adaptivity.gaps import Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes
-from rodfem.continuation.branch import Point, Special
+from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.index_chain import Row, chained
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
@@ -41,7 +41,7 @@ class SpecialSearch:
     def __init__(self, meshes: Meshes, gaps: Gaps, observer: Observer) -> None:
         """Nothing is known about a branch before :meth:`begin`."""
         self.meshes, self.gaps, self.observer = meshes, gaps, observer
-        self.follower = meshes.followers[0]
+        self.solver = meshes.solvers[0]
         self.level = 0
         self._open: list[Point] = []
         self._before: Point | None = None
@@ -58,7 +58,7 @@ class SpecialSearch:
         self._open, self._before = [last], None
         self._touching.restart(last)
 
-    def after(self, a: Point, b: Point) -> list[Special]:
+    def after(self, a: Point, b: Point) -> list[SpecialPoint]:
         """Special points that the row ``b`` after ``a`` tells of, in order of arclength.
 
         An eigenvalue within the tolerance of zero has no sign yet: rows with one wait until it has.  One that stays
@@ -82,15 +82,15 @@ class SpecialSearch:
         if changed:
             was = rows[0].negative, rows[0].slope > 0
             for point in (*rows, b):
-                renew(self.follower, point, turning=len(rows) > 1 or a.slope * b.slope < 0)
+                renew(self.solver, point, turning=len(rows) > 1 or a.slope * b.slope < 0)
             if was != (rows[0].negative, rows[0].slope > 0) and self._before is not None:
                 rows.insert(0, self._here(self._before))  # what changes does so before that row
         self._before, self._open = rows[-1], [b]
-        between = [] if changed else self._touching.between(self.follower, a, b)
+        between = [] if changed else self._touching.between(self.solver, a, b)
         self._touching.add(b)
         return self._examined(self._among([*rows, *between, b]))
 
-    def rest(self) -> list[Special]:
+    def rest(self) -> list[SpecialPoint]:
         """Special points among the last rows of a branch, where they have an eigenvalue near zero.
 
         The branch has ended: nothing is tried with shorter steps.
@@ -100,36 +100,36 @@ class SpecialSearch:
         self._on(self._open[-1])
         return self._examined(self._among([self._here(p) for p in self._open], ended=True), ended=True)
 
-    def beyond(self, a: Point, b: Point) -> list[Special]:
+    def beyond(self, a: Point, b: Point) -> list[SpecialPoint]:
         """Special points between a row and a point past the end of its branch, as they are found on one piece."""
         self._on(b)
         self.level = min(a.zero, b.zero)
-        return find_special(self.follower, a, b, self.row(a).crossing(self.row(b)), self._persistent())
+        return find_special(self.solver, a, b, self.row(a).crossing(self.row(b)), self._persistent())
 
     def reach(self, point: Point) -> float:
         """Largest step from a point: near gaps, and where the indices are not explained, short ones."""
         until, largest, _ = self._short
-        near = self.gaps.reach(self.meshes.followers[point.mesh], point)
+        near = self.gaps.reach(self.meshes.solvers[point.mesh], point)
         return min(near, largest) if point.arclength < until else near
 
     def row(self, point: Point) -> Row:
         """Index of a point, small eigenvalues by their Rayleigh quotients."""
         if point.zero <= self.level:
             return Row(point, point.negative, point.negative)
-        self.follower.system.set_phase(point.x)
-        return Row(point, *resolve(self.follower.inertia.at(point.x)))
+        self.solver.system.set_phase(point.x)
+        return Row(point, *resolve(self.solver.inertia.at(point.x)))
 
     def _on(self, point: Point) -> None:
-        self.follower = self.meshes.followers[point.mesh]
+        self.solver = self.meshes.solvers[point.mesh]
 
     def _here(self, point: Point) -> Point:
-        return self.meshes.here(point, self.follower)
+        return self.meshes.here(point, self.solver)
 
     def _persistent(self) -> int:
         """Number of eigenvalues that stay zero without a symmetry."""
-        return max(self.level - self.follower.system.active_drifts(), 0)
+        return max(self.level - self.solver.system.active_drifts(), 0)
 
-    def _among(self, points: Sequence[Point], ended: bool = False) -> list[Special]:
+    def _among(self, points: Sequence[Point], ended: bool = False) -> list[SpecialPoint]:
         """Special points among rows, all but the first and the last of which have an eigenvalue near zero.
 
         Raises :class:`Unresolved` where they do not explain the indices, and shorter steps have not been tried, unless
@@ -156,7 +156,7 @@ class SpecialSearch:
             self._short = b.arclength + length, length / 8, tries
             raise Unresolved
 
-    def _examined(self, specials: list[Special], ended: bool = False) -> list[Special]:
+    def _examined(self, specials: list[SpecialPoint], ended: bool = False) -> list[SpecialPoint]:
         """Branch points with the size of their unfolding parameters; raises :class:`Gap` where they are not one.
 
         One on a branch that has ``ended`` is marked as imperfect instead.
@@ -167,8 +167,8 @@ class SpecialSearch:
         for special in specials:
             weak = special.kind == FOLD and special.coupling <= COUPLED
             if weak or special.kind == BRANCH_POINT or special.negative_before == special.negative_after:
-                gap = self.gaps.examine(self.follower, special)
-                if gap is not None and not ended and self.gaps.open(gap, self.follower):
+                gap = self.gaps.examine(self.solver, special)
+                if gap is not None and not ended and self.gaps.open(gap, self.solver):
                     raise gap
                 if weak and gap is None and special.unfolding >= 0:  # nan: no such point near by
                     special.kind = BRANCH_POINT
@@ -176,19 +176,19 @@ class SpecialSearch:
                     special.kind, special.note = IMPERFECT, str(gap)
         return specials
 
-    def _between(self, p: Row, q: Row, troubles: list[str], halvings: int = HALVINGS) -> list[Special]:
+    def _between(self, p: Row, q: Row, troubles: list[str], halvings: int = HALVINGS) -> list[SpecialPoint]:
         """Folds and branch points between two rows, on halves of the piece where a whole one is not resolved.
 
         It is where they explain the indices of both rows.  ``troubles`` gets sentences on pieces that are not.
         """
         found, why = [], ""
         try:
-            found = find_special(self.follower, p.point, q.point, p.crossing(q), self._persistent())
+            found = find_special(self.solver, p.point, q.point, p.crossing(q), self._persistent())
         except ConvergenceError as trouble:
             why = str(trouble)
         if not why and chained(p.low, p.high, found, q.low, q.high):
             return found
-        middle = midpoint(self.follower, p.point, q.point) if halvings else None
+        middle = midpoint(self.solver, p.point, q.point) if halvings else None
         if middle is None:
             if why:
                 loads = f"{p.point.load:.8g} and {q.point.load:.8g}"

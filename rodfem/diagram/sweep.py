@@ -19,13 +19,13 @@ from petsc4py import PETSc
 from scipy.optimize import brentq, newton
 
 from rodfem.adaptivity.error_estimate import bound, halved
-from rodfem.continuation.branch import Branch, Point, Special
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER, Kind
 from rodfem.continuation.locate import real_root, zero_uncertainty
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.transfer import Transfer, richer_system
@@ -75,7 +75,7 @@ class _Event:
 class Sweep:
     """Sweeps the load of a scene over a range from its start state; used like the explorer of conservative scenes."""
 
-    def __init__(self, solver: Equilibria, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
+    def __init__(self, solver: StaticSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
         """Allocate the pencil; the plan must have passed its check."""
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.span = plan.over(solver.system.scene)
@@ -86,7 +86,7 @@ class Sweep:
         self._load = solver.system.scene.load
 
     @property
-    def solvers(self) -> Sequence[Equilibria]:
+    def solvers(self) -> Sequence[StaticSolver]:
         """The one solver, as the points' mesh number 0 names it."""
         return [self.solver]
 
@@ -113,11 +113,11 @@ class Sweep:
             branch.points.append(point)
             grid.append(point)
             if load in self.plan.at:
-                self._special(branch, Special.given(USER, point))
+                self._special(branch, SpecialPoint.given(USER, point))
             self.observer.progress(branch, point)
         branch.ended = "end of range"
         last = branch.points[-1]
-        branch.special.append(Special.given(END, last))
+        branch.special.append(SpecialPoint.given(END, last))
         branch.renumber()
         if self.plan.error_bars:
             self._error_bars(branch)
@@ -209,7 +209,7 @@ class Sweep:
                 after_it = b.negative  # of all eigenvalues that are recorded
             if event.cluster is not None:
                 self._name(point, event.cluster)
-            special = Special(event.kind, point, negative, after_it, event.uncertainty, omega2=event.omega2)
+            special = SpecialPoint(event.kind, point, negative, after_it, event.uncertainty, omega2=event.omega2)
             special.cluster, special.note = event.cluster, event.note
             if point is not a and point is not b:
                 branch.points.append(point)
@@ -276,7 +276,7 @@ class Sweep:
         return _Event(FLUTTER, located.load, cluster.size, located.uncertainty, located.cluster.mean, located.cluster)
 
     @staticmethod
-    def _measured(solver: Equilibria, vibration: Vibration, guess: PETSc.Vec) -> AtLoad:
+    def _measured(solver: StaticSolver, vibration: Vibration, guess: PETSc.Vec) -> AtLoad:
         """How a cluster is measured at a load: at the equilibrium near ``guess``."""
 
         def measured(load: float, cluster: Cluster) -> Measured:
@@ -323,14 +323,14 @@ class Sweep:
         """Real eigenvalues at a load near the origin, in ascending order."""
         return sorted(v.real for v in self._leftmost(self._state(guess, load)).values if v.imag == 0)
 
-    def _special(self, branch: Branch, special: Special) -> None:
+    def _special(self, branch: Branch, special: SpecialPoint) -> None:
         branch.special.append(special)
         self.observer.special(branch, special)
 
     def _error_bars(self, branch: Branch) -> None:
         with self.solver.system.clock.purpose("error bars"):
             system = self.solver.system
-            richer = Equilibria(richer_system(system))
+            richer = StaticSolver(richer_system(system))
             vibration, transfer = Vibration(richer.system), Transfer(system, richer.system)
             rho = halved(system.fields.discretization.degree)
             for s in branch.special:
@@ -352,14 +352,14 @@ class Sweep:
                 if asked is not None and s.error_estimate > asked * unit(s.point.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"
 
-    def _transferred(self, transfer: Transfer, s: Special) -> Cluster:
+    def _transferred(self, transfer: Transfer, s: SpecialPoint) -> Cluster:
         """The cluster of a special point on another discretisation."""
         assert s.cluster is not None
         columns = [transfer(v, state=False).array_r.real for v in as_vectors(self.solver.system, s.cluster.basis)]
         return Cluster(np.stack(columns, axis=1), s.cluster.mean)
 
     def _richer_flutter(
-        self, richer: Equilibria, vibration: Vibration, transfer: Transfer, guess: PETSc.Vec, s: Special
+        self, richer: StaticSolver, vibration: Vibration, transfer: Transfer, guess: PETSc.Vec, s: SpecialPoint
     ) -> tuple[float, float, float]:
         """Flutter load on the richer discretisation, its uncertainty there, and the double eigenvalue."""
         measured, cluster = self._measured(richer, vibration, guess), self._transferred(transfer, s)
@@ -370,7 +370,7 @@ class Sweep:
         return located.load, located.uncertainty, located.cluster.mean
 
 
-def at_load(solver: Equilibria, guess: PETSc.Vec, load: float) -> PETSc.Vec:
+def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none."""
     system, name = solver.system, solver.system.scene.load
     system.set_phase(guess)

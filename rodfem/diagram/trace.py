@@ -7,7 +7,7 @@ from mpi4py import MPI
 from rodfem import compat
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.observer import Observer, Recorder
-from rodfem.continuation.solvers import Follower
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.frequency_mesh import frequency_mesh
@@ -74,7 +74,7 @@ def trace(
             recorder.complete(diagram)
 
         tracer: Explorer | Sweep
-        if isinstance(found, Follower):
+        if isinstance(found, BranchSolver):
             tracer = Explorer(found, plan, recorder, complete)
         else:
             tracer = Sweep(found, plan, recorder, complete)

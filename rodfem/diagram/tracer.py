@@ -14,12 +14,12 @@ from rodfem.adaptivity.accuracy_control import Watch
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
 from rodfem.adaptivity.zero_stretch import zero_stretch
-from rodfem.continuation.branch import NOT_TRACED, Branch, Point, Special
+from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.locate import solve_at
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import VERTICAL, Follower, distance, follow, hermite
+from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance, follow, hermite
 from rodfem.continuation.special_points import FIRST
 from rodfem.diagram.events import Events
 from rodfem.diagram.plan import Plan
@@ -42,31 +42,31 @@ class Tracer:
     is lost.
     """
 
-    def __init__(self, follower: Follower, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
+    def __init__(self, solver: BranchSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
         """Start with no branch; the plan must have passed its :meth:`Plan.check`."""
-        self.follower, self.plan, self.observer, self.finished = follower, plan, observer, finished
-        self.scene = follower.system.scene
+        self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
+        self.scene = solver.system.scene
         self.span = plan.over(self.scene)
         self.low, self.high = sorted(self.span)
         self.branches: list[Branch] = []
-        self.meshes = Meshes(follower, plan.accuracy)
+        self.meshes = Meshes(solver, plan.accuracy)
         self.gaps = Gaps(self.meshes)
         self.warned = False
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
         self.events = Events(plan.events)
 
     @property
-    def solvers(self) -> Sequence[Follower]:
+    def solvers(self) -> Sequence[BranchSolver]:
         """Followers by the number of their mesh."""
-        return self.meshes.followers
+        return self.meshes.solvers
 
     def use(self, mesh: int) -> None:
-        """Go on with the follower of that mesh."""
-        self.follower = self.meshes.followers[mesh]
+        """Go on with the solver of that mesh."""
+        self.solver = self.meshes.solvers[mesh]
 
     def here(self, point: Point) -> Point:
         """Point on the mesh in use."""
-        return self.meshes.here(point, self.follower)
+        return self.meshes.here(point, self.solver)
 
     def trace(self, branch: Branch) -> None:
         """Follow a branch to its end, insert its special points, estimate errors, hand it on as finished."""
@@ -75,8 +75,8 @@ class Tracer:
             self.observer.branch(branch)
         self.use(branch.points[-1].mesh)
         self.watch = Watch(self.meshes, (self.low, self.high))
-        self.follower.system.set_phase(branch.points[-1].x)
-        self.follower.damp(self._extra(branch.points[-1]) if branch.parent else 0)
+        self.solver.system.set_phase(branch.points[-1].x)
+        self.solver.damp(self._extra(branch.points[-1]) if branch.parent else 0)
         self._attempt(branch)
         self._finish(branch)
 
@@ -95,7 +95,7 @@ class Tracer:
         self.use(point.mesh)
         self.observer.branch(back)
         self.watch = Watch(self.meshes, (self.low, self.high))
-        self.follower.damp(0)
+        self.solver.damp(0)
         self._attempt(back)
         branch = reversed_branch(back)
         branch.ended = back.ended
@@ -104,7 +104,7 @@ class Tracer:
             self._finish(back)
             return
         first = branch.points[0]
-        branch.special.append(Special.given(END, first))
+        branch.special.append(SpecialPoint.given(END, first))
         branch.special[-1].note = f"begins here: {back.ended}"
         branch.renumber()
         self.trace(branch)
@@ -120,7 +120,7 @@ class Tracer:
             self.specials.begin(history[-1])
         while True:
             try:
-                self.watch.row(history[-1], self.follower)
+                self.watch.row(history[-1], self.solver)
                 if not begun:
                     self._first_users(branch)
                     begun = True
@@ -134,16 +134,16 @@ class Tracer:
 
         Rows before the trouble stay what they are on the mesh that was made for them.
         """
-        follower = self.watch.another(trouble, self.observer)
-        if follower is not None:
-            follower.damp(self.follower.system.damping > 0)
-            with self.follower.system.clock.purpose("location"):
-                pairs = self.meshes.carry(history, follower, branch.parent is not None)
+        solver = self.watch.another(trouble, self.observer)
+        if solver is not None:
+            solver.damp(self.solver.system.damping > 0)
+            with self.solver.system.clock.purpose("location"):
+                pairs = self.meshes.carry(history, solver, branch.parent is not None)
             moved = {id(old): new for old, new in pairs if old is trouble.point}
             branch.points = [moved.get(id(p), p) for p in branch.points]
             history = [new for _, new in pairs]
-            self.follower = follower
-            self.observer.mesh(follower.system, trouble.point.load, str(trouble))
+            self.solver = solver
+            self.observer.mesh(solver.system, trouble.point.load, str(trouble))
         last = history[-1].arclength
         branch.points = [p for p in branch.points if p.arclength <= last]
         branch.special = [s for s in branch.special if s.point.arclength <= last]
@@ -152,22 +152,22 @@ class Tracer:
     def _advance(self, branch: Branch, history: list[Point]) -> None:
         """Append points until the branch ends, which :attr:`Branch.ended` then says."""
         self.specials.resume(history[-1])
-        for item in follow(self.follower, history, self.plan.steps, (self.low, self.high), self.specials.reach):
+        for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self.specials.reach):
             if isinstance(item, str):
                 branch.ended = item
-                with self.follower.system.clock.purpose("location"):
+                with self.solver.system.clock.purpose("location"):
                     for special in self.specials.rest():
                         branch.insert(special)
                         self.observer.special(branch, special)
                 return
             previous = history[-1]
             self._check_symmetry(item)
-            self.watch.row(item, self.follower)
+            self.watch.row(item, self.solver)
             self._check_zeros(history, item)
             if item.stretch <= 0:
                 self._end_at_zero_stretch(branch, previous, item)
                 return
-            if self.follower.convexity is not None and self.follower.convexity.lowest(item.x) <= 0:
+            if self.solver.convexity is not None and self.solver.convexity.lowest(item.x) <= 0:
                 branch.ended = f"the stored energy is not convex any more at {self.scene.load} = {item.load:.6g}"
                 return
             try:
@@ -187,14 +187,14 @@ class Tracer:
 
     def _between(self, branch: Branch, a: Point, b: Point) -> str:
         """Insert folds, branch points and user points between two points; a reason if the branch ends there."""
-        with self.follower.system.clock.purpose("location"):
+        with self.solver.system.clock.purpose("location"):
             return self._between_points(branch, a, b)
 
     def _between_points(self, branch: Branch, a: Point, b: Point) -> str:
         specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b)
         pieces = [a, *(s.point for s in specials if s.point.arclength > a.arclength), b]
         users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
-        users += self.events.between(self.follower, a, b)
+        users += self.events.between(self.solver, a, b)
         for special in specials + users:
             self.watch.special(special)
         for special in sorted(specials + users, key=lambda s: s.point.arclength):
@@ -210,7 +210,7 @@ class Tracer:
                 self.observer.special(branch, special)
         return ""
 
-    def _users(self, branch: Branch, p: Point, q: Point, a: Point, b: Point) -> list[Special]:
+    def _users(self, branch: Branch, p: Point, q: Point, a: Point, b: Point) -> list[SpecialPoint]:
         """User points between two neighbours among which the load is monotone."""
         found = []
         for load in self.plan.at:
@@ -222,11 +222,11 @@ class Tracer:
                 s = p.arclength + (load - p.load) / (q.load - p.load) * (q.arclength - p.arclength)
                 for _ in range(3):
                     x, direction = hermite(a, b, s)
-                    slope = self.follower.system.scalar(direction)
+                    slope = self.solver.system.scalar(direction)
                     if slope:
-                        s = min(max(s + (load - self.follower.system.scalar(x)) / slope, p.arclength), q.arclength)
+                        s = min(max(s + (load - self.solver.system.scalar(x)) / slope, p.arclength), q.arclength)
                 point = self._user_between(a, b, load, (p, q), s)
-                found.append(Special.given(USER, point))
+                found.append(SpecialPoint.given(USER, point))
         return found
 
     def _first_users(self, branch: Branch) -> None:
@@ -245,9 +245,9 @@ class Tracer:
         Close to a branch point Newton's method at a fixed load fails, or ends on the other branch.  On planes across
         the branch it does not, and the load is a function of arclength there, whose zero is found.
         """
-        system, (p, q), guess = self.follower.system, rows, hermite(a, b, s)[0]
+        system, (p, q), guess = self.solver.system, rows, hermite(a, b, s)[0]
         system.set_phase(guess)
-        x, outcome = self.follower.at_load(guess, load, reach=1.0)
+        x, outcome = self.solver.at_load(guess, load, reach=1.0)
         on_branch = outcome.converged and (
             a.x is not p.x or distance(system, guess, x) < 0.5 * distance(system, a.x, x) or p.load == load
         )
@@ -256,63 +256,63 @@ class Tracer:
                 raise ConvergenceError(self._no_equilibrium(load))
 
             def beyond(s: float) -> float:
-                return system.scalar(solve_at(self.follower, lambda t: hermite(a, b, t), s)) - load
+                return system.scalar(solve_at(self.solver, lambda t: hermite(a, b, t), s)) - load
 
             margin = INSIDE * (q.arclength - p.arclength)
             s = brentq(beyond, p.arclength + margin, q.arclength - margin, xtol=1e-15)
-            x = solve_at(self.follower, lambda t: hermite(a, b, t), s)
+            x = solve_at(self.solver, lambda t: hermite(a, b, t), s)
             system.set_load(x, load)
-        return self.follower.point(x, s, self.follower.load_tangent(x, q.load > p.load), outcome)
+        return self.solver.point(x, s, self.solver.load_tangent(x, q.load > p.load), outcome)
 
     def _no_equilibrium(self, load: float) -> str:
         return f"No equilibrium at {self.scene.load} = {load:g} between two points of the branch: use another load."
 
     def user(self, guess: PETSc.Vec, load: float, s: float, increasing: bool) -> Point:
         """Point at exactly ``load`` from a guess; raises :class:`ConvergenceError`."""
-        self.follower.system.set_phase(guess)
-        x, outcome = self.follower.at_load(guess, load, reach=1.0)
+        self.solver.system.set_phase(guess)
+        x, outcome = self.solver.at_load(guess, load, reach=1.0)
         if not outcome.converged:
             raise ConvergenceError(self._no_equilibrium(load))
-        return self.follower.point(x, s, self.follower.load_tangent(x, increasing), outcome)
+        return self.solver.point(x, s, self.solver.load_tangent(x, increasing), outcome)
 
-    def _meeting(self, branch: Branch, special: Special) -> str:
+    def _meeting(self, branch: Branch, special: SpecialPoint) -> str:
         """Recognise a branch point that is known already; a reason if the branch ends there."""
         for other in self.branches:
             for i, known in enumerate(other.special):
                 if other is branch and special.point.arclength - known.point.arclength < 0.5:
                     continue  # a neighbour on this branch: a nearly double eigenvalue
                 if known.kind.branches and self.alike(known.point, special.point, SAME_SPECIAL):
-                    special.meets = (other.name, i)
+                    special.connects_to = (other.name, i)
                     special.switched = known.switched = True
-                    if branch.parent == special.meets:
+                    if branch.parent == special.connects_to:
                         return "closed loop"
-                    if special.zero_of == "mu" and known.zero_of == "slope":
+                    if special.test_function == "mu" and known.test_function == "slope":
                         return ""  # the branch on which the known one ended: it goes on
                     return f"meets {other.name} at {self.scene.load} = {special.point.load:.8g}"
-        if special.zero_of == "slope":
+        if special.test_function == "slope":
             return f"meets another branch at {self.scene.load} = {special.point.load:.8g}"
         return ""
 
     def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> None:
         """Add the last admissible point, where the smallest stretch vanishes, and say so."""
-        shape = self.follower.shape
+        shape = self.solver.shape
         branch.ended = "stretch reaches zero"
 
         def stretch(s: float) -> float:
-            return shape.stretch(solve_at(self.follower, lambda t: hermite(a, b, t), s))
+            return shape.stretch(solve_at(self.solver, lambda t: hermite(a, b, t), s))
 
         h = b.arclength - a.arclength
         s = brentq(stretch, a.arclength + INSIDE * h, b.arclength, xtol=1e-11)
-        x = solve_at(self.follower, lambda t: hermite(a, b, t), s)
-        row = self.follower.row(hermite(a, b, s)[1])
-        last = self.follower.point(x, s, self.follower.tangent(row))
+        x = solve_at(self.solver, lambda t: hermite(a, b, t), s)
+        row = self.solver.row(hermite(a, b, s)[1])
+        last = self.solver.point(x, s, self.solver.tangent(row))
         if self._between(branch, a, last):
             return
-        special = Special(END, last, last.negative, last.negative, 1e-10, zero_of="stretch")
+        special = SpecialPoint(END, last, last.negative, last.negative, 1e-10, test_function="stretch")
         if self.plan.error_bars:
             try:
-                with self.follower.system.clock.purpose("error bars"):
-                    special = zero_stretch(self.follower, last)
+                with self.solver.system.clock.purpose("error bars"):
+                    special = zero_stretch(self.solver, last)
             except ConvergenceError as trouble:
                 special.note = f"no error estimate: {trouble}"
             else:
@@ -337,10 +337,10 @@ class Tracer:
         if not parameter.admissible[0] < beyond < parameter.admissible[1] or previous.x is last.x:
             return
         try:
-            with self.follower.system.clock.purpose("location"):
+            with self.solver.system.clock.purpose("location"):
                 guess = hermite(previous, last, last.arclength)[0]
                 point = self.user(guess, beyond, 2 * last.arclength - previous.arclength, beyond > load)
-                point.arclength = last.arclength + distance(self.follower.system, last.x, point.x)
+                point.arclength = last.arclength + distance(self.solver.system, last.x, point.x)
                 found = [s for s in self.specials.beyond(previous, point) if s.kind.branches]
         except ConvergenceError as trouble:
             self.observer.warn(
@@ -361,16 +361,16 @@ class Tracer:
             return False
         first = branch.points[1]
         if max(abs(a.slope), abs(b.slope)) < VERTICAL * (self.high - self.low):  # equal loads: compare the states
-            return distance(self.follower.system, b.x, self.here(branch.points[0]).x) < b.arclength - a.arclength
+            return distance(self.solver.system, b.x, self.here(branch.points[0]).x) < b.arclength - a.arclength
         if (a.load - first.load) * (b.load - first.load) > 0 or not near(first, a, 4) or a.slope * first.slope <= 0:
             return False
         s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
         guess = hermite(a, b, s)[0]
-        self.follower.system.set_phase(guess)
-        x, outcome = self.follower.at_load(guess, first.load, reach=1.0)
+        self.solver.system.set_phase(guess)
+        x, outcome = self.solver.at_load(guess, first.load, reach=1.0)
         if not outcome.converged:  # beside a fold, say: not there
             return False
-        return self.alike(self.follower.point(x, s, None, outcome), first, SAME_STATE)
+        return self.alike(self.solver.point(x, s, None, outcome), first, SAME_STATE)
 
     def alike(self, a: Point, b: Point, tolerance: float) -> bool:
         """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
@@ -378,9 +378,9 @@ class Tracer:
         return equivalent(a, b, max(tolerance, across), across**0.5)
 
     def _check_symmetry(self, point: Point) -> None:
-        for notice in self.follower.system.verification.read():
+        for notice in self.solver.system.verification.read():
             self.observer.warn(notice)
-        if point.drift > 1e-6 * self.follower.inertia.scale:
+        if point.drift > 1e-6 * self.solver.inertia.scale:
             self.watch.drifting(point)
             raise ConvergenceError(
                 f"The mesh does not resolve a symmetry of the scene any more: the drift is {point.drift:.2g} at "
@@ -393,14 +393,14 @@ class Tracer:
         extra = self._extra(point)
         recent = [p for p in history[-4:] if p.arclength > 0.0]  # a branch point has zeros of its own
         stay = extra > 0 and bool(recent) and all(p.zero == point.zero for p in recent)
-        self.follower.damp(extra if stay else 0)
+        self.solver.damp(extra if stay else 0)
         if stay and len(recent) == 4 and point.zero <= self.specials.level and not self.warned:
             self.warned = True
             self._say_zeros(recent[0], point, extra)
 
     def _say_zeros(self, before: Point, point: Point, extra: int) -> None:
         """Say of eigenvalues that count as zero at two rows whether round-off tells them from zero, or they are it."""
-        system, inertia, still = self.follower.system, self.follower.inertia, 0
+        system, inertia, still = self.solver.system, self.solver.inertia, 0
         own = point.zero - system.active_drifts() - extra
         for p in (before, point):
             system.set_phase(p.x)
@@ -421,18 +421,18 @@ class Tracer:
     def _extra(self, point: Point) -> int:
         """Zero eigenvalues, beside symmetries' and the branch's own, of the point at which phases were last set."""
         vertical = abs(point.slope) < VERTICAL * (self.high - self.low)  # the branch itself is a family at one load
-        return point.zero - self.follower.system.active_drifts() - vertical
+        return point.zero - self.solver.system.active_drifts() - vertical
 
     def _finish(self, branch: Branch) -> None:
         branch.renumber()
         explain(branch)
         self._singular_start(branch)
         last = branch.points[-1]
-        if branch.ended == "end of range" and last.zero > self.follower.system.active_drifts():
+        if branch.ended == "end of range" and last.zero > self.solver.system.active_drifts():
             self._singular_end(branch, last)
             last = branch.points[-1]
         if not any(s.point is last for s in branch.special):
-            branch.special.append(Special.given(END, last))
+            branch.special.append(SpecialPoint.given(END, last))
             branch.renumber()
         if self.plan.error_bars or self.plan.accuracy:
             self._error_bars(branch)
@@ -444,7 +444,7 @@ class Tracer:
         self.finished()
 
     def _error_bars(self, branch: Branch) -> None:
-        with self.follower.system.clock.purpose("error bars"):
+        with self.solver.system.clock.purpose("error bars"):
             for special in branch.special:
                 if isnan(special.error_estimate):
                     self.meshes.richer(special.point.mesh).estimate(special)

@@ -20,7 +20,7 @@ from mpi4py import MPI
 
 from rodfem import compat
 from rodfem.errors import POINTWISE, InputError
-from rodfem.fem.rotation_field import ByAngle, ByQuaternion, Turning
+from rodfem.fem.rotation_field import AngleField, QuaternionField, Turning
 from rodfem.problem.contribution import UNIT, Block, Group, Motion, Unknown
 from rodfem.problem.end import LETTERS, SIDES
 from rodfem.problem.kinds import reals, whole
@@ -78,7 +78,7 @@ class Discretization:
 
 def turning_of(scene: Scene) -> Turning:
     """How the rotation of a scene's rod is described."""
-    return ByQuaternion() if scene.normal is None else ByAngle(scene.normal)
+    return QuaternionField() if scene.normal is None else AngleField(scene.normal)
 
 
 def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:

@@ -18,7 +18,7 @@ STALLED = 1e-6
 
 
 @dataclass(frozen=True)
-class Outcome:
+class NewtonResult:
     """How a Newton iteration ended.
 
     ``error`` is what the observed rate of convergence leaves after the last correction (that one's size, if the factors
@@ -37,7 +37,7 @@ def correct(
     row: PETSc.Vec,
     most: int = 12,
     reach: float = 1e3,
-) -> Outcome:
+) -> NewtonResult:
     """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place, with LU factors.
 
     As :func:`iterate`; fails at a singular matrix, too.
@@ -59,7 +59,7 @@ def iterate(
     most: int,
     reach: float,
     tolerance: float = 0.0,
-) -> Outcome:
+) -> NewtonResult:
     """Newton's method with chord steps, in place; ``solve(state, equations, fresh)`` returns what x is reduced by.
 
     A Jacobian is factored first (``fresh``), and again only while corrections do not shrink tenfold from one to the
@@ -91,14 +91,14 @@ def iterate(
         left = size if fresh else min(2.0 * size / previous, 1.0) * size
         if size < TOLERANCE or left < tolerance or (fresh and still > size > 0.5 * previous):
             origin.aypx(-1.0, x)
-            return Outcome(True, iteration, left, system.norm(origin))
+            return NewtonResult(True, iteration, left, system.norm(origin))
         refactor = size > 0.02 or size > 0.1 * previous
         previous = size
     origin.aypx(-1.0, x)
-    return Outcome(False, iteration, size, float("inf"))
+    return NewtonResult(False, iteration, size, float("inf"))
 
 
-def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Outcome:
+def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> NewtonResult:
     """Solve from a guess that is too far for Newton's method, in place, by pseudo-transient continuation.
 
     The overdamped motion ``M x' = -F(x)`` on the constraints is integrated by implicit Euler steps, ``(S + M/tau) dx =
@@ -125,4 +125,4 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Outc
             if outcome.converged:
                 trial.copy(x)
                 return outcome
-    return Outcome(False, most, float("inf"), float("inf"))
+    return NewtonResult(False, most, float("inf"), float("inf"))

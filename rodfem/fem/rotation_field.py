@@ -17,7 +17,7 @@ TWICE = 4 * np.pi
 
 
 @dataclass(frozen=True)
-class ByQuaternion:
+class QuaternionField:
     """Rotation as a quaternion ``q`` of four components, whose unit norm is a constraint."""
 
     name = "q"
@@ -61,7 +61,7 @@ class ByQuaternion:
 
 
 @dataclass(frozen=True)
-class ByAngle:
+class AngleField:
     """The angle about the normal of the plane, e1 or e2 (``normal`` 0 or 1), from the undeformed state.
 
     It is not confined to one turn: a quaternion tells angles apart up to ``4 pi``, and the number of turns beyond is
@@ -120,4 +120,4 @@ class ByAngle:
         return np.asarray(2 * np.arctan2(q[..., self.normal + 1], q[..., 0]))
 
 
-Turning = ByQuaternion | ByAngle
+Turning = QuaternionField | AngleField

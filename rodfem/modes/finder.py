@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import bound, halved
-from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.errors import InputError
 from rodfem.fem.system import combine
 from rodfem.fem.transfer import Transfer, richer_system
@@ -31,11 +31,11 @@ FLOOR = 1e-12
 class ModeFinder:
     """Finds the modes of states of one :class:`~rodfem.fem.system.System`."""
 
-    def __init__(self, solver: Equilibria, error_bars: bool = True) -> None:
+    def __init__(self, solver: StaticSolver, error_bars: bool = True) -> None:
         """Take what computes equilibria; ``error_bars`` are from a second, richer discretisation."""
         self.judge, self.motions = Judge(solver), Motions(solver.system)
         self.system, self.error_bars = solver.system, error_bars
-        self._richer: tuple[Equilibria, Judge, Transfer] | None = None
+        self._richer: tuple[StaticSolver, Judge, Transfer] | None = None
 
     def __call__(self, x: PETSc.Vec, number: int, method: str = "auto") -> tuple[Verdict, Modes]:
         """Judge the equilibrium ``x`` and find its ``number`` left-most modes (nearest zero without a potential)."""
@@ -145,7 +145,7 @@ class ModeFinder:
         """Bounds from the eigenvalues of the same state on a richer discretisation; inf where there is none."""
         if self._richer is None:
             richer = richer_system(self.system)
-            solver = Equilibria(richer)
+            solver = StaticSolver(richer)
             self._richer = solver, Judge(solver), Transfer(self.system, richer)
         solver, judge, transfer = self._richer
         guess = transfer(x, state=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import ceil, floor, isfinite, log10
 
-from rodfem.continuation.branch import Special
+from rodfem.continuation.branch import SpecialPoint
 
 
 def rounded_up(error: float) -> float:
@@ -29,7 +29,7 @@ def number(value: float, error: float, resolved: bool | None = True) -> str:
     return f"{shown:.{digits}f} ({least}{rounded_up(error + abs(value - shown)):.0e})"
 
 
-def index_in_words(special: Special) -> str:
+def index_in_words(special: SpecialPoint) -> str:
     """Index at a special point in words: before and after if it changes."""
     before, after = special.negative_before, special.negative_after
     index = f"{before}->{after}" if before != after else f"{special.point.negative}"

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import Branch, Special, not_followed
-from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.branch import Branch, SpecialPoint, not_followed
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Fields
 from rodfem.fem.system import System
@@ -133,7 +133,7 @@ def _branch_data(branch: Branch) -> dict[str, Any]:
     }
 
 
-def _special_data(s: Special) -> dict[str, Any]:
+def _special_data(s: SpecialPoint) -> dict[str, Any]:
     return {
         "kind": s.kind,
         "load": s.point.load,
@@ -149,7 +149,7 @@ def _special_data(s: Special) -> dict[str, Any]:
         "resolved": s.resolved,
         "located_to": s.located_to,
         "coupling": s.coupling,
-        "meets": list(s.meets) if s.meets else None,
+        "meets": list(s.connects_to) if s.connects_to else None,
         "followed": s.switched,
         "omega2": _plain(s.omega2),
         "law": None if s.law is None else asdict(s.law) | {"uncertainty": _plain(s.law.uncertainty)},
@@ -177,7 +177,7 @@ def load_json(path: Path) -> dict[str, Any]:
     return read_json(path, DIAGRAM, ("scene", "parameter", "branches"))
 
 
-def save_states(branch: Branch, solvers: Sequence[Equilibria], path: Path, first: bool) -> None:
+def save_states(branch: Branch, solvers: Sequence[StaticSolver], path: Path, first: bool) -> None:
     """Append the states of a branch to an HDF5 file; collective, written on rank 0.
 
     Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
@@ -241,7 +241,7 @@ def mesh_of(system: System) -> dict[str, Any]:
     return {"formulation": d.formulation, **sizes}
 
 
-def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc.Vec:
+def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc.Vec:
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
     Raises :class:`InputError` where the file has another or a newer format, or no such row, has it in the other
@@ -249,7 +249,7 @@ def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc
     """
     import h5py
 
-    wanted = follower.system.fields.discretization.formulation
+    wanted = solver.system.fields.discretization.formulation
     try:
         with h5py.File(path, "r") as file:
             STATES.check_hdf5(file, ("formulation", "branches"))
@@ -265,7 +265,7 @@ def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc
         raise InputError(
             f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json beside it."
         ) from trouble
-    system = follower.system
+    system = solver.system
     wanted_names = [b.name for b in system.fields.blocks] + [n for n in system.scalars if not n.startswith("drift")]
     missing = [name for name in ("s", "elements", *wanted_names) if name not in sample]
     if missing:
@@ -273,4 +273,4 @@ def load_state(path: Path, branch: str, row: int, follower: Equilibria) -> PETSc
             f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
             "another scene, or by another version of rodfem; run the scene again."
         )
-    return follower.shape.restore(sample)
+    return solver.shape.restore(sample)

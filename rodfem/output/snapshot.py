@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rodfem.continuation.branch import Branch, Point
-from rodfem.continuation.solvers import Equilibria
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.output.files import save_states
 
 
@@ -35,7 +35,7 @@ class Snapshot:
 
 def snapshot(
     branches: Sequence[Branch],
-    solvers: Sequence[Equilibria],
+    solvers: Sequence[StaticSolver],
     point: Point,
     path: Path | str | None,
     caption: str | None,

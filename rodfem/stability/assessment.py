@@ -85,7 +85,7 @@ class Judge(Workspace):
     """Judges states of one system; keeps matrices, symbolic factorisations and the last modes for the next state."""
 
     def __init__(self, source: Any) -> None:
-        """Take a :class:`~rodfem.fem.system.System`, or what has one (a follower)."""
+        """Take a :class:`~rodfem.fem.system.System`, or what has one (a solver)."""
         super().__init__(source)
         self._methods: dict[str, Method] = {}
 
@@ -151,5 +151,5 @@ class Judge(Workspace):
 
 
 def judge(source: Any, x: PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
-    """Judge one state of a system or follower: see :class:`Judge`, which is to be kept along a branch."""
+    """Judge one state of a system or solver: see :class:`Judge`, which is to be kept along a branch."""
     return Judge(source)(x, method, number)

@@ -26,7 +26,7 @@ class Workspace:
     """Matrices and factorisations, made when they are asked for and kept for the next state."""
 
     def __init__(self, source: Any) -> None:
-        """Take a :class:`~rodfem.fem.system.System`, or what has one (a follower)."""
+        """Take a :class:`~rodfem.fem.system.System`, or what has one (a solver)."""
         self.system: System = source if isinstance(source, System) else source.system
         self.conservative = self.system.scene.conservative
         given = getattr(source, "inertia", None)
