@@ -20,10 +20,10 @@ from benchmarks.targets import TARGETS
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 
-import closed_form
-import exact
-import shooting
-from integration import Problem, Rod
+import closed_form_hemitropic
+import closed_forms
+import reference_values
+from shooting_solver import Problem, Rod
 
 K0 = 3 * pi
 CORD = Problem(Rod(intrinsic=(0.0, K0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])
@@ -46,7 +46,7 @@ class Spectrum:
 def spectra() -> dict[str, Spectrum]:
     """Eigenvalues with closed forms or by Ritz's method, by name."""
     inertia = (1e-3, 1e-3, 2e-3)
-    beck = tuple(float(exact.column(near, 10.0).real) for near in (26.8, 345.5))
+    beck = tuple(float(closed_forms.column(near, 10.0).real) for near in (26.8, 345.5))
     return {
         "cord": Spectrum("cord", 20.0, "straight cord, unit rotary inertia", straight_cord(20.0)),
         "cord with mass": Spectrum(
@@ -55,7 +55,7 @@ def spectra() -> dict[str, Spectrum]:
         ),
         "hemitropic": Spectrum(
             *("hemitropic", 0.2, "straight hemitropic rod, unit rotary inertia"),
-            tuple(closed_form.spectrum(0.2, *HEMITROPIC)[:3]),
+            tuple(closed_form_hemitropic.spectrum(0.2, *HEMITROPIC)[:3]),
         ),
         "follower": Spectrum(
             "follower", 10.0, "rod under a follower load, mass 1, weak plane", beck, 1.0, (0.0, 0.0, 0.0)
@@ -136,17 +136,23 @@ def shot_ruler(load: float) -> float:
 
 def again() -> dict[tuple[str, str, str], float]:
     """The references of :data:`benchmarks.targets.TARGETS` by scene, branch and name, computed anew."""
-    first, second = exact.tensions(1.5)[:2]
-    one, two = closed_form.loads(*HEMITROPIC)[:2]
-    P, _ = exact.double(20.0, 120.0)
+    first, second = closed_forms.tensions(1.5)[:2]
+    one, two = closed_form_hemitropic.loads(*HEMITROPIC)[:2]
+    P, _ = closed_forms.double(20.0, 120.0)
     found = {
         "cord": (
             *(first, second, shot_cord(40.0, (0, 0, 40, -4.79, -2.36, 0))),
             *(fold_of_cord(), shot_cord(40.0, (0, -35.38, 40, 9.78, -7.12, 1.40))),
         ),
-        "hemitropic": (one, two, shooting.FIRST[0.5][0], shooting.FOLD[0], shooting.SECOND[0.5][0]),
+        "hemitropic": (
+            one,
+            two,
+            reference_values.FIRST[0.5][0],
+            reference_values.FOLD[0],
+            reference_values.SECOND[0.5][0],
+        ),
         "ruler": (ruler_buckles(), shot_ruler(8.0)),
-        "follower": (float(P), *(float(exact.column(near, 10.0).real) for near in (26.8, 345.5))),
+        "follower": (float(P), *(float(closed_forms.column(near, 10.0).real) for near in (26.8, 345.5))),
     }
     names = {scene: [(b, t.name) for b, ts in branches.items() for t in ts] for scene, branches in TARGETS.items()}
     return {

@@ -38,8 +38,8 @@ from rodfem.stability.round_off import decide, quotient_error
 
 sys.path.append(str(ROOT / "tests"))
 
-import scenes
-import states
+import demo_cases
+import small_states
 
 LOAD, BUCKLED, NUMBER = 20.0, 40.0, 4
 ELEMENTS = (100, 1000, 10_000, 100_000)
@@ -70,13 +70,13 @@ def state(formulation: str, elements: int, degree: int, which: str = "straight")
     Neither has a symmetry; the search for one, longer than what is measured, is left out.
     """
     rodfem.fem.system.find_symmetries = lambda fields, equations: []
-    solver = Solver(scenes.scene("cord"), Discretization(formulation, elements, degree)).equilibria
+    solver = Solver(demo_cases.scene("cord"), Discretization(formulation, elements, degree)).equilibria
     solver.system.set_phase(None)
     load = LOAD if which == "straight" else BUCKLED
     guess = solver.start(load)
     if which == "buckled":
-        _, x = states.buckled("cord", formulation, 16, 6, load)
-        guess = solver.shape.restore(states.solver("cord", formulation, 16, 6).shape.sample(x))
+        _, x = small_states.buckled("cord", formulation, 16, 6, load)
+        guess = solver.shape.restore(small_states.solver("cord", formulation, 16, 6).shape.sample(x))
     x, outcome = solver.at_load(guess, load)
     assert outcome.converged
     return solver.system, x
@@ -311,7 +311,7 @@ def ranks() -> str:
     for elements in (25, 50, 100, 200, 400, 1000, 10_000):
         row = [str(elements)]
         for name, coordinates in (("cord", "tangent"), ("hemitropic", "tangent"), ("hemitropic", "compatible")):
-            solver = Solver(states.scene(name), Discretization("pointwise", elements, 1)).equilibria
+            solver = Solver(small_states.scene(name), Discretization("pointwise", elements, 1)).equilibria
             pencil = Blocks(solver.system, coordinates).assemble(solver.start(20.0 if name == "cord" else 0.1))
             h = solver.system.scene.length / elements
             sigma = rank_of(pencil)

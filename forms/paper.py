@@ -41,7 +41,7 @@ gone, ``dn`` is constant and its equation is ``int theta x R v + R dv = 0``.  Th
 * the force: the paper perturbs the components of ``n`` in the body frame, here ``dn`` is a vector in the space frame.
   With ``n = R N`` the latter is ``dn = theta x n + R dN``.
 
-In what sense UFL's second derivative agrees (``tests/test_paper.py``):
+In what sense UFL's second derivative agrees (``tests/forms/test_paper.py``):
 
 * Pointwise it does exactly, at any ``q`` and in any state, for directions ``dq = 1/2 theta q``, without the unit norm
   term.  The curve's acceleration, polarised, is ``-1/4 theta1 . theta2 q``: a change of length, to which ``R(q/|q|)``

@@ -8,10 +8,10 @@ from itertools import groupby
 from typing import Any
 
 import classics
-import rods
-import scenes as demos
-import test_classics
-import test_docs
+import demo_cases as demos
+import hemitropic_cases
+from literature import test_classics
+from problem import test_docs
 
 import rodfem
 from rodfem.continuation.branch import Branch, SpecialPoint
@@ -21,7 +21,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.problem.scene import Scene
 
 DEMOS: dict[str, Callable[[], Scene]] = {
-    "hemitropic": rods.scene,
+    "hemitropic": hemitropic_cases.scene,
     "cord": lambda: demos.scene("cord", span=(60.0, 8.0)),
     "ruler": lambda: demos.scene("ruler"),
     "follower": lambda: demos.scene("follower"),

@@ -26,7 +26,7 @@ from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import Discretization
 
-import states  # isort: skip
+import small_states  # isort: skip
 
 LOAD, DEGREE, RUNS = 40.0, 2, 3
 NUDGE = 1e-3
@@ -45,8 +45,8 @@ def first(solver: Any, state: str) -> PETSc.Vec:
     guess = solver.start(LOAD)
     if state == "buckled":
         coarse = "cord", solver.system.fields.discretization.formulation, 16, 6
-        _, x = states.buckled(*coarse, LOAD)
-        guess = solver.shape.restore(states.solver(*coarse).shape.sample(x))
+        _, x = small_states.buckled(*coarse, LOAD)
+        guess = solver.shape.restore(small_states.solver(*coarse).shape.sample(x))
     x, outcome = solver.at_load(guess, LOAD)
     if not outcome.converged:
         raise ConvergenceError(f"no {state} state")

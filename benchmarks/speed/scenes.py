@@ -16,15 +16,15 @@ from rodfem.problem.scene import Inertia, Scene
 
 sys.path.append(str(ROOT / "tests"))
 
-import rods
-import scenes
+import demo_cases
+import hemitropic_cases
 
 WEAK = "bending about d1"
 
 
 def scene(name: str) -> Scene:
     """The scene of a demo with its default constants."""
-    return rods.scene() if name == "hemitropic" else scenes.scene(name)
+    return hemitropic_cases.scene() if name == "hemitropic" else demo_cases.scene(name)
 
 
 def with_inertia(spectrum: Spectrum) -> Scene:

@@ -6,8 +6,8 @@ Errors are relative to references that neither rodfem nor what it is compared wi
 said. `10 P6 reduced` is ten elements of degree 6 in the reduced formulation.
 """
 REFERENCES = """
-All but the hemitropic rod's bent states (multiple shooting, `tests/shooting.py`) were computed anew in this run, and
-differ from the table by at most {deviation:.0e}: errors below that mean nothing.
+All but the hemitropic rod's bent states (multiple shooting, `tests/reference_values.py`) were computed anew in this
+run, and differ from the table by at most {deviation:.0e}: errors below that mean nothing.
 """
 EQUILIBRIA = """
 Time per accepted point of following a branch, index included, special points not, against the error of the ordinate

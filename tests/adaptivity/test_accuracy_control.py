@@ -1,0 +1,199 @@
+"""An accuracy asked for: true errors stay below it at every row and special point, at less cost than uniform meshes."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import boundary_layer
+import classics
+import closed_form_hemitropic
+import closed_forms
+import demo_cases
+import h5py
+import hemitropic_cases
+import numpy as np
+import pytest
+import reference_values
+from mpi4py import MPI
+from scipy.optimize import brentq
+from scipy.special import ellipk
+
+from rodfem.app.run import run
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.kinds import BRANCH_POINT, FLUTTER, FOLD, USER
+from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import Solver
+from rodfem.diagram.trace import trace
+from rodfem.errors import InputError
+from rodfem.fem.fields import Discretization, Fields
+from rodfem.output.files import load_state
+from rodfem.problem.scene import Scene
+
+ALONE = [pytest.param(accuracy, marks=pytest.mark.alone) for accuracy in (1e-4, 1e-8, 1e-10)]
+ACCURACIES = pytest.mark.parametrize("accuracy", [1e-6, *ALONE])
+CORD = {"fold": 7.8065554232, "shortening": 0.5793314271, "points": (49.34802200544679, 8.063525384097708)}
+"""Spectral collocation and shooting; ``k0^2 - w^2`` with ``w = 2 pi`` and ``tan(w/2) = w/2``."""
+
+
+def explored(scene: Scene, accuracy: float, at: tuple[float, ...] = (), depth: int = 1) -> Diagram:
+    """Explore a scene to an accuracy, on meshes of the program's choice."""
+    return trace(scene, plan=Plan(at=at, depth=depth, accuracy=accuracy))
+
+
+def special(found: Diagram, branch: str, kind: str) -> list[tuple[float, float]]:
+    """Loads and ordinates of the special points of a kind on a branch."""
+    return [(s.point.load, s.point.ordinate) for s in found.special(kind, branch)]
+
+
+def claimed(branches: list[Branch]) -> float:
+    """Largest error that a row or a special point is estimated to have."""
+    rows = [p.estimate for b in branches for p in b.points if np.isfinite(p.estimate)]
+    return max(rows)
+
+
+@pytest.mark.alone
+@ACCURACIES
+def test_cord(accuracy: float) -> None:
+    found = explored(demo_cases.scene("cord"), accuracy, at=(40.0,))
+    errors = np.subtract([load for load, _ in special(found, "straight", BRANCH_POINT)], CORD["points"])
+    assert abs(errors / CORD["points"]).max() < accuracy
+    assert abs(special(found, "branch 2", FOLD)[0][0] - CORD["fold"]) / CORD["fold"] < accuracy
+    assert abs(special(found, "branch 1", USER)[0][1] - CORD["shortening"]) < accuracy
+    assert claimed(found.branches) <= accuracy
+
+
+@pytest.mark.alone
+@ACCURACIES
+def test_hemitropic(accuracy: float) -> None:
+    found = explored(hemitropic_cases.scene(), accuracy, at=(0.5,))
+    errors = np.subtract(
+        [load for load, _ in special(found, "straight", BRANCH_POINT)], closed_form_hemitropic.loads(-3, 1, 1, 3)
+    )
+    assert abs(errors).max() < accuracy
+    assert abs(special(found, "branch 1", USER)[0][1] - reference_values.FIRST[0.5][0]) < accuracy
+    assert abs(np.subtract(special(found, "branch 2", FOLD)[0], reference_values.FOLD[:2])).max() < accuracy
+    assert abs(special(found, "branch 2", USER)[0][1] - reference_values.SECOND[0.5][0]) < accuracy
+    assert claimed(found.branches) <= accuracy
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("accuracy", [1e-5, 1e-9])
+def test_every_row_of_an_elastica(accuracy: float) -> None:
+    """Deflection of the tip of a column: ``2 k / sqrt(P)`` with ``K(k) = sqrt(P)``, all along the buckled branch."""
+    found = explored(classics.elastica(20.0), accuracy)
+    trunk, buckled = found.branches[:2]
+    (buckling,) = [s.point.load for s in trunk.special if s.kind == BRANCH_POINT][:1]
+    assert abs(buckling - np.pi**2 / 4) / buckling < accuracy
+    for p in buckled.points[1:]:
+        miss, slope = (deflection(p.load) - p.ordinate, (deflection(p.load + 1e-4) - deflection(p.load - 1e-4)) / 2e-4)
+        assert abs(miss) / (1 + abs(slope)) < accuracy  # distance from the curve: upright where it begins
+    assert claimed(found.branches) <= accuracy
+
+
+def deflection(P: float) -> float:
+    """Tip of a bent column of stiffness and length one."""
+    return float(2 * (brentq(lambda m: ellipk(m) - P**0.5, 0.0, 1 - 1e-12, xtol=1e-16) / P) ** 0.5)
+
+
+@cache
+def pulled(accuracy: float) -> Diagram:
+    return explored(boundary_layer.scene(), accuracy, at=(4.0, 5.0))
+
+
+@ACCURACIES
+def test_every_row_of_a_taut_rod(accuracy: float) -> None:
+    """Boundary layers that become thirty times thinner on the way, down to a thousandth of the rod."""
+    found = pulled(accuracy)
+    (branch,) = found.branches
+    assert branch.ended == "end of range"
+    assert max(abs(p.ordinate - boundary_layer.shortening(p.load)) for p in branch.points) < accuracy
+    assert claimed(found.branches) <= accuracy
+    assert len({p.mesh for p in branch.points}) > 2
+
+
+@pytest.mark.alone
+def test_graded_mesh_beats_uniform_ones() -> None:
+    """The same error at the end of the taut rod's branch takes twelve times the unknowns on equal elements."""
+    found = pulled(1e-6)
+    end = found.branches[0].points[-1]
+    graded = found.solvers[end.mesh].system.fields
+    error = abs(end.ordinate - boundary_layer.shortening(6.0))
+    sizes = np.diff(graded.discretization.vertices)
+    assert sizes.max() > 30 * sizes.min()
+    assert sizes[[0, -1]] == pytest.approx(sizes.min(), rel=0.1)
+    uniform = Solver(boundary_layer.scene(), Discretization("auto", 12 * graded.unknowns // 40, 8)).equilibria
+    system = uniform.system
+    assert system.fields.unknowns > 11 * graded.unknowns
+    x = uniform.shape.restore(found.solvers[end.mesh].shape.sample(end.x))
+    x, outcome = uniform.at_load(x, 6.0)
+    assert outcome.converged
+    assert abs(uniform.shape.ordinate(x) - boundary_layer.shortening(6.0)) > error
+
+
+def test_what_was_used_where(folder: Path) -> None:
+    """Files name the mesh of each row; rows of all meshes are read back, on another mesh too."""
+    scene = boundary_layer.scene((3.0, 4.5))
+    run(scene, plan=Plan(scene.span, accuracy=1e-6), output=folder, figures=False, quiet=True)
+    data = json.loads((folder / "diagram.json").read_text())
+    assert data["accuracy"] == 1e-6
+    (branch,), meshes = data["branches"], data["meshes"]
+    rows = branch["columns"]
+    assert len(set(rows["mesh"])) > 1
+    assert max(rows["estimate"]) < 1e-6
+    assert data["discretization"]["unknowns"] == max(m["unknowns"] for m in meshes)
+    with h5py.File(folder / "states.h5") as file:
+        for row, number in enumerate(rows["mesh"]):
+            s = file["branches/straight/s"][row]
+            s = s[np.isfinite(s)]
+            assert s[:: meshes[number]["degree"]] == pytest.approx(meshes[number]["vertices"], abs=1e-14)
+    other = Solver(scene, Discretization("auto", 40, 6)).equilibria
+    for row in (0, len(rows["load"]) - 1):
+        x = load_state(folder / "states.h5", "straight", row, other)
+        assert other.shape.ordinate(x) == pytest.approx(rows["ordinate"][row], abs=1e-5)
+
+
+@pytest.mark.parametrize("accuracy", [0.0, -1e-6, 1e-20, 1.0, float("nan"), float("inf")])
+def test_bad_accuracy(accuracy: float) -> None:
+    scene = hemitropic_cases.scene()
+    with pytest.raises(InputError, match=r"is not attainable: ask for one between 1e-10 .round-off. and 0.1"):
+        Plan(scene.span, accuracy=accuracy).check(scene)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize(("accuracy", "number"), [(1e-3, 6), (1e-6, 12)])
+def test_accuracy_of_a_sweep(accuracy: float, number: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """All frequencies, and the flutter load, against the frequency equation of Beck's column (good to 1e-7)."""
+    scene = demo_cases.scene("follower")
+    folder = MPI.COMM_WORLD.bcast(tmp_path)
+    plan = Plan((15.0, 25.0), accuracy=accuracy, spectrum=number)
+    (branch,) = run(scene, plan=plan, output=folder, figures=False)
+    out = capfd.readouterr().out
+    assert MPI.COMM_WORLD.rank or f"for an accuracy of {accuracy:g}: with half as many more" in out
+    (flutter,) = [s for s in branch.special if s.kind == FLUTTER]
+    assert abs(flutter.point.load / closed_forms.double(20.0, 120.0)[0] - 1) < accuracy
+    assert not flutter.note
+    for point in branch.points[::25]:
+        for mu in (complex(*parts) for parts in point.omega2):
+            planes = closed_forms.column(mu, point.load), closed_forms.column(mu, point.load, EI=10.0)
+            assert np.nanmin(np.abs(np.array(planes) - mu)) < accuracy * abs(mu)
+
+
+@pytest.mark.parametrize("words", [("--elements", "8"), ("--degree=6",), ("--elem", "8")])
+def test_accuracy_and_a_mesh(words: tuple[str, ...], capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        hemitropic_cases.run_demo("--accuracy", "1e-6", *words)
+    assert left.value.code == 2
+    if MPI.COMM_WORLD.rank == 0:
+        assert "error: --accuracy chooses elements and degree itself: leave out --" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("vertices", "words"),
+    [((0.0, 0.5), "2 vertices"), ((0.0, 0.7, 0.5, 1.0), "ascend"), ((0.0, 0.2, 0.5, 0.9), "begin and end at 0 and 1")],
+)
+def test_bad_vertices(vertices: tuple[float, ...], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Fields(boundary_layer.scene(), Discretization("auto", 3, 4, vertices))

@@ -1,0 +1,191 @@
+"""Error bars are bounds: of special points, of local laws, of what is printed; against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from io import StringIO
+from math import hypot, pi, sqrt
+
+import classics
+import hemitropic_cases
+import numpy as np
+import pytest
+import reference_values
+from classics import SUPPORTS, column
+from mpi4py import MPI
+from scipy.optimize import brentq
+from scipy.special import ellipk
+
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, trace
+from rodfem.app.terminal import Report
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD
+from rodfem.output.digits import number
+
+LARGE = 3.0
+"""A bar is not larger than this times the error, but for round-off."""
+ROUND_OFF = 1e-10
+DEEP = 8.973089969728
+"""Load at which the crown of a deep arch snaps, in units of EI/R^2, by shooting: 897 of DaDeppo & Schmidt (1975)."""
+
+
+def explored(scene: Scene, mesh: tuple[int, int] | float, at: tuple[float, ...] = (), depth: int = 0) -> list[Branch]:
+    """Explore a scene with error bars, on equal elements of a degree, or to an accuracy."""
+    accuracy = mesh if isinstance(mesh, float) else None
+    d = Discretization("auto", *mesh) if isinstance(mesh, tuple) else None
+    return trace(scene, d, Plan(at=at, depth=depth, steps=classics.WIDE, accuracy=accuracy)).branches
+
+
+def check(value: float, exact: float, bar: float) -> None:
+    """The bar holds, and is not needlessly large."""
+    assert abs(value - exact) <= bar <= LARGE * abs(value - exact) + ROUND_OFF
+
+
+# --- special points -------------------------------------------------------------------------------------------------
+
+
+@cache
+def tip(P: float) -> float:
+    """Deflection of a bent cantilever of stiffness and length one: ``2 k / sqrt(P)`` with ``K(k) = sqrt(P)``."""
+    return float(2 * sqrt(brentq(lambda m: ellipk(m) - sqrt(P), 0.0, 1 - 1e-12, xtol=1e-16) / P))
+
+
+@pytest.mark.parametrize("mesh", [(8, 1), (3, 2), (4, 3), (2, 4), (4, 5), (2, 6), (8, 6)])
+def test_elastica(mesh: tuple[int, int]) -> None:
+    """Buckling loads, and deflections between the elements' ends and at one of them."""
+    stops = (3.0, 6.0)
+    trunk, *buckled = explored(classics.elastica(8.0), mesh, stops, depth=1)
+    loads = [s for s in trunk.special if s.kind == BRANCH_POINT]
+    assert len(loads) == 2
+    for EI, s, branch in zip((1.0, 2.0), loads, buckled, strict=True):
+        check(s.point.load, EI * pi**2 / 4, s.error_estimate)
+        for end in (s for s in branch.special if s.kind != BRANCH_POINT):
+            check(end.point.ordinate, tip(end.point.load / EI), end.ordinate_error)
+
+
+@pytest.mark.parametrize("mesh", [(6, 4), (8, 5), pytest.param((12, 4), marks=pytest.mark.alone)])
+def test_ring(mesh: tuple[int, int]) -> None:
+    """Michell's ring: ``C t = sqrt(n^2 - 1)``; what one degree more still misses counts."""
+    (circle,) = explored(classics.ring(), mesh)
+    found = [s for s in circle.special if s.kind == BRANCH_POINT]
+    for s, n in zip(found[:2], (2, 3), strict=True):
+        check(s.point.load, sqrt(n * n - 1) / 1.5, s.error_estimate)
+
+
+@pytest.mark.parametrize("mesh", [(8, 2), (4, 4), (4, 6), (6, 6)])
+def test_deep_arch(mesh: tuple[int, int]) -> None:
+    """On few elements one degree more may lower an error by a third only, or turn its sign."""
+    (branch,) = explored(classics.deep_arch(), mesh)
+    fold = next(s for s in branch.special if s.kind == FOLD)
+    check(fold.point.load, DEEP, fold.error_estimate)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7])
+def test_deep_arch_to_an_accuracy(accuracy: float) -> None:
+    (branch,) = explored(classics.deep_arch(), accuracy)
+    fold = next(s for s in branch.special if s.kind == FOLD)
+    assert abs(fold.point.load - DEEP) <= fold.error_estimate <= accuracy * DEEP
+
+
+def test_arithmetic_of_many_elements() -> None:
+    """Where the discretisation is exact the eigenvalue that vanishes has the round-off of a stiff matrix."""
+    for mesh in ((64, 4), (64, 6), (128, 4)):
+        (branch,) = explored(classics.elastica(3.0), mesh)
+        (s,) = [s for s in branch.special if s.kind == BRANCH_POINT]
+        assert abs(s.point.load - pi**2 / 4) <= s.located_to <= s.error_estimate < 1e-8
+
+
+def test_highest_degree() -> None:
+    """Of the highest degree there is none richer: halves of the elements do."""
+    (branch,) = explored(classics.elastica(3.0), (4, 12))
+    (s,) = [s for s in branch.special if s.kind == BRANCH_POINT]
+    assert abs(s.point.load - pi**2 / 4) <= s.error_estimate < 1e-10
+
+
+# --- meshes that do not resolve the rod -----------------------------------------------------------------------------
+
+
+def coarse(accuracy: float | None) -> Diagram:
+    """The hemitropic rod on two elements of degree 2 to begin with."""
+    mesh = Discretization("auto", 2, 2, vertices=(-3.0, 0.0, 3.0))  # given, so that the accuracy chooses none
+    return trace(hemitropic_cases.scene(), mesh, Plan((0.0, 0.55), (0.5,), 1, accuracy=accuracy))
+
+
+def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
+    """At 0.5 two meshes agree by accident in the ordinate, not in the strains: its bar is a tenth of its error."""
+    diagram = coarse(None)
+    (s,) = diagram.special("user", "branch 1")
+    assert abs(s.point.ordinate - reference_values.FIRST[0.5][0]) > 5 * s.ordinate_error
+    assert s.resolved is False
+    stream = StringIO()
+    Report(stream=stream).table(diagram.branches, diagram.solvers[0].system)
+    if MPI.COMM_WORLD.rank == 0:
+        assert "(at least 2e-03)" in stream.getvalue()
+        assert "does not resolve" in stream.getvalue()
+
+
+def test_an_accuracy_is_not_reached_by_accident() -> None:
+    """Points that agree on two meshes to the accuracy asked for, and are not resolved, are computed on a finer one."""
+    (s,) = coarse(1e-2).special("user", "branch 1")
+    assert s.resolved
+    assert abs(s.point.ordinate - reference_values.FIRST[0.5][0]) <= s.ordinate_error <= 1e-2 * s.point.ordinate
+
+
+@pytest.mark.alone
+def test_straight_rod_is_resolved_by_any_mesh() -> None:
+    """It has no strains but constant ones; its null vector, a quarter of a cosine, has."""
+    for mesh, buckling in (((1, 1), False), ((4, 1), True)):
+        (straight,) = explored(classics.elastica(6.0), mesh, (2.0,))
+        found = {s.kind: s.resolved for s in straight.special}
+        assert found == {"user": True, BRANCH_POINT: buckling, "end": True}
+
+
+# --- local laws -----------------------------------------------------------------------------------------------------
+
+
+def across(s: float) -> Ordinate:
+    return Ordinate("across", s=s, of=lambda r, q: hypot(r[0], r[1]))
+
+
+def along(s: float) -> Ordinate:
+    return Ordinate("along", s=s, of=lambda r, q: float(r[2]))
+
+
+# supports, ordinate, end of the span, coefficient for bending stiffness one: ``P = p^2 (1 + m/2 + ...)`` with the
+# elliptic parameter m of each bent quarter, of length pi/(2 p), whose deflection is ``2 sqrt(m)/p`` and shortening m
+LAWS = {
+    "cantilever": ("clamped-free", across(1.0), 6.0, pi**4 / 128),
+    "cantilever, shortening": ("clamped-free", along(1.0), 6.0, -(pi**2) / 8),
+    "pinned": ("pinned-pinned", across(0.5), 25.0, pi**4 / 8),
+    "pinned, shortening": ("pinned-pinned", along(1.0), 25.0, -(pi**2) / 2),
+    "clamped": ("clamped-clamped", across(0.5), 42.0, pi**4 / 2),
+    "clamped, shortening": ("clamped-clamped", along(1.0), 42.0, -2 * pi**2),
+}
+
+
+@pytest.mark.parametrize("mesh", [(4, 3), (4, 5), (8, 6)])
+@pytest.mark.parametrize("name", LAWS)
+def test_coefficient_of_a_pitchfork(name: str, mesh: tuple[int, int]) -> None:
+    supports, ordinate, most, expected = LAWS[name]
+    scene = replace(column(name, SUPPORTS[supports], (0.0, most)), ordinate=ordinate)
+    trunk = explored(scene, mesh, depth=1)[0]
+    found = [s for s in trunk.special if s.kind == BRANCH_POINT]
+    assert found
+    for EI, s in zip((1.0, 2.0), found, strict=False):
+        assert s.law is not None
+        assert s.law.kind == "supercritical pitchfork"
+        miss = abs(s.law.coefficient - EI * expected)
+        assert miss <= s.law.uncertainty <= 10 * miss + 1e-6 * EI * abs(expected)
+
+
+# --- what is printed ------------------------------------------------------------------------------------------------
+
+
+def test_printed_bars_hold() -> None:
+    """Digits that are left out count: the bar printed is one of the number printed."""
+    rng = np.random.default_rng(5)
+    for value, error in zip(rng.normal(size=300), 10.0 ** rng.uniform(-12, 0, 300), strict=True):
+        shown, _, bar = number(value, error).partition(" (")
+        assert abs(float(shown) - value) + error <= float(bar[:-1]) * (1 + 1e-9) <= 3 * error

@@ -1,0 +1,59 @@
+"""Many rods: shared among ranks, kept in files, and taken up again."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from demo_cases import scene
+from mpi4py import MPI
+
+from rodfem.app.many import many
+from rodfem.errors import InputError, SceneError
+from rodfem.problem.scene import Scene
+
+COMM = MPI.COMM_WORLD
+
+
+@pytest.mark.short
+def test_shared_kept_and_taken_up_again(folder: Path) -> None:
+    rods = [scene("cord", turns=float(turns)) for turns in (1.0, 1.5, 2.0, 2.5, 3.0)]
+    done: list[float] = []
+
+    def work(rod: Scene) -> dict[str, Any]:
+        k0 = rod.parameters["k0"].value
+        done.append(k0)
+        if k0 > 18:
+            raise SceneError("too many turns")
+        return {"square": k0**2}
+
+    results = many(rods, work, folder / "many")
+    assert [round(r["square"], 6) for r in results[:4]] == [round(r.parameters["k0"].value ** 2, 6) for r in rods[:4]]
+    assert results[4] == {"error": "too many turns"}
+    assert len(done) == len(rods[COMM.rank :: COMM.size])
+    assert COMM.allreduce(len(done)) == 5
+    (folder / "many" / "rod-00001.json").write_text("{ cut off")
+    COMM.barrier()
+    changed = [replace(rods[0], span=(50.0, 0.0)), *rods[1:]]
+    done.clear()
+    assert many(changed, work, folder / "many") == results
+    assert COMM.allreduce(len(done)) == 2  # the one that was cut off, the one that has changed
+
+
+@pytest.mark.short
+def test_a_result_of_a_newer_format_is_kept(folder: Path) -> None:
+    """It is refused on every rank, and not written over."""
+    rods = [scene("cord", turns=float(turns)) for turns in (1.0, 1.5, 2.0)]
+    many(rods, lambda rod: {"span": list(rod.span)}, folder)
+    file = folder / "rod-00001.json"
+    if COMM.rank == 0:
+        data = json.loads(file.read_text())
+        file.write_text(json.dumps(data | {"format": data["format"] | {"version": 2, "program": "rodfem 9.1"}}))
+    COMM.barrier()
+    text = file.read_text()
+    with pytest.raises(InputError, match=r"rod-00001.json was written by rodfem 9.1, in version 2 of the format"):
+        many(rods, lambda rod: {}, folder)
+    assert file.read_text() == text

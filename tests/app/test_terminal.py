@@ -1,0 +1,224 @@
+"""Words of the terminal, of diagram.json and of the documentation say what is computed, and what is left out."""
+
+from __future__ import annotations
+
+import json
+import pydoc
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import demo_cases
+import h5py
+import hemitropic_cases
+import numpy as np
+import pytest
+from hemitropic_cases import run_demo
+from mpi4py import MPI
+
+import rodfem
+from rodfem.app.run import run
+from rodfem.diagram.plan import Plan
+from rodfem.fem.fields import Discretization
+from rodfem.problem.ends import Attachment, clamped, free
+from rodfem.problem.scene import Inertia, Ordinate, Scene
+
+HOME = Path(__file__).parents[2]
+FIRST = MPI.COMM_WORLD.rank == 0
+MESH = Discretization("reduced", 6, 3)
+
+
+@pytest.fixture
+def printed(capfd: pytest.CaptureFixture[str]) -> Iterator[Any]:
+    """Returns what a run prints on the first rank, and its diagram.json."""
+
+    def terminal(scene: Scene, plan: Plan, folder: Path, mesh: Discretization = MESH) -> tuple[str, dict[str, Any]]:
+        run(scene, mesh, plan, folder, figures=False)
+        return capfd.readouterr().out, json.loads((folder / "diagram.json").read_text())
+
+    yield terminal
+
+
+def compressed(rod: str = "flexible") -> Scene:
+    """A column whose stretch and shear have an energy: haringx of docs/rods.md."""
+    return Scene(
+        name="column",
+        interval=(0.0, 1.0),
+        rod=rod,
+        energy=lambda v, k, c: (
+            25.0 * (v[0] ** 2 + v[1] ** 2) + 100.0 * (v[2] - 1) ** 2 + 0.5 * (k[0] ** 2 + 2 * k[1] ** 2 + k[2] ** 2)
+        ),
+        parameters={"P": 0.0},
+        load="P",
+        ends=(clamped(), free(lambda c: (0.0, 0.0, -c.P))),
+        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
+        span=(0.0, 1.0),
+    )
+
+
+# --- what an energy is, and what it does without ---------------------------------------------------------------------
+
+
+def test_energy_is_that_of_the_rod_alone(folder: Path, printed: Any) -> None:
+    """Under ``P`` the stretch is ``1 - P/200``: ``int W ds = P^2/400``, where the total energy is ``-P^2/400``."""
+    out, data = printed(compressed(), Plan(error_bars=False), folder)
+    columns = data["branches"][0]["columns"]
+    np.testing.assert_allclose(columns["energy"], np.array(columns["load"]) ** 2 / 400, rtol=0, atol=1e-12)
+    assert "without the potential of the loads" in data["meaning"]["energy"]
+    assert set(columns) <= set(data["meaning"])
+    assert not FIRST or re.search(r"ordinate +int W ds +index", out)
+
+
+@pytest.mark.parametrize(
+    ("rod", "ignored", "better"),
+    [
+        ("unshearable and inextensible", ["v1", "v2", "v3"], "flexible"),
+        ("unshearable", ["v1", "v2"], "flexible"),
+        ("inextensible", ["v3"], "flexible"),
+        ("flexible", [], ""),
+    ],
+)
+def test_an_energy_of_strains_that_a_rod_does_not_have(
+    rod: str, ignored: list[str], better: str, folder: Path, printed: Any
+) -> None:
+    scene = compressed(rod)
+    assert [f"v{i + 1}" for i in scene.ignored_strains] == ignored
+    out, data = printed(replace(scene, span=(0.0, 0.1)), Plan(error_bars=False), folder)
+    assert data["ignored_strains"] == ignored
+    sentence = re.findall(r"The stored energy depends on (.*), but a rod .* choose rod='(\w+)'\.\n", out)
+    if FIRST and ignored:
+        assert [x.split(" ")[0] for x in sentence[0][0].split(", ")] == ignored
+        assert sentence[0][1] == better
+    else:
+        assert not sentence
+
+
+def test_strains_that_an_energy_does_not_have() -> None:
+    """An energy of stretch alone suggests a rod that stretches; those of the demos ignore nothing."""
+    stretching = replace(
+        compressed("unshearable and inextensible"),
+        energy=lambda v, k, c: (v[2] - 1) ** 2 * (1 + c.s) + k[0] ** 2 + k[1] ** 2 + k[2] ** 2,
+    )
+    assert stretching.ignored_strains == (2,)
+    known = [hemitropic_cases.scene(), *(demo_cases.scene(name) for name in ("cord", "ruler", "follower"))]
+    assert all(scene.ignored_strains == () for scene in known)
+
+
+# --- eigenvalues and indices -----------------------------------------------------------------------------------------
+
+
+def test_inertia_of_the_spectrum_is_named(folder: Path, printed: Any) -> None:
+    rod, plan = replace(compressed(), span=(0.0, 0.1)), Plan(spectrum=1, error_bars=False)
+    own = replace(rod, inertia=Inertia(rho_I=lambda c: (2.0, 2.0, 2.0)))
+    carried = replace(rod, attachments=(Attachment(1.0, rotary_inertia=lambda c: (1.0, 1.0, 1.0)),))
+    found = [printed(scene, plan, folder) for scene in (rod, own, carried)]
+    assert [scene.has_inertia for scene in (rod, own, carried)] == [False, True, True]
+    if FIRST:
+        words = ("unit rotary inertia", "the scene's inertia", "the scene's inertia")
+        assert all(f"omega^2 for {w} (symm" in out for w, (out, _) in zip(words, found, strict=True))
+    first, second = (data["branches"][0]["columns"]["spectrum"][0][0] for _, data in found[:2])
+    assert first == pytest.approx(2 * second, rel=1e-9)
+
+
+def test_what_is_counted_under_loads_without_potential(folder: Path, printed: Any) -> None:
+    beck = demo_cases.scene("follower", span=(0.0, 5.0))
+    mesh = Discretization("pointwise", 4, 4)
+    out, data = printed(beck, Plan(at=(2.0,), method="shift-invert", error_bars=False), folder, mesh)
+    assert "negative or complex" in data["meaning"]["negative"]
+    if FIRST:
+        assert "not of an index" in out
+        assert out.count("index") == 1
+        assert len(re.findall(r"\bunstable *$|\bunstable +zero", out, flags=re.MULTILINE)) == 2
+        assert "P = 2: stable" in out
+
+
+# --- branch points that are not followed -----------------------------------------------------------------------------
+
+
+def test_branch_points_below_the_depth_are_counted(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    common = ("--range", "0", "0.2", "--elements", "6", "--degree", "3", "--no-figures", "--output", str(folder))
+    run_demo(*common, "--depth", "0")
+    out = capfd.readouterr().out
+    data = json.loads((folder / "diagram.json").read_text())
+    assert [branch["name"] for branch in data["branches"]] == ["straight"]
+    assert data["branch_points_not_followed"] == 1
+    assert [s["followed"] for s in data["branches"][0]["special"] if s["kind"] == "branch point"] == [False]
+    assert not FIRST or "1 branch point was not followed, at the depth of switches: --depth 1 follows" in out
+    run_demo(*common, "--depth", "1")
+    out = capfd.readouterr().out
+    data = json.loads((folder / "diagram.json").read_text())
+    assert len(data["branches"]) == 2
+    assert data["branch_points_not_followed"] == 0
+    assert "not followed" not in out
+
+
+# --- documentation ---------------------------------------------------------------------------------------------------
+
+
+def test_modules_are_attributes() -> None:
+    """In an interpreter that has loaded nothing else, as ``import rodfem; help(rodfem.modes.modes)``."""
+    if not FIRST:
+        return
+    pages = ["README.md", "docs/rods.md", "rodfem/__init__.py"]
+    text = "".join((HOME / page).read_text() for page in pages)
+    named = {name for name in re.findall(r"\b((?:rodfem|forms)\.[a-zA-Z_.]*[a-zA-Z_])", text) if "XX" not in name}
+    table = re.findall(r"^\| (`[a-z_/`, ]+) \|", text[text.index("## How it works") :], flags=re.MULTILINE)
+    named |= {"rodfem." + name.replace("/", ".") for row in table for name in re.findall(r"`([a-z_/]+)`", row)}
+    assert {"rodfem.modes.modes", "rodfem.stability.assessment", "rodfem.fem.link.link", "forms.loads"} <= named
+    lines = ["import pydoc, rodfem, forms"] + [f"pydoc.render_doc({name})" for name in sorted(named)]
+    environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(HOME), "HOME": str(Path.home())}
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+
+
+def test_what_is_no_module_is_named() -> None:
+    for owner, words in ((rodfem, "it has Attachment, "), (rodfem.stability, "'rodfem.stability' has no")):
+        with pytest.raises(AttributeError, match=words):
+            _ = owner.nothing
+    assert "Modes of one state" in pydoc.render_doc(rodfem.modes.modes)
+
+
+@pytest.mark.alone
+def test_python_of_the_readme(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    """All its blocks, one after the other, as they stand."""
+    monkeypatch.setattr("rodfem.app.run._draw", lambda *_: None)
+    monkeypatch.chdir(folder)
+    names: dict[str, Any] = {}
+    for block in re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), flags=re.DOTALL):
+        exec(block, names)
+    solver, straight, buckled = names["solver"], names["straight"], names["buckled"]
+    assert (straight.index, buckled.index, buckled.zero, buckled.load) == (2, 0, 1, 0.52)
+    np.testing.assert_allclose(names["modes"].value[0], solver.assess(straight, "dense").values[0], rtol=1e-8)
+    assert capfd.readouterr().out.count("Locus of the branch point in lam and k0") == 1
+
+
+def test_an_equilibrium_that_there_is_not() -> None:
+    hemitropic = rodfem.Solver(hemitropic_cases.scene(), MESH)
+    with pytest.raises(rodfem.SceneError, match=r"lam = 1.5 is outside its admissible range"):
+        hemitropic.equilibrium(1.5)
+    with pytest.raises(rodfem.ConvergenceError, match=r"No equilibrium was found at lam = 0.5: go there in steps"):
+        hemitropic.equilibrium(0.5, guess=hemitropic.equilibria.system.new_vector())
+
+
+def test_a_saved_state_of_another_scene(folder: Path) -> None:
+    """An unshearable rod has a stretch, the one whose state was saved none."""
+    run(compressed("unshearable and inextensible"), MESH, Plan(error_bars=False), folder, figures=False, quiet=True)
+    stretched = rodfem.Solver(compressed("unshearable"), MESH)
+    with pytest.raises(rodfem.InputError, match="has no v, needed for the scene 'column': it was written for"):
+        stretched.restore(folder / "states.h5", "straight", 0)
+
+
+def test_mu_is_an_eigenvalue_and_nothing_else(folder: Path, printed: Any) -> None:
+    """The multiplier of the unit norm has a symbol of its own, in the terminal and in the file."""
+    plan = Plan((0.0, 0.1), at=(0.05,), method="count", spectrum=1, error_bars=False)
+    out, _ = printed(compressed(), plan, folder)
+    if FIRST:
+        assert "unit-norm multiplier eta (P3)" in out
+        assert set(re.findall(r"\bmu\b.{0,10}", out)) == {"mu = omega^2"}
+        with h5py.File(folder / "states.h5") as file:
+            assert {"q", "eta"} < set(file["branches/straight"])
+            assert "mu" not in file["branches/straight"]

@@ -1,0 +1,290 @@
+"""Loci in the plane of two parameters against closed forms, and against shooting where the state depends on both."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from functools import cache
+from math import pi
+from pathlib import Path
+from types import SimpleNamespace
+
+import classics
+import closed_form_hemitropic
+import numpy as np
+import pytest
+from closed_forms import double, flutter
+from demo_cases import explored as demo
+from demo_cases import scene as demo_scene
+from hemitropic_cases import explored, follower, specials
+from mpi4py import MPI
+from scipy.optimize import brentq
+from shooting_solver import Problem, Rod
+
+from forms.energy import bending
+from rodfem.codim2.locus import Locus, locus
+from rodfem.continuation.branch import Branch, SpecialPoint
+from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.step_control import StepControl
+from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
+from rodfem.errors import InputError
+from rodfem.fem.fields import Discretization
+from rodfem.output.plot_locus import _footer, draw_locus
+from rodfem.problem.ends import clamped, free
+from rodfem.problem.scene import Ordinate, Parameter, Scene
+
+pytestmark = pytest.mark.alone
+
+PLANE = ((0.01, 0.9), (-3.1, 1.0))
+WIDE = StepControl(first=0.05, largest=0.15)
+
+
+@cache
+def straight() -> Locus:
+    """Second buckling load of the hemitropic rod against the coupling A."""
+    return locus(follower(), specials(explored()[0], "branch point")[1], "A", PLANE, WIDE)
+
+
+def bent(s: np.ndarray) -> np.ndarray:
+    """Rotation by sin(pi s/2) about e2."""
+    half = np.sin(np.pi * s / 2) / 2
+    return np.stack([np.cos(half), 0 * s, np.sin(half), 0 * s], axis=-1)
+
+
+@cache
+def cantilever(load: str, span: tuple[float, float]) -> Diagram:
+    """An inextensible cantilever under a thrust lam and a small force e across it, in the plane of weak bending."""
+    rod = Scene(
+        name="cantilever",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending(k, (10.0, 1.0, 10.0)),
+        parameters={"lam": Parameter(0.0 if load == "lam" else 2.8, r"\lambda"), "e": Parameter(0.0)},
+        load=load,
+        ends=(clamped(), free(lambda c: (c.e, 0.0, -c.lam))),
+        start=None if load == "lam" else bent,
+        ordinate=Ordinate("deflection of the tip", s=1.0, of=lambda r, q: float(r[0])),
+        span=span,
+    )
+    return trace(rod, Discretization("reduced", 4, 6), Plan(depth=0, error_bars=False))
+
+
+def root(f, guess: float) -> float:  # type: ignore[no-untyped-def]
+    return float(brentq(f, guess - 1e-3, guess + 1e-3, xtol=1e-15, rtol=1e-14))
+
+
+def test_buckling_of_the_straight_rod() -> None:
+    """On the closed form all along, with two turning points in the load, and bounds that are met exactly."""
+    found = straight()
+    exact = np.array(
+        [root(lambda x, A=A: closed_form_hemitropic.buckling(x, A, 1, 1, 3), lam) for lam, A in found.values]
+    )
+    miss, known = abs(found.values[:, 0] - exact), ~np.isnan(found.error[:, 0])
+    assert miss.max() < 1e-10
+    assert known.sum() >= 5
+    assert np.all(miss[known] <= 3 * found.error[known].sum(axis=1))
+    assert found.error[known].max() < 1e-9
+    assert found.ended == ("A = -3.1, its bound", "A = 1, its bound")
+    assert (found.values[0, 1], found.values[-1, 1]) == (-3.1, 1.0)
+    assert found.values[found.start] == pytest.approx([closed_form_hemitropic.loads(-3, 1, 1, 3)[1], -3.0], abs=1e-10)
+    assert {tuple(pair) for pair in found.index.tolist()} == {(2, 4)}
+    turns = [found.values[m.row] for m in found.marks]
+    assert [m.kind for m in found.marks] == ["turns in lam"] * 2
+    for lam, A in turns:
+        slope = closed_form_hemitropic.buckling(lam, A + 1e-4, 1, 1, 3) - closed_form_hemitropic.buckling(
+            lam, A - 1e-4, 1, 1, 3
+        )
+        assert abs(slope) < 1e-10
+    assert turns[1][1] == pytest.approx(0, abs=1e-7)
+
+
+def test_straight_cord() -> None:
+    (first, _) = specials(demo("cord")["straight"], "branch point")
+    found = locus(demo("cord").follower, first, "k0", ((-10.0, 60.0), (3.0, 16.0)), steps=WIDE, error_bars=2)
+    lam, k0 = found.values.T
+    assert (lam[0], lam[-1]) == (-10.0, 60.0)
+    assert abs(lam - k0**2 + 4 * pi**2).max() < 1e-9
+    assert {tuple(pair) for pair in found.index.tolist()} == {(0, 1)}
+
+
+def test_fold_of_the_cord_by_shooting() -> None:
+    """The state depends on both parameters; the fold by shooting is where its determinant vanishes, in the moment."""
+    cord = demo("cord")
+    (fold,) = specials(cord["branch 2"], "fold")
+    found = locus(cord.follower, fold, "k0", ((4.0, 13.0), (8.0, 11.0)), steps=WIDE, error_bars=3)
+    assert found.values[[0, -1], 0].tolist() == [4.0, 13.0]
+    assert found.values[found.start, 0] == pytest.approx(7.8065554232, abs=1e-8)
+    for row in (0, len(found.values) - 1):
+        lam, k0 = found.values[row]
+        n, k = cord.start_of_rod(SimpleNamespace(x=found.states[row]))  # type: ignore[arg-type]
+        rod = Problem(Rod(intrinsic=(0.0, k0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])
+        p = np.array([n[0], n[1], lam, k[0], k[1] - k0, k[2]])
+
+        def beside(h: float, rod: Problem = rod, p: np.ndarray = p) -> tuple[np.ndarray, np.ndarray]:
+            return rod.solve(p + h * np.eye(6)[4], shot=[0, 1, 2, 3, 5])
+
+        h = brentq(lambda h: rod.singular(beside(h)[0]), -1e-3, 1e-3, xtol=1e-8)  # noqa: B023
+        p, end = beside(h)
+        beyond = found.values[row] - found.values[abs(row - 1)]
+        at_this_k0 = found.error[row] @ [1.0, abs(beyond[0] / beyond[1])]  # errors are measured across the curve
+        assert abs(p[2] - lam) <= 3 * at_this_k0 <= 1e-7
+        assert 1 - end[9] == pytest.approx(found.ordinate[row], abs=1e-7)
+    assert {tuple(pair) for pair in found.index.tolist()} == {(1, 2)}
+
+
+def test_fold_ends_where_the_pitchfork_changes_its_side() -> None:
+    constants = (-2.0, 1.0, 1.0, 3.0)
+    (fold,) = specials(explored(constants=constants)[2], "fold")
+    found = locus(follower(constants=constants), fold, "A", PLANE, steps=WIDE, error_bars=2)
+    assert all(sentence.startswith("the fold ends on a branch point") for sentence in found.ended)
+    for row in (0, -1):
+        lam, A = found.values[row]
+        assert closed_form_hemitropic.loads(A, 1, 1, 3)[1] == pytest.approx(lam, abs=1e-9)
+        assert found.ordinate[row] < 1e-5
+    assert found.values[found.start, 0] == pytest.approx(0.3534002860735, abs=1e-9)
+
+
+def test_cusp() -> None:
+    """A thrust above Euler's and a force across that sweeps from one side to the other: folds that meet at a cusp."""
+    diagram = cantilever("e", (0.3, -0.3))
+    fold, other = diagram.special("fold")
+    found = locus(diagram.solvers[0], fold, "lam", ((-0.5, 0.5), (2.0, 3.0)), steps=WIDE, error_bars=0)
+    (cusp,) = found.marks
+    assert cusp.kind == "cusp"
+    assert found.values[cusp.row] == pytest.approx([0, pi**2 / 4], abs=1e-9)
+    assert found.ended == ("lam = 3, its bound", "lam = 3, its bound")
+    assert found.values[0, 0] == pytest.approx(-found.values[-1, 0], abs=1e-9)
+    assert {tuple(pair) for pair in found.index.tolist()} == {(0, 1)}
+    assert found.passes(fold) and found.passes(other)  # so that no second run writes the same curve
+    assert not found.passes(replace(other, point=replace(other.point, load=0.9 * other.point.load)))
+
+
+def test_a_parameter_that_destroys_the_branch_point() -> None:
+    diagram = cantilever("lam", (0.0, 4.0))
+    (euler,) = diagram.special("branch point")
+    found = locus(diagram.solvers[0], euler, "e", ((0.0, 4.0), (-1.0, 1.0)), steps=WIDE, error_bars=0)
+    assert len(found.values) == 1
+    assert found.ended == ("e is an imperfection that destroys the branch point",) * 2
+
+
+def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
+    rod = demo_scene("follower", span=(19.0, 21.0))
+    solver, branch = swept(rod)
+    (flutter,) = specials(branch, "flutter")
+    found = locus(solver, flutter, "J1", ((18.0, 22.0), (0.0, 0.004)), steps=WIDE, error_bars=2)
+    assert found.ended == ("J1 = 0, its bound", "J1 = 0.004, its bound")
+    for (P, J), mu in zip(found.values, found.omega2, strict=True):
+        assert [P, mu] == pytest.approx(double(P, mu, J).tolist(), rel=3e-11)
+    assert abs(found.values[-1, 0] - double(20.0, 120.0, 0.004)[0]) <= 10 * found.error[-1].max() <= 1e-9
+
+
+def swept(scene: Scene) -> tuple[StaticSolver, Branch]:
+    """Frequencies over the range of a scene, and what computed them."""
+    diagram = trace(scene, Discretization("pointwise", 4, 6), Plan(error_bars=False))
+    return diagram.solvers[0], diagram[0]
+
+
+def test_flutter_of_a_rod_that_bends_alike(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    """Two pairs of frequencies meet at once: where each does in its plane, down to where the double one vanishes."""
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
+    solver, branch = swept(classics.partly_following(1.0, (15.0, 25.0), strong=1.0))
+    (special,) = specials(branch, "flutter")
+    assert (special.negative_before, special.negative_after) == (0, 4)
+    found = locus(solver, special, "share", ((15.0, 25.0), (0.0, 1.0)), error_bars=5)
+    assert found.ended[1] == "share = 1, its bound"
+    assert found.ended[0].startswith("the double eigenvalue vanishes: divergence near P = 17.06957")
+    for (P, share), mu in list(zip(found.values, found.omega2, strict=True))[4::4]:
+        assert flutter(share, P + 0.01, mu + 0.1) == pytest.approx((P, mu), rel=1e-9, abs=1e-7)
+    P, share = found.values[0]
+    assert np.cos(np.sqrt(P)) * (share - 1) == pytest.approx(share, abs=1e-9)
+    assert np.isfinite(found.error[~np.isnan(found.error)]).all()
+    assert np.nanmax(found.error) < 1e-9
+
+
+@pytest.mark.parametrize(("strong", "which"), [(10.0, 0), (1.0, 1)])
+def test_divergence(strong: float, which: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``cos sqrt P = share/(share - 1)``: one curve, through both loads of a share, which turns at one half."""
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
+    solver, branch = swept(classics.partly_following(0.2, (0.0, 25.0), strong))
+    both = specials(branch, "divergence")
+    assert [s.point.load for s in both] == pytest.approx([np.arccos(-0.25) ** 2, (2 * pi - np.arccos(-0.25)) ** 2])
+    found = locus(solver, both[which], "share", ((0.0, 25.0), (-0.5, 0.6)), steps=WIDE, error_bars=3)
+    P, share = found.values.T
+    assert abs(np.cos(np.sqrt(P)) * (share - 1) - share).max() < 1e-9
+    assert set(found.ended) == {"P = 25, its bound", "share = -0.5, its bound"}
+    (turn,) = found.marks
+    assert turn.kind == "turns in share"
+    assert found.values[turn.row] == pytest.approx([pi**2, 0.5], abs=1e-6)
+    assert np.nanmax(found.error) < 1e-9
+
+
+def test_errors_that_are_not_known_are_said_to_be_so() -> None:
+    found = replace(straight(), error=straight().error.copy())
+    rows = np.flatnonzero(~np.isnan(found.error[:, 0]))
+    known = found.error[rows[1:]].max()
+    found.error[rows[0]] = np.inf
+    data = found.data()
+    json.dumps(data, allow_nan=False)
+    assert data["without_estimate"] == [rows[0]]
+    assert data["columns"]["error"][rows[0]] == [None, None]
+    told = re.search(r"curves accurate to (\S+) \((.*)\)$", _footer([data]))
+    assert told is not None and known <= float(told[1]) <= 1.1 * known  # rounded up
+    assert told[2] == f"estimated at {len(rows) - 1} of {len(found.values)} points, without success at 1 more"
+    found.error[rows] = np.inf
+    assert _footer([found.data()]).endswith(f"the error could not be estimated at any of {len(rows)} points")
+
+
+def test_nothing_is_left_behind() -> None:
+    solver, special = follower(), specials(explored()[0], "branch point")[0]
+    system = solver.system
+    point = explored()[1].points[5]
+    system.set_phase(point.x)
+    before, phases, line = solver.point(point.x, 0.0, None), list(system.phases), system.line
+    locus(solver, special, "C", ((0.01, 0.9), (0.95, 1.05)), steps=WIDE, error_bars=0)
+    assert system.line is line is system.equations.line
+    assert all(a is b for a, b in zip(system.phases, phases, strict=True))
+    after = solver.point(point.x, 0.0, None)
+    for name in ("load", "ordinate", "energy", "negative", "zero", "stretch"):
+        assert getattr(after, name) == pytest.approx(getattr(before, name), rel=1e-13)
+
+
+def test_saved_and_drawn(folder: Path) -> None:
+    found = straight()
+    if MPI.COMM_WORLD.rank == 0:
+        found.save(folder / "locus.json")
+        data = json.loads((folder / "locus.json").read_text())
+        assert data["columns"]["lam"] == found.values[:, 0].tolist()
+        assert data["columns"]["error"][1] == [None, None]
+        assert draw_locus([data], folder / "locus.png").stat().st_size > 20000
+        text = found.text()
+        assert "Locus of the branch point in lam and A" in text
+        assert "turns in lam" in text
+        with pytest.raises(ValueError, match="no locus"):
+            draw_locus([], folder / "none.png")
+
+
+@pytest.mark.parametrize(
+    ("parameter", "bounds", "message"),
+    [
+        ("D", PLANE, "'D' is no parameter of the scene"),
+        ("lam", PLANE, "is the load itself"),
+        ("A", ((0.01, 0.9), (1.0, -1.0)), "bounds 1, -1 of A are empty"),
+        ("A", ((0.01, 2.0), (-3.1, 1.0)), "outside its admissible range"),
+        ("A", ((0.01, 0.9), (-4.0, 1.0)), "not convex"),
+        ("A", ((0.2, 0.9), (-3.1, 1.0)), "outside the bounds: widen them"),
+    ],
+)
+def test_mistakes(parameter: str, bounds: tuple, message: str) -> None:
+    special = specials(explored()[0], "branch point")[0]
+    with pytest.raises(InputError, match=message):
+        locus(follower(), special, parameter, bounds)
+
+
+def test_no_locus_of_an_end() -> None:
+    end: SpecialPoint = specials(explored()[0], "end")[0]
+    with pytest.raises(InputError, match="has no locus"):
+        locus(follower(), end, "A", ((0.01, 0.96), (-3.1, 1.0)))

@@ -1,0 +1,189 @@
+"""Following branches: exact loads, either direction, restarts from files, and the work of the ends."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import classics
+import closed_form_hemitropic
+import numpy as np
+import pytest
+import reference_values
+from hemitropic_cases import DEFAULT, explored, follower, specials, user_points
+from numpy.polynomial.legendre import leggauss
+
+import rodfem
+from rodfem import Branch, Discretization, Plan, Point
+from rodfem.continuation.step_control import IndexStepControl, StepControl
+from rodfem.errors import InputError, SceneError
+from rodfem.output.files import load_state, save_states
+
+HALF = DEFAULT[3]
+points, weights = leggauss(12)
+GAUSS = tuple(float(load) for load in 0.6 + 0.1 * points)
+WEIGHTS = 0.1 * weights
+AT = (0.05, 0.5, *GAUSS, 0.9)
+
+
+@pytest.mark.short
+def test_user_points_and_ends_lie_at_their_loads_exactly() -> None:
+    straight, first, second = explored(at=AT)
+    assert [s.point.load for s in specials(straight, "user")] == sorted(AT)
+    assert [s.point.load for s in specials(first, "user")] == sorted(AT)[1:]  # the branch begins at 0.114
+    assert [s.point.load for s in specials(second, "user") if s.point.load < 0.6] == [
+        x for x in sorted(AT) if 0.35 < x < 0.6
+    ]
+    assert straight.points[0].load == 0.0
+    assert straight.points[-1].load == first.points[-1].load == 0.95
+
+
+@pytest.mark.short
+def test_energy_grows_by_the_work_of_the_ends() -> None:
+    """``dE/dlam = n . d(r(l) - r(-l))/dlam = -2 l n3``, integrated by Gauss's rule, and energies found by shooting."""
+    first = explored(at=AT)[1]
+    states = [user_points(first, load)[0] for load in GAUSS]
+    power = [-2 * HALF * follower().system.scalar(p.x, "n3") for p in states]
+    work = reference_values.FIRST[0.7][1] - reference_values.FIRST[0.5][1]
+    assert WEIGHTS @ power == pytest.approx(work, abs=5e-9)
+
+
+def test_contact_force_is_constant_and_the_same_in_both_formulations() -> None:
+    rich = follower("pointwise", 8, 6)
+    state = user_points(explored("pointwise", 8, 6, at=(0.5,), depth=1)[1], 0.5)[0]
+    n = rich.shape.sample(state.x)["n"].reshape(-1, 3)
+    n3 = follower().system.scalar(user_points(explored(at=AT)[1], 0.5)[0].x, "n3")
+    np.testing.assert_allclose(n[:, 2], n3, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(n, np.broadcast_to(n[0], n.shape), rtol=0, atol=1e-9)
+
+
+@pytest.mark.alone
+def test_decreasing_load() -> None:
+    """The same special points as with increasing load, met the other way round."""
+    straight, *buckled = explored("reduced", 12, 6, span=(0.5, 0.05), at=(0.2,))
+    found = specials(straight, "branch point")
+    np.testing.assert_allclose(
+        [s.point.load for s in found], closed_form_hemitropic.loads(*DEFAULT)[::-1], rtol=0, atol=1e-10
+    )
+    assert [(s.negative_before, s.negative_after) for s in found] == [(4, 2), (2, 0)]
+    assert straight.points[0].load == 0.5
+    assert straight.points[-1].load == 0.05
+    second, first = buckled
+    (fold,) = specials(second, "fold")
+    assert fold.point.load == pytest.approx(reference_values.FOLD[0], abs=1e-10)
+    assert (fold.negative_before, fold.negative_after) == (3, 2)
+    assert (first.points[-1].load, second.points[-1].load) == (0.5, 0.5)
+    assert user_points(first, 0.2)[0].ordinate == pytest.approx(reference_values.FIRST[0.2][0], abs=1e-9)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("start", [0.0, 0.01, 0.07 / 3, 0.05, 0.1])
+def test_loads_are_located_as_precisely_as_they_claim(start: float) -> None:
+    """Where the points of a branch lie must not matter, and 1/12 of the rod at degree 6 is exact for this purpose."""
+    found = specials(explored("reduced", 12, 6, span=(start, 0.9), depth=0)[0], "branch point")
+    for s, exact in zip(found, closed_form_hemitropic.loads(*DEFAULT), strict=True):
+        assert abs(s.point.load - exact) <= 3 * s.located_to
+
+
+@pytest.mark.alone
+def test_special_points_do_not_depend_on_the_steps() -> None:
+    coarse = explored("reduced", 12, 6, span=(0.0, 0.6), steps=StepControl(first=0.05, largest=0.25, aim=2e-2))
+    found = [s.point.load for b in coarse for s in b.special if s.kind in ("branch point", "fold")]
+    np.testing.assert_allclose(
+        found, [*closed_form_hemitropic.loads(*DEFAULT), reference_values.FOLD[0]], rtol=0, atol=1e-10
+    )
+    assert max(len(b.points) for b in coarse) < 20
+
+
+@pytest.mark.short
+def test_newton_converges_quadratically() -> None:
+    """The size of a correction is the square of the one before: the Jacobian is the derivative of the equations."""
+    f = follower()
+    y = user_points(explored(at=AT)[1], 0.5)[0].x.copy()
+    f.system.set_phase(y)
+    f.system.set_load(y, 0.52)
+    residual, step = f.system.new_vector(), f.system.new_vector()
+    sizes = []
+    for _ in range(4):
+        state = f.system.at(y)
+        state.residual(residual)
+        state.factor(f.axis)
+        assert f.system.solve(residual, step)
+        y.axpy(-1.0, step)
+        sizes.append(f.system.norm(step))
+    assert sizes[-1] < 1e-9
+    assert np.log(sizes[3] / sizes[2]) / np.log(sizes[2] / sizes[1]) == pytest.approx(2, abs=0.2)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_restart_on_another_discretisation(formulation: str, folder: Path) -> None:
+    """A saved state starts Newton's method on other elements of another degree, and it lands on the exact state."""
+    branch = explored(formulation, 8, 6, at=AT if formulation == "reduced" else (0.5,), depth=1)[1]
+    save_states(branch, [follower(formulation, 8, 6)], folder / "states.h5", first=True)
+    row = branch.points.index(user_points(branch, 0.5)[0])
+    other = follower(formulation, 10, 8)
+    other.system.comm.barrier()
+    guess = load_state(folder / "states.h5", branch.name, row, other)
+    assert other.system.scalar(guess) == 0.5
+    other.system.set_phase(guess)
+    y, outcome = other.at_load(guess, 0.5, reach=1e-2)
+    assert outcome.converged
+    assert outcome.iterations <= 4
+    assert other.shape.ordinate(y) == pytest.approx(reference_values.FIRST[0.5][0], abs=1e-10)
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_polynomials_survive_a_finer_mesh_and_back(formulation: str) -> None:
+    """A finer mesh of a higher degree holds every state of a coarse one, so that nothing is lost on the way back."""
+    coarse, fine = follower(formulation, 8, 6), follower(formulation, 16, 8)
+    (p,) = user_points(explored(formulation, 8, 6, at=AT if formulation == "reduced" else (0.5,), depth=1)[1], 0.5)
+    back = coarse.shape.restore(fine.shape.sample(fine.shape.restore(coarse.shape.sample(p.x))))
+    back.axpy(-1.0, p.x)
+    assert back.norm() < 1e-11 * p.x.norm()
+
+
+@pytest.mark.short
+def test_restart_from_what_is_not_there(folder: Path) -> None:
+    branch = explored(at=AT)[0]
+    path = folder / "states.h5"
+    save_states(branch, [follower()], path, first=True)
+    follower().system.comm.barrier()
+    for wrong in ((folder / "nothing.h5", "straight", 0), (path, "crooked", 0), (path, "straight", 999)):
+        with pytest.raises(InputError, match=r"no row .* of a branch"):
+            load_state(*wrong, follower())
+    with pytest.raises(InputError, match="states of the reduced formulation"):
+        load_state(path, "straight", 0, follower("pointwise"))
+
+
+def test_steps_that_bound_the_change_of_the_index() -> None:
+    """Euler's loads of a pinned column of nearly equal stiffnesses, ``pi^2`` and ``1.004 pi^2``, with a row between."""
+    rod = classics.column(
+        "euler", classics.SUPPORTS["pinned-pinned"], (8.0, 12.0), constants={"B2": 1.004}
+    )  # fmt: skip
+    found = {
+        kind: rodfem.trace(rod, plan=Plan(depth=0, steps=kind(largest=0.2, first=0.2), error_bars=False))[0]
+        for kind in (StepControl, IndexStepControl)
+    }
+    changes = {kind: {abs(a.index - b.index) for a, b in pairwise(_rows(b))} for kind, b in found.items()}
+    assert changes == {StepControl: {0, 2}, IndexStepControl: {0, 1}}
+    for branch in found.values():
+        loads = [s.point.load for s in branch.special if s.kind == "branch point"]
+        assert loads == pytest.approx([np.pi**2, 1.004 * np.pi**2], rel=1e-9)
+    with pytest.raises(InputError, match="A change of the index of 0 leads nowhere: give change=1 or more"):
+        IndexStepControl(change=0)
+
+
+def _rows(branch: Branch) -> list[Point]:
+    """Points of a branch without its special points."""
+    special = {id(s.point) for s in branch.special if s.kind == "branch point"}
+    return [p for p in branch.points if id(p) not in special]
+
+
+@pytest.mark.alone
+def test_singular_equations_are_told_in_a_sentence() -> None:
+    """Two meshes of degree 1 on which the equations are exactly singular: no division by the size of nothing."""
+    with pytest.raises(SceneError, match="Constraints depend on one another"):
+        rodfem.trace(classics.pressed_ring(), Discretization("auto", 2, 1))
+    (branch,) = rodfem.trace(classics.winkler(), Discretization("auto", 16, 1))
+    assert branch.ended.startswith("no convergence at P = 0 (steps below 1e-05; 1 eigenvalues vanish there")

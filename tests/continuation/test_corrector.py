@@ -1,0 +1,93 @@
+"""One symmetric factorisation a point against two shifts, LU factors, and what the theory says."""
+
+from __future__ import annotations
+
+import demo_cases
+import hemitropic_cases
+import numpy as np
+import pytest
+
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.corrector import NEAR
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD
+from rodfem.continuation.solvers import BranchSolver
+from rodfem.fem.newton import TOLERANCE, correct
+
+BENT = {"hemitropic": ("branch 1", 0.5), "cord": ("branch 2", 30.0), "ruler": ("branch 1", 8.0)}
+
+
+def demo(name: str, formulation: str) -> tuple[BranchSolver, list[Branch]]:
+    """Solver and branches of a demo."""
+    if name == "hemitropic":
+        return hemitropic_cases.follower(formulation, 8, 6), hemitropic_cases.explored(formulation, 8, 6)
+    found = demo_cases.explored(name, formulation)
+    return found.follower, found.branches
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+@pytest.mark.parametrize("name", ["hemitropic", "cord", "ruler"])
+def test_index_is_that_of_two_shifts_at_every_point(name: str, formulation: str) -> None:
+    follower, branches = demo(name, formulation)
+    for branch in branches:
+        for point in branch.points:
+            follower.system.set_phase(point.x)
+            index = follower.inertia.at(point.x).count()
+            if point is not branch.points[0] and not any(s.point is point for s in branch.special):
+                assert (index.negative, index.zero) == (point.negative, point.zero), (branch.name, point.load)
+
+
+@pytest.mark.parametrize("name", BENT)
+def test_state_and_tangent_are_those_of_lu_factors(name: str) -> None:
+    follower, branches = demo(name, "reduced")
+    system, wanted = follower.system, BENT[name]
+    branch = next(b for b in branches if b.name == wanted[0])
+    point = min(branch.points[2:-2], key=lambda p: abs(p.load - wanted[1]))
+    row = follower.row(point.tangent)
+    guess = point.x.copy()
+    guess.axpy(0.01, point.tangent)
+    guess.axpy(1e-3, system.metric * follower.inertia.seed(0))
+    system.set_phase(guess)
+    ours, theirs = guess.copy(), guess.copy()
+    corrected = follower.corrector.correct(ours, row)
+    assert corrected is not None and corrected[0].converged and correct(system, theirs, row).converged
+    ours.axpy(-1.0, theirs)
+    assert system.norm(ours) < TOLERANCE
+    tangent = follower.tangent(row, at=theirs)
+    regular = follower.corrector.factor(theirs)
+    assert regular is not None and system.norm(regular.along(row) - tangent) < 1e-12
+    image = system.at(theirs).jacobian(row) * tangent  # J t = (0, row . t)
+    system.set_load(image, 0.0)
+    assert image.norm() < 1e-9 * system.matrix.norm()
+
+
+@pytest.mark.parametrize("name", ["hemitropic", "cord"])
+def test_near_singular_states_are_left_to_others(name: str) -> None:
+    follower, branches = demo(name, "reduced")
+    special = [s for b in branches for s in b.special if s.kind in (FOLD, BRANCH_POINT)]
+    assert len(special) > 2
+    for s in special:
+        follower.system.set_phase(s.point.x)
+        follower.corrector.restart()
+        assert follower.corrector.factor(s.point.x) is None
+        found = follower.inertia.at(s.point.x)
+        found.count()
+        assert abs(found.nearest(1)[0][0]) < NEAR * follower.inertia.scale
+
+
+def test_nearest_eigenvalue_of_the_straight_cord_is_estimated() -> None:
+    """Straight cord in tension: S is singular at 49.348 only, and its eigenvalues are smooth in between."""
+    follower, branches = demo("cord", "reduced")
+    straight = branches[0].points
+    seen = []
+    follower.corrector.restart()
+    for point in straight[1:20]:
+        follower.system.set_phase(point.x)
+        special = any(s.point is point for s in branches[0].special)
+        if not special and (regular := follower.corrector.factor(point.x)):
+            factored = follower.inertia.at(point.x)
+            factored.count()
+            exact = abs(factored.nearest(1, accuracy=1e-6)[0][0])
+            assert regular.nearest > (1 - 1e-6) * exact  # an upper bound
+            seen.append(regular.nearest / exact)
+    assert len(seen) > 5
+    assert np.median(seen) < 1.5

@@ -1,0 +1,315 @@
+"""The index of each row is that of its own state, and from row to row it changes by what the special points say."""
+
+from __future__ import annotations
+
+import io
+from argparse import Namespace
+from dataclasses import replace
+from math import cos, pi, sin
+from typing import Any
+
+import demo_cases
+import hemitropic_cases
+import numpy as np
+import pytest
+from classics import ON_AXIS, RIGID, ROUND, WIDE, circle, column, explore, push, winkler
+from closed_form_hemitropic import buckling
+from closed_form_hemitropic import loads as buckling_loads
+from mpi4py import MPI
+from rows import verify
+from scipy.optimize import brentq
+
+from forms.energy import bending
+from rodfem import (
+    Discretization,
+    Observer,
+    Ordinate,
+    Parameter,
+    Plan,
+    Ring,
+    Scene,
+    Solver,
+    StepControl,
+    clamped,
+    free,
+    pinned,
+    sliding,
+    trace,
+)
+from rodfem.app.terminal import Report
+from rodfem.codim2.locus import locus
+from rodfem.continuation.index_chain import Row, breaks, chained, explain
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD
+from rodfem.continuation.solvers import _to_load
+from rodfem.continuation.special_points import directions, leave
+from rodfem.diagram.explorer import Explorer
+from rodfem.diagram.tracer import equivalent
+from rodfem.output.files import _branch_data
+from rodfem.stability.assessment import judge
+
+EULER = pi**2 / 4
+"""Buckling load of the clamped-free column."""
+
+
+def localised(turns: int = 27) -> Scene:
+    """A rod twisted by many turns and pulled by T between clamps: van der Heijden & Thompson (2000), in other units."""
+    return Scene(
+        name="localised", interval=(0.0, 1.0), rod=RIGID, load="T", span=(3200.0, 2450.0),
+        energy=lambda v, k, c: bending(k, (1.0, 1.0, c.C)),
+        parameters={"T": Parameter(3200.0), "C": Parameter(0.789 / 1.345)},
+        ends=(clamped(), sliding(ON_AXIS, (cos(turns * pi), 0.0, 0.0, sin(turns * pi)), lambda c: (0.0, 0.0, c.T))),
+        start=lambda s: np.stack([np.cos(turns * pi * s), 0 * s, 0 * s, np.sin(turns * pi * s)], axis=1),
+        ordinate=Ordinate("end shortening", s=1.0, of=lambda r, q: 1 - r[2]),
+    )  # fmt: skip
+
+
+@pytest.mark.alone
+def test_a_rod_under_high_tension() -> None:
+    """Its eigenvalues are a thousand times as sensitive to its state as those of a rod without load.
+
+    The count at the prediction is another one than at the equilibrium; the paper's reduction is a third opinion.
+    """
+    diagram = trace(localised(), Discretization("reduced", 40, 6), Plan(depth=1, error_bars=False))
+    solver = diagram.solvers[0]
+    verify(solver, diagram.branches)
+    (buckled,) = diagram.branches[1:]
+    assert {p.negative for p in buckled.points[1:]} == {1}
+    for point in buckled.points[10::8]:
+        solver.system.set_phase(point.x)
+        assert judge(solver, point.x, "reduction").negative == 1
+
+
+@pytest.mark.parametrize("apart", [3e-3, 1e-4, 1e-6])
+def test_neighbours_in_one_step(apart: float) -> None:
+    """A pinned column that bends almost alike about both axes: P = pi^2 B, each with its own index on either side."""
+    scene = column(
+        "neighbours", (clamped(), free(push)), (0.0, 4.0), constants={"B1": 1.0, "B2": 1.0 + apart}
+    )  # fmt: skip
+    first, second = explore(scene).special()
+    assert [s.point.load for s in (first, second)] == pytest.approx([EULER, EULER * (1 + apart)], abs=1e-11)
+    assert [(s.negative_before, s.negative_after) for s in (first, second)] == [(0, 1), (1, 2)]
+
+
+@pytest.mark.parametrize("half", [1e-6, 1e-5, 1e-3])
+def test_a_range_about_the_buckling_load(half: float) -> None:
+    """The eigenvalue that vanishes is within the tolerance of zero at every row but the ends."""
+    scene = column("range", (clamped(), free(push)), (EULER - half, EULER + half))
+    found = explore(scene)
+    (special,) = found.special()
+    assert special.point.load == pytest.approx(EULER, abs=1e-11)
+    assert (special.negative_before, special.negative_after) == (0, 1)
+
+
+@pytest.mark.alone
+def test_a_double_point_that_the_mesh_splits() -> None:
+    """Michell's ring of C = 1.5 at its fourth mode, C t0 = sqrt(15): one point, where two eigenvalues vanish."""
+    scene = column(
+        "ring", Ring(odd=True), (2.4, 2.7), load="k", constants={"k": 2.4, "B2": 1.0, "C": 1.5}, start=circle, **ROUND,
+        energy=lambda v, k, c: bending((k[0], k[1], k[2] - c.k), (c.B1, c.B2, c.C)),
+    )  # fmt: skip
+    (branch,) = trace(scene, Discretization("auto", 8, 6), Plan(depth=0, steps=WIDE))
+    (special,) = [s for s in branch.special if s.kind == BRANCH_POINT]
+    assert (special.negative_before, special.negative_after, special.multiplicity) == (4, 6, 2)
+    assert abs(special.point.load - np.sqrt(15) / 1.5) < special.error_estimate
+    assert "does not tell apart" in special.note
+    assert not branch.unexplained
+
+
+def test_a_family_at_the_first_load() -> None:
+    """At P = 0 a ring under a radial dead load may turn freely; its branch leads across that family.
+
+    The circle buckles in its plane at P = n^2 under a dead radial load (Bodner 1958); turned, it falls at once.
+    """
+
+    def load(c: Any) -> tuple[Any, ...]:
+        import ufl
+
+        return (c.P * ufl.cos(c.s), 0.0, -c.P * ufl.sin(c.s))
+
+    scene = column(
+        "dead ring", Ring(), (0.0, 5.0), start=circle, planar="e2", constants={"B2": 1.0}, distributed=load, **ROUND
+    )  # fmt: skip
+    (branch,) = explore(scene, elements=12).branches
+    assert branch.ended == "end of range"
+    assert len(branch.points) < 60
+    assert [s.point.load for s in branch.special if s.kind == BRANCH_POINT] == pytest.approx([4.0], abs=1e-8)
+
+
+@pytest.mark.alone
+def test_a_fold_beside_the_branch_point_that_it_comes_from() -> None:
+    """At A = -2.31 the second branch of the hemitropic rod turns back 0.04 from where it begins.
+
+    The locus of the fold at A = -2, followed to that A, has the same load.
+    """
+    branches = hemitropic_cases.explored(constants=(-2.31, 1.0, 1.0, 3.0))
+    (fold,) = hemitropic_cases.specials(branches[2], "fold")
+    assert fold.point.arclength < 0.05
+    assert (fold.negative_before, fold.negative_after) == (3, 2)
+    (other,) = hemitropic_cases.specials(hemitropic_cases.explored(constants=(-2.0, 1.0, 1.0, 3.0))[2], "fold")
+    solver = hemitropic_cases.follower(constants=(-2.0, 1.0, 1.0, 3.0))
+    found = locus(solver, other, "A", ((0.3, 0.4), (-2.31, -1.9)), error_bars=0)
+    row = int(np.argmin(found.values[:, 1]))
+    assert found.values[row] == pytest.approx([fold.point.load, -2.31], abs=1e-9)
+
+
+@pytest.mark.parametrize("largest", [0.05, 0.15])
+def test_a_fold_and_a_branch_point_of_opposite_sign_in_one_step(largest: float) -> None:
+    """On a foundation of k = 240 the second branch turns back 0.017 after its index has gone from 3 to 4.
+
+    At the ends of the step it is 3.  Steps of 0.3 happen to end between the two.
+    """
+    scene = winkler()
+    scene = replace(scene, parameters={**scene.parameters, "k": Parameter(240.0)})
+    plan = Plan(depth=1, steps=StepControl(largest=largest), error_bars=False)
+    branch = trace(scene, Discretization("auto", 8, 6), plan)[2]
+    found = [(s.kind, s.negative_before, s.negative_after) for s in branch.special[1:3]]
+    assert found == [(BRANCH_POINT, 3, 4), (FOLD, 4, 3)]
+    assert [s.point.load for s in branch.special[1:3]] == pytest.approx([31.28043, 31.27381], abs=1e-5)
+
+
+@pytest.mark.parametrize(("longer", "apart"), [(1e-3, 0.0265), (1e-4, 8.39e-3), (1e-6, 8.39e-4)])
+def test_an_eigenvalue_that_passes_zero_twice_in_one_step(longer: float, apart: float) -> None:
+    """Two double branch points of the straight rod, ``apart`` by the closed form: the index is 2 on either side.
+
+    For A = 0 they depend on lam (1 - lam) l^2 alone, and meet at lam = 1/2 and a half length of 2.84188.
+    """
+    meet = brentq(lambda half: buckling(0.5, 0.0, 1.0, 1.0, half), 2.8, 2.9, xtol=1e-15)
+    constants = (0.0, 1.0, 1.0, meet + longer)
+    first = brentq(lambda lam: buckling(lam, *constants), 0.4, 0.5, xtol=1e-15)
+    assert 1 - 2 * first == pytest.approx(apart, rel=5e-3)
+    mesh, plan = Discretization("reduced", 16, 6), Plan(depth=0, steps=StepControl(largest=0.1), error_bars=False)
+    (straight,) = trace(hemitropic_cases.scene(constants), mesh, plan)
+    pair = straight.special[1:3]
+    assert [(s.negative_before, s.negative_after) for s in pair] == [(2, 4), (4, 2)]
+    assert [s.point.load for s in pair] == pytest.approx([first, 1 - first], abs=1e-9)
+    # in a shorter rod the eigenvalue comes near zero, and turns back
+    (straight,) = trace(hemitropic_cases.scene((0.0, 1.0, 1.0, meet - longer)), mesh, plan)
+    assert [(s.negative_before, s.negative_after) for s in straight.special] == [(0, 2), (2, 0), (0, 0)]
+
+
+def test_a_row_beside_a_pair_of_crossings() -> None:
+    """A step of 0.3 ends 6e-4 beyond two double branch points that are 4e-3 apart, and tells nothing of them."""
+    constants = (0.554629, 1.0, 1.0, 2.851609)
+    expected = buckling_loads(*constants)
+    plan = Plan(depth=0, steps=StepControl(largest=0.3), error_bars=False)
+    (straight,) = trace(hemitropic_cases.scene(constants), Discretization("reduced", 16, 6), plan)
+    found = [s for s in straight.special if s.kind == BRANCH_POINT]
+    assert [s.point.load for s in found] == pytest.approx(expected, abs=1e-9)
+    assert [(s.negative_before, s.negative_after) for s in found] == [(0, 2), (2, 4), (4, 2), (2, 0)]
+
+
+@pytest.mark.alone
+def test_every_row_of_the_ring_demo() -> None:
+    scene = demo_cases.module("ring").scene(Namespace(twisting=1.5, span=(0.0, 1.6)))
+    diagram = trace(scene, Discretization("auto", 8, 6), Plan(error_bars=False))
+    verify(diagram.solvers[0], diagram.branches)
+    assert [b.name for b in diagram] == ["circle", "branch 1", "branch 1.1", "branch 1.2"]
+
+
+def test_what_is_not_explained_is_kept() -> None:
+    """With the special point taken out of a branch its rows contradict each other."""
+    found = explore(column("euler", (pinned(), pinned(ON_AXIS, push)), (0.0, 30.0), constants={"B2": 1.3}))
+    branch = found.branches[0]
+    singular = [s for s in branch.special if s.kind == BRANCH_POINT]
+    assert breaks(branch.points, branch.special) == []
+    rows = [p for p in branch.points if p is not singular[0].point]
+    (broken,) = breaks(rows, singular[1:])
+    assert (broken.before, broken.after) == (0, 1)
+    assert broken.a.load < singular[0].point.load < broken.b.load
+    assert "index changes from 0 to 1" in str(broken)
+    branch.points, branch.special = rows, singular[1:]
+    branch.renumber()
+    explain(branch)
+    columns, (entry,) = _branch_data(branch)["columns"], _branch_data(branch)["unexplained"]
+    assert (entry["before"], entry["after"]) == (0, 1)
+    assert columns["load"][entry["row"]] == broken.a.load
+    terminal = io.StringIO()
+    Report(stream=terminal).table([branch], found.solver.system)
+    assert f"! {branch.name}: {broken}" in terminal.getvalue() or MPI.COMM_WORLD.rank > 0
+    a, b = Row(branch.points[0], 0, 0), Row(branch.points[-1], 2, 2)
+    assert chained(a.low, a.high, singular, b.low, b.high)
+    assert not chained(a.low, a.high, singular[:1], b.low, b.high)
+    assert not chained(a.low, a.high, singular[::-1], b.low, b.high)
+
+
+def test_steps_that_do_not_explain_are_repeated() -> None:
+    """A ring whose stiffness varies by 1e-4 along it: the double point at P = 3 is broken, and passed without a jump.
+
+    The imperfect ring has one branch of stable states; a jump would leave it on the circle, with index 2.
+    """
+    import ufl
+
+    from forms import loads
+
+    scene = column(
+        "nearly uniform", Ring(), (2.6, 3.4), start=circle, planar="e2", constants={"P": 2.6, "B2": 1.0, "e": 1e-4},
+        potential=lambda x, c: loads.pressure(x.r, x.dr, c.P), **ROUND,
+        energy=lambda v, k, c: (1 + c.e * ufl.cos(2 * c.s)) * bending(k, (c.B1, c.B2, c.C)),
+    )  # fmt: skip
+    plan = Plan(depth=0, steps=StepControl(largest=0.1), error_bars=False)
+    (branch,) = trace(scene, Discretization("auto", 12, 6), plan)
+    assert {p.negative for p in branch.points} == {0}
+    assert not branch.unexplained
+    assert abs(branch.points[-1].ordinate - 2.0) > 0.3
+
+
+@pytest.mark.parametrize("short", [0.0, 1e-9, 1e-4])
+def test_branches_that_leave_at_the_end_of_the_range(short: float) -> None:
+    """All rows are within the range; a branch of which it has nothing is none."""
+    scene = column("range", (clamped(), free(push)), (0.0, EULER + short))
+    found = explore(scene, depth=1)
+    (special,) = found.special()
+    assert special.point.load == pytest.approx(EULER, abs=1e-11)
+    assert len(found.branches) == (2 if short == 1e-4 else 1)
+    for branch in found.branches:
+        assert branch.ended == "end of range"
+        assert max(p.load for p in branch.points) <= scene.span[1] * (1 + 1e-7)
+
+
+def test_a_range_that_begins_at_a_branch_point() -> None:
+    """What is not looked at is said: the branch point is a row that no search has before it."""
+    scene = column("range", (clamped(), free(push)), (EULER, 4.0))
+    diagram = trace(scene, Discretization("reduced", 8, 6), Plan(error_bars=False))
+    (branch,) = diagram
+    assert [p.negative for p in branch.points[1:]] == [1] * (len(branch.points) - 1)
+    assert any("is singular: 1 eigenvalue(s) vanish there" in sentence for sentence in diagram.warnings)
+    assert _branch_data(branch)["singular_start"] == 1
+
+
+def test_eigenvalues_beside_a_critical_load_are_no_family_of_equilibria() -> None:
+    """Within the tolerance of a count, yet far above the round-off of their Rayleigh quotients: nothing moves."""
+    scene = column("range", (clamped(), free(push)), (EULER, EULER + 1e-6))
+    diagram = trace(scene, Discretization("reduced", 8, 6), Plan(error_bars=False))
+    said = " ".join((*diagram.warnings, *diagram.notes))
+    assert "move freely" not in said
+    assert "without being zero: a critical load is close to P = 2.4674011" in said
+
+
+def test_mirror_images_are_compared_at_one_load() -> None:
+    """First points at distances that differ by 1e-4, relative, are of a branch and its image all the same."""
+    scene = column("mirror", (clamped(), free(push)), (0.0, 6.0))
+    solver = Solver(scene, Discretization("reduced", 8, 6)).equilibria
+    explorer = Explorer(solver, Plan(scene.span, depth=0, error_bars=False), Observer(), lambda: None)
+    (special,) = [s for s in explorer.run()[0].special if s.kind == "branch point" and s.point.load < 4]
+    (way,) = directions(solver, special)
+    first = leave(solver, special, way, 0.05)
+    way.scale(-1.0)
+    image = leave(solver, special, way, 0.05 * (1 + 1e-4))
+    assert not equivalent(first, image)
+    assert explorer._mirrored(special, first, image) and explorer._mirrored(special, image, first)
+    assert not explorer._mirrored(special, replace(first, energy=1.001 * first.energy), image)
+
+
+def test_the_last_step_to_a_bound_goes_the_way_of_the_prediction() -> None:
+    """From a straight state and a direction into the buckled ones the straight state at the bound is no next point."""
+    scene = column("bound", (clamped(), free(push)), (0.0, 6.0))
+    diagram = trace(scene, Discretization("reduced", 8, 6), Plan((0.0, 2.6), depth=0, error_bars=False))
+    (special,) = diagram.special("branch point")
+    solver, last = diagram.solvers[0], diagram[0].points[-1]
+    aside = last.tangent.copy()
+    aside.axpy(1.0, special.null_vectors[0])
+    aside.scale(1.0 / solver.system.norm(aside))
+    solver.system.set_phase(last.x)
+    assert _to_load(solver, [last], last.load + 0.02, last.load + 0.01, 0.02, 1e-5) is not None
+    wrong = replace(last, tangent=aside)
+    assert _to_load(solver, [wrong], last.load + 0.02, last.load + 0.01, 0.02, 1e-5) is None

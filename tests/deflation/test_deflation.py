@@ -1,0 +1,216 @@
+"""Deflation against what exploring finds, and against integration of the rod's initial value problem."""
+
+from __future__ import annotations
+
+from io import StringIO
+from math import pi
+
+import classics
+import hemitropic_cases
+import numpy as np
+import pytest
+from demo_cases import Found, explored, scene
+from shooting_solver import Problem, Rod
+
+from rodfem.app.terminal import Report
+from rodfem.continuation.branch import Point
+from rodfem.continuation.observer import Observer
+from rodfem.continuation.solvers import BranchSolver, distance
+from rodfem.deflation.discrete_symmetries import mirrors
+from rodfem.deflation.group_orbit import Orbit
+from rodfem.deflation.guesses import turned_state
+from rodfem.deflation.search import NEW, SAME, Deflation, equilibria_at, find_equilibria, starts
+from rodfem.diagram.explorer import Explorer
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import Solver
+from rodfem.errors import InputError
+from rodfem.fem.fields import Discretization
+
+K0 = 3 * pi
+CORD = Problem(Rod(intrinsic=(0.0, K0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])
+
+
+def cord() -> Found:
+    return explored("cord", "reduced", at=(39.9, 40.0, 40.1))
+
+
+def ruler() -> Found:
+    return explored("ruler", "reduced", at=(5.95, 6.0, 6.05))
+
+
+def only(points: list[Point], **values: float) -> Point:
+    """The one point with these values."""
+    (p,) = [p for p in points if all(abs(getattr(p, name) - v) < 1e-8 for name, v in values.items())]
+    return p
+
+
+def force(follower: BranchSolver, x: object) -> float:
+    """Size of the equations' residual at a state, without phase conditions."""
+    out = follower.system.new_vector()
+    follower.system.set_phase(None)
+    follower.system.at(x).residual(out)
+    return float(out.norm())
+
+
+@pytest.mark.alone
+def test_cord() -> None:
+    """From the straight state alone: all that exploring finds, and whatever else is found is an equilibrium."""
+    found = cord()
+    known = equilibria_at(found.follower, found.branches, 40.0)
+    assert len(known) == 4
+    search = Deflation(found.follower, 40.0, [p for p in known if abs(p.ordinate) < 1e-9])
+    new = search.run(24)
+    for p in known:
+        if abs(p.ordinate) > 1e-9:
+            match = only(new, energy=p.energy, ordinate=p.ordinate)
+            assert (match.negative, match.zero) == (p.negative, p.zero)
+    assert not [p for p in new if abs(p.ordinate) < 1e-9]
+    for p in new:
+        n, k = found.start_of_rod(p)
+        guess = np.array([n[0], n[1], 40.0, k[0], k[1] - K0, k[2]])
+        q, end = CORD.solve(guess)
+        assert abs(q - guess).max() < 0.1
+        assert (end[10], 1 - end[9]) == pytest.approx((p.energy, p.ordinate), abs=1e-4)
+    assert search.tally.count(NEW) == len(new)
+    assert len(search.tally.tries) == 24
+
+
+def test_cord_beyond_what_was_explored() -> None:
+    """With all explored states given, only others are found: they are on branches that exploring did not reach."""
+    found = cord()
+    known = equilibria_at(found.follower, found.branches, 40.0)
+    for p in find_equilibria(found.follower, 40.0, known, tries=12):
+        assert min(abs(p.energy - k.energy) for k in known) > 1e-3
+        assert (p.load, p.error < 1e-9) == (40.0, True)
+
+
+def test_hemitropic() -> None:
+    """A circle of states counts as one, and the states are those of the branches."""
+    follower = hemitropic_cases.follower()
+    branches = hemitropic_cases.explored(at=(0.35,), depth=1)
+    search = Deflation(follower, 0.35)
+    new = search.run(24)
+    for name in ("straight", "branch 1", "branch 2"):
+        (branch,) = [b for b in branches if b.name == name]
+        for p in hemitropic_cases.user_points(branch, 0.35):
+            match = only(new, energy=p.energy, ordinate=p.ordinate)
+            assert (match.negative, match.zero) == (p.negative, p.zero)
+            orbit = Orbit(follower.system, match.x, 0)
+            for angle in (0.7, 2.5, 4.0):  # all of the circle is known, and in equilibrium
+                x = orbit.at(angle)
+                assert search.nearest_known(x) < 1e-9
+                assert force(follower, x) < 1e-9
+
+
+def test_ring_in_its_plane() -> None:
+    """Moved, turned, or run around along itself it is the same ring: a circle, and beyond 3 the pressed one."""
+    follower = Solver(classics.pressed_ring(), Discretization("auto", 12, 6)).equilibria
+    found = Deflation(follower, 4.0).run(10)
+    assert sorted(p.negative for p in found) == [0, 2]
+    circle, pressed = sorted(found, key=lambda p: -p.negative)
+    assert circle.energy == pytest.approx(np.pi, rel=1e-9)
+    assert (circle.zero, pressed.zero) == (3, 4)  # two translations, a rotation; and the shift, which a circle turns by
+
+
+@pytest.mark.alone
+def test_ruler() -> None:
+    """Both ways of falling to the side count as one; it is the start of the branch that leaves the plane."""
+    found = ruler()
+    (plane,) = hemitropic_cases.user_points(found["plane"], 6.0)
+    search = Deflation(found.follower, 6.0, [plane])
+    (buckled,) = search.run(24)
+    (p,) = hemitropic_cases.user_points(found["branch 1"], 6.0)
+    assert (buckled.energy, buckled.ordinate) == pytest.approx((p.energy, p.ordinate), abs=1e-10)
+    assert (buckled.negative, buckled.zero, plane.negative) == (0, 0, 1)
+    (mirror,) = search.mirrors
+    image = mirror(found.follower.system, buckled.x)
+    assert distance(found.follower.system, image, buckled.x) > 0.5
+    assert force(found.follower, image) < 1e-9
+    assert search.nearest_known(image) < SAME
+
+    explorer = Explorer(found.follower, Plan((0.0, 12.0), error_bars=False), Observer(), lambda: None)
+    up, down = starts(buckled, "found")
+    for branch in (up, down):
+        explorer.trace(branch)
+    assert up.ended == "end of range"
+    assert up.points[-1].ordinate == pytest.approx(found["branch 1"].points[-1].ordinate, abs=1e-9)
+    assert down.ended.startswith("meets another branch")
+    assert down.points[-1].load == pytest.approx(4.42594840243, abs=1e-9)
+
+
+def test_nothing_to_find() -> None:
+    """Under a small load there is one equilibrium: it is found, nothing else is, and the report says so."""
+    follower = Solver(scene("ruler", direction="e2"), Discretization()).equilibria
+    out = StringIO()
+    (only_one,) = find_equilibria(follower, 0.2, tries=1)
+    search = Deflation(follower, 0.2, [only_one])
+    assert search.run(10) == []
+    assert len(search.tally.tries) == 10
+    assert search.tally.count(NEW) == 0
+    report = Report(follower.system.comm, stream=out)
+    report.say(str(search.tally))
+    if follower.system.comm.rank == 0:
+        assert "10 tries: 0 new" in out.getvalue()
+        assert "no proof" in out.getvalue()
+
+
+def test_known_state_at_another_load() -> None:
+    with pytest.raises(InputError, match=r"not 6\.5"):
+        Deflation(ruler().follower, 6.5, hemitropic_cases.user_points(ruler()["plane"], 6.0))
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_mirrors_are_those_of_the_equations(formulation: str) -> None:
+    expected = {"cord": {(1, -1, 1), (1, 1, -1), (1, -1, -1)}, "ruler": {(1, -1, 1)}}
+    for name, signs in expected.items():
+        follower = Solver(scene(name), Discretization(formulation)).equilibria
+        found = mirrors(follower.system, follower.start(5.0))
+        assert {m.signs for m in found} == signs
+        x = turned_state(follower.system, follower.start(5.0), 1.0, [1, 2])
+        for mirror in found:
+            image = mirror(follower.system, x)
+            assert distance(follower.system, mirror(follower.system, image), x) < 1e-12
+            if formulation == "reduced" or not mirror.reversal:  # a reversal may move the reaction to the other end
+                assert force(follower, image) == pytest.approx(force(follower, x), rel=1e-12)
+
+
+def test_step_is_newtons_for_the_deflated_equations() -> None:
+    """The rescaled step ``d`` solves ``G'(x) d = -G(x)``, with ``G'`` by differences, next to points and to circles."""
+    for follower, load in ((ruler().follower, 6.0), (hemitropic_cases.follower(), 0.35)):
+        search = Deflation(follower, load)
+        search.run(3)
+        system = follower.system
+        x = turned_state(system, search.found[0].x, 0.5, [3])
+        system.set_phase(x)
+
+        def deflated(t: float, direction: object, x=x, search=search, system=system) -> object:
+            y, out = x.copy(), system.new_vector()
+            y.axpy(t, direction)
+            system.at(y).residual(out)
+            out.scale(float(np.prod([1 + 1 / d**2 for d, _ in search.known.nearest(y)])))
+            return out
+
+        step, plain = system.new_vector(), system.new_vector()
+        value = deflated(0.0, step)
+        state = system.at(x)
+        state.residual(plain)
+        state.factor(follower.axis)
+        system.solve(plain, step)
+        step.scale(-1.0)
+        step.scale(search.rescaling(x, step))
+        h = 1e-6 / system.norm(step)
+        slope = deflated(h, step)
+        slope.axpy(-1.0, deflated(-h, step))
+        slope.scale(1 / (2 * h))
+        slope.axpy(1.0, value)
+        assert slope.norm() < 1e-5 * value.norm()
+
+
+def test_guesses_do_not_depend_on_ranks() -> None:
+    system = ruler().follower.system
+    straight = ruler().follower.start(1.0)
+    x = turned_state(system, straight, 1.0, [0, 7])
+    q = ruler().follower.shape.sample(x)["q"]
+    assert q[0] == pytest.approx([1, 0, 0, 0], abs=1e-15)
+    assert np.linalg.norm(q, axis=1) == pytest.approx(1, abs=1e-14)
+    assert q[24] == pytest.approx([0.80094931574151, -0.54006580455896, 0.24587627411001, -0.07971184], abs=1e-8)

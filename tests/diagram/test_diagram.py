@@ -1,0 +1,199 @@
+"""Diagrams from Python: traced without files or output, asked, saved and read again."""
+
+from __future__ import annotations
+
+import gc
+import os
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import demo_cases
+import hemitropic_cases
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import rodfem
+from rodfem import Diagram, Discretization, InputError, Observer, Parameter, Plan
+from rodfem.continuation.branch import Branch
+
+MESH = Discretization("reduced", 8, 6)
+SHORT = Plan((60.0, 30.0), depth=1)
+
+
+@pytest.fixture(scope="module")
+def diagram() -> Diagram:
+    return rodfem.trace(demo_cases.scene("cord"), MESH, SHORT)
+
+
+def test_nothing_is_printed_and_no_file_is_written(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    found = rodfem.trace(hemitropic_cases.scene(), MESH, Plan((0.0, 0.2), depth=0, error_bars=False))
+    assert [s.negative_after for s in found.special()] == [2]
+    assert capfd.readouterr() == ("", "")
+    assert list(folder.iterdir()) == []
+
+
+def test_nothing_outside_the_package_assembles_what_traces() -> None:
+    """Demos, benchmarks and documentation state scenes and call :func:`rodfem.trace`, or compute by a Solver."""
+    home = Path(__file__).parents[2]
+    files = [*home.glob("demos/*.py"), *home.glob("benchmarks/**/*.py"), home / "docs" / "rods.md", home / "README.md"]
+    assert len(files) > 20
+    inside = re.compile(r"\b(Explorer|BranchSolver|System)\b")
+    assert {(str(f), found) for f in files for found in inside.findall(f.read_text())} == set()
+
+
+def test_branches_and_special_points(diagram: Diagram) -> None:
+    assert [b.name for b in diagram] == ["straight", "branch 1", "branch 2"][: len(diagram)]
+    assert diagram["straight"] is diagram[0]
+    with pytest.raises(KeyError, match="no branch 'plain': there are 'straight', 'branch 1'"):
+        _ = diagram["plain"]
+    first = diagram.special("branch point", "straight")[0]
+    assert first in diagram.special()
+    assert diagram.special("fold") == []
+    assert {s.kind for s in diagram.special()}.isdisjoint({"end", "user"})
+    assert repr(diagram).startswith("<Diagram of 'cord': ")
+    assert f"{first.point.load:.6f}"[:6] in diagram._repr_html_()
+
+
+def test_states_at_a_load(diagram: Diagram) -> None:
+    """Each is at that very load, with the index that another method finds there."""
+    found = diagram.at(40.0)
+    assert [p.load for p in found] == [40.0] * len(found)
+    assert [p.index for p in found] == [1, 0]
+    for point in found:
+        verdict = diagram.assess(point, method="dense")
+        assert verdict.negative == point.index
+        values = diagram.modes(point, 2).value
+        np.testing.assert_allclose(values, verdict.values[:2], rtol=1e-7)
+    assert (found[0].stable, found[1].stable) == (False, True)
+    with pytest.raises(InputError, match=r"The load 20 is outside the range 30 to 60 of this diagram: trace a wider"):
+        diagram.at(20.0)
+
+
+@pytest.mark.alone
+def test_a_locus_begins_at_its_special_point(diagram: Diagram) -> None:
+    """The critical tension is ``k0^2 - w^2``: of the first mode, which it is for all k0, the difference is constant."""
+    special = diagram.special("branch point", "straight")[0]
+    found = diagram.locus(special, "k0", (9.0, 9.8))
+    k0 = diagram.scene.parameters["k0"].value
+    w2 = k0**2 - special.point.load
+    np.testing.assert_allclose(found.values[:, 1] ** 2 - found.values[:, 0], w2, atol=1e-6)
+
+
+@pytest.mark.alone
+def test_a_saved_diagram_is_a_diagram(diagram: Diagram, folder: Path) -> None:
+    saved = diagram.save(folder / "cord")
+    assert sorted(p.name for p in saved.iterdir()) == ["diagram.json", "states.h5"]
+    again = rodfem.load(saved, diagram.scene)
+    assert repr(again) == repr(diagram)
+    for branch, other in zip(diagram, again, strict=True):
+        np.testing.assert_array_equal([p.load for p in branch.points], [p.load for p in other.points])
+        assert [p.index for p in branch.points] == [p.index for p in other.points]
+        assert [repr(s) for s in branch.special] == [repr(s) for s in other.special]
+        assert [s.multiplicity for s in branch.special] == [s.multiplicity for s in other.special]
+    assert [p.ordinate for p in again.at(40.0)] == pytest.approx([p.ordinate for p in diagram.at(40.0)], abs=1e-10)
+    special = again.special("branch point", "straight")[0]
+    assert again.locus(special, "k0", (9.3, 9.6)).values[0] == pytest.approx(
+        diagram.locus(diagram.special("branch point", "straight")[0], "k0", (9.3, 9.6)).values[0], abs=1e-9
+    )
+    wider = again.again(span=(60.0, 20.0), depth=0, error_bars=False)
+    assert wider.span == (60.0, 20.0)
+    assert len(wider.at(25.0)) == 1
+
+
+def test_files_of_another_scene(diagram: Diagram, folder: Path) -> None:
+    saved = diagram.save(folder / "cord")
+    with pytest.raises(InputError, match=r"holds the scene 'cord' with the load lam, not 'hemitropic' with lam: give"):
+        rodfem.load(saved, hemitropic_cases.scene())
+    other = replace(diagram.scene, parameters={**diagram.scene.parameters, "k0": Parameter(3.0)})
+    with pytest.raises(InputError, match=r"was computed with k0 = 9.42\d+, and the scene has 3: give the scene that"):
+        rodfem.load(saved, other)
+    with pytest.raises(InputError, match="is no rodfem diagram"):
+        rodfem.load(folder, diagram.scene)
+
+
+@pytest.mark.alone
+def test_loads_without_a_potential(folder: Path) -> None:
+    """Beck's column flutters at 20.05095 (the exact frequency equation): the same kind of object."""
+    beck = demo_cases.scene("follower")
+    found = rodfem.trace(beck, plan=Plan((15.0, 25.0)))
+    (flutter,) = found.special("flutter")
+    assert flutter.point.load == pytest.approx(20.05095361, abs=1e-6)
+    assert [p.stable for p in (*found.at(19.9), *found.at(20.2))] == [True, False]
+    again = rodfem.load(found.save(folder / "beck"), beck)
+    assert repr(again) == repr(found)
+    assert again.special("flutter")[0].point.load == flutter.point.load
+    with pytest.raises(InputError, match="A search by deflation needs a scene whose loads all have a potential"):
+        found.search(15.0)
+
+
+def test_an_observer_hears_of_all(diagram: Diagram) -> None:
+    heard: list[Any] = []
+
+    class Ear(Observer):
+        def finished(self, branch: Branch) -> None:
+            heard.append(branch.name)
+
+        def complete(self, diagram: Diagram) -> None:
+            heard.append(len(diagram))
+
+        def warn(self, sentence: str) -> None:
+            heard.append(sentence)
+
+    rod = demo_cases.scene("cord")
+    found = rodfem.trace(rod, MESH, Plan((49.348022005446796, 45.0), depth=0, error_bars=False), Ear())
+    assert heard[-2:] == ["straight", 1]
+    assert [h for h in heard if isinstance(h, str) and h != "straight"] == found.warnings
+    assert any("is singular" in sentence for sentence in found.warnings)
+
+
+@pytest.mark.alone
+def test_pictures(diagram: Diagram, folder: Path) -> None:
+    point = diagram.at(40.0)[1]
+    picture = diagram.show(point, folder / "cord.png")
+    if MPI.COMM_WORLD.rank:
+        return
+    assert picture.png[:8] == b"\x89PNG\r\n\x1a\n"
+    assert (folder / "cord.png").read_bytes() == picture.png == picture._repr_png_()
+    figure = diagram.plot(folder / "diagram.svg")
+    assert len(figure.axes) == 1
+    assert (folder / "diagram.svg").stat().st_size > 1000
+
+
+@pytest.mark.alone
+def test_one_solver(diagram: Diagram) -> None:
+    """States that a solver computes one by one are those of the diagram."""
+    solver = rodfem.Solver(diagram.scene, MESH)
+    straight, buckled = diagram.at(40.0)
+    assert solver.equilibrium(40.0).energy == pytest.approx(straight.energy, rel=1e-12)
+    near = solver.equilibrium(39.0, guess=buckled)
+    assert (near.load, near.index) == (39.0, 0)
+    others = solver.search(40.0, [solver.equilibrium(40.0)], tries=6)
+    assert any(p.energy == pytest.approx(buckled.energy, rel=1e-9) for p in others)
+    with pytest.raises(InputError, match="0 modes cannot be computed: ask for 1 or more"):
+        solver.modes(near, 0)
+
+
+@pytest.mark.alone
+def test_a_diagram_that_is_dropped_leaves_no_memory_behind() -> None:
+    """PETSc keeps what Python has collected until all ranks agree: a diagram had left 21 MB each time."""
+
+    def resident() -> float:
+        """Memory of this process in MB."""
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+    sizes = []
+    for _ in range(5):
+        rodfem.trace(
+            hemitropic_cases.scene((0.5, 1.0, 1.0, 2.9)),
+            Discretization("reduced", 16, 6),
+            Plan(depth=0, error_bars=False),
+        )
+        gc.collect()
+        sizes.append(resident())
+    assert sizes[-1] - sizes[1] < 10.0

@@ -1,0 +1,34 @@
+"""Special points and indices of all demos, classical problems and scenes of the documentation, against a record.
+
+The record guards the numbers while the code changes its shape.  It is no oracle: the other tests have those.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from golden_cases import cases, record
+
+pytestmark = pytest.mark.alone
+NUMBERS: dict[str, Any] = json.loads((Path(__file__).parents[1] / "golden" / "numbers.json").read_text())
+
+
+def test_all_cases_are_recorded() -> None:
+    assert list(NUMBERS) == list(cases())
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_nothing_has_changed(name: str) -> None:
+    found, recorded = record(cases()[name]()), NUMBERS[name]
+    for key in ("name", "ended", "indices"):
+        assert [b[key] for b in found] == [b[key] for b in recorded]
+    for branch, old in zip(found, recorded, strict=True):
+        for key in ("kind", "index", "zero"):
+            assert [s[key] for s in branch["special"]] == [s[key] for s in old["special"]], branch["name"]
+        for s, t in zip(branch["special"], old["special"], strict=True):
+            allowed = max(t["bar"], 1e-10 * max(1.0, abs(t["load"])))
+            assert s["load"] == pytest.approx(t["load"], abs=allowed, rel=0), branch["name"]
+            assert s.get("omega2") == (pytest.approx(t["omega2"], rel=1e-8) if "omega2" in t else None)

@@ -1,0 +1,119 @@
+"""Sweeps of frequencies: which eigenvalue goes on from which, flutter at the start of a range, the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import classics
+import numpy as np
+import pytest
+from closed_forms import column
+from hemitropic_cases import specials
+from matplotlib.figure import Figure
+from mpi4py import MPI
+
+from rodfem.app.terminal import Report
+from rodfem.continuation.branch import Branch
+from rodfem.diagram.solver import Solver
+from rodfem.diagram.trace import trace
+from rodfem.fem.fields import Discretization
+from rodfem.output.plot_frequencies import curves, draw_frequencies
+from rodfem.problem.scene import Scene
+from rodfem.stability.nonsymmetric import Vibration
+
+
+def swept(scene: Scene, monkeypatch: pytest.MonkeyPatch, loads: int = 26) -> tuple[Branch, dict, str]:
+    """Frequencies over the range of a scene: branch, diagram, and what the terminal shows."""
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", loads)
+    out = StringIO()
+    diagram = trace(scene, Discretization("pointwise", 4, 6), observer=Report(stream=out))
+    return diagram[0], diagram.data, out.getvalue()
+
+
+def named(kinds: Callable[[str], bool], data: dict) -> bool:
+    return all(kinds(name) for row in data["branches"][0]["columns"]["motion"] for name in row)
+
+
+@pytest.mark.parametrize(("span", "loads"), [((0.0, 1.0), 11), ((-1.0, 1.0), 11), ((0.0, 36.0), 61)])
+def test_flutter_at_any_torque(span: tuple[float, float], loads: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nicolai: the frequencies of a cantilever are double without torque, Euler's and Bernoulli's, and complex with it.
+
+    At great torques more pairs come near than were known before, complex already.
+    """
+    scene = replace(classics.torque("follower_moment"), span=span)
+    branch, _, said = swept(scene, monkeypatch, loads)
+    found = specials(branch, "flutter")
+    assert [s.point.load for s in found] == [0.0] * (2 if span[0] < 0 else 1)
+    after = found[-1]
+    assert after.negative_before == 0 < after.negative_after
+    assert "flutter at every P > 0 next to it" in after.note
+    assert after.omega2 == pytest.approx(1.8751040687119611**4, abs=1e-8)
+    assert after.error_estimate < 1e-11
+    assert "!" not in said
+    assert all(p.negative > 0 for p in branch.points if p.load != 0.0)
+
+
+def test_curves_go_on_where_they_cross(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The strong plane's frequency passes between those of the weak one, each a curve of one motion: Beck's column."""
+    branch, data, _ = swept(classics.partly_following(1.0, (0.0, 25.0)), monkeypatch)
+    motions: dict[int, set[str]] = {}
+    for p in branch.points:
+        for (mu, other), name, number in zip(p.omega2, p.motion, p.curve, strict=True):
+            motions.setdefault(number, set()).add(name)
+            if abs(p.load - 20.05) > 0.2 and other == 0:
+                EI = {"bending about d1": 1.0, "bending about d2": 10.0}[name]
+                assert abs(column(mu, p.load, EI) - mu) < 1e-6 * mu
+    assert {len(names) for names in motions.values()} == {1}
+    first = branch.points[0]
+    (strong,) = {n for (mu, _), n in zip(first.omega2, first.curve, strict=True) if abs(mu - 123.6) < 1}
+    (line,) = [c for c in curves(data["branches"][0]["columns"]) if abs(c.roots[0] ** 2 - 123.6) < 1]
+    assert motions[strong] == {line.motion} == {"bending about d2"}
+    assert len(line.loads) >= len(branch.points) - 1
+
+
+def test_double_frequencies_have_one_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the rod bends alike in all planes the vectors of a frequency are any in a plane, its name is not."""
+    for scene in (classics.partly_following(1.0, (0.0, 25.0), 1.0), classics.partly_following(0.2, (0.0, 25.0), 1.0)):
+        assert named(lambda name: name == "bending", swept(scene, monkeypatch)[1])
+
+
+def test_divergence_is_marked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, data, _ = swept(classics.partly_following(0.4, (0.0, 25.0)), monkeypatch)
+    drawn: list[Figure] = []
+
+    class Kept(Figure):
+        def __init__(self, *given: object, **more: object) -> None:
+            super().__init__(*given, **more)
+            drawn.append(self)
+
+    monkeypatch.setattr("rodfem.output.plot_frequencies.Figure", Kept)
+    if MPI.COMM_WORLD.rank == 0:
+        draw_frequencies(data, folder / "frequencies.png")
+        (axes,) = drawn[0].axes
+        places = [float(line.get_xdata()[0]) for line in axes.get_lines() if line.get_marker() == "v"]
+        first = np.arccos(-2 / 3)
+        assert places == pytest.approx([first**2, (2 * np.pi - first) ** 2])
+        assert {text.get_text() for text in axes.texts} == {"5.29241", "15.8616", "16.4039"}
+        legend = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert {"divergence", "flutter", "diverged, growth rate"} < set(legend)
+        columns = data["branches"][0]["columns"]
+        for row in columns["omega2"]:  # all eigenvalues negative: there is no frequency to scale the axis by
+            row[:] = [[-abs(mu), 0.0] for mu, _ in row]
+        draw_frequencies(data, folder / "none.png")
+
+
+def test_long_pencil_on_any_number_of_ranks() -> None:
+    """22001 unknowns: cut at the ranks where there are several (exact: the frequency equation)."""
+    solver = Solver(classics.partly_following(1.0, (0.0, 25.0)), Discretization("pointwise", 2000, 1)).equilibria
+    x, outcome = solver.at_load(solver.start(10.0), 10.0)
+    assert outcome.converged
+    vibration = Vibration(solver.system)
+    vibration.assemble(x)
+    for target in (1.0, 26 + 3j):
+        values = vibration.near(2, target).values
+        assert abs(values - column(26.7885149853, 10.0)).min() < 3e-7 * 26.8
+        assert abs(values.imag).max() < 1e-5
+    assert np.isclose(vibration.near(2, 1.0).values, column(132.59, 10.0, 10.0), rtol=1e-6).any()

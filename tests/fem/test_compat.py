@@ -1,0 +1,149 @@
+"""What the bridge to dolfinx promises, whatever its release."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from hemitropic_cases import follower, run_demo, scene
+from mpi4py import MPI
+from numpy.polynomial import legendre
+
+from rodfem import compat
+from rodfem.errors import SetupError
+from rodfem.fem.fields import Discretization
+from rodfem.fem.system import System
+
+COMM = MPI.COMM_WORLD
+DEGREES = pytest.mark.parametrize("degree", [1, 2, 3, 6, 8])
+
+
+def lobatto(degree: int) -> np.ndarray:
+    """Gauss-Lobatto-Legendre points in [0, 1]."""
+    inner = legendre.legroots(legendre.legder(np.eye(degree + 1)[-1])) if degree > 1 else []
+    return (np.array([-1.0, *np.sort(inner), 1.0]) + 1) / 2
+
+
+@DEGREES
+def test_nodes_are_those_of_lobatto(degree: int) -> None:
+    np.testing.assert_allclose(np.sort(compat.nodes(degree)), lobatto(degree), rtol=0, atol=1e-14)
+
+
+@DEGREES
+def test_basis_is_nodal_and_reproduces_polynomials(degree: int) -> None:
+    x = np.linspace(0, 1, 17)
+    basis = compat.lagrange_basis(degree, x)
+    np.testing.assert_allclose(compat.lagrange_basis(degree, compat.nodes(degree)), np.eye(degree + 1), atol=1e-12)
+    np.testing.assert_allclose(basis.sum(axis=1), 1, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(basis @ compat.nodes(degree) ** degree, x**degree, rtol=0, atol=1e-13)
+
+
+def test_constants() -> None:
+    np.testing.assert_array_equal(compat.lagrange_basis(0, np.array([0.1, 0.9])), [[1], [1]])
+    assert compat.lagrange_basis(3, np.array([])).shape == (0, 4)
+    assert 0 <= compat.nodes(0)[0] <= 1
+
+
+@pytest.mark.short
+def test_mixed_space_has_the_parts_asked_for() -> None:
+    elements = 5
+    parts = [(True, 3, 4), (True, 3, 1), (False, 2, 2), (False, 0, 3)]
+    space = compat.mixed_space(compat.interval_mesh(COMM, elements, -1.0, 2.0), parts)
+    for i, (continuous, degree, components) in enumerate(parts):
+        dofmap = space.sub(i).collapse()[0].dofmap
+        size = elements * degree + 1 if continuous else elements * (degree + 1)
+        assert dofmap.index_map.size_global * dofmap.index_map_bs == size * components
+
+
+@pytest.mark.short
+def test_fields_have_the_nodes_of_their_elements() -> None:
+    """A linear function of arclength, set at what ``coordinates`` says are the nodes, has the slope one everywhere."""
+    fields = follower("reduced", 8, 6).system.fields
+    a, b = fields.vertices.T
+    np.testing.assert_allclose(b - a, 6 / 8, rtol=1e-13)
+    f = fem.Function(fields.space)
+    f.x.array[fields.dofs["q"][..., 2]] = fields.coordinates(6)
+    slope = ufl.split(f)[0][2].dx(0)
+    error = fem.assemble_scalar(fem.form((slope - 1) ** 2 * ufl.dx))
+    assert COMM.allreduce(error) < 1e-20
+
+
+def test_lobatto_quadrature_collocates() -> None:
+    """With the rule of the unit-norm constraint the mass matrix is diagonal, and holds that rule's weights."""
+    degree, elements, length = 4, 5, 3.0
+    mesh = compat.interval_mesh(COMM, elements, 0.0, length)
+    space = compat.mixed_space(mesh, [(True, degree, 1), (False, 0, 1)])
+    u, v = ufl.TrialFunctions(space)[0], ufl.TestFunctions(space)[0]
+    dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": 2 * degree - 1, "quadrature_rule": "GLL"})
+    matrix = fem.petsc.assemble_matrix(fem.form(u * v * dx))
+    matrix.assemble()
+    diagonal = matrix.getDiagonal()
+    found = np.concatenate(COMM.allgather(diagonal.array_r))
+    matrix.setDiagonal(diagonal * 0.0)
+    assert matrix.norm() < 1e-15
+    ends = legendre.legval(2 * lobatto(degree) - 1, np.eye(degree + 1)[-1])
+    weights = length / elements / (degree * (degree + 1) * ends**2)
+    expected = np.zeros(elements * degree + 1)
+    for e in range(elements):
+        expected[e * degree : (e + 1) * degree + 1] += weights
+    np.testing.assert_allclose(
+        np.sort(found)[elements:], np.sort(expected), rtol=1e-12
+    )  # zeros first, of the constants
+
+
+@pytest.mark.short
+def test_a_second_system_compiles_nothing() -> None:
+    """Otherwise every run would compile again what is in the cache, and say so."""
+    follower("reduced", 8, 6)
+    said: list[str] = []
+    with compat.announce_compilation(lambda: said.append("compiling")):
+        System(scene(), Discretization("reduced", 9, 6))
+    assert COMM.allreduce(said, op=MPI.SUM) == []
+
+
+def test_compilation_is_announced_once(folder: Path) -> None:
+    mesh = compat.interval_mesh(COMM, 4, 0.0, 1.0)
+    keyword = "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
+    cache: dict[str, Any] = {keyword: {"cache_dir": str(folder)}}
+    said: list[str] = []
+
+    def integrate() -> float:
+        x = ufl.SpatialCoordinate(mesh)[0]
+        forms = [fem.form(x**n * ufl.dx, **cache) for n in (1, 2)]
+        return sum(COMM.allreduce(fem.assemble_scalar(form)) for form in forms)
+
+    with compat.announce_compilation(lambda: said.append("compiling")):
+        assert integrate() == pytest.approx(1 / 2 + 1 / 3, rel=1e-14)
+    assert COMM.allreduce(said, op=MPI.SUM) == ["compiling"]  # by the rank that compiles
+    with compat.announce_compilation(lambda: said.append("again")):
+        assert integrate() == pytest.approx(1 / 2 + 1 / 3, rel=1e-14)
+    assert COMM.allreduce(said, op=MPI.SUM) == ["compiling"]
+
+
+@pytest.mark.short
+def test_complex_petsc_gives_one_sentence(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(compat, "COMPLEX", True)
+    with pytest.raises(SetupError, match="complex"):
+        compat.require_real_petsc()
+    with pytest.raises(SystemExit) as ended:
+        run_demo("--output", str(folder / "out"))
+    assert ended.value.code == 2
+    out, err = capfd.readouterr()
+    if COMM.rank == 0:
+        assert (out, err.count("\n"), err[:7]) == ("", 1, "error: ")
+
+
+def test_locked_cache_gives_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    def locked(*_: object, **__: object) -> None:
+        raise TimeoutError("JIT compilation timed out")
+
+    monkeypatch.setattr(compat.fem, "form", locked)
+    with pytest.raises(SetupError, match="delete the folder"):
+        compat.compile_forms([None])

@@ -1,0 +1,124 @@
+"""A state owns its numbers: no other state, load or parameter that is evaluated meanwhile changes them."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_states import plain
+
+from forms.energy import bending
+from rodfem.continuation.solvers import StaticSolver
+from rodfem.fem.fields import Discretization
+from rodfem.fem.parameters import line
+from rodfem.fem.state import State
+from rodfem.fem.system import System
+from rodfem.problem.ends import clamped
+from rodfem.problem.scene import Ordinate, Parameter, Scene
+from rodfem.stability.inertia import Inertia
+
+SOURCES = Path(__file__).parents[2] / "rodfem"
+
+
+def numbers(state: State) -> np.ndarray:
+    """Equations, a row of their Jacobian, energy, load and rotations of a state."""
+    out = state.system.new_vector()
+    state.residual(out)
+    matrix = state.jacobian(state.system.load_axis())
+    image = matrix * state.system.load_axis()
+    return np.concatenate([out.array_r, image.array_r, [state.energy(), state.load], state.turned.ravel()])
+
+
+@pytest.mark.short
+@pytest.mark.parametrize("name", ["cord", "ruler", "hemitropic"])
+def test_numbers_stay_when_another_state_is_evaluated(name: str) -> None:
+    system, x = plain(name, "pointwise", 6, 3, 0.2)
+    x = x.copy()
+    state = system.at(x)
+    before = numbers(state)
+    x.scale(0.5)  # the vector it came from goes on to another state
+    other = system.at(x, line(system.scene, {system.scene.load: 0.3}, {system.scene.load: 2.0}))
+    assert np.linalg.norm(numbers(other) - before) > 1e-3 * np.linalg.norm(before)
+    np.testing.assert_array_equal(numbers(state), before)
+    with pytest.raises(ValueError, match="read-only"):
+        state.local[0] = 1.0
+
+
+@pytest.mark.short
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> None:
+    """Also where the ends are: the ordinate is measured from them."""
+    rod = Scene(
+        name="moved",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending(k, (1.0, c.B, 1.0)),
+        parameters={"d": Parameter(0.1), "e": Parameter(0.0), "B": Parameter(2.0)},
+        load="d",
+        ends=(clamped(lambda c: (c.e, 0.0, 0.0)), clamped(lambda c: (c.e, 0.0, 1.0 - c.d))),
+        start=lambda s: np.stack([np.cos(np.sin(pi * s)), 0 * s, np.sin(np.sin(pi * s)), 0 * s], axis=1),
+        ordinate=Ordinate("place of the middle", s=0.5, of=lambda r, q: r[0]),
+        span=(0.05, 0.5),
+    )
+    moved = replace(rod, parameters={"d": Parameter(0.1), "e": Parameter(0.7), "B": Parameter(3.0)})
+    discretization = Discretization(formulation, 4, 3)
+    given, expected = (StaticSolver(System(scene, discretization)) for scene in (rod, moved))
+    x = expected.start(0.2)
+    assert abs(given.shape.ordinate(x) - expected.shape.ordinate(x)) > 0.5
+    given.system.line = line(rod, {"d": 0.15, "e": 0.7, "B": 3.0}, {"d": 0.25})
+    y = x.copy()
+    given.system.set_load(y, 0.2)  # d = 0.15 + 0.25 * 0.2 = 0.2
+    assert given.shape.ordinate(y) == pytest.approx(expected.shape.ordinate(x), abs=1e-14)
+    assert given.energy(y) == pytest.approx(expected.energy(x), rel=1e-14)
+    ours, theirs = given.system.new_vector(), expected.system.new_vector()
+    given.system.at(y).residual(ours)
+    expected.system.at(x).residual(theirs)
+    assert (ours - theirs).norm() < 1e-13 * theirs.norm()
+
+
+@pytest.mark.alone
+def test_only_states_write_where_forms_read() -> None:
+    """``fields.u`` is named by the equations, in UFL, and by the state; frozen objects are completed by themselves."""
+    for path in sorted(SOURCES.rglob("*.py")):
+        tree, where = ast.parse(path.read_text()), str(path.relative_to(SOURCES))
+        named = {ast.unparse(n).rpartition("self.")[2] for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
+        assert not named & {"fields.u", "f.u", "u.x"} or where in ("fem/equations.py", "fem/state.py"), where
+        inside = [f for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) and f.name == "__post_init__"]
+        allowed = sum(ast.unparse(f).count("object.__setattr__") for f in inside)
+        assert ast.unparse(tree).count("object.__setattr__") == allowed, where
+
+
+@pytest.mark.short
+def test_stale_factors_refuse() -> None:
+    """Rather than tell a number of the state that took their place; so do those that were never made."""
+    system, x = plain("cord", "reduced", 6, 3, 20.0)
+    y, inertia = x.copy(), Inertia(system)
+    system.set_load(y, 60.0)
+    first = inertia.at(x)
+    with pytest.raises(RuntimeError, match="not factored"):
+        first.nearest(1)
+    index, values = first.count(), first.nearest(1)[0]
+    second = inertia.at(y)
+    with pytest.raises(RuntimeError, match="not factored"):
+        second.response(inertia.seed(0))
+    assert second.count() != index
+    asked = {
+        "below": lambda: first.below(0.0),
+        "count": first.count,
+        "nearest": lambda: first.nearest(1),
+        "response": lambda: first.response(inertia.seed(0)),
+        "noise": lambda: first.noise(inertia.seed(0)),
+        "matrix": lambda: first.matrix,
+        "border": lambda: first.border,
+        "factors": lambda: first.factors,
+    }
+    for name, ask in asked.items():
+        with pytest.raises(RuntimeError, match="another state"):
+            pytest.fail(f"{name} returned {ask()}")
+    again = inertia.at(x)
+    assert again.count() == index
+    assert again.nearest(1)[0] == pytest.approx(values, rel=1e-3)

@@ -1,0 +1,152 @@
+"""Continuous symmetries that are found from the equations, first equilibria far from the start, and linking numbers."""
+
+from __future__ import annotations
+
+from math import hypot, pi
+
+import numpy as np
+import pytest
+from demo_cases import scene
+from hemitropic_cases import DEFAULT
+from hemitropic_cases import scene as hemitropic
+
+from forms.energy import bending
+from rodfem.diagram.solver import Solver
+from rodfem.fem.fields import Discretization
+from rodfem.fem.link import link, writhe
+from rodfem.fem.newton import relax
+from rodfem.fem.system import FEW, System
+from rodfem.problem.ends import Constants, End, Ring, clamped, free, pinned
+from rodfem.problem.scene import Ordinate, Parameter, Scene
+
+MIDDLE = Ordinate("displacement of the middle", s=0.5, of=lambda r, q: hypot(r[0], r[1]))
+
+
+def push(c: Constants) -> tuple:
+    return (0.0, 0.0, -c.P)
+
+
+def column(left: End, right: End, B: float = 2.0) -> Scene:
+    return Scene(
+        name="column",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending(k, (1.0, c.B, 1.0)),
+        parameters={"P": Parameter(0.0), "B": Parameter(B)},
+        load="P",
+        ends=(left, right),
+        ordinate=MIDDLE,
+        span=(0.0, 30.0),
+    )
+
+
+def circle(s: np.ndarray) -> np.ndarray:
+    return np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1)
+
+
+def ring(twisting: float = 1.5, B: float = 1.0) -> Scene:
+    return Scene(
+        name="ring",
+        interval=(0.0, 2 * pi),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending((k[0], k[1], k[2] - c.t), (1.0, c.B, twisting)),
+        parameters={"t": Parameter(0.0), "B": Parameter(B)},
+        load="t",
+        ends=Ring(),
+        ordinate=Ordinate("width", s=pi, of=lambda r, q: float(np.linalg.norm(r))),
+        span=(0.0, 3.0),
+        start=circle,
+    )
+
+
+SLIDING = pinned(lambda c: (0.0, 0.0, None), push)
+CASES = [
+    (column(clamped(), free(push)), 0, 0),
+    (column(pinned(), SLIDING), 1, 1),  # turns about its axis
+    (column(pinned(), SLIDING, B=1.0), 2, 2),  # and its cross-sections are round
+    (hemitropic(DEFAULT), 1, 1),
+    (scene("cord"), 0, 0),
+    (ring(), 5, 8),  # three rotations, round cross-sections, along itself; three translations where there are places
+    (ring(B=2.0), 4, 7),
+]
+
+
+@pytest.mark.parametrize(("rod", "reduced", "pointwise"), CASES)
+def test_number_of_symmetries(rod: Scene, reduced: int, pointwise: int) -> None:
+    for formulation, expected in (("reduced", reduced), ("pointwise", pointwise)):
+        assert len(System(rod, Discretization(formulation, 4, 6)).symmetries) == expected
+
+
+@pytest.mark.parametrize(("rod", "expected"), [(scene("cord"), 0), (hemitropic(DEFAULT), 1), (scene("ruler"), 0)])
+def test_a_fine_mesh_has_the_same_symmetries(rod: Scene, expected: int) -> None:
+    """Those of many unknowns are sought with few elements."""
+    system = System(rod, Discretization("reduced", 1000, 1))
+    assert system.fields.unknowns > FEW
+    assert len(system.symmetries) == expected
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_generators_are_null_vectors(formulation: str) -> None:
+    """``S g = 0`` at an equilibrium, for the buckled pinned rod and both its symmetries."""
+    solver = Solver(column(pinned(), SLIDING, B=1.0), Discretization(formulation, 8, 6)).equilibria
+    system = solver.system
+    x = solver.start(15.0, bent=0.8)
+    system.set_phase(x)
+    assert relax(system, x, solver.axis).converged
+    assert solver.shape.ordinate(x) > 0.1
+    assert len(system.drifts) == 2
+    state = system.at(x)
+    generators = [state.generator(i) for i in range(2)]
+    system.set_phase(None)
+    matrix = state.jacobian(solver.axis)
+    for g in generators:
+        assert system.norm(g) > 0.1
+        assert (matrix * g).norm() < 1e-9 * matrix.norm()
+
+
+def test_first_equilibrium_far_from_the_start() -> None:
+    """A coiled rod let go from straight: Newton's method alone does not get there, going downhill does."""
+    coiled = Scene(
+        name="coiled",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending((k[0], k[1] - c.k0, k[2] - 1.0), (1.0, 1.0, 0.7)),
+        parameters={"T": Parameter(0.0), "k0": Parameter(6.0)},
+        load="T",
+        ends=(clamped(), free(lambda c: (0.0, 0.0, c.T))),
+        ordinate=MIDDLE,
+        span=(0.0, 20.0),
+    )
+    solver = Solver(coiled, Discretization("reduced", 8, 6)).equilibria
+    x, outcome = solver.first(0.0)
+    assert outcome.converged
+    assert solver.energy(x) == pytest.approx(0.0, abs=1e-12)  # without tension it takes its own shape, a helix
+    x, outcome = solver.first(20.0)
+    assert outcome.converged
+    assert solver.energy(x) > 5
+
+
+def test_writhe_of_a_trefoil() -> None:
+    """Of the symmetric trefoil, by the double Gauss integral."""
+    t = np.linspace(0, 2 * np.pi, 1501)[:-1]
+    curve = np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], axis=1)
+    d = np.stack([np.cos(t) + 4 * np.cos(2 * t), -np.sin(t) + 4 * np.sin(2 * t), -3 * np.cos(3 * t)], axis=1)
+    total = 0.0
+    for i in range(0, len(t), 10):
+        apart = np.delete(np.arange(len(t)), i)
+        r = curve[i] - curve[apart]
+        total += 10 * np.sum(np.cross(d[i], d[apart]) * r / np.linalg.norm(r, axis=1, keepdims=True) ** 3)
+    gauss = total * (t[1] - t[0]) ** 2 / (4 * np.pi)
+    assert writhe(curve[::3]) == pytest.approx(gauss, abs=2e-3)
+
+
+@pytest.mark.parametrize("turns", [-1, 0, 3])
+def test_link_of_a_twisted_circle(turns: int) -> None:
+    s = np.linspace(0, 2 * np.pi, 97)
+    half = turns * s / 2
+    q = np.stack([np.cos(s / 2) * np.cos(half), np.sin(s / 2) * np.sin(half), np.sin(s / 2) * np.cos(half)], axis=1)
+    q = np.column_stack([q, np.cos(s / 2) * np.sin(half)])
+    r = np.stack([1 - np.cos(s), 0 * s, np.sin(s)], axis=1)
+    number, Tw, Wr = link({"s": s, "q": q, "r": r})
+    assert number == turns
+    assert (Tw, Wr) == pytest.approx((turns, 0.0), abs=1e-4)

@@ -1,0 +1,187 @@
+"""Imports go one way: what each module of the package may know of the others."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+HOME = Path(__file__).parents[2]
+LEVELS = 23
+"""Levels of the modules of ``rodfem``: lower it when there are fewer, never raise it."""
+ROOMS = 11
+"""Levels of its packages."""
+CIRCLES = [{"rodfem.diagram.diagram", "rodfem.diagram.trace"}]
+"""Modules that import each other inside functions (a diagram can be traced again): add none."""
+MATRICES = {
+    "rodfem.linalg.factorization",
+    "rodfem.linalg.selection",
+    "rodfem.linalg.replicated",
+    "rodfem.linalg.substructured",
+    "rodfem.linalg.subdomain",
+    "rodfem.linalg.matrices",
+    "rodfem.linalg.householder",
+    "rodfem.linalg.null_space",
+    "rodfem.linalg.orthogonal",
+}
+"""Linear algebra, which knows nothing of rods."""
+BELOW_MATRICES = {"rodfem.errors", "rodfem.compat"}
+"""Other modules that they may import."""
+MATHEMATICS = {"ufl", "forms", "__future__", "collections", "dataclasses", "typing"}
+"""All that ``forms`` may import."""
+
+pytestmark = pytest.mark.alone
+
+
+@cache
+def modules() -> dict[str, ast.Module]:
+    """All modules of both packages, parsed."""
+    found = {}
+    for package in ("rodfem", "forms"):
+        for path in sorted((HOME / package).rglob("*.py")):
+            name = ".".join(path.relative_to(HOME).with_suffix("").parts)
+            found[name.removesuffix(".__init__")] = ast.parse(path.read_text())
+    return found
+
+
+def imports(node: ast.AST, functions: bool = True, annotations: bool = True) -> Iterator[str]:
+    """Dotted names that a module imports when loaded, by its ``functions``, and for its ``annotations`` alone."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Import):
+            yield from (alias.name for alias in child.names)
+        elif isinstance(child, ast.ImportFrom):
+            assert child.level == 0, "imports are absolute"
+            yield from (f"{child.module}.{alias.name}" for alias in child.names)
+        elif isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef)) and not functions:
+            continue
+        elif isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING" and not annotations:
+            continue
+        else:
+            yield from imports(child, functions, annotations)
+
+
+@cache
+def arrows(functions: bool = False, annotations: bool = False) -> dict[str, set[str]]:
+    """Modules of ``rodfem`` that each of its modules imports."""
+
+    def home(name: str) -> str:
+        while name and name not in modules():
+            name = name.rpartition(".")[0]
+        return name
+
+    graph = {}
+    for module, tree in modules().items():
+        if module.startswith("rodfem"):
+            found = {home(name) for name in imports(tree, functions, annotations)}
+            graph[module] = {name for name in found if name.startswith("rodfem")} - {module}
+    return graph
+
+
+def circles(graph: dict[str, set[str]]) -> list[set[str]]:
+    """Largest sets of modules each of which reaches all others of its set."""
+    reached = {module: set(direct) for module, direct in graph.items()}
+    for middle in graph:
+        for module in graph:
+            if middle in reached[module]:
+                reached[module] |= reached[middle]
+    found = {frozenset(b for b in reached[a] if a in reached[b]) for a in graph if a in reached[a]}
+    return [set(circle) for circle in sorted(found, key=sorted)]
+
+
+def levels(graph: dict[str, set[str]]) -> int:
+    """Number of modules in the longest chain of imports."""
+
+    @cache
+    def level(module: str) -> int:
+        return 1 + max(map(level, graph[module]), default=0)
+
+    return max(map(level, graph))
+
+
+def test_no_circle_of_imports() -> None:
+    assert circles(arrows()) == []
+    assert circles(arrows(functions=True)) == CIRCLES
+
+
+def test_no_more_levels() -> None:
+    assert levels(arrows()) <= LEVELS
+
+
+def rooms() -> dict[str, set[str]]:
+    """Packages, and single modules beside them, that each imports."""
+
+    def room(module: str) -> str:
+        return ".".join(module.split(".")[:2])
+
+    graph: dict[str, set[str]] = {}
+    for module, found in arrows().items():
+        if module != "rodfem":
+            others = {room(other) for other in found if other != "rodfem"} - {room(module)}
+            graph[room(module)] = graph.get(room(module), set()) | others
+    return graph
+
+
+def test_rooms_know_only_those_below() -> None:
+    """As docs/architecture.md lists them, from top to bottom; the statement of a problem knows no dolfinx."""
+    assert circles(rooms()) == []
+    assert levels(rooms()) <= ROOMS
+    page = (HOME / "docs" / "architecture.md").read_text()
+    order = re.findall(r"^\| `([a-z0-9]+)` \|", page[page.index("## The rooms") :], flags=re.MULTILINE)
+    assert {f"rodfem.{name}" for name in order} == {
+        name for name in rooms() if (HOME / name.replace(".", "/")).is_dir()
+    }
+    for place, name in enumerate(order):
+        above = {f"rodfem.{other}" for other in order[:place]}
+        assert not rooms()[f"rodfem.{name}"] & above, name
+    for module, tree in modules().items():
+        if module.startswith("rodfem.problem"):
+            known = {name.split(".")[0] for name in imports(tree)}
+            assert known.isdisjoint({"dolfinx", "petsc4py", "slepc4py", "mpi4py"}), module
+
+
+def test_circles_and_levels_of_a_graph() -> None:
+    graph = {"a": {"b"}, "b": {"c"}, "c": {"d", "b"}, "d": set(), "e": {"e", "a"}}
+    assert circles(graph) == [{"b", "c"}, {"e"}]
+    assert levels({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == 3
+
+
+def test_forms_are_ufl_alone() -> None:
+    for module, tree in modules().items():
+        if module.split(".")[0] == "forms":
+            assert {name.split(".")[0] for name in imports(tree)} <= MATHEMATICS, module
+
+
+def test_command_line_is_known_to_programs_alone() -> None:
+    """Only modules that are run themselves read options, and nothing imports the options of the demos."""
+    for module, tree in modules().items():
+        names = set(imports(tree))
+        program = any(
+            isinstance(statement, ast.If) and ast.unparse(statement.test) == "__name__ == '__main__'"
+            for statement in tree.body
+        )
+        assert module == "rodfem.app.cli" or program or "argparse" not in names, module
+        assert not any(name.startswith("rodfem.app.cli") for name in names), module
+
+
+def test_matrices_know_no_rods() -> None:
+    assert set(modules()) >= MATRICES
+    for module in sorted(MATRICES):
+        assert arrows(functions=True, annotations=True)[module] <= MATRICES | BELOW_MATRICES, module
+
+
+def test_arrows_are_what_the_interpreter_follows() -> None:
+    """Loading a module loads those that the graph says it reaches, and packages."""
+    program = "import sys, rodfem.app.many; print(*(m for m in sys.modules if m.startswith('rodfem')))"
+    out = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=HOME).stdout
+    reached, new = set(), {"rodfem.app.many"}
+    while new:
+        reached |= new
+        new = set().union(*(arrows()[module] for module in new)) - reached
+    packages = {"rodfem", "rodfem.lazy", *(name for name in modules() if (HOME / name.replace(".", "/")).is_dir())}
+    assert set(out.split()) - packages == reached - packages

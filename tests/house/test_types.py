@@ -1,0 +1,84 @@
+"""What a type checker, ``help`` and the interpreter's start make of the package from outside."""
+
+from __future__ import annotations
+
+import ast
+import pydoc
+import re
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import pytest
+
+import rodfem
+
+HOME = Path(__file__).parents[2]
+HEAVY = ("dolfinx", "matplotlib", "mpi4py", "petsc4py", "slepc4py", "pyvista")
+
+pytestmark = pytest.mark.alone
+
+
+def test_stub_and_lazy_exports_are_the_same() -> None:
+    """``__init__.pyi``, which type checkers read, against the table by which ``__init__.py`` loads names."""
+    lines = {f"from rodfem.{home} import {name} as {name}" for name, home in rodfem._HOMES.items()} | {
+        "__version__: str"
+    }
+    stub = {ast.unparse(statement) for statement in ast.parse((HOME / "rodfem" / "__init__.pyi").read_text()).body}
+    assert not lines - stub, "add to rodfem/__init__.pyi:\n" + "\n".join(sorted(lines - stub))
+    assert not stub - lines, "remove from rodfem/__init__.pyi:\n" + "\n".join(sorted(stub - lines))
+
+
+def test_no_public_name_is_a_module() -> None:
+    """``import rodfem.name`` would put the module in the place of the name."""
+    modules = {path.stem for path in (HOME / "rodfem").glob("*.py")} | {
+        path.parent.name for path in (HOME / "rodfem").glob("*/__init__.py")
+    }
+    assert not modules & set(rodfem._HOMES)
+
+
+def installed(folder: Path) -> Path:
+    """Python of a new virtual environment in which the packages are installed: it has links to them."""
+    venv.create(folder, system_site_packages=True, symlinks=True)
+    (packages,) = folder.glob("lib/python*/site-packages")
+    for name in ("rodfem", "forms"):
+        (packages / name).symlink_to(HOME / name)
+    return folder / "bin" / "python"
+
+
+def test_types_of_an_installed_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The README's scripts are accepted by ``mypy --strict`` elsewhere, and no public name is ``Any`` there."""
+    api = pytest.importorskip("mypy.api", reason="mypy is not installed: `make lint` does that")
+    for variable in ("PYTHONPATH", "MYPYPATH"):
+        monkeypatch.delenv(variable, raising=False)
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), flags=re.DOTALL)
+    Path("readme.py").write_text("".join(blocks))
+    revealed = [f"reveal_type(rodfem.{name})" for name in rodfem._HOMES]
+    wrong = "rodfem.Parameter('one')"
+    Path("names.py").write_text("\n".join(["import rodfem", *revealed, wrong]))
+    options = ["--strict", "--config-file=", "--cache-dir=cache", f"--python-executable={installed(tmp_path / 'venv')}"]
+    out, trouble, _ = api.run([*options, "readme.py", "names.py"])
+    assert not trouble
+    assert re.findall(r"^(.*): error: (.*?)  \[", out, flags=re.MULTILINE) == [
+        (f"names.py:{len(revealed) + 2}", 'Argument 1 to "Parameter" has incompatible type "str"; expected "float"')
+    ]
+    types = re.findall('Revealed type is "(.*)"', out)
+    assert len(types) == len(revealed)
+    assert "Any" not in types
+    assert any(shown.endswith("-> rodfem.problem.scene.Scene") for shown in types)
+
+
+def test_help_is_short_and_names_all() -> None:
+    text = pydoc.plain(pydoc.render_doc(rodfem))
+    assert len(text.splitlines()) < 300
+    assert set(rodfem._HOMES) <= set(re.findall(r"\w+", text[text.index("Public names") :]))
+
+
+@pytest.mark.parametrize("statement", ["import rodfem", "from rodfem import Ordinate, Parameter, Scene, clamped"])
+def test_a_scene_is_stated_without_what_computes_and_draws(statement: str) -> None:
+    program = f"{statement}; import sys; print(*sys.modules)"
+    out = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=HOME).stdout
+    assert "rodfem" in out.split()
+    assert not {*HEAVY} & {*out.split()}

@@ -1,0 +1,209 @@
+"""Factors on several ranks (on one: only the scalars are shared) against dense linear algebra on the same matrices."""
+
+from __future__ import annotations
+
+from time import process_time
+
+import numpy as np
+import pytest
+import small_states
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.diagram.solver import Solver
+from rodfem.fem.fields import Discretization
+from rodfem.fem.system import System
+from rodfem.linalg.factorization import Klu, Mumps, lu_package
+from rodfem.linalg.matrices import gathered
+from rodfem.linalg.replicated import Copied
+from rodfem.linalg.substructured import Condensed
+from rodfem.stability.assessment import Judge
+from rodfem.stability.inertia import Inertia
+
+pytestmark = pytest.mark.short
+
+FORMULATIONS = pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+STATES = pytest.mark.parametrize(
+    ("name", "state", "load"),
+    [("cord", "plain", 30.0), ("cord", "buckled", 40.0), ("hemitropic", "plain", 0.25), ("hemitropic", "buckled", 0.2)],
+)
+SHARED = pytest.mark.parametrize("shared", ["pieces", "copies"])
+LU = "rodfem_lu_"
+SIGMAS = (-30.0, -3.0, -0.1, 0.0, 0.1, 2.0, 40.0)
+
+
+def at(name: str, state: str, formulation: str, load: float) -> tuple[System, PETSc.Vec]:
+    """System and state, its phase conditions set."""
+    system, x = getattr(small_states, state)(name, formulation, 7, 3, load)
+    system.set_phase(x)
+    return system, x
+
+
+def symmetric(system: System, shared: str) -> Condensed | Copied:
+    """LDL^t factors."""
+    factors = Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3})
+    return Copied(factors) if shared == "copies" else Condensed(system.fields.dense_rows, factors)
+
+
+def whole(vector: PETSc.Vec) -> np.ndarray:
+    """All of a vector on every rank."""
+    return np.concatenate(vector.comm.tompi4py().allgather(vector.array_r))
+
+
+@SHARED
+@FORMULATIONS
+@STATES
+def test_inertia_and_solutions(name: str, state: str, formulation: str, load: float, shared: str) -> None:
+    system, x = at(name, state, formulation, load)
+    inertia, factors = Inertia(system), symmetric(system, shared)
+    right, out = inertia.seed(1), system.new_vector()
+    for sigma in SIGMAS:
+        matrix = inertia.at(x).matrix
+        matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        dense = gathered(matrix).toarray()
+        factors(matrix)
+        assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
+        factors.solve(right, out)
+        expected = np.linalg.solve(dense, whole(right))
+        np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
+
+
+@SHARED
+@FORMULATIONS
+def test_inertia_beside_a_branch_point(formulation: str, shared: str) -> None:
+    """The straight rod loses stability at 0.1143042145: eigenvalues are near zero there."""
+    system, x = at("hemitropic", "plain", formulation, 0.1143042145)
+    inertia, factors = Inertia(system), symmetric(system, shared)
+    for sigma in (-1e-5, 1e-5):
+        matrix = inertia.at(x).matrix
+        matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        factors(matrix)
+        negative = (np.linalg.eigvalsh(gathered(matrix).toarray()) < 0).sum()
+        assert factors.inertia() == (negative, 0)
+
+
+@SHARED
+def test_many_right_hand_sides(shared: str) -> None:
+    system, x = at("hemitropic", "buckled", "pointwise", 0.2)
+    inertia, factors = Inertia(system), symmetric(system, shared)
+    matrix = inertia.at(x).matrix
+    matrix.axpy(1.0, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    factors(matrix)
+    rows = (system.fields.local_unknowns, system.fields.unknowns)
+    right = PETSc.Mat().createDense((rows, (None, 3)), comm=system.comm)
+    right.setUp()
+    right.assemble()
+    out = right.duplicate()
+    for i in range(3):
+        right.getDenseArray()[:, i] = inertia.seed(i).array_r
+    factors.solve_all(right, out)
+    for i in range(3):
+        one = system.new_vector()
+        factors.solve(inertia.seed(i), one)
+        np.testing.assert_allclose(out.getDenseArray()[:, i], one.array_r, rtol=1e-8, atol=1e-12)
+
+
+@SHARED
+@pytest.mark.parametrize("package", ["klu", "mumps"])
+@FORMULATIONS
+@pytest.mark.parametrize(("name", "load"), [("follower", 10.0), ("hemitropic", 0.3)])
+def test_matrix_without_symmetry(formulation: str, name: str, load: float, package: str, shared: str) -> None:
+    if package == "klu" != lu_package(MPI.COMM_SELF, LU):
+        pytest.skip("PETSc has no KLU")
+    if name == "follower":
+        formulation = "pointwise"
+    system, x = at(name, "plain", formulation, load)
+    alone = Klu(LU, system.fields.dense_rows) if package == "klu" else Mumps("lu", {8: 0})
+    factors = Copied(alone) if shared == "copies" else Condensed(system.fields.dense_rows, alone)
+    row = system.metric * x
+    system.set_load(row, 1.0)
+    matrix = system.at(x).jacobian(row)
+    right, out = system.load_axis(), system.new_vector()
+    factors(matrix)
+    assert factors.regular
+    factors.solve(right, out)
+    expected = np.linalg.solve(gathered(matrix).toarray(), whole(right))
+    np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
+
+
+def chain(n: int, sigma: float) -> PETSc.Mat:
+    """Chain of ``n`` masses between walls, shifted by ``sigma``, as a distributed matrix."""
+    matrix = PETSc.Mat().createAIJ((n, n), nnz=3, comm=MPI.COMM_WORLD)
+    matrix.setUp()
+    for i in range(*matrix.getOwnershipRange()):
+        for j in range(max(i - 1, 0), min(i + 2, n)):
+            matrix.setValue(i, j, 2.0 - sigma if i == j else -1.0)
+    matrix.assemble()
+    return matrix
+
+
+def frequencies(n: int) -> np.ndarray:
+    """Eigenvalues of the chain."""
+    return 2 - 2 * np.cos(np.pi * np.arange(1, n + 1) / (n + 1))
+
+
+def test_pieces_may_be_singular_where_the_whole_is_not() -> None:
+    """At eigenvalues of all parts of the chain the whole is counted right, and solved with."""
+    n = 24
+    factors = Condensed(1, Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
+    exact = frequencies(n)
+    for sigma in np.unique(np.round([s for m in range(1, n) for s in frequencies(m)], 12)):
+        if abs(exact - sigma).min() < 1e-6:
+            continue
+        matrix = chain(n, float(sigma))
+        factors(matrix)
+        assert factors.inertia() == ((exact < sigma).sum(), 0)
+        right, out = matrix.createVecs()
+        right.set(1.0)
+        factors.solve(right, out)
+        assert (matrix * out - right).norm() < 1e-9 * out.norm()
+
+
+@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="nothing is cut on one rank")
+@pytest.mark.parametrize(("formulation", "elements"), [("reduced", 5000), ("pointwise", 2000)])
+def test_long_rods_are_cut(formulation: str, elements: int) -> None:
+    """Their index, their eigenvalue nearest zero, and the left-most ones are those of MUMPS on one rank."""
+    found = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        solver = Solver(small_states.scene("cord"), Discretization(formulation, elements, 1), comm).equilibria
+        system = solver.system
+        for factors in (solver.inertia.factors, system.lu):
+            assert isinstance(factors, Condensed) == (comm.size > 1)
+        system.set_phase(None)
+        x, outcome = solver.at_load(solver.start(20.0), 20.0)
+        assert outcome.converged
+        verdict = Judge(solver)(x, number=3)
+        assert verdict.certified
+        factored = solver.inertia.at(x)
+        factored.count()
+        nearest, _ = factored.nearest(1, accuracy=1e-9)
+        found.append([verdict.negative, verdict.zero, *nearest, *verdict.values])
+    np.testing.assert_allclose(*found, rtol=1e-7)
+
+
+@pytest.mark.skipif(lu_package(MPI.COMM_SELF, LU) != "klu", reason="PETSc has no KLU")
+@pytest.mark.parametrize(("formulation", "elements", "degree"), [("pointwise", 1000, 1), ("reduced", 300, 6)])
+def test_dense_rows_do_not_fill_in(formulation: str, elements: int, degree: int) -> None:
+    """Newton's matrix has an arclength equation, and integral constraints.
+
+    Where one of them is the pivot of a sparse row KLU takes tens to hundreds of times as long as MUMPS.
+    """
+    solver = Solver(
+        small_states.scene("hemitropic"), Discretization(formulation, elements, degree), MPI.COMM_SELF
+    ).equilibria
+    solver.system.set_phase(None)
+    x = solver.start(0.3, 0.4)
+    matrix, times = solver.system.at(x).jacobian(solver.axis), []
+    for factors in (Klu(LU, solver.system.fields.dense_rows), Mumps("lu", {8: 0})):
+        factors(matrix)
+        least = np.inf
+        for _ in range(3):
+            matrix.stateIncrease()
+            started = process_time()
+            factors(matrix)
+            least = min(least, process_time() - started)
+        times.append(least)
+        right, out = solver.inertia.seed(1), solver.system.new_vector()
+        factors.solve(right, out)
+        assert (matrix * out - right).norm() < 1e-14 * matrix.norm(PETSc.NormType.INFINITY) * out.norm()
+    assert times[0] < 8 * times[1]

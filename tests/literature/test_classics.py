@@ -1,0 +1,447 @@
+"""Classical problems of the stability of rods against closed forms, frequency equations and values from literature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from math import cos, pi, sin, sqrt, tan
+from typing import Any
+
+import classics
+import numpy as np
+import pytest
+from classics import FORMULATIONS, column, explore, sweep
+from scipy.integrate import quad
+from scipy.linalg import expm
+from scipy.optimize import brentq, fsolve
+from scipy.special import ellipe, ellipk, jv
+from shooting_solver import Rod
+
+from rodfem import Discretization, End, Scene, Solver, clamped
+from rodfem.stability.nonsymmetric import Vibration
+
+
+def root(f: Callable[[float], float], a: float, b: float) -> float:
+    return float(brentq(f, a, b, xtol=1e-15, rtol=1e-14))
+
+
+# --- where a straight or circular state becomes unstable ------------------------------------------------------------
+
+EULER = {
+    "clamped-free": [2.46740110, 2 * 2.46740110, 9 * 2.46740110, 18 * 2.46740110],
+    "pinned-pinned": [9.86960440, 2 * 9.86960440, 4 * 9.86960440],
+    "clamped-pinned": [20.1907285564, 2 * 20.1907285564],
+    "clamped-clamped": [39.4784176044],
+    "hinged-clamped": [20.1907285564],  # the hinge about d1 leaves free what is bent about d1 only
+}
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("supports", EULER)
+def test_euler(supports: str, formulation: str) -> None:
+    found = explore(classics.euler(supports), formulation)
+    assert found.loads() == pytest.approx(EULER[supports], rel=4e-9)
+    for i, s in enumerate(found.special()):
+        assert (s.negative_before, s.negative_after, s.multiplicity) == (i, i + 1, 1)
+
+
+PI2 = pi**2
+E1 = PI2 / 4
+"""Euler's load of a cantilever."""
+TORQUE = 2 * root(lambda x: tan(x) - x, 4.4, 4.6)
+"""Greenhill's torque between clamped ends; squared, the second critical load of a clamped column."""
+HEAVY = 9 / 4 * root(lambda x: float(jv(-1 / 3, x)), 1.5, 2.2) ** 2
+"""Greenhill's weight of a column."""
+GA, EA = 50.0, 200.0
+
+
+def dead_arch(half: float) -> float:
+    """Radial dead load p of an arch of radius one: ``f'' + p f = a cos s``, ``f'(+-half) = 0``, ``int f cos s = 0``."""
+
+    def mean(p: float) -> float:
+        w = sqrt(p)
+        waves = sin((w + 1) * half) / (w + 1) + sin((w - 1) * half) / (w - 1)
+        return half + sin(2 * half) / 2 - sin(half) / (w * sin(w * half)) * waves
+
+    return root(mean, 2.0, (pi / half) ** 2 - 1e-6)
+
+
+def stiff_and_weak(f: Callable[[float, float], float], a: float, b: float) -> list[float]:
+    """Loads ``EI w^2`` with ``f(w, EI) = 0`` for both stiffnesses of a column."""
+    return [EI * root(lambda w, EI=EI: f(w, EI), a, b) ** 2 for EI in (1.0, 2.0)]  # type: ignore[misc]
+
+
+# scene, formulations, number of modes at each load, loads
+BOTH, CENTRELINE = FORMULATIONS, ("pointwise",)
+CRITICAL: dict[str, tuple[Callable[[], Scene], tuple[str, ...], int, list[float]]] = {
+    "haringx": (
+        lambda: classics.shearable("flexible", GA, EA),
+        BOTH,
+        1,
+        [root(lambda p: p * (1 - p / EA + p / GA) - E1, 0.0, 4.0)],
+    ),
+    "haringx without stretch": (
+        lambda: classics.shearable("inextensible", GA, EA),
+        BOTH,
+        1,
+        [(sqrt(1 + PI2 / GA) - 1) * GA / 2],
+    ),
+    "timoshenko": (lambda: classics.timoshenko(GA), BOTH, 1, [E1 / (1 + E1 / GA)]),
+    "heavy": (classics.heavy, CENTRELINE, 1, [HEAVY]),
+    "foundation": (classics.winkler, CENTRELINE, 1, [PI2 + 300 / PI2, 4 * PI2 + 75 / PI2, 2 * PI2 + 300 / PI2]),
+    "tip spring": (
+        classics.tip_spring,
+        BOTH,
+        1,
+        stiff_and_weak(lambda w, EI: tan(w) / w - 1 + EI * w * w / 10, 1.6, 4.0),
+    ),
+    "foot spring": (classics.foot_spring, BOTH, 1, stiff_and_weak(lambda w, EI: EI * w * tan(w) - 3, 0.1, 1.5)),
+    "point load": (lambda: classics.point_load(0.4), CENTRELINE, 1, [E1 / 0.16]),
+    "stepped": (
+        lambda: classics.stepped(0.3),
+        BOTH,
+        1,
+        [root(lambda p: tan(0.3 * sqrt(p / 2)) * tan(0.7 * sqrt(p)) - sqrt(2), 2.0, 4.4)],
+    ),
+    "greenhill": (classics.greenhill, BOTH, 2, [TORQUE / 2]),
+    "michell": (classics.michell, BOTH, 2, [2 * pi * sqrt(n * n - 1) / 1.5 for n in (2, 3)]),
+    "ring of intrinsic twist": (classics.ring, BOTH, 2, [sqrt(n * n - 1) / 1.5 for n in (2, 3)]),
+    # before that the end turns by a, C a = M cos a = T: the straight rod is unstable where T = pi + 2 a
+    "semi-tangential": (classics.semi_tangential, BOTH, 2, [1.25 * pi / cos(pi / 8)]),
+    "lateral": (classics.lateral, BOTH, 1, [4.62463226448]),
+    "pressed ring": (classics.pressed_ring, CENTRELINE, 2, [3.0]),
+    "pressed arch": (lambda: classics.arch(1.0, dead=False), CENTRELINE, 1, [PI2 - 1]),
+    "arch under dead load": (lambda: classics.arch(1.0, dead=True), CENTRELINE, 1, [dead_arch(1.0)]),
+    "tip on a plane": (classics.tip_on_plane, BOTH, 1, [PI2 / 2, 20.1907285564]),
+    "middle on a line": (classics.middle_on_line, CENTRELINE, 1, [4 * PI2]),
+    "no mean deflection": (classics.no_mean_deflection, CENTRELINE, 1, [TORQUE**2]),
+    "no mean curvature": (classics.no_mean_curvature, BOTH, 1, [PI2, 2 * PI2]),
+    "in a plane": (classics.on_plane, CENTRELINE, 1, [PI2 / 2]),
+    "turning in a plane": (classics.turning_in_plane, CENTRELINE, 1, [2 * PI2, 8 * PI2]),
+    "bent about one axis": (classics.unbendable, BOTH, 1, [PI2 / 2]),
+}
+
+
+def test_values_in_the_literature() -> None:
+    assert pytest.approx(8.98681891582, rel=1e-12) == TORQUE
+    assert pytest.approx(7.8373474389, rel=1e-10) == HEAVY
+
+
+@pytest.mark.parametrize(
+    ("name", "formulation"), [(name, f) for name, expected in CRITICAL.items() for f in expected[1]]
+)
+def test_critical_loads(name: str, formulation: str) -> None:
+    scene, _, modes, expected = CRITICAL[name]
+    found = explore(scene(), formulation, elements=12 if "ring" in name or name == "michell" else 8)
+    assert found.loads() == pytest.approx(expected, rel=1e-9)
+    for i, s in enumerate(found.special()):
+        assert (s.negative_before, s.negative_after, s.multiplicity) == (i * modes, (i + 1) * modes, modes)
+    assert found.branches[0].ended == "end of range"
+
+
+# --- bent states ----------------------------------------------------------------------------------------------------
+
+
+def tip_of_elastica(P: float) -> tuple[float, float]:
+    """Tip of a bent cantilever of stiffness and length one, along and across."""
+    w = sqrt(P)
+    m = root(lambda m: float(ellipk(m)) - w, 0.0, 1 - 1e-15)
+    return 2 * float(ellipe(m)) / w - 1, 2 * sqrt(m) / w
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_elastica(formulation: str) -> None:
+    assert tip_of_elastica(1.5 * E1) == pytest.approx((0.3635882249, 0.7885758057), rel=1e-9)
+    stops = (1.5 * E1, 8.0, 20.0)
+    found = explore(classics.elastica(20.0), formulation, depth=1, stops=stops)
+    assert len(found.branches) == 3
+    for P in stops:
+        for branch, EI in ((1, 1.0), (2, 2.0)):
+            if EI * E1 < P:
+                r = found.sample(branch, P)["r"][-1]
+                miss = np.array([r[2], np.hypot(r[0], r[1])]) - tip_of_elastica(P / EI)
+                assert abs(miss).max() < 1e-9
+    assert [b.points[-1].negative for b in found.branches] == [2, 0, 1]
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_bow(formulation: str) -> None:
+    """Pinned ends at a prescribed distance: the multiplier is the thrust of the elastica."""
+    d = 0.2
+    m = root(lambda m: 2 * float(ellipe(m) / ellipk(m)) - 1 - d, 1e-3, 1 - 1e-6)
+    w = 2 * float(ellipk(m))
+    found = explore(classics.bow(), formulation, stops=(d,))
+    assert abs(found.sample(0, d)["g1"]) == pytest.approx(w * w, rel=1e-8)
+    (user,) = found.special("user")
+    assert user.point.energy == pytest.approx(2 * w * w * (float(ellipe(m) / ellipk(m)) - 1 + m), rel=1e-9)
+    assert {p.negative for p in found.branches[0].points} == {0}
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_bathe_and_bolourchi(formulation: str) -> None:
+    r = explore(classics.bathe(), formulation).sample()["r"][-1]
+    assert r[[0, 2, 1]] == pytest.approx([15.68480053, 47.15043857, 53.47485879], rel=1e-9)
+
+
+def helix(s: np.ndarray, curvature: float, torsion: float) -> np.ndarray:
+    """Quaternions (m, 4) of the directors normal, binormal, tangent."""
+    w = np.hypot(curvature, torsion)
+    return np.stack([np.cos(w * s / 2), 0 * s, np.sin(w * s / 2) * curvature / w, np.sin(w * s / 2) * torsion / w], 1)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_helix_of_any_pitch(formulation: str) -> None:
+    """A helix is a solution for any pitch; what holds it is a force and a moment along its axis."""
+    curvature, C, stops = 3.0, 0.6, (0.5, 2.0, 4.0)
+    found = explore(classics.helix(curvature), formulation, stops=stops)
+    for t in stops:
+        state = found.sample(0, t)
+        miss = state["q"] - helix(state["s"], curvature, t)
+        force = np.array([0.0, curvature, t]) * t * (C - 1)
+        n = np.array([[state[f"n{i}"] for i in (1, 2, 3)]]) if formulation == "reduced" else state["n"]
+        assert abs(miss).max() < 1e-9
+        assert abs(n - force).max() < 1e-7
+
+
+def test_helix_as_the_degree_grows() -> None:
+    """Its error falls to round-off."""
+    errors, t = [], 2.0
+    for degree in (2, 4, 6, 8, 10):
+        solver = Solver(classics.helix(3.0), Discretization("reduced", 6, degree)).equilibria
+        x = solver.start(0.0)
+        for load in (0.0, 0.5, 1.0, 1.5, t):
+            x, outcome = solver.at_load(x, load)
+            assert outcome.converged
+        state = solver.shape.sample(x)
+        errors.append(abs(state["q"] - helix(state["s"], 3.0, t)).max())
+    assert errors[-1] < 1e-13
+    assert all(b < a / 50 or b < 1e-13 for a, b in pairwise(errors))
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_extension_of_a_helical_spring(formulation: str) -> None:
+    """A helix under every force along its axis, of curvature and torsion that its two equilibrium equations give."""
+    k0, t0, C, stops = 6.0, 2.0, 0.8, (5.0, 15.0, 30.0)
+    found = explore(classics.spring(k0, t0), formulation, stops=stops)
+    for F in stops:
+
+        def equations(x: np.ndarray, F: float = F) -> list[float]:
+            w3 = np.hypot(*x) ** 3
+            return [x[0] - k0 + F * x[0] * x[1] / w3, C * (x[1] - t0) - F * x[0] ** 2 / w3]
+
+        curvature, torsion = fsolve(equations, [k0, t0], xtol=1e-14)
+        w = np.hypot(curvature, torsion)
+        r = found.sample(0, F)["r"]
+        assert r[-1, 2] == pytest.approx(torsion / w, abs=1e-9)
+        assert abs(np.hypot(r[:, 0], r[:, 1]) - curvature / w**2).max() < 1e-9
+    assert {p.negative for p in found.branches[0].points} == {0}
+
+
+def by_elements(state: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Quaternions and strains ``k`` at the nodes of each element, (elements, nodes, 4) and (elements, nodes, 3)."""
+    elements = state["elements"]
+    degree = (len(state["s"]) - 1) // elements
+    nodes = np.arange(elements)[:, None] * degree + np.arange(degree + 1)
+    q = state["q"][nodes]
+    slopes = []
+    for s, values in zip(state["s"][nodes], q, strict=True):
+        fits = [np.polynomial.Polynomial.fit(s, values[:, i], degree) for i in range(4)]
+        slopes.append(np.stack([p.deriv()(s) for p in fits], axis=1))
+    dq = np.array(slopes)
+    k = 2 * (q[..., :1] * dq[..., 1:] - dq[..., :1] * q[..., 1:] - np.cross(q[..., 1:], dq[..., 1:]))
+    return q, k
+
+
+def turned(q: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """Vectors ``a`` rotated by unit quaternions."""
+    w, u = q[..., :1], q[..., 1:]
+    return a + 2 * np.cross(u, w * a + np.cross(u, a))
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_clamped_loop(formulation: str) -> None:
+    """Twisted by four radian until its ends pass each other: integrals of motion, and an initial value problem."""
+    found = explore(classics.loop(), formulation, elements=16, stops=(0.5, 1.1))
+    for d in (0.5, 1.1):
+        state = found.sample(0, d)
+        n = np.array([state[f"n{i}"] for i in (1, 2, 3)]) if formulation == "reduced" else state["n"].mean((0, 1))
+        q, k = by_elements(state)
+        m = turned(q, k)
+        hamiltonian = 0.5 * (k**2).sum(axis=2) + turned(q, np.broadcast_to([0.0, 0.0, 1.0], k.shape)) @ n
+        for conserved in (hamiltonian, m @ n, k[..., 2]):  # axial moment; of equal stiffnesses, the twist too
+            assert np.ptp(conserved) < 1e-5 * abs(n).max()
+        end = Rod().integrate(np.array([*n, *m[0, 0]]))[:, 0]
+        assert end[7:10] == pytest.approx([0.0, 0.0, 1 - d], abs=1e-6)
+        assert abs(end[:4] @ [cos(2.0), 0.0, 0.0, sin(2.0)]) == pytest.approx(1.0, abs=1e-6)
+
+
+# --- planar rods ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_lateral_buckling_of_a_planar_rod(formulation: str) -> None:
+    """In its plane it is stable under every load; in space it is not."""
+    (branch,) = explore(classics.lateral("e2"), formulation).branches
+    for p in branch.points:
+        assert (p.negative, p.negative_in_space) == (0, int(p.load > 4.62463226448))
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_planar_column(formulation: str) -> None:
+    """Bent about its stiff axis, the weak one being across: stable in the plane, unstable in space."""
+    found = explore(classics.planar_column(), formulation, depth=1)
+    assert found.loads() == pytest.approx([2 * E1], rel=1e-9)
+    for p in found.branches[0].points:
+        if abs(p.load - 2 * E1) > 1e-6:
+            assert (p.negative, p.negative_in_space) == (int(p.load > 2 * E1), (p.load > E1) + (p.load > 2 * E1))
+    assert {(p.negative, p.negative_in_space) for p in found.branches[1].points[1:]} == {(0, 1)}
+    r = found.sample(1)["r"][-1]
+    assert (r[2], abs(r[0])) == pytest.approx(tip_of_elastica(12.0 / 2), abs=1e-9)
+    assert r[1] == 0
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("kind", ["moment", "follower_moment"])
+def test_rolled_up(kind: str, formulation: str) -> None:
+    """Bending stiffness 2: an arc of angle P/2, four turns of it at most; by a potential, and stable."""
+    found = explore(classics.rolled(kind), formulation, stops=(3.0,))
+    (branch,) = found.branches
+    assert {(p.negative, p.negative_in_space) for p in branch.points} == {(0, None)}
+    assert branch.points[-1].load == pytest.approx(8 * pi)
+    for load, angle in ((3.0, 1.5), (None, 4 * pi)):
+        sample = found.sample(load=load)
+        s = sample["s"]
+        assert sample["angle"][:, 0] == pytest.approx(angle * s, abs=1e-11)
+        arc = np.stack([1 - np.cos(angle * s), 0 * s, np.sin(angle * s)], axis=1) / angle
+        assert sample["r"] == pytest.approx(arc, abs=1e-7)
+
+
+@pytest.mark.parametrize("planar", ["e2", None])
+def test_hanging_cable(planar: str | None) -> None:
+    """Straight and too long at first, it finds down; but for what its stiffness does it is a catenary."""
+    a = root(lambda a: a * np.sinh(0.4 / a) - 0.5, 0.2, 2.0)
+    sag = a * (np.cosh(0.4 / a) - 1)
+    found = explore(classics.chain(planar), elements=12, stops=(1e-4, 1e-5))
+    (branch,) = found.branches
+    assert {p.negative for p in branch.points} == {0}
+    misses = [s.point.ordinate - sag for s in found.special("user")]
+    assert abs(misses[1]) < 2e-6
+    assert misses[0] / misses[1] == pytest.approx(10.0, rel=0.05)
+
+
+# --- a material that loses its convexity ----------------------------------------------------------------------------
+
+
+def test_loss_of_convexity() -> None:
+    """``W = k^2/2 - k^4/4`` is convex to ``k^2 = 1/3``, which the clamped end reaches first: by quadrature.
+
+    The curvature has a vertical tangent there, so that the error of a uniform mesh falls like h only.
+    """
+    largest = 1 / 12  # of k W' - W, which is P (sin(angle of the tip) - sin(angle))
+
+    def length(P: float) -> float:
+        tip = np.arcsin(largest / P)
+
+        def slope(x: float) -> float:  # angle = tip (1 - x^2): the curvature vanishes at the tip as x does
+            h = 12 * P * (np.sin(tip) - np.sin(tip * (1 - x * x)))
+            return 2 * tip * x / sqrt(h / 3 / (1 + sqrt(max(1 - h, 0.0))))
+
+        return quad(slope, 1e-9, 1.0, epsabs=1e-12)[0]
+
+    P = root(lambda P: length(P) - 1, largest + 1e-6, 1.0)
+    late = []
+    for elements in (8, 16):
+        (branch,) = explore(classics.softening(), elements=elements).branches
+        beyond = float(branch.ended.rpartition(" ")[2])
+        assert branch.ended == f"the stored energy is not convex any more at P = {beyond:g}"
+        assert 0.98 * P < branch.points[-1].load < beyond
+        assert {p.negative for p in branch.points} == {0}
+        late.append(beyond / P - 1)
+    assert late[1] < 0.6 * late[0] < 0.6 * 0.005
+
+
+# --- loads without a potential --------------------------------------------------------------------------------------
+
+
+def cantilever(mu: complex, P: float, tip: float, middle: float) -> complex:
+    """Zero at the eigenvalues: ``w'''' + P w'' = mu w``, with jumps of the shear force at masses."""
+    A = np.eye(4, k=1, dtype=complex)
+    A[3, 0], A[3, 2] = mu, -P
+    mass = np.eye(4, dtype=complex)
+    mass[3, 0] = mu * middle
+    half = expm(A / 2)
+    y = (half @ mass @ half)[:, 2:]
+    return complex(np.linalg.det(np.array([y[2], y[3] + mu * tip * y[0]])))
+
+
+@pytest.mark.parametrize(
+    ("tip", "middle", "span", "about"),
+    [
+        (0.0, 0.0, (15.0, 25.0), (20.0, 120.0)),
+        (1.0, 0.0, (10.0, 20.0), (16.0, 40.0)),
+        (0.3, 0.5, (10.0, 25.0), None),
+    ],
+    ids=["Beck", "Pflueger", "two masses"],
+)
+def test_flutter_with_masses(
+    tip: float, middle: float, span: tuple, about: tuple | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
+    scene = classics.beck(tip, middle, span)
+    assert not scene.conservative
+    (flutter,) = sweep(scene).special("flutter")
+
+    def equations(x: np.ndarray) -> list[float]:
+        h = 1e-20
+        return [cantilever(x[1], x[0], tip, middle).real, cantilever(complex(x[1], h), x[0], tip, middle).imag / h]
+
+    P, mu = fsolve(equations, about or (flutter.point.load, flutter.omega2), xtol=1e-13)
+    assert (flutter.point.load, flutter.omega2) == pytest.approx((P, mu), rel=1e-9)
+    assert (flutter.negative_before, flutter.negative_after) == (0, 2)
+
+
+def test_leipholz(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
+    scene = classics.leipholz()
+    assert not scene.conservative
+    assert sweep(scene).loads("flutter") == pytest.approx([40.0537365149], rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["moment", "follower_moment"])
+def test_torque_on_a_cantilever(kind: str) -> None:
+    """Nicolai's paradox: where both stiffnesses are equal there is flutter, however small the torque."""
+    scene = classics.torque(kind)
+    assert not scene.conservative
+    solver = Solver(scene, Discretization("pointwise", 4, 6)).equilibria
+    x = solver.start(0.0)
+    for T in (0.3, 0.6, 0.9):
+        x, outcome = solver.at_load(x, T)
+        assert outcome.converged
+        vibration = Vibration(solver.system)
+        vibration.assemble(x)
+        values = vibration.near(4, -1e-3).values
+
+        def frequency(mu: complex, T: float = T) -> complex:  # w'''' - i T w''' = mu w, where w = x + i y
+            A = np.eye(4, k=1, dtype=complex)
+            A[3, 0], A[3, 3] = mu, 1j * T
+            y = expm(A)[:, 2:]
+            moment = y[2] - (1j * T * y[1] if kind == "moment" else 0)
+            return complex(np.linalg.det(np.array([moment, y[3] - 1j * T * y[2]])))
+
+        for mu in values:
+            h = 1e-6 * abs(mu)
+            misses = [abs(frequency(m) / (frequency(m + h) - frequency(m - h)) * 2 * h) for m in (mu, mu.conjugate())]
+            assert min(misses) < 1e-7 * abs(mu)
+        assert abs(values.imag).min() > 1e-3
+
+
+def test_which_loads_have_a_potential() -> None:
+    def conservative(**load: Callable) -> bool:
+        return column("loaded", (clamped(), End(**load)), (0.0, 1.0), inertia=classics.BEAM).conservative
+
+    assert conservative(force=classics.push)
+    assert not conservative(follower=classics.push)
+    assert not conservative(moment=classics.push)
+    assert not conservative(follower_moment=classics.push)
+    assert all(s().conservative for s in (classics.semi_tangential, classics.heavy, classics.pressed_ring))
+    assert not classics.leipholz().conservative

@@ -1,0 +1,184 @@
+"""The rod under a follower load against the frequency equation of Beck's column, solved in complex arithmetic."""
+
+from __future__ import annotations
+
+import json
+import os
+import runpy
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from closed_forms import column, double
+from demo_cases import scene
+from hemitropic_cases import specials
+from mpi4py import MPI
+
+from rodfem.continuation.branch import Branch
+from rodfem.diagram.solver import Solver
+from rodfem.diagram.trace import trace
+from rodfem.fem.fields import Discretization
+from rodfem.stability.nonsymmetric import Vibration
+
+DEMO = Path(__file__).parents[2] / "demos" / "follower.py"
+
+
+@cache
+def vibration(P: float, elements: int = 8, degree: int = 6, **constants: object) -> Vibration:
+    """The pencil of the demo at one load."""
+    solver = Solver(scene("follower", **constants), Discretization("pointwise", elements, degree)).equilibria
+    x, outcome = solver.at_load(solver.start(P), P)
+    assert outcome.converged
+    found = Vibration(solver.system)
+    found.assemble(x)
+    return found
+
+
+@cache
+def swept(span: tuple[float, float], rotary_inertia: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Branch:
+    rod = scene("follower", span=span, rotary_inertia=rotary_inertia)
+    (branch,) = trace(rod, Discretization("pointwise", 4, 6))
+    return branch
+
+
+def test_where_eigenvalues_meet() -> None:
+    assert double(20.0, 120.0) == pytest.approx([20.0509536189738, 121.342510140494], rel=1e-9)
+    assert double(20.0, 120.0, J=1e-3)[0] == pytest.approx(19.8391305740585, rel=1e-9)
+
+
+def test_two_flutters_in_a_coarse_sweep() -> None:
+    """A step of two in the load, within which an eigenvalue of the strong plane passes by the pair that meets."""
+    found = specials(swept((0.0, 200.0)), "flutter")
+    assert len(found) == 2
+    for s, expected in zip(found, (double(20.0, 120.0), double(128.0, 1370.0)), strict=True):
+        assert abs(s.point.load - expected[0]) <= s.error_estimate <= 3e-5
+    assert found[0].error_estimate < 1e-9
+
+
+@pytest.mark.parametrize(("span", "J"), [((0.0, 25.0), 0.0), ((25.0, 15.0), 1e-3)])
+def test_flutter(span: tuple[float, float], J: float) -> None:
+    branch = swept(span, (J, 0.0, 0.0))
+    (flutter,) = specials(branch, "flutter")
+    load, mu = double(20.0, 120.0, J)
+    assert abs(flutter.point.load - load) <= flutter.error_estimate <= 3e-10
+    assert abs(flutter.omega2 - mu) <= flutter.omega2_error <= 3e-9
+    assert sorted((flutter.negative_before, flutter.negative_after)) == [0, 2]
+    for p in branch.points:
+        if p is not flutter.point:
+            assert p.negative == (2 if p.load > load else 0)
+            for re, im in p.omega2[:2]:  # the two that meet, or the weak and the strong plane
+                value = complex(re, im)
+                assert np.nanmin([abs(column(value, p.load, *plane) - value) for plane in ((1, J), (10, 0))]) < 1e-6
+
+
+@pytest.mark.parametrize("P", [0.0, 10.0])
+def test_two_planes(P: float) -> None:
+    values = vibration(P).near(6, 1.0).values[:6]
+    assert abs(values.imag).max() < 1e-7
+    for v in values.real:
+        weak, strong, scaled = column(v, P), column(v, P, EI=10), 10 * column(v / 10, P / 10)
+        assert np.nanmin([abs(v - weak), abs(v - strong)]) < 1e-9 * v
+        assert np.nanmin([abs(v - weak), abs(v - scaled)]) < 1e-9 * v
+    if P == 10:
+        for expected in (26.7885149853, 345.468944394):
+            assert abs(values - expected).min() < 1e-9 * expected
+            assert column(expected, P) == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize(("P", "near"), [(40.0, 10 - 11j), (100.0, 9.4 - 35j)])
+def test_past_flutter(P: float, near: complex) -> None:
+    expected = column(near**2, P)
+    assert abs(expected.imag) > 100
+    by_complex_shift = vibration(P).near(2, expected.conjugate() * 1.01).values
+    by_real_shift = vibration(P).near(8, expected.real).values
+    assert abs(by_complex_shift - expected.conjugate()).min() < 1e-8 * abs(expected)
+    assert max(abs(by_real_shift - v).min() for v in (expected, expected.conjugate())) < 1e-8 * abs(expected)
+
+
+@pytest.mark.parametrize("target", [20 + 5j, 340 - 30j])
+def test_complex_shift_finds_real_eigenvalues(target: complex) -> None:
+    one, other = (vibration(10.0).near(2, t).values for t in (target, target.real))
+    assert max(abs(other / value - 1).min() for value in one) < 1e-9
+
+
+def test_mass_and_inertia() -> None:
+    heavy = vibration(10.0, mass=2.0).near(2, 10.0).values
+    assert abs(heavy - 26.7885149853 / 2).min() < 1e-9
+    twist = (np.pi / 2) ** 2 / 1e-3  # clamped and free, with B3 = 1
+    assert abs(vibration(10.0, rotary_inertia=(0.0, 0.0, 1e-3)).near(2, 2400.0).values - twist).min() < 1e-9 * twist
+
+
+def test_motions_have_names() -> None:
+    """Bending about d1 is the weak plane, about d2 the strong one, and torsion has a closed form."""
+    found = vibration(10.0, rotary_inertia=(1e-3, 1e-3, 2e-3)).near(5, 1.0)
+    assert {"bending about d1", "bending about d2", "torsion"} == set(found.kinds)
+    for mu, kind in zip(found.values, found.kinds, strict=True):
+        EI = {"bending about d1": 1, "bending about d2": 10}.get(kind)
+        torsion = (np.pi / 2 * np.arange(1, 10, 2)) ** 2 / 2e-3
+        expected = torsion if EI is None else column(mu, 10.0, EI, 1e-3)
+        assert np.min(abs(mu - expected)) < 1e-8 * abs(mu)
+
+
+@pytest.mark.parametrize(("elements", "degree"), [(2, 2), (2, 3), (8, 1), (4, 6)])
+@pytest.mark.parametrize("P", [1.8, 30.0])
+def test_no_spurious_eigenvalue_on_crude_meshes(elements: int, degree: int, P: float) -> None:
+    """Infinite eigenvalues come in Jordan blocks, which round-off brings near: none is among those returned."""
+    values = vibration(P, elements, degree).near(40, -1e-3).values
+    assert len(values) <= 2 * elements * degree
+    assert values.real.min() > -1e3
+    assert abs(values).max() < 1e10
+    if P < 20:  # beyond, the crude ones have not fluttered yet
+        for mu in values[:2]:
+            exact = [column(mu, P), column(mu, P, EI=10)]
+            assert np.nanmin([abs(mu - e) for e in exact]) < (1e-6 if elements * degree > 8 else 0.1) * abs(mu)
+
+
+def test_dense_reductions_find_what_slepc_finds() -> None:
+    dense, krylov = (vibration(15.0, elements).near(4, 1.0) for elements in (2, 8))
+    assert dense.values[:3] == pytest.approx(krylov.values[:3], rel=2e-4)
+    assert dense.kinds[:3] == krylov.kinds[:3]
+
+
+@pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts a process of its own")
+def test_complex_petsc(tmp_path: Path) -> None:
+    """With the complex build, where it is installed beside the real one, the demo gives the same numbers."""
+    builds = [sorted(Path("/usr/lib").glob(f"{x}dir/{x}*/*-complex")) for x in ("petsc", "slepc")]
+    if not all(builds) or not _complex_works(builds):
+        pytest.skip("no complex build of dolfinx, petsc4py and slepc4py")
+    environment = os.environ | {"PETSC_DIR": str(builds[0][-1]), "SLEPC_DIR": str(builds[1][-1])}
+    command = [sys.executable, str(DEMO), "--no-figures", "--output", str(tmp_path)]
+    subprocess.run(command, env=environment, check=True, timeout=300, capture_output=True)
+    branch = json.loads((tmp_path / "diagram.json").read_text())["branches"][0]
+    (flutter,) = [s for s in branch["special"] if s["kind"] == "flutter"]
+    assert flutter["load"] == pytest.approx(20.0509536189738, abs=1e-9)
+    (p,) = [p for p in swept((0.0, 25.0)).points if p.load == 25.0]
+    np.testing.assert_allclose(branch["columns"]["omega2"][-1], p.omega2, rtol=1e-9, atol=1e-6)
+    hemitropic = [sys.executable, str(DEMO.with_name("hemitropic.py")), "--output", str(tmp_path)]
+    refused = subprocess.run(hemitropic, env=environment, timeout=300, capture_output=True, text=True)
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("error: This PETSc was built for complex numbers")
+
+
+def _complex_works(builds: list[list[Path]]) -> bool:
+    environment = os.environ | {"PETSC_DIR": str(builds[0][-1]), "SLEPC_DIR": str(builds[1][-1])}
+    check = "from petsc4py import PETSc; import dolfinx, slepc4py.SLEPc; assert PETSc.ScalarType(1j)"
+    return subprocess.run([sys.executable, "-c", check], env=environment, capture_output=True).returncode == 0
+
+
+def test_asymmetry_has_low_rank() -> None:
+    assert [vibration(P).asymmetry()[0] for P in (0.0, 10.0, 40.0)] == [0, 4, 4]
+
+
+def test_reduced_formulation_is_refused(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setattr(sys, "argv", [str(DEMO), "--formulation", "reduced", "--output", str(folder)])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(DEMO), run_name="__main__")
+    out, err = capfd.readouterr()
+    assert (ended.value.code, out) == (2, "")
+    if MPI.COMM_WORLD.rank == 0:
+        assert err.startswith("error: The reduced formulation") and err.find("\n") == len(err) - 1

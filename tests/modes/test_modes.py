@@ -1,0 +1,305 @@
+"""Modes against closed forms, finite differences of the shape and of the energy; files, pictures, the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import classics
+import h5py
+import numpy as np
+import pytest
+from closed_forms import column as beck_value
+from hemitropic_cases import run_demo
+from mpi4py import MPI
+from numpy.polynomial import legendre
+from petsc4py import PETSc
+from scipy.spatial.transform import Rotation
+from small_states import buckled, plain, scene
+from small_states import solver as solver_of
+
+from rodfem.continuation.solvers import StaticSolver
+from rodfem.diagram.solver import Solver
+from rodfem.errors import InputError
+from rodfem.fem.fields import Discretization
+from rodfem.modes.finder import ModeFinder
+from rodfem.modes.modes import SYMMETRY, Modes, load_modes, save_modes
+from rodfem.modes.perturbation import Motions
+from rodfem.output.plot_modes import FRAMES, GROWS, amplitude, draw_modes, main
+from rodfem.problem.scene import Scene
+
+pytestmark = pytest.mark.short
+
+FINE = Discretization("reduced", 6, 6)
+
+
+def state(given: Scene, discretization: Discretization, load: float, steps: int = 1) -> tuple[StaticSolver, PETSc.Vec]:
+    """Equilibrium that Newton's method finds from the scene's start, in ``steps`` of the load."""
+    solver = Solver(given, discretization).equilibria
+    x, outcome = solver.first(load / steps)
+    for part in np.linspace(0, load, steps + 1)[2:]:
+        x, outcome = solver.at_load(x, part)
+    assert outcome.converged
+    return solver, x
+
+
+def modes_of(solver: StaticSolver, x: PETSc.Vec, number: int, method: str = "auto", error_bars: bool = False) -> Modes:
+    return ModeFinder(solver, error_bars)(x, number, method)[1]
+
+
+# --- closed forms ------------------------------------------------------------------------------------------------
+
+
+def test_euler_column() -> None:
+    """Clamped-free, EI = 1 and 2: rotation sqrt(2) sin w s, displacement its integral, mu = EI w^2 - P."""
+    P, given = 10.0, classics.euler("clamped-free")
+    modes = modes_of(*state(given, FINE, P), 3, error_bars=True)
+    w = np.pi / 2 * np.array([1, 1, 3])
+    EI = [1.0, 2.0, 1.0]
+    torsion = np.pi**2 / 4
+    expected = sorted([(e * x**2 - P, a, x) for e, x, a in zip(EI, w, (0, 1, 0), strict=True)] + [(torsion, 2, w[0])])
+    assert modes.motion == ("bending about d1", "bending about d2", "torsion")
+    for i, (mu, axis, wave) in enumerate(expected[:3]):
+        assert modes.value[i] == pytest.approx(mu, rel=1e-9)
+        assert abs(modes.value[i] - mu) < 2 * modes.error[i] < 1e-6
+        rotation = np.zeros((len(modes.s), 3))
+        rotation[:, axis] = 2**0.5 * np.sin(wave * modes.s)
+        along = {0: (1, -1.0), 1: (0, 1.0), 2: (0, 0.0)}[axis]  # dr' = w x e3
+        moved = np.zeros_like(rotation)
+        moved[:, along[0]] = along[1] * 2**0.5 * (1 - np.cos(wave * modes.s)) / wave
+        sign = np.sign(modes.rotation[i, :, axis].sum())
+        np.testing.assert_allclose(sign * modes.rotation[i], rotation, atol=1e-6)
+        np.testing.assert_allclose(sign * modes.displacement[i], moved, atol=1e-6)
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_straight_cord(formulation: str) -> None:
+    """Its fourth mode stays in the plane of the coil: rotation sqrt(2) sin 2 pi s, mu = (2 pi)^2 + lam."""
+    modes = modes_of(*state(scene("cord"), Discretization(formulation, 6, 6), 20.0), 4)
+    assert modes.value[3] == pytest.approx(4 * np.pi**2 + 20, rel=1e-8)
+    wave = 2 * np.pi * modes.s
+    sign = np.sign(modes.displacement[3, :, 0].sum())
+    np.testing.assert_allclose(sign * modes.rotation[3, :, 1], 2**0.5 * np.sin(wave), atol=2e-5)
+    np.testing.assert_allclose(sign * modes.displacement[3, :, 0], 2**0.5 * (1 - np.cos(wave)) / (2 * np.pi), atol=2e-5)
+    assert abs(modes.displacement[:, [0, -1], :2]).max() < 1e-12  # the end slides along e3
+
+
+def shape(mu: complex, P: float, s: np.ndarray, adjoint: bool) -> np.ndarray:
+    """Mode of Beck's column (EI = mass = 1), or of its adjoint: w'' + P w = w''' + P w' = 0 at s = 1 (Reut's)."""
+    root = np.sqrt(P * P / 4 + mu + 0j)
+    a, b = np.sqrt(root - P / 2), np.sqrt(root + P / 2)
+
+    def basis(x: np.ndarray, k: int) -> np.ndarray:
+        shift = [np.cosh, np.sinh]
+        bent = [np.cos(b * x), -np.sin(b * x), -np.cos(b * x), np.sin(b * x)][k]
+        other = [np.sin(b * x), np.cos(b * x), -np.sin(b * x), -np.cos(b * x)][k]
+        first = a**k * shift[k % 2](a * x) - b**k * bent
+        return np.array([first, a**k * shift[1 - k % 2](a * x) / a - b**k * other / b])
+
+    one = np.ones(1)
+    row = basis(one, 2)[:, 0] + (P * basis(one, 0)[:, 0] if adjoint else 0.0)
+    return np.tensordot([row[1], -row[0]], basis(s, 0), 1)
+
+
+@pytest.mark.parametrize(("P", "near"), [(10.0, 26.8), (10.0, 345.5), (30.0, 50 + 150j)])
+def test_beck_column(P: float, near: complex) -> None:
+    """Right and left modes, before flutter and after: those of the column and of its adjoint."""
+    solver, x = state(classics.beck(span=(1.0, 35.0)), Discretization("pointwise", 6, 6), P)
+    modes = modes_of(solver, x, 3)
+    mu = beck_value(near, P)
+    (i,) = [i for i, v in enumerate(modes.value) if abs(v - mu) < 1e-6 * abs(mu)]
+    assert modes.value[i] == pytest.approx(mu, rel=1e-9)
+    for found, adjoint in ((modes.displacement[i], False), (modes.left_displacement[i], True)):
+        exact = shape(mu, P, modes.s, adjoint)
+        scaled = exact * (found[-1, 1] / exact[-1])
+        np.testing.assert_allclose(found[:, 1], scaled, atol=1e-6 * abs(scaled).max())
+        assert abs(found[:, [0, 2]]).max() < 1e-8 * abs(scaled).max()
+    overlap = np.array([modes.amplitude(u, w) for u, w in zip(modes.displacement, modes.rotation, strict=True)])
+    np.testing.assert_allclose(overlap, np.eye(3), atol=1e-8)
+
+
+# --- finite differences ------------------------------------------------------------------------------------------
+
+
+CASES = {
+    "cord": lambda f: (solver_of("cord", f, 6, 3), buckled("cord", f, 6, 3, 40.0)[1]),
+    "hemitropic": lambda f: (solver_of("hemitropic", f, 6, 3), buckled("hemitropic", f, 6, 3, 0.2)[1]),
+    "ruler": lambda f: (solver_of("ruler", f, 6, 3), buckled("ruler", f, 6, 3, 6.0)[1]),
+    "semi-tangential": lambda f: state(classics.semi_tangential(), Discretization(f, 4, 3), 2.0),
+    "tip on plane": lambda f: state(classics.tip_on_plane(), Discretization(f, 4, 3), 2.0),
+    "linear elements": lambda f: state(classics.lateral(), Discretization(f, 12, 1), 5.0, 5),
+}
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+@pytest.mark.parametrize("name", CASES)
+def test_motion_is_the_derivative_of_the_shape(name: str, formulation: str) -> None:
+    solver, x = CASES[name](formulation)
+    motions = Motions(solver.system)
+    d = solver.system.new_vector()
+    begin, end = d.getOwnershipRange()
+    d.array[:] = np.sin(1.3 * np.arange(begin, end))
+    solver.system.set_load(d, 0.0)
+    found, eps = motions.at(x, d), 1e-5
+    ends = []
+    for sign in (1, -1):
+        y = x.copy()
+        y.axpy(sign * eps, d)
+        ends.append(motions.sample(y))
+    np.testing.assert_allclose(found.r, (ends[0]["r"] - ends[1]["r"]) / (2 * eps), atol=1e-6)
+    turn = [Rotation.from_quat(np.roll(e["q"], -1, axis=1)) for e in ends]
+    np.testing.assert_allclose(found.w, (turn[0] * turn[1].inv()).as_rotvec() / (2 * eps), atol=1e-6)
+
+
+def test_energy_along_an_unstable_mode() -> None:
+    """A cantilever past lateral buckling: turned along the mode it has the energy mu a^2/2 more, by plain numpy."""
+    P, d = 5.5, FINE
+    modes = modes_of(*state(classics.lateral(), d, P, 6), 2)
+    assert modes.value[0] < 0 < modes.value[1]
+    x, weights = legendre.leggauss(10)
+
+    def energy(q: np.ndarray) -> float:
+        total, k = 0.0, d.degree
+        for e in range(d.elements):
+            part = slice(e * k, (e + 1) * k + 1)
+            half = (modes.s[part][-1] - modes.s[part][0]) / 2
+            c = legendre.legfit((modes.s[part] - modes.s[part][0]) / half - 1, q[part], k)
+            p, slope = legendre.legval(x, c), legendre.legval(x, legendre.legder(c)) / half
+            size = (p * p).sum(axis=0)
+            curvature = 2 * (p[0] * slope[1:] - slope[0] * p[1:] - np.cross(p[1:].T, slope[1:].T).T) / size
+            d3 = 2 * (p[1] * p[3] + p[0] * p[2]) / size  # along the load, e1
+            total += half * weights @ (np.array([1, 10, 1]) @ curvature**2 / 2 - P * d3)
+        return total
+
+    q = Rotation.from_quat(np.roll(modes.q, -1, axis=1))
+    for i in range(2):
+        at = [
+            energy(np.roll((Rotation.from_rotvec(a * modes.rotation[i]) * q).as_quat(), 1, axis=1))
+            for a in (-1e-3, 0.0, 1e-3)
+        ]
+        assert (at[0] - 2 * at[1] + at[2]) / 1e-6 == pytest.approx(modes.value[i], rel=1e-4)
+        assert abs(at[2] - at[0]) < 1e-8  # an equilibrium
+
+
+# --- methods, symmetries, planes ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["shift-invert", "cayley", "slicing", "reduction", "dense"])
+def test_modes_do_not_depend_on_the_method(method: str) -> None:
+    """Straight, with eigenvalues in pairs, whose modes are turned to a fixed basis; and buckled, with a symmetry."""
+    for system, x in (plain("hemitropic", "reduced", 6, 3, 0.2), buckled("hemitropic", "reduced", 6, 3, 0.2)):
+        solver = solver_of("hemitropic", "reduced", 6, 3)
+        assert solver.system is system
+        expected, found = modes_of(solver, x, 4), modes_of(solver, x, 4, method)
+        assert found.motion == expected.motion
+        np.testing.assert_allclose(found.displacement, expected.displacement, atol=1e-6)
+        overlap = [found.amplitude(u, w) for u, w in zip(found.displacement, found.rotation, strict=True)]
+        np.testing.assert_allclose(overlap, np.eye(len(found.value)), atol=1e-9)
+    assert found.motion[-1] == SYMMETRY
+    turned = found.displacement[-1] / np.cross([0, 0, 1], found.r)[len(found.s) // 2, :2].max()
+    along = np.cross([0, 0, 1], found.r)
+    factor = np.sum(turned * along) / np.sum(along * along)
+    np.testing.assert_allclose(turned, factor * along, atol=1e-9)  # the whole rod turns about its axis
+
+
+def test_ring() -> None:
+    """A circle has four symmetry modes (rotations, turning of its sections) and no other eigenvalue near zero."""
+    solver, x = state(classics.ring(), Discretization("reduced", 8, 6), 0.5)
+    verdict, modes = ModeFinder(solver)(x, 3)
+    assert (verdict.negative, verdict.zero, modes.motion.count(SYMMETRY)) == (0, 4, 4)
+    assert modes.value[:3].min() > 0.1
+    assert modes.error[:3].max() < 1e-6
+    np.testing.assert_allclose(modes.displacement[:, 0], modes.displacement[:, -1], atol=1e-10)
+    overlap = [modes.amplitude(u, w) for u, w in zip(modes.displacement, modes.rotation, strict=True)]
+    np.testing.assert_allclose(overlap, np.eye(7), atol=1e-9)
+
+
+def test_planar_rod_stays_in_its_plane() -> None:
+    modes = modes_of(*state(classics.planar_column(), FINE, 6.0), 2)
+    assert modes.value[0] == pytest.approx(np.pi**2 / 2 - 6.0, rel=1e-8)
+    assert abs(modes.displacement[..., 1]).max() == abs(modes.rotation[..., [0, 2]]).max() == 0.0
+
+
+def test_counting_finds_no_modes() -> None:
+    solver, x = state(classics.planar_column(), FINE, 6.0)
+    with pytest.raises(InputError, match="another method than 'count'"):
+        modes_of(solver, x, 2, "count")
+
+
+# --- files and pictures ------------------------------------------------------------------------------------------
+
+
+def test_file_and_pictures(folder: Path, capfd: pytest.CaptureFixture) -> None:
+    modes = modes_of(*state(classics.beck(span=(1.0, 35.0)), Discretization("pointwise", 6, 6), 30.0), 2)
+    if MPI.COMM_WORLD.rank:
+        return
+    path = folder / "modes.h5"
+    save_modes(modes, path, "branch 1", 7, {"title": "Beck's column"}, first=True)
+    again = load_modes(path, "branch 1", 7)
+    np.testing.assert_array_equal(again.displacement, modes.displacement)
+    assert again.motion == modes.motion
+    with pytest.raises(InputError, match="has no modes of row 3 of a branch 'branch 1': it has branch 1, row 7"):
+        load_modes(path, "branch 1", 3)
+    with pytest.raises(InputError, match=r"run a scene with Plan.modes=.* and Plan.at="):
+        load_modes(folder / "nothing.h5", "branch 1", 3)
+    with pytest.raises(InputError, match="no mode 3 of 'branch 1', row 7: choose 1 to 2"):
+        draw_modes(path, "branch 1", 7, folder / "modes.png", [3])
+    arguments = [str(path), "--branch", "branch 1", "--row", "7", "--mode", "1", "--output"]
+    assert main([*arguments, str(folder / "a" / "modes.gif")]) == main([*arguments, str(folder / "modes.png")]) == 0
+    assert (folder / "a" / "modes.gif").read_bytes().count(b"\x21\xf9\x04") == 60  # pictures
+    assert (folder / "modes.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    assert main([*arguments[:-2], "9"]) == 2
+    assert "choose 1 to 2" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(("root", "grows"), [(2j, False), (3.0, True), (0.5 + 10j, True), (3.0 + 0.1j, True)])
+def test_animation_is_a_loop_without_a_jump(root: complex, grows: bool) -> None:
+    """From picture to picture, and from the last to the first, it does not go far."""
+    path = np.array([amplitude(complex(root), grows, frame / FRAMES) for frame in range(FRAMES + 1)])
+    assert path[-1] == pytest.approx(path[0], abs=1e-12)
+    assert abs(path).max() == pytest.approx(1.0)
+    assert abs(np.diff(path)).max() < 0.3
+    if grows:
+        start = path[: int(GROWS * FRAMES) + 1]
+        np.testing.assert_allclose(start[1:] / start[:-1], start[1] / start[0])  # exponential
+
+
+def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:
+    common = ("--range", "0", "0.25", "--at", "0.2", "--no-figures", "--output", str(folder))
+    run_demo(*common, "--modes", "2", "--method", "cayley")
+    out = capfd.readouterr().out
+    if MPI.COMM_WORLD.rank == 0:
+        assert "straight, lam = 0.2: unstable in 2 directions" in out
+        assert "branch 1, lam = 0.2: stable, 1 zero" in out
+        assert "cayley (as asked), counts prove that none is missing" in out
+        with h5py.File(folder / "modes.h5") as file, h5py.File(folder / "states.h5") as states:
+            assert list(file["branches"]) == ["branch 1", "straight"]
+            ((row, group),) = file["branches/branch 1"].items()
+            np.testing.assert_allclose(group["r"][:], states["branches/branch 1/r"][int(row)], atol=1e-14)
+            assert group["motion"].asstr()[-1] == SYMMETRY
+            assert {name: end.attrs["kind"] for name, end in group["supports"].items()} == dict.fromkeys(
+                ("left end", "right end"), "clamp"
+            )
+            assert group["displacement"].shape == group["weight_rotation"].shape == (3, len(group["s"]), 3)
+    run_demo(*common, "--method", "count")
+    out = capfd.readouterr().out
+    if MPI.COMM_WORLD.rank == 0:
+        assert "count (as asked); 2 factorisations" in out
+    for words, sentence in (
+        (("--at", "0.2", "--method", "magic"), "Unknown method 'magic'"),
+        (("--modes", "2"), "needs loads to judge at"),
+        (("--at", "0.2", "--modes", "2", "--method", "count"), "Counting alone finds no modes"),
+    ):
+        with pytest.raises(SystemExit):
+            run_demo("--range", "0", "0.25", "--output", str(folder), *words)
+        err = capfd.readouterr().err
+        assert MPI.COMM_WORLD.rank or sentence in err
+
+
+def test_null_vectors_in_files_are_motions(folder: Path) -> None:
+    """At the first buckling load the straight rod's null vector moves it sideways, and holds its ends."""
+    run_demo("--range", "0", "0.2", "--no-figures", "--output", str(folder))
+    if MPI.COMM_WORLD.rank == 0:
+        with h5py.File(folder / "states.h5") as file:
+            group = file["branches/straight/special/0/null_vector_0"]
+            assert abs(group["r"][[0, -1]]).max() < 1e-10 < 1e-2 < abs(group["r"][:, :2]).max()
+            assert abs(group["q"][[0, -1]]).max() == 0.0

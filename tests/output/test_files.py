@@ -1,0 +1,204 @@
+"""What a run leaves: diagram.json, states.h5 and a picture, from the command line of the demo."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import reference_values
+from hemitropic_cases import DEFAULT, run_demo
+from mpi4py import MPI
+from numpy.polynomial import legendre
+from scipy.spatial.transform import Rotation
+
+from rodfem.app.terminal import Report
+from rodfem.output.plot_diagram import draw_diagram
+
+pytestmark = pytest.mark.short
+
+ELEMENTS, DEGREE, HALF = 8, 6, DEFAULT[3]
+ARGUMENTS = (
+    "--elements",
+    str(ELEMENTS),
+    "--degree",
+    str(DEGREE),
+    "--range",
+    "0",
+    "0.4",
+    "--at",
+    "0.2",
+    "0.35",
+    "--no-figures",
+)
+SPECTRUM = {"reduced": ("--spectrum", "3"), "pointwise": ()}
+FORMULATIONS = pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+
+COLUMNS = {"load", "ordinate", "energy", "negative", "zero"}
+SPECIAL = {
+    "kind": str,
+    "load": float,
+    "ordinate": float,
+    "row": int,
+    "negative_before": int,
+    "negative_after": int,
+    "error_estimate": float,
+    "resolved": bool,
+    "located_to": float,
+}
+TIMING = ("assembly_s", "solve_s", "stability_s", "total_s")
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Folders of one run in each formulation."""
+    parent = Path(MPI.COMM_WORLD.bcast(str(tmp_path_factory.mktemp("runs"))))
+    out = {name: parent / name for name in ("reduced", "pointwise")}
+    for name, folder in out.items():
+        run_demo(*ARGUMENTS, "--formulation", name, "--output", str(folder), *SPECTRUM[name])
+    return out
+
+
+def diagram(folder: Path) -> dict[str, Any]:
+    return json.loads((folder / "diagram.json").read_text(), parse_constant=pytest.fail)  # no NaN, no Infinity
+
+
+@FORMULATIONS
+def test_diagram_says_what_was_computed(results: dict[str, Path], formulation: str) -> None:
+    data = diagram(results[formulation])
+    assert (data["scene"], data["parameter"], data["range"]) == ("hemitropic", "lam", [0.0, 0.4])
+    assert isinstance(data["ordinate"], str)
+    assert {"A": -3.0, "B": 1.0, "C": 1.0}.items() <= data["constants"].items()
+    free_nodes = ELEMENTS * DEGREE - 1
+    strains = ELEMENTS * DEGREE
+    fields = {"reduced": 5 * free_nodes + strains + 3, "pointwise": 8 * free_nodes + 4 * strains}[formulation]
+    assert data["discretization"] == {
+        "formulation": formulation,
+        "elements": ELEMENTS,
+        "degree": DEGREE,
+        "unknowns": fields + 2,  # with the load and the drift
+    }
+    timing = data["timing"]
+    assert all(timing[name] > 0 for name in TIMING)
+    assert sum(timing[name] for name in TIMING[:3]) < timing["total_s"]
+    assert timing["points"] == sum(len(branch["columns"]["load"]) for branch in data["branches"])
+    assert timing["ranks"] == MPI.COMM_WORLD.size
+
+
+@FORMULATIONS
+def test_columns_and_special_points_belong_together(results: dict[str, Path], formulation: str) -> None:
+    branches = diagram(results[formulation])["branches"]
+    names = [branch["name"] for branch in branches]
+    assert len(set(names)) == len(branches) == 3
+    for branch in branches:
+        columns = branch["columns"]
+        assert set(columns) >= COLUMNS
+        assert len({len(column) for column in columns.values()}) == 1
+        if SPECTRUM[formulation]:
+            assert all(len(values) == 3 for values in columns["spectrum"])
+        assert isinstance(branch["ended"], str)
+        assert branch["parent"] is None or branch["parent"][0] in names
+        for s in branch["special"]:
+            assert {name: type(s[name]) for name in SPECIAL} == SPECIAL
+            assert all(columns[name][s["row"]] == s[name] for name in ("load", "ordinate", "energy", "zero"))
+        assert branch["special"][-1]["row"] == len(columns["load"]) - 1
+        if branch["parent"]:
+            parent, number = branch["parent"]
+            origin = branches[names.index(parent)]["special"][number]
+            assert (origin["kind"], origin["load"]) == ("branch point", columns["load"][0])
+    kinds = [[s["kind"] for s in branch["special"]] for branch in branches]
+    assert kinds[0] == ["branch point", "user", "branch point", "user", "end"]
+    assert kinds[1:] == [["user", "user", "end"], ["fold", "user", "end"]]
+
+
+@FORMULATIONS
+def test_states_are_the_rows_of_the_columns(results: dict[str, Path], formulation: str) -> None:
+    with h5py.File(results[formulation] / "states.h5", "r") as file:
+        branches = diagram(results[formulation])["branches"]
+        assert set(file["branches"]) == {branch["name"] for branch in branches}
+        np.testing.assert_allclose(file["section/stiffness"], [np.eye(2)], rtol=0, atol=1e-8)
+        for branch in branches:
+            group, columns = file["branches"][branch["name"]], branch["columns"]
+            middle = np.flatnonzero(group["s"][0] == 0.0)[0]
+            np.testing.assert_array_equal(group["load"], columns["load"])
+            assert [end.attrs["kind"] for end in group["supports"].values()] == ["clamp", "clamp"]
+            assert all(len(end["force"]) == len(columns["load"]) for end in group["supports"].values())
+            ordinate = np.hypot(*group["r"][:, middle, :2].T)
+            np.testing.assert_allclose(ordinate, columns["ordinate"], rtol=0, atol=1e-12)
+            least = group["v"][:].reshape(len(ordinate), -1).min(axis=1)
+            assert np.all(np.array(columns["stretch"]) <= least + 1e-12)
+            vectors = [s["multiplicity"] for s in branch["special"] if s["multiplicity"]]
+            assert vectors == [len(group["special"][i]) for i in group.get("special", ())]
+
+
+@FORMULATIONS
+def test_shapes_are_those_of_a_clamped_unshearable_rod(results: dict[str, Path], formulation: str) -> None:
+    """Ends where the clamps are, unit quaternions at the nodes, and ``r' = v3 d3`` by differentiating polynomials."""
+    with h5py.File(results[formulation] / "states.h5", "r") as file:
+        s = file["branches/straight/s"][0]
+        np.testing.assert_allclose(s[::DEGREE], np.linspace(-HALF, HALF, ELEMENTS + 1), atol=1e-14)
+        lobatto = [-1.0, *np.sort(legendre.legroots(legendre.legder(np.eye(DEGREE)[-1]))), 1.0]  # nodes of v
+        for group in file["branches"].values():
+            load, r, q, v = (group[name][:] for name in ("load", "r", "q", "v"))
+            for end, sign in ((0, -1), (-1, 1)):
+                expected = np.outer(sign * HALF * (1 - load), [0, 0, 1])
+                np.testing.assert_allclose(r[:, end], expected, rtol=0, atol=1e-9)
+                np.testing.assert_array_equal(q[:, end], np.tile([1.0, 0, 0, 0], (len(q), 1)))
+            np.testing.assert_allclose(np.linalg.norm(q, axis=-1), 1, rtol=0, atol=1e-9)
+            for row in (0, len(load) // 2):
+                for e in range(ELEMENTS):
+                    nodes = slice(e * DEGREE, (e + 1) * DEGREE + 1)
+                    half = (s[nodes][-1] - s[nodes][0]) / 2
+                    x = (s[nodes] - s[nodes][0]) / half - 1
+                    slope = legendre.legval(lobatto, legendre.legder(legendre.legfit(x, r[row, nodes], DEGREE))) / half
+                    turn = legendre.legval(lobatto, legendre.legfit(x, q[row, nodes], DEGREE)).T
+                    d3 = Rotation.from_quat(turn[:, [1, 2, 3, 0]]).as_matrix()[:, :, 2]
+                    np.testing.assert_allclose(slope.T, v[row, e] * d3, rtol=0, atol=2e-3)
+
+
+def test_both_formulations_save_the_same_shapes(results: dict[str, Path]) -> None:
+    """At the loads asked for, up to a rotation about the axis."""
+    shapes = []
+    for folder in results.values():
+        (first,) = [b for b in diagram(folder)["branches"] if b["name"] == "branch 1"]
+        rows = [s["row"] for s in first["special"] if s["kind"] == "user"]
+        with h5py.File(folder / "states.h5", "r") as file:
+            r = file["branches/branch 1/r"][:][rows]
+        shapes.append(np.stack([np.hypot(r[..., 0], r[..., 1]), r[..., 2]]))
+    np.testing.assert_allclose(shapes[0], shapes[1], rtol=0, atol=1e-6)
+    assert shapes[0][0][0].max() == pytest.approx(reference_values.FIRST[0.2][0], abs=1e-8)
+
+
+def test_interrupted_run_keeps_finished_branches(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = []
+    announce = Report.branch
+
+    def stop(self: Report, branch: Any) -> None:
+        begun.append(branch.name)
+        if len(begun) == 3:
+            raise KeyboardInterrupt
+        announce(self, branch)
+
+    monkeypatch.setattr(Report, "branch", stop)
+    with pytest.raises((KeyboardInterrupt, SystemExit)):
+        run_demo(*ARGUMENTS, "--output", str(folder))
+    MPI.COMM_WORLD.barrier()
+    branches = diagram(folder)["branches"]
+    assert [branch["name"] for branch in branches] == begun[:2]
+    assert [branch["ended"] for branch in branches] == ["end of range", "end of range"]
+    with h5py.File(folder / "states.h5", "r") as file:
+        assert [len(file["branches"][b["name"]]["load"]) for b in branches] == [
+            len(b["columns"]["load"]) for b in branches
+        ]
+    assert not list(folder.glob("*.part"))
+
+
+def test_picture(results: dict[str, Path]) -> None:
+    if MPI.COMM_WORLD.rank == 0:
+        path = draw_diagram(diagram(results["reduced"]), results["reduced"] / "pictures" / "diagram.png")
+        head = path.read_bytes()[:24]
+        assert head[:8] == b"\x89PNG\r\n\x1a\n"
+        assert (int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")) == (1500, 1000)

@@ -1,0 +1,411 @@
+"""Formats of files: versions are checked, and docs/files.md has the entries that runs write, no more and no fewer."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+from problem.test_docs import page, scenes
+
+import rodfem
+from forms.energy import bending
+from rodfem.app.many import many
+from rodfem.app.run import run
+from rodfem.continuation.branch import Unexplained
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import Solver
+from rodfem.errors import InputError
+from rodfem.fem.fields import Discretization
+from rodfem.file_format import DIAGRAM, FORMATS, LOCUS, MODES, PROGRAM, RESULT, STATES
+from rodfem.output import plot_diagram as plot
+from rodfem.output import plot_modes, render
+from rodfem.output.files import load_state
+from rodfem.output.plot_locus import draw_locus
+from rodfem.problem.scene import Parameter, Scene
+
+HOME = Path(__file__).parents[2]
+PAGE = (HOME / "docs" / "files.md").read_text()
+MESH, POINTWISE = Discretization("auto", 4, 6), Discretization("pointwise", 4, 6)
+pytestmark = pytest.mark.alone
+
+
+def column() -> Scene:
+    """Euler's, whose buckling load is least at e = 0."""
+    return replace(
+        scenes()["euler"],
+        energy=lambda v, k, c: bending(k, (1.0 + c.e**2, 2.0, c.C)),
+        parameters={"P": Parameter(0.0), "e": Parameter(0.1), "C": Parameter(1.0)},
+    )
+
+
+def held() -> Scene:
+    """A hinge on the left, a clamp that turns on the right."""
+    known = scenes()
+    return replace(known["twisted"], ends=(known["hinge"].ends[0], known["twisted"].ends[1]), name="held")
+
+
+def sprung() -> Scene:
+    """Springs at both ends, and no twist."""
+    known = scenes()
+    spring = rodfem.elastic(lambda c: (10.0, 10.0, 10.0), lambda c: 5.0, force=page()["push"])
+    return replace(known["untwistable"], ends=(spring, spring), name="sprung")
+
+
+def guided() -> Scene:
+    """A guide at either end, the left one with a spring that keeps the rod from turning."""
+    left = rodfem.sliding_hinge((0.0, 1.0, 0.0), (0.6, 0.0, -0.8))
+    spring = replace(left, energy=lambda x, c: page()["loads"].rotational_spring(x.q, 5.0))
+    return replace(scenes()["euler"], ends=(spring, page()["guided"]), name="guided")
+
+
+QUICK = {"error_bars": False, "depth": 0}
+RUNS: dict[str, tuple[Callable[[], Scene], Discretization, Plan]] = {
+    "pinned": (lambda: scenes()["euler"], MESH, Plan((0.0, 12.0), at=(11.0,), depth=1, spectrum=2, modes=2)),
+    "accurate": (lambda: scenes()["euler"], MESH, Plan((0.0, 1.0), accuracy=1e-4)),
+    "locus": (column, MESH, Plan((0.0, 12.0), locus=("e", -0.2, 0.2), **QUICK)),
+    "planar": (lambda: scenes()["in_plane"], MESH, Plan((0.0, 1.0), **QUICK)),
+    "follower": (lambda: scenes()["leipholz"], MESH, Plan((0.0, 42.0), at=(5.0,), modes=1, **QUICK)),
+    "ring": (lambda: scenes()["ring"], POINTWISE, Plan((0.0, 0.2), **QUICK)),
+    "foundation": (lambda: scenes()["winkler"], MESH, Plan((0.0, 1.0), at=(0.5,), modes=1, **QUICK)),
+    "stretched": (lambda: scenes()["pressed"], MESH, Plan((1.0, 0.99), at=(0.995,), modes=1, **QUICK)),
+    "held": (held, MESH, Plan((0.0, 0.2), **QUICK)),
+    "guided": (guided, MESH, Plan((0.0, 0.2), **QUICK)),
+    "sprung": (sprung, MESH, Plan((0.0, 0.2), **QUICK)),
+}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with a folder of each run."""
+    folder = Path(MPI.COMM_WORLD.bcast(str(tmp_path_factory.mktemp("files")))) / "results"
+    for name, (scene, mesh, plan) in RUNS.items():
+        diagram = run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
+        if name == "pinned":  # a run that leaves something unexplained, as no small one does
+            diagram[0].unexplained = [Unexplained(*diagram[0].points[:2], 0, 1)]
+            diagram.save(folder / "unexplained")
+    many([scenes()["euler"]], lambda scene: {"any": 1}, folder / "many")
+    return folder
+
+
+# --- the page and the files ------------------------------------------------------------------------------------------
+
+Entries = dict[str, list[str]]
+"""Types of all that has a name, with <...> in it for what the scene or the run names."""
+BELOW = {"states.h5": "branches/<branch>", "modes.h5": "branches/<branch>/<row>"}
+
+
+def rows(text: str) -> list[list[str]]:
+    """Name, type, unit, meaning and condition of all entries in tables."""
+    cells = [[cell.strip(" `") for cell in line.split("|")[1:-1]] for line in re.findall(r"^\| `.*$", text, re.M)]
+    return [row for row in cells if len(row) == 5]
+
+
+def described() -> dict[str, dict[str, tuple[str, str]]]:
+    """Type and condition of each entry of each file, as the page has them."""
+    out: dict[str, dict[str, tuple[str, str]]] = {name: {} for name in FILES}
+    for title, text in re.findall(r"^## ([^\n]*)\n(.*?)(?=^## |\Z)", PAGE, flags=re.MULTILINE | re.DOTALL):
+        files = [title.strip("`")] if title.startswith("`") else list(BELOW) if title.startswith("Supports") else []
+        for part in re.split(r"^### ", text, flags=re.MULTILINE):
+            heading = re.match(r"`(.*)`\n", part)
+            for name, kind, _, _, where in rows(part):
+                for file in files:
+                    above = heading[1] if heading else BELOW[file] if len(files) > 1 else ""
+                    path = f"{above}{'.' if file.endswith('json') else '/'}{name}".lstrip("./")
+                    assert path not in out[file], path
+                    out[file][path] = kind, where
+    return out
+
+
+def type_of(value: Any) -> str:
+    """Type of a value of a JSON file, as ``number (2, 3)``; a dimension in which its rows differ is k."""
+    kinds: set[str] = set()
+
+    def shape(x: Any) -> list[str]:
+        if not isinstance(x, list):
+            kinds.add({bool: "boolean", int: "integer", float: "number", str: "text", type(None): "null"}[type(x)])
+            return []
+        inner = [shape(y) for y in x]
+        alike = [len(set(sizes)) == 1 for sizes in zip(*inner, strict=False)]
+        return [str(len(x)), *(n if same else "k" for n, same in zip(inner[0] if inner else [], alike, strict=True))]
+
+    size = shape(value)
+    return ", ".join(sorted(kinds)) + (f" ({', '.join(size)})" if size else "")
+
+
+def of_json(path: Path) -> Iterator[tuple[str, str, set[str]]]:
+    """Path, type, and names below it of each entry."""
+    whole = json.loads(path.read_text())
+    chosen = whole.get("parameters", [])
+
+    def entries(data: dict[str, Any], above: str) -> Iterator[tuple[str, str, set[str]]]:
+        names: set[str] = set()
+        for name, value in data.items():
+            last = above.split(".")[-1]
+            own = {"constants": "<parameter>", "meaning": "<column>"}.get(last, name)
+            own = "<parameter>" if last == "columns" and name in chosen else own
+            names.add(own)
+            here = f"{above}.{own}".lstrip(".")
+            if here == "result":
+                yield here, "any", set()
+            elif isinstance(value, dict):
+                yield from entries(value, here)
+            elif isinstance(value, list) and value and isinstance(value[0], dict):
+                yield here, "objects", set()
+                for x in value:
+                    yield from entries(x, f"{here}[]")
+            else:
+                yield here, type_of(value), set()
+        yield above, "object", names
+
+    return entries(whole, "")
+
+
+def of_hdf5(path: Path) -> Iterator[tuple[str, str, set[str]]]:
+    """Path, type, and names below it of each entry."""
+    kinds = {"f": "number", "i": "integer", "b": "boolean", "c": "complex", "O": "text", "U": "text"}
+
+    def typed(value: np.ndarray) -> str:
+        size = ", ".join(map(str, value.shape))
+        return kinds[value.dtype.kind] + (f" ({size})" if size else "")
+
+    def entries(group: h5py.Group, above: str) -> Iterator[tuple[str, str, set[str]]]:
+        names = {f"@{name}" for name in group.attrs}
+        for name, value in group.attrs.items():
+            yield f"{above}/@{name}".lstrip("/"), typed(np.asarray(value)), set()
+        for name, value in group.items():
+            last = above.split("/")[-1]
+            own = {"branches": "<branch>", "supports": "<place>", "constraints": "<constraint>"}.get(last)
+            own = own or ("<row>" if last == "<branch>" and name.isdigit() else re.sub(r"\d+$", "<i>", name))
+            own = own.replace("vector_<i>", "vector_<j>")
+            names.add(own)
+            here = f"{above}/{own}".lstrip("/")
+            if isinstance(value, h5py.Group):
+                yield from entries(value, here)
+            else:
+                yield here, typed(value[()]), set()
+        yield above, "group", names
+
+    with h5py.File(path) as file:
+        yield from entries(file, "")
+
+
+FILES = {
+    "diagram.json": of_json,
+    "states.h5": of_hdf5,
+    "modes.h5": of_hdf5,
+    "locus-1.json": of_json,
+    "rod-00000.json": of_json,
+}
+
+
+def fits(found: str, told: str) -> bool:
+    """Whether a type that a file has is the one that the page tells."""
+    if told == "objects":
+        return found in (told, " (0)")
+    kinds, size = re.fullmatch(r"(.*?)(?: ?\((.*)\))?", found).groups()
+    allowed = set(re.findall(r"[a-z]+", re.sub(r"\(.*?\)", "", told))) - {"or"}
+    if not set(re.findall(r"[a-z]+", kinds)) <= allowed | ({"integer"} if "number" in allowed else set()):
+        return False
+    if kinds == "null" and not size:
+        return True
+    dims = size.split(", ") if size else []
+    return any(_alike(dims, one.split(", ") if one else []) for one in re.findall(r"\((.*?)\)", told) or [""])
+
+
+def _alike(dims: list[str], told: list[str]) -> bool:
+    if dims[:1] == ["0"]:
+        return bool(told)
+    return len(dims) == len(told) and all(a == b or not b.isdigit() for a, b in zip(dims, told, strict=True))
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_page_has_what_files_have(results: Path, file: str) -> None:
+    told, missing = described()[file], []
+    found: dict[str, set[str]] = defaultdict(set)
+    for path in sorted(results.glob(f"*/{file}")):
+        for name, kind, below in FILES[file](path):
+            found[name].add(kind)
+            start = f"{name}{'.' if file.endswith('json') else '/'}" if name else ""
+            if kind in ("object", "group"):
+                always = {x[len(start) :] for x, (_, where) in told.items() if x.startswith(start) and not where}
+                missing += [f"{path}: {start}{x}" for x in always - below if not re.search(r"[./<]|\[\]", x)]
+    names = {name for name in found if name and not name.endswith("[]")}
+    assert (names - set(told), set(told) - names) == (set(), set())
+    assert missing == []
+    assert [(name, k, told[name][0]) for name in names for k in found[name] if not fits(k, told[name][0])] == []
+
+
+def test_units_are_told() -> None:
+    units = {name: unit for name, kind, unit, *_ in rows(PAGE) if re.match("number|integer", kind)}
+    assert len(units) > 100
+    assert [name for name, unit in units.items() if not unit] == []
+
+
+def test_example_of_the_page(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(results.parent)
+    (block,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(block, names)
+    assert (names["r"].shape, names["q"].shape) == ((25, 3), (25, 4))
+    data = rodfem.load_json(results / "pinned" / "diagram.json")
+    (branch,) = [b for b in data["branches"] if b["name"] == "branch 1"]
+    assert np.hypot(*names["r"][12, :2]) == pytest.approx(branch["columns"]["ordinate"][names["row"]], abs=1e-12)
+    assert branch["columns"]["load"][names["row"]] == 11.0
+
+
+# --- versions --------------------------------------------------------------------------------------------------------
+
+
+def marked(path: Path, **mark: Any) -> Path:
+    """A file of a run with another mark, or none."""
+    if path.suffix == ".json":
+        data = json.loads(path.read_text())
+        given = data.pop("format")
+        path.write_text(json.dumps(({"format": given | mark} if mark else {}) | data))
+        return path
+    with h5py.File(path, "a") as file:
+        names = {"name": "format", "version": "format_version", "program": "program"}
+        for key, name in names.items():
+            if not mark:
+                del file.attrs[name]
+            elif key in mark:
+                file.attrs[name] = mark[key]
+    return path
+
+
+@pytest.fixture
+def copied(results: Path, folder: Path) -> Path:
+    """Copy of files of all formats."""
+    for name in ("pinned/diagram.json", "pinned/states.h5", "pinned/modes.h5", "locus/locus-1.json"):
+        (folder / Path(name).name).write_bytes((results / name).read_bytes())
+    (folder / "rod-00000.json").write_bytes((results / "many" / "rod-00000.json").read_bytes())
+    return folder
+
+
+def read(folder: Path) -> list[Callable[[], Any]]:
+    """All readers of a diagram, of states, of modes, of a locus and of a result of work."""
+    euler, at = scenes()["euler"], ("branch 1", 0)
+    with h5py.File(folder / "modes.h5") as file:
+        modes = "straight", int(next(iter(file["branches/straight"])))
+    locus = folder / "locus-1.json"
+    return [
+        lambda: rodfem.load_json(folder / "diagram.json"),
+        lambda: plot.draw_diagram(json.loads((folder / "diagram.json").read_text()), folder / "diagram.png"),
+        lambda: rodfem.load(folder, euler),
+        lambda: load_state(folder / "states.h5", *at, Solver(euler, MESH).equilibria),
+        lambda: render._read(folder / "states.h5", *at),
+        lambda: rodfem.load_modes(folder / "modes.h5", *modes),
+        lambda: plot_modes.draw_modes(folder / "modes.h5", *modes, folder / "modes.png"),
+        lambda: draw_locus([json.loads(locus.read_text())], folder / "locus.png"),
+        lambda: many([euler], lambda scene: {"any": 2}, folder),
+    ]
+
+
+NAMES = {
+    DIAGRAM: "diagram.json",
+    STATES: "states.h5",
+    MODES: "modes.h5",
+    LOCUS: "locus-1.json",
+    RESULT: "rod-00000.json",
+}
+
+
+def test_files_say_what_they_are_and_are_read_without_it(copied: Path) -> None:
+    """Those of today, and those of yesterday, which said nothing; a saved result is used again."""
+    assert f"version: {rodfem.__version__}\n" in (HOME / "CITATION.cff").read_text()
+    assert json.loads((copied / "diagram.json").read_text())["format"] == {
+        "name": "rodfem diagram", "version": 1, "program": f"rodfem {rodfem.__version__}"
+    }  # fmt: skip
+    with h5py.File(copied / "states.h5") as file:
+        names = ("format", "format_version", "program")
+        assert [file.attrs[name] for name in names] == ["rodfem states", 1, PROGRAM]
+    for _ in range(2):
+        assert [reader() for reader in read(copied)][-1] == [{"any": 1}]
+        for file in NAMES.values() if _ == 0 else ():
+            marked(copied / file)
+    assert "format" not in rodfem.load_json(copied / "diagram.json")
+
+
+def test_newer_files_are_refused(copied: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    for form in FORMATS:
+        marked(copied / NAMES[form], version=form.version + 1, program="rodfem 9.1")
+    sentence = (
+        rf"was written by rodfem 9\.1, in version 2 of the format 'rodfem \w+', and {PROGRAM} reads versions up to"
+    )
+    for reader in read(copied):
+        with pytest.raises(InputError, match=sentence):
+            reader()
+    assert plot.main([str(copied / "diagram.json")]) == 2
+    assert render.main([str(copied / "states.h5"), "--branch=straight", "--row=0"]) == 2
+    assert plot_modes.main([str(copied / "modes.h5"), "--branch=straight", "--row=0"]) == 2
+    lines = capfd.readouterr().err.splitlines()
+    assert len(lines) == 3 and all(re.search(sentence, line) for line in lines)
+    assert json.loads((copied / "rod-00000.json").read_text())["result"] == {"any": 1}
+
+
+def test_files_of_another_kind_are_refused(copied: Path) -> None:
+    for path in (copied / name for name in NAMES.values()):
+        marked(path, name="rodfem song")
+    for reader in read(copied):
+        with pytest.raises(InputError, match=r"has the format 'rodfem song', not 'rodfem [a-z]+': give .* of"):
+            reader()
+    with pytest.raises(InputError, match=r"not 'rodfem modes': give the modes.h5 of a run with Plan.modes="):
+        rodfem.load_modes(copied / "modes.h5", "straight", 0)
+
+
+@pytest.mark.parametrize(
+    ("lost", "sentence"),
+    [
+        ("branches", "states.h5 has no branches, so it is no rodfem states"),
+        ("branches/straight/elements", "has no elements, needed for the scene 'pinned'"),
+        ("branches/straight/supports/left end/frame", "has a support without frame in /branches/straight"),
+    ],
+)
+def test_what_an_old_file_lacks_is_named(copied: Path, lost: str, sentence: str) -> None:
+    path = marked(copied / "states.h5")
+    with h5py.File(path, "a") as file:
+        del file[lost]
+    reader = render._read if "supports" in lost else load_state
+    more = () if "supports" in lost else (Solver(scenes()["euler"], MESH).equilibria,)
+    with pytest.raises(InputError, match=sentence):
+        reader(path, "straight", 0, *more)
+
+
+def test_old_modes_and_diagrams_that_lack_something(copied: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    with h5py.File(marked(copied / "modes.h5"), "a") as file:
+        (row,) = file["branches/straight"]
+        del file[f"branches/straight/{row}/weight_rotation"]
+    with pytest.raises(
+        InputError, match=f"modes of row {row} of the branch 'straight' without weight_rotation: another"
+    ):
+        rodfem.load_modes(copied / "modes.h5", "straight", int(row))
+    whole = json.loads(marked(copied / "diagram.json").read_text())
+    del whole["branches"][1]["special"][0]["unfolding"]
+    (copied / "diagram.json").write_text(json.dumps(whole))
+    with pytest.raises(
+        InputError, match=r"diagram.json, branch 'branch 1', has no unfolding, so it is no rodfem diagram"
+    ):
+        rodfem.load(copied, scenes()["euler"])
+    (copied / "diagram.json").write_text(json.dumps({"branches": []}))
+    with pytest.raises(InputError, match="has no scene, parameter, so it is no rodfem diagram"):
+        rodfem.load_json(copied / "diagram.json")
+    (copied / "diagram.json").write_text("[1]")
+    assert plot.main([str(copied / "diagram.json")]) == 2
+    assert (
+        "has no entries by name, so it is no rodfem diagram: give the diagram.json of a run" in capfd.readouterr().err
+    )
+
+
+@pytest.mark.parametrize("version", [0, "1", None, 1.5])
+def test_versions_that_are_none(version: Any) -> None:
+    with pytest.raises(InputError, match="where a whole number from 1 on was expected"):
+        DIAGRAM.check({"format": {"name": DIAGRAM.name, "version": version}}, "file")

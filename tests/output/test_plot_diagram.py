@@ -1,0 +1,150 @@
+"""Diagrams drawn from hand-made dictionaries: what is seen of stability, and of what a branch does not explain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from demo_cases import scene
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
+from rodfem.errors import SceneError
+from rodfem.fem.fields import Discretization
+from rodfem.fem.link import link
+from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram
+from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE, hidden, pieces_of
+from rodfem.output.sheet import PALETTE
+from rodfem.problem.scene import Ordinate
+
+
+def branch(name: str, ordinate: list[float], negative: list[int], **more: Any) -> dict[str, Any]:
+    columns = {"load": [float(i) for i in range(len(negative))], "ordinate": ordinate, "negative": negative}
+    return {"name": name, "parent": None, "columns": columns | more.pop("columns", {}), "special": [], **more}
+
+
+def diagram(*branches: dict[str, Any]) -> dict[str, Any]:
+    return {"title": "made by hand", "parameter_label": "P", "ordinate": "x", "branches": list(branches)}
+
+
+def legend(*branches: dict[str, Any]) -> list[str]:
+    axes = Figure().subplots()
+    return [str(handle.get_label()) for handle in _draw_branches(axes, branches)[0]]
+
+
+def pixels(path: Path, color: str, rows: slice = slice(None), columns: slice = slice(0, 1450)) -> np.ndarray:
+    picture = imread(path)[rows, columns, :3]
+    return np.asarray(np.all(abs(picture - np.array(to_rgb(color))) < 0.04, axis=2))
+
+
+@pytest.mark.alone
+def test_nothing_unstable_is_hidden_below_something_stable(folder: Path) -> None:
+    """Two branches at the same place: in the pixels of their line both colours are seen."""
+    both = [branch("a", [0.0] * 9, [0] * 9), branch("b", [0.0] * 9, [1] * 9)]
+    path = draw_diagram(diagram(*both), folder / "diagram.png")
+    line = int(pixels(path, PALETTE[0]).sum(axis=1).argmax())  # most of the stable line
+    here = slice(line - 8, line + 9)
+    dark, blue = (pixels(path, color, here).sum() for color in PALETTE[:2])
+    assert dark > 2000 and blue > 500
+
+
+@pytest.mark.alone
+def test_lines_that_cross_or_touch_hide_nothing() -> None:
+    x = np.arange(0.0, 200.0, 2.0)
+    flat, steep = np.column_stack([x, 0 * x]), np.column_stack([x, x - 100.0])
+    fork = np.column_stack([x, 3 * np.sqrt(x)])  # from the same point, across
+    assert hidden(steep, [flat]) == hidden(fork, [flat]) == []
+    (part,) = hidden(flat, [flat[40:], steep])
+    np.testing.assert_array_equal(part, flat[39:])
+
+
+@pytest.mark.alone
+def test_stable_in_the_plane_is_not_called_stable(folder: Path) -> None:
+    """The pitchfork of a planar rod at row 4, which is unstable in space from row 2 on."""
+    point = {"kind": "branch point", "row": 4, "load": 4.0, "ordinate": 0.0, "negative_before": 0, "negative_after": 1}
+    column = {"negative_in_space": [0, 0, 1, 1, 0, 2, 2]}  # at the branch point itself an eigenvalue is zero
+    planar = branch("planar", [0.0] * 7, [0, 0, 0, 0, 0, 1, 1], special=[point], columns=column)
+    found = [(p.kind, p.label, p.curve[:, 0].tolist()) for p in pieces_of(planar, "black")]
+    assert found == [
+        (STABLE, "0 (0)", [0, 1]),
+        (PLANAR, "0 (1)", [1, 2, 3, 4]),
+        (UNSTABLE, "1 (2)", [4, 5, 6]),
+    ]
+    assert {STABLE, PLANAR, "negative eigenvalues in the plane (in space)"} <= set(legend(planar))
+    del planar["columns"]["negative_in_space"]
+    assert [p.label for p in pieces_of(planar, "black")] == ["0", "1"]
+    assert PLANAR not in legend(planar)
+    planar["columns"]["negative_in_space"] = [None] * 7  # end moments have no potential in space
+    assert [p.label for p in pieces_of(planar, "black")] == ["0", "1"]
+
+
+@pytest.mark.alone
+def test_what_is_unexplained_is_marked(folder: Path) -> None:
+    yellow = "#F0E442"
+    plain = branch("a", [0.0, 1.0, 2.0, 3.0], [0, 0, 2, 2])
+    assert UNEXPLAINED not in legend(plain) and UNEXPLAINED not in legend(plain | {"unexplained": []})
+    assert not pixels(draw_diagram(diagram(plain), folder / "plain.png"), yellow).any()
+    warned = plain | {"unexplained": [{"row": 1, "before": 0, "after": 2}]}
+    assert UNEXPLAINED in legend(warned)
+    seen = pixels(draw_diagram(diagram(warned), folder / "warned.png"), yellow)
+    y, x = (places.mean() for places in np.nonzero(seen[300:700, 400:1100]))  # the mark, without the legend
+    dots = pixels(folder / "plain.png", PALETTE[0])[300:700, 400:1100]
+    assert abs(y - 200) < 60 and abs(x - 350) < 120 and dots.any()  # in the middle of the segment
+
+
+@pytest.mark.short
+def test_a_singular_first_state_is_marked() -> None:
+    plain = branch("a", [0.0, 1.0, 2.0], [0, 1, 1])
+    assert SINGULAR not in legend(plain | {"singular_start": 0})
+    assert SINGULAR in legend(plain | {"singular_start": 1})
+
+
+@pytest.mark.alone
+def test_imperfect_bifurcations_have_a_mark_and_their_unfolding(folder: Path) -> None:
+    def point(row: int, **more: Any) -> dict[str, Any]:
+        found = {"kind": "imperfect bifurcation", "row": row, "load": float(row), "ordinate": 0.0}
+        return found | {"negative_before": 0, "negative_after": 1, **more}
+
+    one = branch("a", [0.0] * 5, [0, 0, 0, 1, 1], special=[point(2, unfolding=-3e-9)])
+    assert "imperfect bifurcation, unfolding 3e-09" in legend(one)
+    two = branch("a", [0.0] * 5, [0, 0, 0, 1, 1], special=[point(2, unfolding=3e-9), point(3, unfolding=2e-7)])
+    assert "imperfect bifurcation, unfolding 3e-09 to 2e-07" in legend(two)
+    unknown = branch("a", [0.0] * 5, [0, 0, 0, 1, 1], special=[point(2, unfolding=None)])
+    assert "imperfect bifurcation" in legend(unknown)
+    assert [(p.negative, len(p.curve)) for p in pieces_of(one, "black")] == [(0, 3), (1, 3)]
+    assert draw_diagram(diagram(one), folder / "one.png").exists()
+
+
+def test_twist_of_a_ring_is_its_link_less_its_writhe() -> None:
+    """The ordinate, an integral of the discretised strains, beside the writhe of polygons (Klenin & Langowski)."""
+    demo = scene("ring", twisting=1.5, span=(1.0, 1.2))
+    found = trace(demo, Discretization("reduced", 8, 6), Plan(depth=1, error_bars=False))
+    circle, buckled = found.branches[:2]
+    np.testing.assert_allclose([p.ordinate for p in circle.points], 0.0, atol=1e-11)
+    checked = 0
+    for point in buckled.points[:: max(len(buckled.points) // 6, 1)]:
+        if 0.1 < point.ordinate < 0.9:  # before it passes through itself
+            number, _, Wr = link(found.solvers[0].shape.sample(point.x))
+            assert point.ordinate == pytest.approx(number - Wr, abs=2e-4)
+            checked += 1
+    assert checked > 1
+    unstable = [p.ordinate for p in buckled.points if p.negative]
+    assert unstable and min(unstable) > 0.1  # nowhere where a circle is stable
+
+
+@pytest.mark.alone
+def test_ordinates_along_the_rod_are_checked() -> None:
+    ring = scene("ring", twisting=1.5, span=(1.0, 1.2))
+    for of, sentence in (
+        (lambda x, c: x.d1, r"ordinate along the rod has the shape \(3,\): return a scalar"),
+        (lambda x, c: x.k[2] * c.nothing, "asks for a constant 'nothing'"),
+        (lambda x: x.k[2], r"ordinate along the rod is no function of 2 argument\(s\)"),
+    ):
+        with pytest.raises(SceneError, match=sentence):
+            replace(ring, ordinate=Ordinate("twist", s=None, of=of))

@@ -1,0 +1,101 @@
+"""Remedies name arguments: each exists in Python and has an option of the command line, which is named there."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+from hemitropic_cases import run_demo
+from mpi4py import MPI
+
+import rodfem
+from rodfem.app.cli import ARGUMENT, Parser, parser_for
+from rodfem.errors import POINTWISE, Argument, ConvergenceError, InputError, Remedy, SceneError, SetupError
+from rodfem.problem.scene import Scene
+
+HOME = Path(__file__).parents[2] / "rodfem"
+PROGRAMS = ("app/cli.py", "output/plot_modes.py", "output/plot_diagram.py", "output/render.py")
+"""Modules that are run themselves, and may know their own options."""
+
+pytestmark = pytest.mark.short
+
+
+def parser() -> Parser:
+    return parser_for("rod", "", "F", (0.0, 1.0), 8, 6)
+
+
+def named() -> set[tuple[str, str]]:
+    """Owner and name of every argument in the package: each is two strings, or a name from a tuple of them."""
+    found = set()
+    for path in HOME.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.GeneratorExp) and "Argument(" in ast.unparse(node.elt):
+                owner = ast.literal_eval(node.elt.args[0])  # type: ignore[attr-defined]
+                found |= {(owner, name) for name in ast.literal_eval(node.generators[0].iter)}
+            elif isinstance(node, ast.Call) and ast.unparse(node.func) == "Argument":
+                if all(isinstance(word, ast.Constant) for word in node.args[:2]):
+                    found.add(tuple(word.value for word in node.args[:2]))  # type: ignore[attr-defined]
+    return found
+
+
+def test_every_argument_exists_and_has_an_option() -> None:
+    assert {("StepControl", "largest"), ("Plan", "depth"), ("Discretization", "elements"), ("run", "output")} <= named()
+    for owner, name in named():
+        assert name in inspect.signature(getattr(rodfem, owner)).parameters, (owner, name)
+        assert ARGUMENT.fullmatch(str(Argument(owner, name))), (owner, name)
+        assert parser().option(name).startswith("--")
+
+
+def test_no_other_module_knows_options() -> None:
+    known = [name for action in parser()._actions for name in action.option_strings if name.startswith("--")]
+    options = re.compile(rf"(?:{'|'.join(known)})\b")
+    for path in HOME.rglob("*.py"):
+        if str(path.relative_to(HOME)) not in PROGRAMS:
+            strings = [n.value for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Constant)]
+            assert not [s for s in strings if isinstance(s, str) and "``--" not in s and options.search(s)], path
+
+
+def test_words_of_python_and_of_the_command_line() -> None:
+    steps, depth = Argument("StepControl", "largest"), Argument("Plan", "depth", 3)
+    trouble = ConvergenceError("It did not", Remedy("try {} or {}", steps, depth))
+    assert trouble.remedy is not None and trouble.remedy.arguments == (steps, depth)
+    assert str(trouble) == "It did not: try StepControl(largest=...) or Plan(depth=3)."
+    assert parser().in_options(f"So ({trouble})") == "So (It did not: try --step or --depth 3.)"
+    assert parser().in_options(str(POINTWISE)) == "use --formulation pointwise"
+    for unknown in ("use Event(name=...)", "use StepControl(smallest=...)"):
+        assert parser().in_options(unknown) == unknown
+
+
+def test_classes_of_errors() -> None:
+    assert issubclass(SceneError, InputError) and issubclass(InputError, ValueError)
+    assert all(issubclass(kind, RuntimeError) for kind in (ConvergenceError, SetupError))
+    with pytest.raises(InputError) as option:
+        rodfem.Plan(depth=-1).check(column())
+    assert not isinstance(option.value, SceneError)
+    with pytest.raises(SceneError):
+        column(span=(0.0, 0.0))
+
+
+def column(span: tuple[float, float] = (0.0, 1.0)) -> Scene:
+    return Scene(
+        name="column",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: 0.5 * (k[0] ** 2 + k[1] ** 2 + k[2] ** 2),
+        parameters={"P": 0.0},
+        load="P",
+        ends=(rodfem.clamped(), rodfem.free(lambda c: (0.0, 0.0, -c.P))),
+        ordinate=rodfem.Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
+        span=span,
+    )
+
+
+def test_terminal_of_the_command_line_names_options(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        run_demo("--depth", "-1", "--output", str(folder))
+    err = capfd.readouterr().err
+    assert not err or err == "error: -1 is not a depth: give 0 or more in --depth.\n"
+    assert bool(err) == (MPI.COMM_WORLD.rank == 0)

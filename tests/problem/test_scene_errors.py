@@ -1,0 +1,446 @@
+"""Bad input ends with one sentence and status 2, before anything is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from math import cos, cosh, pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from hemitropic_cases import run_demo
+from mpi4py import MPI
+
+from rodfem import trace
+from rodfem.app.run import run
+from rodfem.continuation.step_control import StepControl
+from rodfem.diagram.plan import Plan
+from rodfem.errors import InputError, SceneError
+from rodfem.fem.fields import Discretization, Fields
+from rodfem.fem.system import System
+from rodfem.output.files import load_json
+from rodfem.problem import ends, scene
+from rodfem.problem.ends import (
+    Attachment,
+    End,
+    Ring,
+    at,
+    clamped,
+    elastic,
+    everywhere,
+    free,
+    hinged,
+    integral,
+    pinned,
+)
+from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
+
+pytestmark = pytest.mark.short
+
+BAD = [
+    "--elements 0",
+    "--elements -3",
+    "--elements 2.5",
+    "--degree 0",
+    "--degree 13",
+    "--degree six",
+    "--formulation foo",
+    "--range 0 1.5",
+    "--range 1 0.5",
+    "--range 0.5 0.5",
+    "--range 0",
+    "--range nan 0.5",
+    "--range 0 inf",
+    "--range=-inf 0.5",
+    "--at 2",
+    "--at -0.1",
+    "--at nan",
+    "--at inf",
+    "--twisting 0.5",  # 10 B < A^2: the energy is not convex
+    "--twisting nan",
+    "--coupling inf",
+    "--coupling -3.2",
+    "--bending -1",
+    "--bending 0",
+    "--bending inf",
+    "--half-length 0",
+    "--half-length -1",
+    "--half-length nan",
+    "--half-length inf",
+    "--spectrum -1",
+    "--spectrum 1.5",
+    "--colour blue",
+    "blue",
+    "--output /proc/nowhere",
+    "--output",
+]
+
+
+@pytest.mark.parametrize("arguments", BAD)
+def test_bad_input(
+    arguments: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def compute(*_: object, **__: object) -> None:
+        raise AssertionError("set up a system for bad input")
+
+    monkeypatch.setattr(System, "__init__", compute)
+    output = folder / "out"
+    with pytest.raises(SystemExit) as ended:
+        run_demo(*(["--output", str(output)] if "--output" not in arguments else []), *arguments.split())
+    out, err = capfd.readouterr()
+    assert ended.value.code == 2
+    assert not output.exists()
+    if MPI.COMM_WORLD.rank == 0:
+        assert err.startswith("error: ")
+        assert err.endswith(".\n")
+        assert err.count("\n") == 1
+        assert out == ""
+    else:
+        assert out == err == ""
+
+
+def ordinate(s: float = 0.0) -> Ordinate:
+    return Ordinate("nothing", s=s, of=lambda r, q: 0.0)
+
+
+GOOD: dict[str, Any] = {
+    "name": "cantilever",
+    "interval": (0.0, 1.0),
+    "rod": "flexible",
+    "energy": lambda v, k, c: 0.5 * (v[0] ** 2 + v[1] ** 2 + (v[2] - 1) ** 2 + k[0] ** 2 + k[1] ** 2 + c.B * k[2] ** 2),
+    "parameters": {"F": Parameter(0.0), "B": Parameter(2.0)},
+    "load": "F",
+    "ends": (clamped(), free(lambda c: (0, 0, c.F))),
+    "ordinate": ordinate(),
+    "span": (0.0, 1.0),
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"interval": (1.0, 0.0)}, "interval"),
+        ({"interval": (0.0, float("nan"))}, "interval"),
+        ({"rod": "stiff"}, "kind of rod"),
+        ({"load": "G"}, "not a parameter"),
+        ({"parameters": {"F": Parameter(0.0), "B": Parameter(2.0, admissible=(3.0, 4.0))}}, "admissible"),
+        ({"parameters": {"F": Parameter(0.0), "B": Parameter(-2.0)}}, "not convex"),
+        ({"ordinate": ordinate(2.0)}, "not on the rod"),
+        ({"span": (0.3, 0.3)}, "empty"),
+        ({"ends": (free(), free())}, "drift away"),
+        ({"ends": (clamped(lambda c: (0, None, 0)), free())}, "drift away"),
+    ],
+)
+def test_bad_scene(change: dict, words: str) -> None:
+    Scene(**GOOD)
+    with pytest.raises(SceneError, match=words):
+        Scene(**(GOOD | change))
+
+
+ZERO = (0.0, 0.0, 0.0)
+RIGID: dict[str, Any] = {"rod": "unshearable and inextensible"}
+Ends = tuple[End, End]
+
+
+def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
+    return {"ends": (left or clamped(), right or free())}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        # names
+        ({"parameters": {"F": 0.0, "s": 1.0}}, "cannot have the name 's'"),
+        ({"parameters": {"F": Parameter(0.0)}}, "asks for a constant 'B': add it"),
+        ({"potential": lambda x, c: c.G * x.r[0]}, "asks for a constant 'G'"),
+        ({"potential": lambda x, c: x.z}, "asks for 'z': it has"),
+        ({"constraints": (at(0.5, lambda x, c: x.k[0]),)}, "asks for 'k': it has"),
+        # functions
+        (held(clamped(ZERO)), "position of the left end is .*: give a function"),  # type: ignore[arg-type]
+        (held(right=free(ZERO)), "force on the right end is .*: give a function"),  # type: ignore[arg-type]
+        ({"energy": lambda v, k: k[0]}, "no function of 3 argument"),
+        ({"energy": lambda v, k, c: None}, "energy is None: return"),
+        ({"energy": None}, "energy is None: give a function"),
+        ({"inertia": 1.0}, "inertia is 1.0: give one"),
+        ({"energy": lambda v, k, c: np.cosh(k[0])}, "stored energy fails with TypeError.*write it with UFL"),
+        ({"constraints": (integral(lambda x, c: x.k[2], 3.0),)}, "value of an integral constraint is 3"),  # type: ignore[arg-type]
+        ({"start": lambda s: (cos(s), 0.0, 0.0, 0.0)}, "start fails with TypeError.*array of arclengths"),
+        # kinds
+        ({"constraints": at(0.5, lambda x, c: x.r[0])}, r"constraints=\(at\("),
+        ({"attachments": Attachment(0.5)}, r"attachments=\(Attachment\("),
+        ({"breaks": 0.5}, r"breaks=\(0.5,\)"),
+        ({"parameters": ["F", "B"]}, "give a dictionary"),
+        ({"parameters": {"F": Parameter(0.0, admissible=(1.0, -1.0)), "B": 2.0}}, "give the lower bound first"),
+        ({"ordinate": Ordinate("r", s=0.0, of=lambda r, q: r)}, "ordinate fails with TypeError.*returns a number"),
+        # sizes and shapes
+        ({"energy": lambda v, k, c: k}, "energy has the shape"),
+        ({"potential": lambda x, c: x.r}, "potential along the rod has the shape"),
+        (held(right=End(energy=lambda x, c: x.r)), "energy of the right end has the shape"),
+        ({"constraints": (at(0.5, lambda x, c: x.r),)}, "constraint has the shape"),
+        ({"constraints": (integral(lambda x, c: x.k),)}, "constraint has the shape"),
+        ({"constraints": (everywhere(lambda x, c: x.k, strain=True),)}, "constraint has the shape"),
+        (held(clamped(lambda c: (0, 0))), "position of the left end has 2 components: give 3"),
+        (held(clamped(lambda c: 0)), "position of the left end is a single value"),  # type: ignore[arg-type,return-value]
+        (held(right=free(lambda c: (0, c.F))), "force on the right end has 2 components"),
+        (held(right=free(follower=lambda c: (0, c.F))), "follower force on the right end has 2"),
+        (held(right=End(moment=lambda c: (0, c.F))), "moment on the right end has 2"),
+        (held(right=End(follower_moment=lambda c: (0, c.F))), "follower moment on the right end has 2"),
+        ({"distributed": lambda c: (0, 1)}, "distributed force has 2"),
+        ({"follower": lambda c: (0, 1)}, "distributed follower force has 2"),
+        ({"attachments": (Attachment(0.5, force=lambda c: (0, 1)),)}, "force of an attachment has 2"),
+        ({"attachments": (Attachment(0.5, rotary_inertia=lambda c: (0, 1)),)}, "inertia of an attachment has 2"),
+        ({"inertia": Inertia(rho_I=lambda c: (1.0, 1.0))}, "rotary inertia per length has 2"),
+        ({"start": lambda s: np.zeros((4, len(s)))}, r"start has the shape \(4, 5\)"),
+        # clamps that contradict themselves
+        (held(clamped(rotation=(1.0, 0.0, 0.0))), "rotation of the left end has 3"),  # type: ignore[arg-type]
+        (held(clamped(rotation=(0.0, 0.0, 0.0, 0.0))), "zero quaternion"),
+        (held(clamped(rotation=lambda c: (0, 0, 0, c.F))), "zero quaternion"),
+        ({"planar": "e2"} | held(clamped(rotation=(1.0, 0.0, 0.0, 1.0))), "leaves the plane across e2"),
+        (held(hinged((0.0, 0.0, 0.0))), "no axis"),
+        (held(hinged((1.0, 0.0))), "hinge of the left end has 2"),  # type: ignore[arg-type]
+        (held(End(position=lambda c: ZERO, hinge=(1.0, 0.0, 0.0))), "a hinge but no rotation"),
+        ({"start": lambda s: np.zeros((len(s), 4))}, "no rotation everywhere"),
+        # loads on what is held
+        (held(End(position=lambda c: ZERO, follower=lambda c: ZERO)), "whose position is held"),
+        (held(right=End(rotation=(1.0, 0.0, 0.0, 0.0), moment=lambda c: ZERO)), "whose directors are held"),
+        # nothing that holds, or nothing that gives way
+        ({"ends": (pinned(lambda c: (0, 0, None)), pinned(lambda c: (0, 0, None)))}, "drift away along e3"),
+        ({"ends": (free(), free()), "constraints": (integral(lambda x, c: x.k[2]),)}, "drift away along e1"),
+        (RIGID | held(right=clamped(lambda c: (0, 0, 1.2))), "only 1 long"),
+        (RIGID | held(right=clamped(lambda c: (0, 0, 0.5 + 4 * c.F * (1 - c.F)))), "At F = .* only 1 long"),
+        # rings
+        ({"ends": (clamped(),)}, "not two of the kind End"),
+        ({"ends": Ring()}, "no straight start"),
+        ({"ends": Ring(odd=False), "start": lambda s: turns(s, 1)}, r"Ring\(odd=True\)"),
+        ({"ends": Ring(odd=True), "start": lambda s: turns(s, 2)}, r"Ring\(odd=False\)"),
+        # places
+        ({"attachments": (Attachment(1.5, force=lambda c: ZERO),)}, "attachment at s = 1.5 is not on the rod"),
+        ({"constraints": (at(-0.5, lambda x, c: x.r[0]),)}, "constraint at s = -0.5 is not on the rod"),
+        ({"breaks": (2.0,)}, "break at s = 2 is not on the rod"),
+        ({"planar": "e3"}, "planar across 'e3'"),
+        ({"planar": "e2"} | held(right=clamped(lambda c: (0.0, 0.2, 0.9))), "held at 0 and 0.2 along e2"),
+        (
+            {"planar": "e2"} | held(right=free(force=lambda c: (0.0, c.F, 0.0))),
+            "force on the right end pushes the rod out",
+        ),
+        (
+            {"planar": "e2"} | held(right=End(moment=lambda c: (0.0, 1.0, c.F))),
+            "moment on the right end pushes the rod out",
+        ),
+    ],
+)
+def test_mistakes(change: dict, words: str, capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SceneError, match=words) as raised:
+        Scene(**(GOOD | change))
+    message = str(raised.value)
+    assert message[0].isupper() and message.endswith(".") and "\n" not in message
+    assert capfd.readouterr() == ("", "")
+
+
+def test_parameters_that_nothing_feels() -> None:
+    scene = Scene(**(GOOD | {"parameters": {"F": 0.0, "B": 2.0, "G": 1.0}}))
+    for load, locus, kind, words in (
+        ("G", None, SceneError, "depends on its load 'G'"),
+        ("F", ("G", 0.0, 2.0), InputError, "depends on 'G'"),
+    ):
+        with pytest.raises(kind, match=words):
+            Plan((0.0, 1.0), locus=locus).check(scene.varying(load, (0.0, 1.0)))
+
+
+def test_functions_that_a_number_satisfies_but_no_expression() -> None:
+    """``math.cosh`` takes the numbers of the first checks; the forms are more than numbers."""
+    scene = Scene(**(GOOD | {"energy": lambda v, k, c: GOOD["energy"](v, k, c) + cosh(k[0])}))
+    with pytest.raises(SceneError, match=r"stored energy fails with .*write it with UFL"):
+        System(scene, Discretization("reduced", 4, 2))
+
+
+def test_a_rod_squeezed_to_nothing() -> None:
+    """The energy is written in v3, not in v3 - 1: without a load the rod has no length."""
+    scene = Scene(**(GOOD | {"energy": lambda v, k, c: ufl.dot(v, v) + ufl.dot(k, k)}))
+    with pytest.raises(SceneError, match=r"squeezed to a stretch.*v\[2\] - 1"):
+        trace(scene, Discretization("reduced", 4, 2), Plan(error_bars=False))
+
+
+def turns(s: np.ndarray, count: int) -> np.ndarray:
+    """So many turns about e2 in all."""
+    return np.stack([np.cos(pi * count * s), 0 * s, np.sin(pi * count * s), 0 * s], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (held(right=free(follower=lambda c: (0, 0, c.F))), "give it an inertia"),
+        ({"inertia": Inertia(rho_A=lambda c: -1.0)}, "-1 is negative"),
+        (
+            held(right=clamped(lambda c: (0, 0, 1))) | {"inertia": Inertia(rho_I=lambda c: (1.0, -2.0, 1.0))},
+            "-2 is negative",
+        ),
+        (
+            {"planar": "e2", "start": lambda s: np.stack([np.cos(s), np.sin(s), 0 * s, 0 * s], axis=1)},
+            "leaves the plane",
+        ),
+    ],
+)
+def test_inertia_and_plane(change: dict, words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        Scene(**(GOOD | change))
+
+
+def test_scenes_that_are_no_mistakes() -> None:
+    """Held by a spring only; ends farther apart than a rod that may stretch or shear; closed after two turns."""
+    Scene(**(GOOD | {"ends": (elastic(lambda c: 1.0), free())}))
+    for rod in ("flexible", "unshearable", "inextensible"):
+        Scene(**(GOOD | {"rod": rod} | held(right=clamped(lambda c: (0, 0, 1.2)))))
+    Scene(**(GOOD | {"ends": Ring(odd=False), "start": lambda s: turns(s, 2)}))
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        ({"distributed": lambda c: (0, 0, c.F)}, "a distributed force"),
+        ({"potential": lambda x, c: x.r[0] ** 2}, "the potential along the rod"),
+        ({"attachments": (Attachment(0.5, force=lambda c: (0, 0, c.F)),)}, "what is attached along the rod"),
+        ({"constraints": (at(0.5, lambda x, c: x.r[0]),)}, "a constraint"),
+        (
+            held(right=free(follower=lambda c: (0, 0, c.F))) | {"inertia": Inertia(rho_A=lambda c: 1.0)},
+            "a load without potential",
+        ),
+    ],
+)
+def test_no_centreline(change: dict, what: str) -> None:
+    scene = Scene(**(GOOD | change))
+    with pytest.raises(InputError, match=f"{what} needs: use Discretization.formulation=.pointwise.."):
+        Fields(scene, Discretization("reduced", 4, 3))
+    assert Fields(scene, Discretization("auto", 4, 3)).discretization.formulation == "pointwise"
+
+
+def test_fewer_elements_than_pieces() -> None:
+    scene = Scene(**(GOOD | {"breaks": (0.1, 0.2, 0.3, 0.4)}))
+    with pytest.raises(InputError, match=r"5 pieces between joints.*use more than 4 elements"):
+        Fields(scene, Discretization("auto", 4, 3))
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: Discretization("mixed"), lambda: Discretization(elements=0), lambda: Discretization(degree=0)]
+)
+def test_bad_discretization(make: Callable[[], Discretization]) -> None:
+    with pytest.raises(InputError, match=r"choose|give"):
+        make()
+
+
+def raising(*_: object) -> Any:
+    return 1 / 0
+
+
+def takes_functions(owner: type) -> list[str]:
+    """Fields of a dataclass that are annotated as functions."""
+    words = ("Callable", "OfConstants", "OfPlace")
+    return [f.name for f in fields(owner) if any(word in str(f.type) for word in words)]
+
+
+STATED = [x for module in (ends, scene) for x in vars(module).values() if is_dataclass(x) and isinstance(x, type)]
+EVERY = sorted({(owner.__name__, name) for owner in STATED for name in takes_functions(owner)})
+
+
+def with_function(owner: str, name: str) -> Scene:
+    """A scene with a function that raises in one field of one of its parts."""
+    moving = clamped(rotation=lambda c: (1, 0, 0, 0))
+    if owner in ("End", "SlidingHinge"):
+        end = getattr(ends, owner)(**{name: raising})
+        return Scene(**(GOOD | {"ends": (end, moving) if "tion" in name else (clamped(), end)}))
+    parts: dict[str, Any] = {
+        "Inertia": lambda: {"inertia": Inertia(**{name: raising})},
+        "Ordinate": lambda: {"ordinate": Ordinate("nothing", 0.0, raising)},
+        "Attachment": lambda: {"attachments": (Attachment(0.5, **{name: raising}),)},
+        "Constraint": lambda: {"constraints": (at(0.5, raising),)},
+        "Integral": lambda: {"constraints": (integral(**({"of": lambda x, c: x.k[2]} | {name: raising})),)},
+        "Scene": lambda: {name: raising},
+    }
+    return Scene(**(GOOD | parts[owner]()))
+
+
+@pytest.mark.parametrize(("owner", "name"), EVERY)
+def test_no_function_of_a_scene_is_forgotten(owner: str, name: str) -> None:
+    """Whatever a dataclass of a scene takes as a function may raise: that is a sentence, and names the function."""
+    with pytest.raises(SceneError, match=r"^The .* fails with ZeroDivisionError, 'division by zero'"):
+        with_function(owner, name).ordinate.of(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+
+
+def test_the_list_of_functions_is_long() -> None:
+    assert {("Inertia", "rho_A"), ("Inertia", "rho_I"), ("Integral", "equals"), ("End", "rotation")} < set(EVERY)
+    assert len(EVERY) >= 23
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Discretization(elements=8.0), "elements is 8.0: give a whole number, as in elements=8"),  # type: ignore[arg-type]
+        (lambda: Discretization(elements="8"), "elements is '8': give a whole number"),  # type: ignore[arg-type]
+        (lambda: Discretization(elements=True), "elements is True: give a whole number"),
+        (lambda: Discretization(degree=6.0), "degree is 6.0: give a whole number, as in degree=6"),  # type: ignore[arg-type]
+        (lambda: Discretization(degree=NAN), "degree is nan: give a whole number"),  # type: ignore[arg-type]
+        (lambda: Discretization(elements=np.bool_(True)), "elements is .*True.*: give a whole"),  # type: ignore[arg-type]
+        (lambda: Discretization(elements=1, vertices=("0", "1")), r"vertices\[0\] is '0': give a number"),  # type: ignore[arg-type]
+        (lambda: Discretization(elements=1, vertices=1.0), "vertices is 1.0: give a tuple of numbers"),  # type: ignore[arg-type]
+        (lambda: StepControl(largest="0.1"), "largest is '0.1': give a number, as in largest=0.05"),  # type: ignore[arg-type]
+        (lambda: StepControl(most=10.5), "most is 10.5: give a whole number, as in most=2000"),  # type: ignore[arg-type]
+        (lambda: StepControl(first=NAN), "first = nan lead nowhere"),
+        (lambda: StepControl(aim=0.0), "aim = 0 lead nowhere"),
+        (lambda: StepControl(most=0), "most is 0: a branch has at least one point"),
+        (lambda: Plan(1.0), "span is 1.0: give 2 numbers"),  # type: ignore[arg-type]
+        (lambda: Plan((0.0, 1.0, 2.0)), "span is .*: give 2 numbers"),  # type: ignore[arg-type]
+        (lambda: Plan(at=0.5), "at is 0.5: give a tuple of numbers"),  # type: ignore[arg-type]
+        (lambda: Plan(at=("0.5",)), r"at\[0\] is '0.5': give a number"),  # type: ignore[arg-type]
+        (lambda: Plan(depth=1.5), "depth is 1.5: give a whole number"),  # type: ignore[arg-type]
+        (lambda: Plan(depth=-1).check(Scene(**GOOD)), "-1 is not a depth"),
+        (lambda: Plan(modes=3.0), "modes is 3.0: give a whole number"),  # type: ignore[arg-type]
+        (lambda: Plan(accuracy="1e-8"), "accuracy is '1e-8': give a number"),  # type: ignore[arg-type]
+        (lambda: Plan(locus=("A",)), "locus is .*: give a name and an interval"),  # type: ignore[arg-type]
+        (lambda: Plan(locus=("A", 0, "b")), r"locus\[1:\]\[1\] is .b.: give a number"),  # type: ignore[arg-type]
+        (lambda: Plan(steps=0.1), r"steps is 0.1: give StepControl"),  # type: ignore[arg-type]
+        (lambda: Plan(method=3), "method is 3: give the name"),  # type: ignore[arg-type]
+    ],
+)
+def test_numbers_of_the_wrong_kind(make: Callable[[], object], words: str) -> None:
+    """A float for a whole number is no raw error of pybind from inside the mesh."""
+    with pytest.raises(InputError, match=words) as raised:
+        make()
+    assert str(raised.value).endswith(".") and "\n" not in str(raised.value)
+
+
+def test_numpys_numbers_are_numbers(folder: Path) -> None:
+    made = Discretization("reduced", np.int64(2), np.int32(3), np.linspace(0.0, 1.0, 3))  # type: ignore[arg-type]
+    assert made == Discretization("reduced", 2, 3, (0.0, 0.5, 1.0))
+    assert {type(x) for x in (made.elements, made.degree)} == {int}
+    assert Plan(np.array([0.0, 1.0]), np.array([0.5])) == Plan((0.0, 1.0), (0.5,))  # type: ignore[arg-type]
+
+
+def test_a_plan_without_a_range_takes_the_scenes(folder: Path) -> None:
+    rod = Scene(**(GOOD | {"span": (0.0, 0.3)}))
+    for plan, rows in ((Plan(error_bars=False), []), (Plan(at=(0.1,), error_bars=False), [0.1])):
+        branches = run(rod, Discretization("reduced", 4, 3), plan, folder, figures=False, quiet=True)
+        assert branches[0].points[-1].load == 0.3
+        assert [s.point.load for s in branches[0].special if s.kind == "user"] == rows
+    assert load_json(folder / "diagram.json")["range"] == [0.0, 0.3]
+    with pytest.raises(InputError, match="outside the range 0 to"):
+        Plan(at=(1.0,)).check(rod)
+
+
+def test_constraints_that_repeat_each_other() -> None:
+    """Named where no first equilibrium can be found: twice the same one, and one on what an end holds."""
+    for constraints, words in (
+        (
+            (at(1.0, lambda x, c: x.r[1]), at(1.0, lambda x, c: 2 * x.r[1])),
+            "constraint 1 of the scene and constraint 2",
+        ),
+        ((at(0.0, lambda x, c: x.r[1]),), "constraint 1 of the scene"),
+    ):
+        rod = Scene(**(GOOD | {"constraints": constraints}))
+        with pytest.raises(SceneError, match=f"depend on one another .{words}"):
+            trace(rod, Discretization("pointwise", 4, 6), Plan(error_bars=False))

@@ -1,0 +1,422 @@
+"""One verdict from all methods; nasty pencils; the band of the count and the rank of the constraints."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import classics
+import demo_cases
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from mpi4py import MPI
+from petsc4py import PETSc
+from small_states import buckled, plain, scene
+
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.solver import Solver
+from rodfem.errors import ConvergenceError, InputError, SceneError
+from rodfem.fem.fields import Discretization
+from rodfem.linalg.matrices import gathered, petsc_matrix
+from rodfem.linalg.selection import factors_of
+from rodfem.problem.scene import Inertia
+from rodfem.stability import methods
+from rodfem.stability.assessment import Judge, judge
+from rodfem.stability.blocks import Blocks
+from rodfem.stability.inertia import Inertia as Count
+from rodfem.stability.method import Method
+from rodfem.stability.methods import METHODS, find
+from rodfem.stability.pencil import Inverse, assemble_pencil, symmetry_modes, weighed_modes, with_factors
+from rodfem.stability.projection import INVERSES
+from rodfem.stability.rank import rank_of, smallest_singular
+from rodfem.stability.reduction import Reduction
+from rodfem.stability.round_off import decide
+
+pytestmark = pytest.mark.alone
+
+SMALL = (6, 3)
+SOLVERS = [name for name in METHODS if name != "count"]
+SPARSE = [name for name in SOLVERS if name != "dense"]
+STATES = [
+    ("cord", 20.0, False),
+    ("cord", 40.0, True),
+    ("hemitropic", 0.2, False),
+    ("hemitropic", 0.2, True),
+    ("ruler", 2.0, False),
+    ("ruler", 6.0, True),
+]
+REFERENCE = [-341.416740999, 467.908344864, 735.029226438]
+SERIAL = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="long on several ranks")
+
+
+@cache
+def at(name: str, formulation: str, load: float, bent: bool) -> tuple[Judge, PETSc.Vec]:
+    system, x = (buckled if bent else plain)(name, formulation, *SMALL, load)
+    return Judge(system), x
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+@pytest.mark.parametrize(("name", "load", "bent"), STATES)
+def test_methods_agree(name: str, load: float, bent: bool, formulation: str) -> None:
+    to_judge, x = at(name, formulation, load, bent)
+    expected = to_judge(x, "dense", 4)
+    scale = abs(expected.values).max()
+    for method in SPARSE:
+        for _ in range(2):  # the second time from the modes of the first
+            found = to_judge(x, method, 4)
+            np.testing.assert_allclose(found.values, expected.values, rtol=1e-9, atol=2e-11 * scale, err_msg=method)
+            assert found.certified, method
+            assert found.errors.max() < 1e-10
+            assert (found.negative, found.zero) == (expected.negative, expected.zero)
+            assert len(found.vectors) == 4
+            assert found.method == method
+            assert found.factorisations >= 2
+    negative = int((expected.values < -1e-7 * scale).sum())
+    assert expected.negative == negative < 4
+    assert expected.zero == (1 if name == "hemitropic" and bent else 0)
+    assert to_judge(x, "count").negative == negative
+
+
+@pytest.mark.parametrize(
+    ("name", "formulation"),
+    [
+        ("semi_tangential", "reduced"),
+        ("tip_on_plane", "reduced"),
+        ("greenhill", "reduced"),
+        ("no_mean_deflection", "pointwise"),
+        ("on_plane", "pointwise"),
+        ("ring", "reduced"),
+        ("ring", "pointwise"),
+        ("pressed_ring", "pointwise"),
+    ],
+)
+def test_methods_agree_with_other_ends_and_constraints(name: str, formulation: str) -> None:
+    """Moving ends are rows, their moments and multipliers of constraints columns of C; eigenvalues come in pairs."""
+    given = getattr(classics, name)()
+    solver = Solver(given, Discretization(formulation, 4, 3)).equilibria
+    x, outcome = solver.first(0.9 * given.span[0] + 0.1 * given.span[1])
+    assert outcome.converged
+    to_judge = Judge(solver.system)
+    expected = to_judge(x, "dense", 3)
+    for method in SPARSE:
+        found = to_judge(x, method, 3)
+        np.testing.assert_allclose(found.values, expected.values, rtol=1e-9, err_msg=method)
+        assert found.certified, method
+
+
+@pytest.mark.parametrize("load", [10.0, 20.0, 40.0])
+def test_methods_agree_without_symmetry(load: float) -> None:
+    system, x = plain("follower", "pointwise", *SMALL, load)
+    to_judge = Judge(system)
+    expected = to_judge(x, "dense", 4)
+    for method in ("auto", "reduction"):
+        np.testing.assert_allclose(to_judge(x, method, 4).values, expected.values, rtol=1e-9, err_msg=method)
+    assert expected.stable == (load < 20.05)
+
+
+def test_names() -> None:
+    to_judge, x = at("cord", "reduced", 20.0, False)
+    with pytest.raises(
+        InputError,
+        match=r"Unknown method 'magic': choose one of auto, cayley, count, dense, reduction, shift-invert, slicing\.",
+    ):
+        to_judge(x, "magic")
+    with pytest.raises(InputError, match="ask for none or more"):
+        to_judge(x, "auto", -1)
+    system, y = plain("follower", "pointwise", *SMALL, 10.0)
+    for method in ("count", "cayley", "slicing"):
+        with pytest.raises(InputError, match=r"symmetric pencil.*: choose one of dense, reduction, shift-invert\."):
+            judge(system, y, method)
+    with pytest.raises(InputError, match="Unknown method 'magic'"):
+        Plan(at=(10.0,), method="magic")
+    assert to_judge(x, number=0).method == "count"
+    assert to_judge(x, number=2).method == "shift-invert"
+    assert to_judge(x, number=30).method == "dense"
+    assert judge(system, y).reason.startswith("the load has no potential")
+    assert "none missing" in str(to_judge(x, number=2))
+
+
+@cache
+def reference() -> tuple[Judge, PETSc.Vec]:
+    inertia = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (1e-3, 1e-3, 2e-3))
+    solver = Solver(replace(demo_cases.scene("cord"), inertia=inertia), Discretization("pointwise", 9, 6)).equilibria
+    solver.system.set_phase(None)
+    x, outcome = solver.at_load(solver.start(20.0), 20.0)
+    assert outcome.converged
+    return Judge(solver.system), x
+
+
+@pytest.mark.short
+@pytest.mark.parametrize("method", SOLVERS)
+def test_reference_values(method: str) -> None:
+    to_judge, x = reference()
+    np.testing.assert_allclose(to_judge(x, method, 3).values, REFERENCE, rtol=1e-9)
+
+
+def test_a_method_is_a_module() -> None:
+    """Names are those of the files; the README says what each does."""
+    folder = Path(methods.__file__ or "").parent
+    assert set(METHODS) == {f.stem.replace("_", "-") for f in folder.glob("*.py") if f.stem != "__init__"}
+    page = (folder.parents[2] / "README.md").read_text()
+    assert all(issubclass(find(name), Method) and f"`{name}`" in page for name in METHODS)
+
+
+def test_parameters_of_cayley_follow_a_branch() -> None:
+    solver = Solver(scene("cord"), Discretization("reduced", *SMALL)).equilibria
+    to_judge = Judge(solver.system)
+    work = []
+    for load in (30.0, 31.0, 32.0, 48.0, 60.0):
+        solver.system.set_phase(None)
+        x, _ = solver.at_load(solver.start(load), load)
+        found, other = to_judge(x, "cayley", 3), to_judge(x, "shift-invert", 3)
+        np.testing.assert_allclose(found.values, other.values, rtol=1e-9)
+        assert found.certified
+        work.append(found.factorisations)
+    assert work[1] < work[0]
+
+
+def test_interval() -> None:
+    to_judge, x = at("cord", "reduced", 20.0, False)
+    every = to_judge(x, "shift-invert", 8).values
+    low, high = (every[1] + every[2]) / 2, (every[5] + every[6]) / 2
+    found = to_judge(x, "slicing", interval=(low, high))
+    np.testing.assert_allclose(found.values, every[2:6], rtol=1e-9)
+    assert found.certified
+    with pytest.raises(InputError, match="is empty"):
+        to_judge(x, "slicing", interval=(high, low))
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_deflation_alone(formulation: str) -> None:
+    """Without the constraint that keeps it out, the symmetry mode is found as mu = 0, unless it is deflated."""
+    to_judge, x = at("hemitropic", formulation, 0.2, True)
+    expected, system = to_judge(x, "shift-invert", 4).values, to_judge.system
+    matrix, mass = system.state_matrix(), system.metric_matrix()
+    assemble_pencil(system, x, matrix, mass)
+    ((mode, _),) = weighed_modes(system, symmetry_modes(system, x), mass).values()
+    shift = float(expected[0]) - 1.0
+    shifted = matrix.copy()
+    shifted.axpy(-shift, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    factors = factors_of("lu", system.comm, 0, 0, {})
+    factors(shifted)
+    assert to_judge.inertia is not None
+    for deflated, zeros in (((), 1), ([mode], 0)):
+        solver = with_factors(matrix, mass, 6, shift, Inverse(factors), to_judge.inertia.seed(1), deflated)
+        solver.solve()
+        values = np.sort([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
+        vanish = abs(values) < 1e-9 * abs(expected).max()
+        assert vanish.sum() == zeros
+        np.testing.assert_allclose(values[~vanish][:4], expected, rtol=1e-9)
+
+
+# --- nasty -----------------------------------------------------------------------------------------------------
+
+
+def test_shift_on_an_eigenvalue() -> None:
+    to_judge, x = at("cord", "reduced", 20.0, False)
+    expected = to_judge(x, "dense", 4).values
+    spectrum = to_judge.spectrum
+    assert spectrum is not None
+    for i in range(3):
+        spectrum.shift = expected[i]
+        found = to_judge(x, "shift-invert", 4)
+        np.testing.assert_allclose(found.values, expected, rtol=1e-9)
+        assert found.certified
+
+
+def test_shift_of_the_reduction_on_an_eigenvalue() -> None:
+    """All three, or a sentence that says to look elsewhere; or without the constraints, whose multiplier is zero."""
+    system, x = plain("cord", "reduced", *SMALL, 20.0)
+    expected = at("cord", "reduced", 20.0, False)[0](x, "dense", 3).values
+    for inverse in INVERSES:
+        reduction = Reduction(Blocks(system).assemble(x), inverse)
+        for value in expected:
+            try:
+                found = reduction.near(3, value)
+            except ConvergenceError as trouble:
+                assert "elsewhere" in str(trouble) or (inverse != "saddle" and "the inverse 'saddle'" in str(trouble))
+                continue
+            assert found.certified
+            assert abs(found.values - value).min() < 1e-9 * abs(expected).max()
+
+
+def test_interval_between_eigenvalues() -> None:
+    """An end on an eigenvalue belongs to the interval or not, what is inside is found."""
+    to_judge, x = at("cord", "reduced", 20.0, False)
+    every = to_judge(x, "dense", 6).values
+    found = to_judge(x, "slicing", interval=(every[1], every[4])).values
+    np.testing.assert_allclose(found[np.isclose(found, every[2])][0], every[2], rtol=1e-9)
+    assert {2, 3} <= {int(np.argmin(abs(every - v))) for v in found} <= {1, 2, 3, 4}
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-10, 1e-6])
+@pytest.mark.parametrize("method", SOLVERS)
+def test_triple_cluster(method: str, apart: float) -> None:
+    """A cantilever bends about d1 and d2 and twists with equal stiffness, mu = (pi/2)^2 thrice; a thrust parts them."""
+    given = classics.euler("clamped-free").varying("P", (0.0, 1.0), B2=1.0)
+    solver = Solver(given, Discretization("reduced", *SMALL)).equilibria
+    x, _ = solver.at_load(solver.start(apart), apart)
+    to_judge = Judge(solver.system)
+    for number in (2, 3, 4):
+        found = to_judge(x, method, number)
+        expected = np.pi**2 / 4 - np.array([apart, apart, 0.0])
+        np.testing.assert_allclose(found.values[:3], expected[:number], rtol=1e-6)
+        assert np.diff(found.values[:3]).max() < apart + 1e-9
+        assert found.values[3:].sum() == pytest.approx((number > 3) * 9 * np.pi**2 / 4, rel=1e-3)
+        assert found.certified
+        assert (found.negative, found.zero) == (0, 0)
+    gram = np.array([[u.dot(to_judge.spectrum.mass * v) for u in found.vectors[:3]] for v in found.vectors[:3]])
+    assert np.linalg.eigvalsh(gram / np.sqrt(np.outer(np.diag(gram), np.diag(gram)))).min() > 0.1  # three directions
+
+
+@pytest.mark.parametrize(
+    ("mass", "rotary"),
+    [(0.0, (1.0, 1.0, 0.0)), (1.0, (0.0, 0.0, 0.0)), (1.0, (0.0, 0.0, 1e-3))],
+)
+@pytest.mark.parametrize("name", ["cord", "ruler"])
+def test_fields_without_mass(name: str, mass: float, rotary: tuple[float, float, float]) -> None:
+    inertia = Inertia(rho_A=lambda c: mass, rho_I=lambda c: rotary)
+    solver = Solver(replace(scene(name), inertia=inertia), Discretization("pointwise", *SMALL)).equilibria
+    load = {"cord": 20.0, "ruler": 2.0}[name]
+    x, outcome = solver.first(load)
+    assert outcome.converged
+    to_judge = Judge(solver.system)
+    expected = to_judge(x, "dense", 4)
+    scale = abs(expected.values).max()
+    assert (expected.values < 0).sum() == expected.negative == {"cord": 1, "ruler": 0}[name]
+    for method in SPARSE:
+        found = to_judge(x, method, 4)
+        np.testing.assert_allclose(found.values, expected.values, rtol=1e-9, atol=1e-10 * scale, err_msg=method)
+        assert found.certified, method
+
+
+@pytest.mark.parametrize("method", SOLVERS)
+def test_an_unstable_direction_without_mass(method: str) -> None:
+    """Its eigenvalue is minus infinity."""
+    inertia = Inertia(rho_I=lambda c: (0.0, 1.0, 0.0))
+    solver = Solver(replace(scene("cord"), inertia=inertia), Discretization("reduced", *SMALL)).equilibria
+    x, _ = solver.first(20.0)
+    with pytest.raises(ConvergenceError, match="no lower end"):
+        Judge(solver.system)(x, method, 2)
+    assert Judge(solver.system)(x, "count").negative == 1
+
+
+@pytest.mark.parametrize("method", SOLVERS)
+def test_no_mass_at_all(method: str) -> None:
+    """One sentence: infinite eigenvalues are none."""
+    inertia = Inertia(rho_I=lambda c: (0.0, 0.0, 0.0))
+    solver = Solver(replace(scene("cord"), inertia=inertia), Discretization("reduced", *SMALL)).equilibria
+    x, _ = solver.first(60.0)
+    with pytest.raises(SceneError, match="give it a mass or a rotary inertia"):
+        Judge(solver.system)(x, method, 2)
+    assert Judge(solver.system)(x, "count").stable
+
+
+def test_more_constraints_than_half_the_unknowns() -> None:
+    """In full coordinates the pointwise formulation has p > m/2 with free strains none: the reduction still holds."""
+    system, x = plain("cord", "pointwise", *SMALL, 20.0)
+    pencil = Blocks(system, "full").assemble(x)
+    m, p = pencil.C.getSize()
+    assert p > m / 2
+    expected = judge(system, x, number=3)
+    assert expected.certified
+    found = Reduction(pencil).near(3, expected.values[0] - 10.0)
+    np.testing.assert_allclose(found.values, expected.values, rtol=1e-9)
+    assert found.certified
+
+
+def test_exact_zero() -> None:
+    """At the buckling load of this discretisation, found by bisection of the quotient, mu is zero to round-off."""
+    solver = Solver(scene("cord"), Discretization("reduced", *SMALL)).equilibria
+    solver.system.set_phase(None)
+    count = Count(solver.system)
+
+    def lowest(load: float) -> float:
+        found = count.at(solver.at_load(solver.start(load), load)[0])
+        found.count()
+        return float(found.nearest(1, accuracy=1e-9)[0][0])
+
+    a, b = 49.0, 50.0
+    f, g = lowest(a), lowest(b)
+    for _ in range(8):
+        if abs(b - a) < 1e-13:
+            break
+        a, b, f = b, b - g * (b - a) / (g - f), g
+        g = lowest(b)
+    x, _ = solver.at_load(solver.start(b), b)
+    found = judge(solver.system, x, "shift-invert", 2)
+    assert (found.negative, found.zero) == (0, 1)
+    assert abs(found.values[0]) < 1e-9 * found.values[1]
+
+
+@SERIAL
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_small_eigenvalues_on_many_elements(formulation: str) -> None:
+    """On either side of the buckling load, ever closer: right, or zero within what is said to be unknown."""
+    solver = Solver(scene("cord"), Discretization(formulation, 10_000, 1)).equilibria
+    solver.system.set_phase(None)
+    count = Count(solver.system)
+
+    def decision(load: float):  # type: ignore[no-untyped-def]
+        return decide(count.at(solver.at_load(solver.start(load), load)[0]))
+
+    loads = 49.348 + np.array([-0.5, 0.5])
+    values = []
+    for load in loads:
+        decision(load)
+        values.append(count.held.nearest(1, accuracy=1e-8)[0][0])
+    slope = (values[1] - values[0]) / 1.0
+    solver_state, _ = solver.at_load(solver.start(49.348), 49.348)
+    decide(count.at(solver_state))
+    middle = count.held.nearest(1, accuracy=1e-8)[0][0]
+    critical = 49.348 - middle / slope
+    for mu in (1e-3, -1e-4, 1e-5, -3e-6, 3e-6, -1e-8, 1e-10, -1e-12):
+        found = decision(critical + mu / slope)
+        if abs(mu) > 2e-6:
+            assert (found.index.negative, found.index.zero) == (int(mu < 0), 0)
+        else:
+            assert found.index.zero == 1
+        assert found.band < 1e-4
+
+
+# --- rank of the constraints -------------------------------------------------------------------------------------
+
+
+@pytest.mark.short
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_smallest_singular_value(formulation: str) -> None:
+    system, x = buckled("hemitropic", formulation, *SMALL, 0.2)
+    for coordinates in ("full", "tangent"):
+        pencil = Blocks(system, coordinates).assemble(x)
+        C = gathered(pencil.C).toarray()
+        assert rank_of(pencil) == pytest.approx(np.linalg.svd(C, compute_uv=False)[-1], rel=1e-9)
+
+
+def test_smallest_singular_value_is_of_the_size_of_an_element() -> None:
+    ratios = []
+    for n in (50, 100, 200):
+        solver = Solver(scene("cord"), Discretization("pointwise", n, 1)).equilibria
+        pencil = Blocks(solver.system).assemble(solver.start(20.0))
+        ratios.append(rank_of(pencil) * n)
+    assert abs(np.diff(ratios)).max() < 0.05 * ratios[-1]
+
+
+def test_dependent_constraints_are_named() -> None:
+    system, x = plain("hemitropic", "reduced", *SMALL, 0.2)
+    pencil = Blocks(system, "full").assemble(x)
+    comm = MPI.COMM_SELF
+    C = gathered(pencil.C).tolil()
+    last = np.concatenate(system.comm.allgather(pencil.where["scalars"]))
+    C[:, last[0]] = C[:, last[1]]
+    sigma, vector = smallest_singular(C)
+    assert sigma < 1e-13
+    np.testing.assert_allclose(abs(vector[last[:2]]), 2**-0.5, rtol=1e-6)
+    where = pencil.where | {"scalars": last, "eta": np.zeros(0, dtype=int)}
+    if system.comm.size == 1:
+        twin = replace(
+            pencil, K=petsc_matrix(comm, gathered(pencil.K)), C=petsc_matrix(comm, sp.csr_matrix(C)), where=where
+        )
+        with pytest.raises(SceneError, match=r"component 1 and position of the ends, component 2.*remove those"):
+            rank_of(twin)

@@ -1,0 +1,133 @@
+"""PETSc's and SLEPc's options reach each solver by its prefix, and overrule what is set for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from petsc4py import PETSc
+from small_states import plain
+
+from rodfem.errors import ConvergenceError
+from rodfem.fem.system import System
+from rodfem.linalg.factorization import Klu
+from rodfem.stability.assessment import Judge
+from rodfem.stability.blocks import Blocks
+from rodfem.stability.nonsymmetric import Vibration
+from rodfem.stability.pencil import in_interval, shift_invert, with_factors
+from rodfem.stability.projection import PREFIX
+from rodfem.stability.reduction import Reduction
+
+pytestmark = pytest.mark.alone
+
+LU = "rodfem_lu_"
+ORDERING = 2
+"""MUMPS's approximate minimum fill: not what rodfem asks for."""
+
+
+@pytest.fixture
+def options() -> Iterator[PETSc.Options]:
+    """PETSc's options; what a test has set is taken back."""
+    found = PETSc.Options()
+    before = set(found.getAll())
+    yield found
+    for name in set(found.getAll()) - before:
+        found.delValue(name)
+
+
+def test_nothing_is_left_in_the_database(options: PETSc.Options) -> None:
+    options["mat_klu_pivot_tol"] = 0.5  # of the user, without a prefix
+    before = options.getAll()
+    system, x = cord()
+    system.at(x).factor(system.load_axis())
+    judge = Judge(system)
+    for method in ("count", "shift-invert", "slicing"):
+        judge(x, method, 2)
+    system, x = plain("follower", "pointwise", 6, 3, 10.0)
+    vibration = Vibration(system)
+    vibration.assemble(x)
+    vibration.near(2, 0.0)
+    shift_invert(vibration.matrix, vibration.mass, 2, 1.0, symmetric=False).solve()
+    assert options.getAll() == before
+    del options["mat_klu_pivot_tol"]
+
+
+def test_threshold_of_pivots_is_read(options: PETSc.Options) -> None:
+    """Factors of KLU with the threshold that was asked for, whatever the prefix that it was asked for with."""
+    system, x = cord()
+    matrix, solutions = system.at(x).jacobian(system.load_axis()), []
+    for name in ("", f"{LU}mat_klu_pivot_tol", "mat_klu_pivot_tol"):
+        if name:
+            options[name] = 1e-12
+        factors, out = Klu(LU, system.fields.dense_rows), system.new_vector()
+        factors(matrix)
+        factors.solve(matrix * x, out)
+        solutions.append(out)
+        if name:
+            del options[name]
+    default, prefixed, plainly = solutions
+    assert (prefixed - plainly).norm() == 0.0
+    assert (default - plainly).norm() > 0.0
+
+
+def cord() -> tuple[System, PETSc.Vec]:
+    system, x = plain("cord", "reduced", 6, 3, 20.0)
+    return System(system.scene, system.fields.discretization), x
+
+
+def test_factors(options: PETSc.Options) -> None:
+    options["rodfem_lu_mat_mumps_icntl_7"] = options["rodfem_cholesky_mat_mumps_icntl_7"] = ORDERING
+    options["rodfem_lu_pc_factor_mat_solver_type"] = "mumps"
+    system, x = cord()
+    system.at(x).factor(system.load_axis())
+    judge = Judge(system)
+    assert judge(x, "count").negative == 1
+    for factors in (system.lu, judge.inertia.factors):
+        assert factors.factor.getMumpsIcntl(7) == ORDERING
+    del options["rodfem_lu_mat_mumps_icntl_7"], options["rodfem_cholesky_mat_mumps_icntl_7"]
+
+
+def test_symmetric_pencil(options: PETSc.Options) -> None:
+    options["rodfem_eps_ncv"], options["rodfem_eps_tol"] = 17, 1e-7
+    system, x = cord()
+    judge = Judge(system)
+    expected = judge(x, "shift-invert", 3).values
+    spectrum = judge.spectrum
+    solver = with_factors(spectrum.matrix, spectrum.mass, 3, -9.0, spectrum._solving.factors, spectrum.inertia.seed(1))
+    assert (solver.getDimensions()[1], solver.getTolerances()[0]) == (17, 1e-7)
+    options["rodfem_slicing_eps_tol"], options["rodfem_slicing_st_mat_mumps_icntl_7"] = 1e-8, ORDERING
+    solver = in_interval(spectrum.matrix, spectrum.mass, -20.0, 30.0)
+    solver.solve()
+    assert solver.getTolerances()[0] == 1e-8
+    assert solver.getKrylovSchurKSP().getPC().getFactorMatrix().getMumpsIcntl(7) == ORDERING
+    np.testing.assert_allclose(sorted(solver.getEigenvalue(i).real for i in range(3)), expected, rtol=1e-8)
+
+
+def test_pencil_without_symmetry(options: PETSc.Options) -> None:
+    system, x = plain("follower", "pointwise", 6, 3, 10.0)
+    vibration = Vibration(system)
+    vibration.assemble(x)
+    expected = vibration.near(2, 0.0).values[:2]
+    options["rodfem_st_pc_factor_mat_solver_type"] = "mumps"
+    options["rodfem_st_mat_mumps_icntl_7"], options["rodfem_st_type"] = ORDERING, "cayley"
+    solver = shift_invert(vibration.matrix, vibration.mass, 2, 1.0, symmetric=False)
+    solver.solve()
+    assert solver.getST().getType() == "cayley"
+    assert solver.getST().getKSP().getPC().getFactorMatrix().getMumpsIcntl(7) == ORDERING
+    values = sorted(solver.getEigenvalue(i).real for i in range(2))
+    np.testing.assert_allclose(values, expected.real, rtol=1e-9)
+
+
+def test_reduced_pencil(options: PETSc.Options) -> None:
+    system, x = cord()
+    reduction = Reduction(Blocks(system).assemble(x))
+    expected = reduction.near(3, -30.0).values
+    options[f"{PREFIX}pc_factor_mat_solver_type"] = "mumps"
+    options[f"{PREFIX}mat_mumps_icntl_7"], options["rodfem_reduced_eps_tol"] = ORDERING, 1e-11
+    np.testing.assert_allclose(reduction.near(3, -30.0).values, expected, rtol=1e-9)
+    options[f"{PREFIX}ksp_type"], options[f"{PREFIX}ksp_max_it"] = "richardson", 3
+    np.testing.assert_allclose(reduction.near(3, -30.0).values, expected, rtol=1e-9)
+    options["rodfem_reduced_eps_ncv"] = 3
+    with pytest.raises(ConvergenceError, match="ncv"):
+        reduction.near(3, -30.0)
