@@ -33,7 +33,7 @@ DEFAULT: Constants = (-3.0, 1.0, 1.0, 3.0)
 @cache
 def demo() -> ModuleType:
     """The demo as a module (it is a script, in no package)."""
-    spec = spec_from_file_location("hemitropic_cases", DEMO)
+    spec = spec_from_file_location("hemitropic_demo", DEMO)
     assert spec is not None and spec.loader is not None
     module = module_from_spec(spec)
     sys.modules[spec.name] = module
