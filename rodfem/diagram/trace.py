@@ -57,6 +57,9 @@ def trace(
         For bad input, before any computation.
     ConvergenceError
         Where not even a first equilibrium is found.
+
+    An error after the first branch was begun, or an interrupt, carries the branches so far in its attribute
+    ``diagram``.
     """
     plan = plan or Plan()
     if scene.conservative:
@@ -80,7 +83,13 @@ def trace(
             tracer = Sweep(found, plan, recorder, complete)
         diagram = Diagram(scene, plan, tracer.branches, tracer.solvers)
         diagram.warnings, diagram.notes = recorder.warnings, recorder.notes
-        tracer.run()
+        try:
+            tracer.run()
+        except BaseException as trouble:  # an interrupt, too: nothing that has been computed is lost
+            if diagram.branches:
+                trouble.diagram = diagram  # type: ignore[attr-defined]
+                trouble.add_note("The branches traced before are in the attribute `diagram` of this error.")
+            raise
     return diagram
 
 

@@ -179,6 +179,20 @@ def test_one_solver(diagram: Diagram) -> None:
         solver.modes(near, 0)
 
 
+def test_an_interrupt_loses_no_branch() -> None:
+    """What had been traced comes with the error, and can be asked."""
+
+    class Impatient(Observer):
+        def finished(self, branch: Branch) -> None:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        rodfem.trace(hemitropic_cases.scene(), MESH, Plan((0.0, 0.2), error_bars=False), Impatient())
+    (straight,) = caught.value.diagram
+    assert [s.negative_after for s in straight.special if s.kind == "branch point"] == [2]
+    assert caught.value.diagram.assess(straight.points[0]).negative == 0
+
+
 @pytest.mark.alone
 def test_a_diagram_that_is_dropped_leaves_no_memory_behind() -> None:
     """PETSc keeps what Python has collected until all ranks agree: a diagram had left 21 MB each time."""
