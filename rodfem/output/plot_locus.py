@@ -24,6 +24,9 @@ POINTS: dict[str, dict[str, Any]] = {
 }
 """Markers of rows by how what is said of them begins, or for the fold's end how it reads."""
 
+ROOM = 0.1
+"""Share of the height above and below the curves, for the indices that stand beside them."""
+
 
 def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     """Draw loci of one scene in the plane of its two parameters, one over the other.
@@ -61,6 +64,7 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
         figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
         axes = figure.subplots()
         axes.set_axisbelow(True)
+        axes.margins(y=ROOM)
         for one in loci:
             kind, columns = one["kind"], one["columns"]
             x, y = (np.asarray(columns[name], dtype=float) for name in reversed(names))
