@@ -15,7 +15,7 @@ from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
 from forms.energy import bending
-from rodfem import Discretization, Ordinate, Plan, Scene, SceneError, Solver, clamped, hinged, run, sliding_hinge, trace
+from rodfem import Discretization, InputError, Ordinate, Plan, Scene, Solver, clamped, hinged, run, sliding_hinge, trace
 from rodfem.output.glyphs import STEEL
 from rodfem.output.render import _read
 from rodfem.problem.end import End
@@ -144,5 +144,5 @@ def test_it_is_stored_and_drawn_as_what_it_is(folder: Path) -> None:
     ],
 )
 def test_mistakes(make: Callable[[], object], words: str) -> None:
-    with pytest.raises(SceneError, match=words):
+    with pytest.raises(InputError, match=words):
         make()
