@@ -61,7 +61,9 @@ def run(
     and the folder ``results/<name>``.  Files are updated after every branch: an interrupted run keeps all completed
     branches.  What the terminal prints is what ``words`` makes of each line.  Returns the diagram.  Raises
     :class:`~rodfem.errors.InputError` for bad input, before any computation, and
-    :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
+    :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found. The ``discretization`` is a
+    :class:`~rodfem.fem.fields.Discretization`.  Pictures are drawn if ``figures``.  The ranks of ``comm`` share the
+    rod.  With ``quiet`` nothing is printed.
     """
     plan = plan or Plan()
     output = output or Path("results") / scene.name
@@ -97,7 +99,11 @@ class Terminal(Report):
     def __init__(
         self, plan: Plan, output: Path, comm: MPI.Comm, quiet: bool, words: Callable[[str], str] = str
     ) -> None:
-        """Write into the folder ``output``, which there is; with ``quiet`` print nothing."""
+        """Write into the folder ``output``, which there is; with ``quiet`` print nothing.
+
+        The ``plan`` says what is printed; ``comm`` has the ranks, of which the first one writes; ``words`` rewords each
+        line.
+        """
         super().__init__(comm, words=words)
         if quiet:
             self.on = self.live = False

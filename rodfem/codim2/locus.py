@@ -56,6 +56,10 @@ class Mark:
 class Locus:
     """A curve of special points in the plane of two parameters, one row a point, in order along the curve.
 
+    ``scene`` and ``title`` name the rod, ``labels`` are those of the two parameters in mathematics, and
+    ``ordinate_name`` is that of the ordinate.  ``constants`` holds all parameters of the scene, and ``discretization``
+    formulation, elements and degree.
+
     Attributes
     ----------
     kind

@@ -91,7 +91,11 @@ class Singular:
         fold: bool,
         left: list[PETSc.Vec] | None = None,
     ) -> None:
-        """Take the null vectors of a special point, and the ``left`` ones where the matrix is not symmetric."""
+        """Take the null vectors of a special point, and the ``left`` ones where the matrix is not symmetric.
+
+        ``solver`` has the mesh, ``plane`` the two parameters; there are as many ``vectors`` as eigenvalues vanish.  At
+        a ``fold`` the single null vector is coupled to the load; otherwise the points are branch points.
+        """
         self.solver, self.system, self.plane, self.fold = solver, solver.system, plane, fold
         self.saddle = solver.inertia if isinstance(solver, BranchSolver) else Inertia(solver.system)
         self.metric = self.saddle.metric
@@ -137,7 +141,8 @@ class Singular:
         """Point of the locus on the plane through ``(p, x)`` across ``tangent``; raises :class:`ConvergenceError`.
 
         With None for the state's part of the tangent the plane is that of the parameters alone: a line of theirs.
-        ``near`` is a point of the curve whose null vectors are close by.
+        ``near`` is a point of the curve whose null vectors are close by. ``reach`` bounds how far ``x`` may move, in
+        the metric.
         """
         self._adopt(near.modes, near.left)
         p, x, origin = np.array(p, dtype=float), x.copy(), (np.array(p, dtype=float), x.copy())

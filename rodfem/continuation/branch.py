@@ -28,9 +28,11 @@ class Point:
     tangent, ``drift`` the largest drift scalar (zero but for round-off), ``error`` the last Newton correction, ``mesh``
     the number of the discretisation that ``x`` belongs to, and ``estimate`` the error of the discretisation in load and
     ordinate, where an accuracy was asked for.  ``determinant`` is the logarithm of the size of the saddle matrix's
-    determinant, at the state whose factors told the index.  Of
-    frequencies ``omega2`` are the eigenvalues (real and imaginary part), ``motion`` what the rod does in each, and
-    ``curve`` the numbers of their curves against the load.
+    determinant, at the state whose factors told the index.  Of frequencies ``omega2`` are the eigenvalues (real and
+    imaginary part), ``motion`` what the rod does in each, and ``curve`` the numbers of their curves against the load.
+    ``load`` and ``ordinate`` are those of the diagram, and ``stretch`` is the smallest stretch ``v3`` along the rod.
+    ``negative`` and ``zero`` count eigenvalues, ``negative_in_space`` those of a planar rod in space (None: not asked
+    for), ``spectrum`` holds the left-most ones.
     """
 
     x: PETSc.Vec
@@ -72,7 +74,7 @@ class Point:
 
 @dataclass
 class NormalForm:
-    """``load = load_b + coefficient x^power + ...``, a bound of the coefficient's error, and the kind of bifurcation.
+    """``load = load_b + coefficient x^power + ...`` at a bifurcation of a ``kind``; the coefficient's ``uncertainty``.
 
     ``side`` is the sign of the load's change on the bifurcating branch.
     """
@@ -102,7 +104,12 @@ class SpecialPoint:
     fold. ``unfolding`` is the size of the unfolding parameters that make it a branch point, relative to the metric as
     eigenvalues are (:mod:`rodfem.continuation.unfolding`): round-off, unless an imperfection has taken it apart.
     ``omega2`` is the double eigenvalue of flutter, ``cluster`` the :class:`~rodfem.stability.cluster.Cluster` of the
-    eigenvalues that collide.
+    eigenvalues that collide. The index is ``negative_before`` and ``negative_after`` the ``point``, which is the row
+    number ``row`` of its branch; ``kind`` is one of :mod:`rodfem.continuation.kinds`.  ``null_vectors`` are of metric
+    norm 1.  ``test_function`` is the one whose zero was located, the eigenvalue ``mu``, the ``slope`` of the load or
+    the least ``stretch``; ``event`` is the user's own.  ``connects_to`` is the branch and the row that meets this one
+    there, and ``switched`` says that the branches leaving it were sought.  ``law`` is the normal form, ``note`` a
+    remark in words, ``omega2_error`` a bound of the error of ``omega2``.
     """
 
     kind: Kind
@@ -150,7 +157,7 @@ class SpecialPoint:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """Two neighbouring rows between which the index changes from ``before`` to ``after`` without a special point."""
+    """Neighbouring rows ``a``, ``b``: the index changes from ``before`` to ``after`` without a special point."""
 
     a: Point
     b: Point
@@ -171,7 +178,10 @@ class Branch:
 
     ``begins`` is the index right after the branch point that it leaves, where the indices of the trunk tell it.
     ``singular_start`` is the number of eigenvalues that vanish at the first state of a range and not all along the
-    branch: a branch point there, if it is one, is not located.
+    branch: a branch point there, if it is one, is not located. ``name`` is unique in the diagram; ``parent`` is the
+    branch and the number of its special point that this one left, and ``depth`` the number of such switches.
+    ``points`` and ``special`` are in order of arclength, ``ended`` says why no more follow, and ``unexplained`` lists
+    changes of index without a special point.
     """
 
     name: str

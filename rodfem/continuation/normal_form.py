@@ -27,7 +27,7 @@ BESIDE = 1e-3
 
 @dataclass(frozen=True)
 class Origin:
-    """A branch point: state, load and ordinate, and the uncertainties of the latter two by its location."""
+    """A branch point: state ``x``, ``load``, ``ordinate``; uncertainties ``load_left``, ``ordinate_left`` of these."""
 
     x: PETSc.Vec
     load: float

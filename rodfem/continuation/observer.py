@@ -30,7 +30,7 @@ class Observer:
         """A scene has been discretised; an ``accuracy`` may be asked for."""
 
     def frequency_mesh(self, mesh: Discretization, number: int, change: float, asked: float) -> None:
-        """A mesh was chosen on which ``number`` frequencies still ``change``, relative; an error was ``asked`` for."""
+        """On the chosen ``mesh`` ``number`` frequencies still ``change``, relative; an error was ``asked`` for."""
 
     def branch(self, branch: Branch) -> None:
         """A branch begins."""

@@ -45,7 +45,9 @@ def special_at(
 ) -> SpecialPoint:
     """Evaluate and classify a located point: multiplicity, null vectors, coupling to the load, kind.
 
-    Vectors of eigenvalues that are zero on the whole branch (``still``) are none of its null vectors.
+    Vectors of eigenvalues that are zero on the whole branch (``still``) are none of its null vectors. ``solver`` has
+    the mesh, ``located`` is the zero found there, ``arclength`` that of the point.  Raises :class:`ConvergenceError`
+    where no null vector is left.
     """
     system, inertia = solver.system, solver.inertia
     x = located.x
@@ -93,7 +95,7 @@ def find_special(
     Where the load turns back there is a fold, or a branch point at which this branch ends on another one.  The
     eigenvalues number ``orders`` (0 is the left-most) change sign from ``a`` to ``b``: those that a fold does not
     explain do so at branch points, or further folds.  ``persistent`` eigenvalues are zero all along, beside those of
-    symmetries, and are not numbered.
+    symmetries, and are not numbered. ``solver`` has the mesh.
     """
     found: list[SpecialPoint] = []
     rest = list(orders)
@@ -150,7 +152,7 @@ def midpoint(solver: BranchSolver, a: Point, b: Point) -> Point | None:
 
 
 def point_between(solver: BranchSolver, a: Point, b: Point, s: float) -> Point | None:
-    """Point of a branch at arclength ``s`` between two of its points; None where it is not between them."""
+    """Point at arclength ``s`` between the points ``a`` and ``b`` of a branch of ``solver``; None where it is not."""
     try:
         x = solve_at(solver, lambda t: hermite(a, b, t), s)
     except ConvergenceError:
@@ -238,7 +240,8 @@ def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, fir
 
     The amplitude is halved until the point lies where the direction says, within half of its distance.  Where that
     fails, a family of equilibria may leave at once, at each of which the Jacobian is singular (an elastica whose ends
-    meet turns as a rigid body about any axis): then Newton's method is damped along the family.
+    meet turns as a rigid body about any axis): then Newton's method is damped along the family. ``solver`` has the
+    mesh, ``first`` is a length in the metric.
     """
     system = solver.system
     row, before = solver.row(direction), system.damping
@@ -272,6 +275,8 @@ def start_branch(
     The second is nearer where the load has turned back before it, or its index is not that with which the branch
     begins: the fold, or the branch point, that says why is on the branch.  So it is where its load is out of bounds.
     Nor is it farther away than the branch that it leaves began: beside a nearly double point branches are short.
+    ``name``, ``parent`` and ``depth`` are recorded in the branch; ``solver`` has the mesh, and ``bounds`` are the least
+    and the greatest load.
     """
     amplitude = FIRST if depth < 2 else max(min(FIRST, special.point.arclength), NEAREST)
     first = leave(solver, special, direction, amplitude)

@@ -79,7 +79,10 @@ class Touching:
 
 
 def inside(solver: BranchSolver, rows: Sequence[Point], p: Point, q: Point) -> list[Point]:
-    """A state between the neighbours ``p`` and ``q`` among three rows whose index is not theirs, if there is one."""
+    """A state between the neighbours ``p`` and ``q`` among three rows whose index is not theirs, if there is one.
+
+    ``solver`` has the mesh, and ``rows`` are consecutive.
+    """
     for multiplicity in MULTIPLICITIES:
         samples = [(row.arclength, relative(row, p, multiplicity)) for row in rows]
         if all(isfinite(value) for _, value in samples):
@@ -119,7 +122,11 @@ def relative(row: Point, other: Point, multiplicity: int) -> float:
 
 
 def lowest(solver: BranchSolver, samples: list[Sample], p: Point, q: Point, multiplicity: int) -> Point | None:
-    """State between two rows, towards the lowest value that the samples lead to, if its index differs from theirs."""
+    """State between two rows, towards the lowest value that the samples lead to, if its index differs from theirs.
+
+    The rows are ``p`` and ``q``, on the mesh of ``solver``.  ``samples`` are arclengths and values of :func:`relative`,
+    for as many coinciding eigenvalues as ``multiplicity`` says.
+    """
     known = [sample for sample in samples if sample[0] in (p.arclength, q.arclength)]
     least = min(value for _, value in known)
     margin = MARGIN * (q.arclength - p.arclength)

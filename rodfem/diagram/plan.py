@@ -30,14 +30,14 @@ class Plan:
     """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars.
 
     Without a ``span`` the range is that of the scene.  Branches are followed from branch points of branches of a depth
-    less than ``depth``; the first branch has depth 0.
-    ``spectrum`` left-most eigenvalues of every state are found besides its index; at the loads ``at`` states are judged
-    by ``method`` (where one is named), and their ``modes`` left-most modes are found; ``tries`` deflated iterations at
-    each of these loads look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
-    special point in the plane of the load and that parameter.  With an ``accuracy`` meshes are chosen and raised on the
-    way such that every row's load and ordinate, and those of every special point, are in error by less than that
-    (relative to values greater than one).  ``events`` are numbers of the state whose zeros are special points, too
-    (conservative scenes).
+    less than ``depth``; the first branch has depth 0. ``spectrum`` left-most eigenvalues of every state are found
+    besides its index; at the loads ``at`` states are judged by ``method`` (where one is named), and their ``modes``
+    left-most modes are found; ``tries`` deflated iterations at each of these loads look for equilibria that no branch
+    has reached; ``locus = (parameter, low, high)`` follows every special point in the plane of the load and that
+    parameter.  With an ``accuracy`` meshes are chosen and raised on the way such that every row's load and ordinate,
+    and those of every special point, are in error by less than that (relative to values greater than one).  ``events``
+    are numbers of the state whose zeros are special points, too (conservative scenes). ``steps`` chooses the lengths of
+    steps, and without ``error_bars`` no second computation bounds the errors.
     """
 
     span: tuple[float, float] | None = None

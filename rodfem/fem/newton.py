@@ -19,7 +19,7 @@ STALLED = 1e-6
 
 @dataclass(frozen=True)
 class NewtonResult:
-    """How a Newton iteration ended.
+    """How a Newton iteration ended: whether ``converged``, after how many ``iterations``.
 
     ``error`` is what the observed rate of convergence leaves after the last correction (that one's size, if the factors
     were new), ``moved`` the size of all corrections together.
@@ -40,7 +40,8 @@ def correct(
 ) -> NewtonResult:
     """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place, with LU factors.
 
-    As :func:`iterate`; fails at a singular matrix, too.
+    As :func:`iterate`; fails at a singular matrix, too. ``system`` has the equations, ``row`` (n,) is the last row of
+    the bordered matrix; ``most`` and ``reach`` are those of :func:`iterate`.
     """
     step = system.new_vector()
 
@@ -69,6 +70,8 @@ def iterate(
 
     With damping ``d`` a correction of size c along a family of equilibria is that by a force ``d c``, which no mesh
     makes exactly zero: one that no longer shrinks is accepted where that force is within the tolerance.
+
+    ``system`` has the equations; ``tolerance`` is the least correction, in the metric, that is asked for.
     """
     equations, origin = system.new_vector(), x.copy()
     still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
@@ -105,6 +108,9 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Newt
     -F``, with ``M`` the metric: it goes downhill, to a state that is stable if one can be reached.  The time step grows
     while the steps are small, and Newton's method takes over near the end (Kelley & Keyes, SIAM J. Numer. Anal. 35
     (1998) 508-523).
+
+    ``system`` has the equations, ``row`` (n,) is the last row of the bordered matrix, and at most ``most`` steps are
+    taken.
     """
     equations, step = system.new_vector(), system.new_vector()
     tau, trial = 1e-2 / system.stiffness_scale, x.copy()

@@ -79,7 +79,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Block:
-    """One field: its name, number of components, degree, continuity, and whether it is a multiplier.
+    """One field: ``name``, number of components ``size``, ``degree``, whether ``continuous``, whether a ``multiplier``.
 
     ``along`` says whether it is that of a constraint all along the rod.
     """

@@ -77,7 +77,7 @@ class Reduced(Known):
 
 
 def place(q: Any, R: Any, s: Any, r: Any = None, **more: Any) -> Place:
-    """Make a place from quaternion, rotation, arclength, centreline (None: there is none) and what else is known."""
+    """Make a place of quaternion ``q``, rotation ``R``, arclength ``s``, centreline ``r`` (None: none) and ``more``."""
     d = {f"d{i + 1}": ufl.as_vector([R[j, i] for j in range(3)]) for i in range(3)}
     kind = Reduced if r is None else Known
     known = {} if r is None else {"r": r}

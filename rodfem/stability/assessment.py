@@ -109,7 +109,8 @@ class Judge(Workspace):
 
         ``interval`` (low, high) is where slicing looks, by default where the ``number`` left-most are.  Raises
         :class:`InputError` for a method that does not exist or apply and for dependent constraints,
-        :class:`ConvergenceError` where an eigensolver fails.
+        :class:`ConvergenceError` where an eigensolver fails. ``method`` is a name of :mod:`rodfem.stability.methods`,
+        or ``auto``.
         """
         name, reason = self.choose(method, number)
         if number < 0:
@@ -151,5 +152,9 @@ class Judge(Workspace):
 
 
 def judge(source: Any, x: PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
-    """Judge one state of a system or solver: see :class:`Judge`, which is to be kept along a branch."""
+    """Judge one state of a system or solver: see :class:`Judge`, which is to be kept along a branch.
+
+    ``source`` is the system or solver, ``x`` its equilibrium; ``method`` and ``number`` are those of
+    :meth:`Judge.__call__`.
+    """
     return Judge(source)(x, method, number)

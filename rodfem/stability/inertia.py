@@ -149,7 +149,7 @@ class Factored:
 
     @property
     def factors(self) -> Factors:
-        """Factors of ``S - shift M``."""
+        """Factors of ``S - shift M``; raises :class:`RuntimeError` before a count has made them."""
         inertia = self._own()
         if inertia.factored != self._filled:
             raise RuntimeError("The matrix of this state was not factored: count first.")
@@ -171,7 +171,10 @@ class Factored:
         return self._own().shift
 
     def below(self, sigma: float) -> int:
-        """Number of eigenvalues below ``sigma``; symmetry modes not counted."""
+        """Number of eigenvalues below ``sigma``; symmetry modes not counted.
+
+        Raises :class:`ConvergenceError` where the count breaks down.
+        """
         own = self._own()
         with own.system.clock("stability"):
             if sigma != own.shift:
@@ -203,7 +206,7 @@ class Factored:
 
         Block inverse iteration from the vectors of the last call, with a Rayleigh-Ritz projection of ``S``, until the
         ``number`` wanted values change by less than ``accuracy`` relative to themselves (or by what the arithmetic
-        resolves).  The block has ``spare`` more vectors.
+        resolves).  The block has ``spare`` more vectors. At most ``most`` iterations are made.
         """
         own, factors, block = self._own(), self.factors, number + spare
         vectors = own.vectors[:block] + [own.seed(i) for i in range(len(own.vectors), block)]

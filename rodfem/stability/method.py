@@ -16,7 +16,7 @@ NEAR_ZERO = 1e-3
 
 
 class Found(NamedTuple):
-    """Eigenvalues, their vectors and backward errors, and whether counts prove that none is missing.
+    """Eigenvalues ``values`` (k,), ``vectors``, backward ``errors``; ``certified``: counts prove that none is missing.
 
     ``factorisations`` are those besides the workspace's own; a ``note`` goes after the reason for the method.
     """

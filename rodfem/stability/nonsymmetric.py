@@ -69,7 +69,7 @@ EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Frequencies:
-    """Eigenvalues ``mu = omega^2`` in ascending order of their real parts, and their backward errors.
+    """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and backward ``errors`` (k,).
 
     ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors`` (n, k) are complex, with the
     n unknowns of this rank.

@@ -26,7 +26,7 @@ SPARE = 2
 
 @dataclass(frozen=True)
 class Decision:
-    """An index, the half width of what counted as zero, and the eigenvalues inside the band of the count.
+    """An ``index``, the half width of what counted as zero, and the eigenvalues inside the band of the count.
 
     Attributes
     ----------
