@@ -1,8 +1,9 @@
-r"""Location of zeros of an eigenvalue or of the slope of the load on a branch.
+r"""Location of special points: zeros of a test function, an eigenvalue or the slope of the load, on a branch.
 
-The bordered system is (nearly) singular near such a point, where equilibria are therefore not computed.  The branch is
-solved at Chebyshev nodes on a short interval around the point; the eigenvalue, the load and the state are smooth
-functions of arclength, and are interpolated with spectral accuracy.
+The slope of the load vanishes at a fold (turning point), an eigenvalue there and at branch points.  The bordered system
+is (nearly) singular near such a point, where equilibria are therefore not computed.  The branch is solved at Chebyshev
+nodes on a short interval around the point; the eigenvalue, the load and the state are smooth functions of arclength,
+and are interpolated with spectral accuracy.
 """
 
 from __future__ import annotations
@@ -90,6 +91,7 @@ def across(system: System, vectors: Sequence[PETSc.Vec], still: Sequence[PETSc.V
     known, out = list(still), []
     for vector in vectors:
         rest = vector.copy()
+        # a remainder of less than half is round-off, or the error of the vectors: it spans nothing new
         project_out(rest, known, system.metric, times=2)
         if (size := system.norm(rest)) > 0.5 * system.norm(vector) or not still:
             rest.scale(1.0 / size)
@@ -108,6 +110,7 @@ def eigenvalue(
     """
     found = solver.inertia.at(x)
     below = found.count().negative
+    # its place among the eigenvalues of its sign, by their distance from zero
     position = order - below if order >= below else below - 1 - order
     for wanted in (position + 1, position + 3, position + 6, position + 12):
         values, vectors = found.nearest(wanted + len(still), accuracy=1e-4)
@@ -180,6 +183,7 @@ def interpolate(samples: list[Sample], test_function: str, guess: float, noise: 
     loads, values = np.array([p.load for p in samples]), np.array([p.mu for p in samples])
     load = chebyshev.chebfit(t, loads - loads[0], len(t) - 1)
     slope = chebyshev.chebder(load)
+    # the test function: an eigenvalue at a branch point, the load's derivative at a fold (turning point)
     f = chebyshev.chebfit(t, values, len(t) - 1) if test_function == "mu" else slope
     root = real_root(f, (guess - middle) / half)
     if root is None:
@@ -187,6 +191,7 @@ def interpolate(samples: list[Sample], test_function: str, guess: float, noise: 
     load_at = float(chebyshev.chebval(root, load)) + loads[0]
     slope_at = float(chebyshev.chebval(root, slope))
     left = zero_uncertainty(f, root)
+    # the last coefficients bound what the series leaves out; a shift of the zero moves the load by its slope
     tail = abs(load[-1]) + abs(slope_at) * left
     floor = round_off(load_at)
     moved = abs(noise / float(chebyshev.chebval(root, chebyshev.chebder(f)))) if test_function == "mu" else 0.0
@@ -249,8 +254,10 @@ def refine(
         nodes = center + half * np.cos(np.pi * (np.arange(count)[::-1] + 0.5) / count)
         samples = [sample(solver, curve, s, mode, persistent, counted=beside is None) for s in nodes]
         located = interpolate(samples, test_function, center, samples[-1].found.noise(mode))
+        # inside the nodes the interpolant is trusted: sharpen; outside it, move there; without a zero, by a secant
         if located is not None and abs(located.s - center) <= half:
             sharp = SHARP if beside is None else max(SHARP, PART * abs(located.load - beside))
+            # a shorter piece that gains less than a digit has met round-off
             settled = best is not None and located.uncertainty > 0.1 * best.uncertainty
             if settled or located.uncertainty - located.arithmetic < sharp:
                 return located if best is None or located.uncertainty < best.uncertainty else best
@@ -319,7 +326,7 @@ def bracket(
         return solver.inertia.at(solve_beside(solver, curve, s, OFF * h)[0]).count().negative > order
 
     first = passed(low)
-    if first == passed(high):
+    if first == passed(high):  # the zero is nearer to an end than a state can be solved
         left, right = (eigenvalue(solver, solve_beside(solver, curve, s, OFF * h)[0], order, still)[0] for s in ends)
         return low if abs(left) < abs(right) else high
     while high - low > width:

@@ -43,7 +43,7 @@ Sample = tuple[float, float]
 
 
 class Touching:
-    """The last rows of a branch, and what their determinants tell of the steps between them."""
+    """The last rows of a branch, and the test for pairs of crossings in the steps between them, by determinants."""
 
     def __init__(self) -> None:
         """No row yet."""
@@ -83,6 +83,7 @@ def inside(solver: BranchSolver, rows: Sequence[Point], p: Point, q: Point) -> l
 
     ``solver`` has the mesh, and ``rows`` are consecutive.
     """
+    # det^(1/m) is a parabola near m coinciding crossings; its vertex is tried for each m
     for multiplicity in MULTIPLICITIES:
         samples = [(row.arclength, relative(row, p, multiplicity)) for row in rows]
         if all(isfinite(value) for _, value in samples):
@@ -97,6 +98,7 @@ def around(solver: BranchSolver, rows: Sequence[Point]) -> list[Point]:
     p, a, b = rows
     if p.negative != a.negative or not relative(a, min(p, b, key=lambda row: row.determinant), 1) < DEEP:
         return []
+    # states nearer and nearer to the low row, until a parabola through them sees the pair
     step = min(a.arclength - p.arclength, b.arclength - a.arclength)
     size = step / NEARER
     while size > LEAST * step:
@@ -117,6 +119,7 @@ def around(solver: BranchSolver, rows: Sequence[Point]) -> list[Point]:
 
 def relative(row: Point, other: Point, multiplicity: int) -> float:
     """Root of the determinant at a row over that at another, with the sign that the indices say; nan if not known."""
+    # determinants are logarithms; the sign of det changes with each negative eigenvalue
     exponent = (row.determinant - other.determinant) / multiplicity
     return float((-1) ** (row.negative - other.negative) * exp(min(exponent, 600.0)))
 
@@ -144,6 +147,7 @@ def lowest(solver: BranchSolver, samples: list[Sample], p: Point, q: Point, mult
             break
         least = size
         known = sorted([*known, (s, size)])
+        # the next parabola goes through the lowest value and its two neighbours
         middle = known.index((s, size))
         samples = known[middle - 1 : middle + 2]
     return None

@@ -1,4 +1,4 @@
-"""Newton's method on the bordered system, with chord steps where they converge fast enough."""
+"""Newton's method for the residual of the bordered system, with chord steps where they converge fast enough."""
 
 from __future__ import annotations
 
@@ -91,10 +91,12 @@ def iterate(
         size = max(distance, step.norm() / (1.0 + x.norm()))
         if not isfinite(size) or distance > reach:
             break
+        # chord steps converge linearly: their rate, doubled for safety, says what the next correction would be
         left = size if fresh else min(2.0 * size / previous, 1.0) * size
         if size < TOLERANCE or left < tolerance or (fresh and still > size > 0.5 * previous):
             origin.aypx(-1.0, x)
             return NewtonResult(True, iteration, left, system.norm(origin))
+        # far from a solution, or where the old factors gain less than a digit, new ones are worth their cost
         refactor = size > 0.02 or size > 0.1 * previous
         previous = size
     origin.aypx(-1.0, x)
@@ -124,6 +126,7 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Newt
         if not isfinite(size):
             break
         x.axpy(-(1.0 if size < 0.4 else 0.4 / size), step)  # constraints are mended in one step, however long
+        # switched evolution: longer time steps while the motion is slow, shorter where it is fast
         tau *= 2.0 if size < 0.2 else 0.5 if size > 0.4 else 1.0
         if (iteration % 5 == 4 and size < 0.1) or size < 1e-3:  # not earlier: it might jump to a state uphill
             x.copy(trial)

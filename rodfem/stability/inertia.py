@@ -90,6 +90,7 @@ class Inertia:
         """
         state = self.system.at(x)
         self._assemble(state)
+        # a generator that is no null vector of S is no symmetry: verify drops its phase condition, S is assembled anew
         with self.system.clock("stability"):
             sound = self.system.verify(self.matrix, state, equations)
         if not sound:
@@ -99,7 +100,7 @@ class Inertia:
 
     @property
     def held(self) -> Factored:
-        """Whatever state the matrix holds."""
+        """The state that the matrix holds now."""
         return Factored(self)
 
     def _assemble(self, state: State) -> None:
@@ -109,13 +110,14 @@ class Inertia:
             state.assemble_into(self.matrix, system.equations.jacobian, load=True)
             system.add_drifts(self.matrix)
             self.matrix.assemble()
+            # at fixed load: the column of the load becomes the border F_lam, a unit diagonal stands for its unknown
             self.matrix.mult(self._axis, self.border)
             self.matrix.diagonalScale(R=self._without_load)
             if system.has_scalars:
                 self.matrix.setValue(system.load_index, system.load_index, 1.0)
             self.matrix.assemble()
         self.shift = 0.0
-        if not self.resolution:
+        if not self.resolution:  # the band of round-off, eps |S| / m, for the smallest weight m of the metric
             mass = system.metric.getDiagonal().array_r[system.metric.getDiagonal().array_r > 0]
             smallest = system.comm.allreduce(float(mass.min()) if len(mass) else np.inf, op=MPI.MIN)
             self.resolution = 10 * EPS * self.matrix.norm(PETSc.NormType.INFINITY) / smallest
@@ -138,7 +140,7 @@ class Factored:
     """
 
     def __init__(self, inertia: Inertia) -> None:
-        """Be the state that the matrix was just filled for."""
+        """Stand for the state that the matrix was just filled for."""
         self.inertia, self._filled = inertia, inertia.filled
 
     def _own(self) -> Inertia:
@@ -167,7 +169,7 @@ class Factored:
 
     @property
     def shift(self) -> float:
-        """What the last count was below."""
+        """Shift of the last count."""
         return self._own().shift
 
     def below(self, sigma: float) -> int:
@@ -184,6 +186,7 @@ class Factored:
             own.factors(own.matrix)
             own.factored = self._filled
             negative, zero = own.factors.inertia()
+        # Sylvester's law: each constraint, and each phase condition, has one negative eigenvalue of the saddle matrix
         below = negative - own.constraints - own.system.active_drifts()
         if zero or below < 0:
             raise ConvergenceError(
@@ -196,6 +199,7 @@ class Factored:
         """Index; two factorisations, the last of which serves :meth:`nearest`."""
         own = self._own()
         negative = self.below(-own.tolerance)
+        # a phase condition takes its symmetry mode out of both counts, and it is a zero eigenvalue of the state
         zero = self.below(own.tolerance) - negative + own.system.active_drifts()
         return Index(negative, zero, own.factors.determinant())
 
@@ -220,6 +224,7 @@ class Factored:
                     factors.solve(own.metric * v, out)
                 orthonormalize(solved, own.metric)
                 images = [own.matrix * y for y in solved]
+                # Rayleigh-Ritz: the quotients of S - shift M on the block, whose basis is orthonormal in M
                 theta, z = np.linalg.eigh(np.array([[y.dot(w) for w in images] for y in solved]))
                 order = np.argsort(abs(theta + own.shift))
                 last, values = values, theta[order] + own.shift

@@ -82,7 +82,7 @@ class Frequencies:
 
     @property
     def noise(self) -> float:
-        """What tells an eigenvalue from zero."""
+        """Magnitude below which an eigenvalue counts as zero."""
         return REAL * max(1.0, float(abs(self.values).min(initial=np.inf)))
 
     def diverged(self) -> int:
