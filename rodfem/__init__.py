@@ -30,7 +30,7 @@ finds and classifies the points where it is lost, follows what branches off, and
   an :class:`Attachment` at any point (:mod:`forms.loads` has potentials).  Loads without a potential make
   ``Scene.conservative`` False: then frequencies are computed, and flutter.
 * **Constraints**: :func:`at` a point, :func:`integral` over the rod, :func:`everywhere` along it.
-* **Ordinate**: what a diagram shows, a number at a point or an integral over the rod (its energy, its twist).
+* **Ordinate**: the number that a diagram shows, at a point or an integral over the rod (its energy, its twist).
 * **Parameters**: any of them can be the load, :meth:`Scene.varying`; :func:`locus` follows a special point in the plane
   of two of them.
 * **Plane**: ``planar="e2"`` keeps the rod in the plane across e2, and records its index in space besides.

@@ -50,7 +50,7 @@ class Smoothness:
 
     @property
     def indicator(self) -> float:
-        """Squared norm of what elements of this degree miss of the strains: as the error of a load, up to a factor."""
+        """Squared norm of the interpolation error of the strains: proportional to the error of a load."""
         missed = self.amplitude * self.decay ** -float(self.degree)
         return float(np.sum(np.diff(self.vertices) * missed**2))
 

@@ -72,7 +72,7 @@ class TooCoarse(Exception):
     def __init__(
         self, point: Point, error: float, directions: Sequence[PETSc.Vec] = (), order: float = 1.0, why: str = ""
     ) -> None:
-        """Keep what a new mesh is chosen from, and in words what was found.
+        """Keep the data from which a new mesh is chosen, and the finding in words.
 
         ``point`` is the state with the ``error``; ``directions`` and ``order`` are those above, and ``why`` is a
         sentence.

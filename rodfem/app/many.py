@@ -23,7 +23,7 @@ Work = Callable[[Scene], dict[str, Any]]
 
 
 def key_of(scene: Scene) -> dict[str, Any]:
-    """What a saved result must agree in with a scene to be used again."""
+    """Properties of a scene in which a saved result must agree with it to be used again."""
     constants = {name: p.value for name, p in scene.parameters.items()}
     return {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants}
 

@@ -23,7 +23,7 @@ from rodfem.output.typical import typical_state
 from rodfem.problem.scene import Scene
 
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
-"""What a picture's caption shows for TeX names."""
+"""Plain text for TeX names in the caption of a picture."""
 
 ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
 
@@ -59,7 +59,7 @@ def run(
 
     By default 8 elements of degree 6 (few elements to start with where the plan has an accuracy), the scene's own span,
     and the folder ``results/<name>``.  Files are updated after every branch: an interrupted run keeps all completed
-    branches.  What the terminal prints is what ``words`` makes of each line.  Returns the diagram.  Raises
+    branches.  Each line on the terminal is reworded by ``words``.  Returns the diagram.  Raises
     :class:`~rodfem.errors.InputError` for bad input, before any computation, and
     :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found. The ``discretization`` is a
     :class:`~rodfem.fem.fields.Discretization`.  Pictures are drawn if ``figures``.  The ranks of ``comm`` share the

@@ -1,4 +1,4 @@
-"""What the terminal shows, on rank 0 only: what is solved, special points as they are found, a final table."""
+"""Terminal output, on rank 0 only: the problem, special points as they are found, a final table."""
 
 from __future__ import annotations
 
@@ -242,7 +242,7 @@ class Report(Observer):
             self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
 
     def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:
-        """Print what a judgement says of one state, with its modes where they were found.
+        """Print the verdict on one state, with its modes if they were computed.
 
         ``name`` is that of the branch, ``load`` the load in words, ``found`` the verdict, ``modes`` the modes, if
         computed.

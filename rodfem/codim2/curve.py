@@ -20,7 +20,7 @@ LOCATED = 1e-8
 
 
 class Criterion(Protocol):
-    """What defines a locus: corrects a guess to it."""
+    """Defining equations of a locus: a corrector onto it."""
 
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Size of a step."""

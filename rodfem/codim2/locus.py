@@ -275,7 +275,7 @@ def _guess(solver: StaticSolver, special: SpecialPoint, p: np.ndarray) -> LocusP
 
 
 def _criterion(solver: StaticSolver, plane: Plane, kind: str, near: LocusPoint) -> Criterion:
-    """What defines the locus of a kind of special points, one of which is ``near``."""
+    """Defining equations of the locus of a kind of special points, one of which is ``near``."""
     if kind == FLUTTER:
         return Collision(solver, plane)
     return Singular(solver, plane, near.modes, kind == FOLD, near.left)

@@ -60,12 +60,12 @@ FEWER = 1e-5
 
 
 class Destroyed(ConvergenceError):
-    """A special point that does not go on to be what it was; says why."""
+    """The special point changes its kind, or ends, along the locus; the message says why."""
 
 
 @dataclass
 class _Linear:
-    """What is known at a state: residual solve, responses to the two parameters, right and left null vectors, G_z."""
+    """Linearisation at a state: residual solve, responses to both parameters, right and left null vectors, G_z."""
 
     s0: PETSc.Vec
     b0: np.ndarray

@@ -29,7 +29,7 @@ class Point:
     the number of the discretisation that ``x`` belongs to, and ``estimate`` the error of the discretisation in load and
     ordinate, where an accuracy was asked for.  ``determinant`` is the logarithm of the size of the saddle matrix's
     determinant, at the state whose factors told the index.  Of frequencies ``omega2`` are the eigenvalues (real and
-    imaginary part), ``motion`` what the rod does in each, and ``curve`` the numbers of their curves against the load.
+    imaginary part), ``motion`` its type, and ``curve`` the numbers of their curves against the load.
     ``load`` and ``ordinate`` are those of the diagram, and ``stretch`` is the smallest stretch ``v3`` along the rod.
     ``negative`` and ``zero`` count eigenvalues, ``negative_in_space`` those of a planar rod in space (None: not asked
     for), ``spectrum`` holds the left-most ones.
@@ -94,7 +94,7 @@ class NormalForm:
 
 @dataclass(repr=False)
 class SpecialPoint:
-    """A special point: what it is, how precisely it was located, its null vectors, and the index on either side.
+    """A special point: kind, precision of its location, null vectors, and the index on either side.
 
     ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` bounds its error, that of the
     discretisation included: of the load for folds and branch points, of the ordinate at user points and ends;
@@ -176,7 +176,7 @@ class Unexplained:
 class Branch:
     """A connected piece of equilibria: its points in order, its special points, where it came from and why it ended.
 
-    ``begins`` is the index right after the branch point that it leaves, where the indices of the trunk tell it.
+    ``begins`` is the index right after the branch point that it leaves, where the indices of the trunk determine it.
     ``singular_start`` is the number of eigenvalues that vanish at the first state of a range and not all along the
     branch: a branch point there, if it is one, is not located. ``name`` is unique in the diagram; ``parent`` is the
     branch and the number of its special point that this one left, and ``depth`` the number of such switches.

@@ -87,7 +87,7 @@ def explain(branch: Branch) -> None:
 
 
 def merge_doubles(branch: Branch) -> None:
-    """Make one of neighbouring branch points that the error of the discretisation does not tell apart.
+    """Merge neighbouring branch points that are closer than the error of the discretisation.
 
     A mesh that lacks a symmetry of the rod splits a multiple eigenvalue: its zeros are apart by no more than the error.
     """

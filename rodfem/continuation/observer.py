@@ -1,4 +1,4 @@
-"""Observers of a computation: what is told of it while it goes on.
+"""Observers of a computation: the events that it reports while it runs.
 
 The computation itself prints nothing and writes no file.  A terminal (:class:`rodfem.app.terminal.Report`), a writer of
 files or a notebook derives from :class:`Observer` and overrides the events that it wants; events are the same on all

@@ -163,7 +163,7 @@ class BranchSolver(StaticSolver):
         return self.inertia.at(x).count().negative == 0
 
     def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, NewtonResult]:
-        """As for any equilibria, but with the symmetric factors where they serve."""
+        """As for any equilibrium, with the symmetric factors unless they are too near singular."""
         x = guess.copy()
         self.system.set_load(x, load)
         corrected = self.corrector.correct(x, self.axis, reach=reach)
@@ -224,9 +224,9 @@ class BranchSolver(StaticSolver):
     ) -> tuple[NewtonResult, PETSc.Vec | None, Index | None]:
         """Correct a prediction in place; also its unit tangent on the side of ``row``, and its index.
 
-        The tangent is None without convergence, the index where the factors that served the correction do not tell it.
-        ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at ``x``
-        itself and not at the prediction. ``row`` is the normal of the plane on which the equilibrium lies, and
+        The tangent is None without convergence, the index where the factors that served the correction do not determine
+        it. ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at
+        ``x`` itself and not at the prediction. ``row`` is the normal of the plane on which the equilibrium lies, and
         ``reach`` bounds how far ``x`` may move, in the metric.
         """
         corrected = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)

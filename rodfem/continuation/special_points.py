@@ -1,4 +1,4 @@
-r"""Special points: detection and classification of folds and branch points, and branch switching.
+r"""Special points: detection and classification of folds (turning points) and branch points; branch switching.
 
 Between two points of a branch with different indices an eigenvalue of the second variation crosses zero; where the
 load turns back, its slope does.  With ``phi`` the null vector (left and right, as the saddle matrix ``S`` is symmetric)
@@ -27,7 +27,7 @@ from rodfem.stability.round_off import decide
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
 UNCOUPLED = 1e-9
-"""Below this it is round-off.  Between the two the index tells, and then the unfolding parameters."""
+"""Below this it is round-off.  Between the two the index decides, and then the unfolding parameters."""
 LEVEL = 1e-3
 """Slope of the load, relative to its span, below which it is taken for zero."""
 INSENSITIVE = 1e-10
@@ -294,7 +294,7 @@ def start_branch(
 
 
 def index_beside(special: SpecialPoint, load: float, ways: int) -> int | None:
-    """Index with which a branch begins that leaves towards ``load``; None where the index of the trunk does not tell.
+    """Index with which a branch begins that leaves towards ``load``; None where that of the trunk does not determine it.
 
     By exchange of stability the eigenvalue that crosses zero has the sign opposite to that on the trunk at the same
     load.  Of one way to leave the eigenvalues of the other null vectors belong to a symmetry, and stay zero.

@@ -11,7 +11,7 @@ solved there.  Successive parabolic interpolation (Brent 1973, chapter 5) ends a
 lowest value that is not zero.  Determinants come with the factors that count the index: they cost nothing.
 
 A row may happen to lie beside such a pair.  Its determinant is then lower than those of both neighbours by orders of
-magnitude, and three rows tell nothing of the pair: two states nearer and nearer to that row take the neighbours' place.
+magnitude, and three rows do not show the pair: two states nearer and nearer to that row replace its neighbours.
 """
 
 from __future__ import annotations

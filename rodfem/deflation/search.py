@@ -220,7 +220,7 @@ def find_equilibria(
 
 
 def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float) -> list[Point]:
-    """Equilibria of traced branches at exactly ``load``: what a search for further ones should know.
+    """Equilibria of traced branches at exactly ``load``, which a search for further ones deflates.
 
     Raises :class:`ConvergenceError` where there is none between two points on either side of the load.
     """

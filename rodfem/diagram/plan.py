@@ -21,7 +21,7 @@ COUNTS = {
     Argument("Plan", "spectrum"): "number of eigenvalues",
     MODES: "number of modes",
 }
-"""What is not negative."""
+"""Arguments that are not negative, in words."""
 GIVE_LOADS = Remedy("give them in {}", Argument("Plan", "at"))
 
 

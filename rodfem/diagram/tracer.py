@@ -410,7 +410,7 @@ class Tracer:
             self._say_zeros(recent[0], point, extra)
 
     def _say_zeros(self, before: Point, point: Point, extra: int) -> None:
-        """Say of eigenvalues that count as zero at two rows whether round-off tells them from zero, or they are it."""
+        """Report eigenvalues that count as zero at two rows: within round-off, or persistently zero."""
         system, inertia, still = self.solver.system, self.solver.inertia, 0
         own = point.zero - system.active_drifts() - extra
         for p in (before, point):

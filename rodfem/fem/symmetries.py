@@ -114,7 +114,7 @@ def derivative(state: NodalValues) -> np.ndarray:
 def mismatch(state: NodalValues) -> float:
     """Greatest jump between elements of the derivative of rotation or centreline.
 
-    It tells how far the mesh is from moving along itself.
+    It measures how far the mesh is from the invariance under the motion along itself.
     """
     fields, worst = state.fields, 0.0
     for block in (b for b in fields.blocks if b.name in (fields.turning.name, "r")):

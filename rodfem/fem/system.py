@@ -235,7 +235,7 @@ class System:
     # --- symmetry ----------------------------------------------------------------------------------------------
 
     def set_phase(self, reference: PETSc.Vec | None) -> None:
-        """Take the phase conditions at ``reference``: as many as it breaks symmetries; None: none active.
+        """Set the phase conditions at ``reference``, one for each symmetry that it breaks; None: none active.
 
         The symmetries form a linear space.  Those combinations of their generators that vanish at the reference state
         are its own symmetries and have no phase condition; the others, orthonormal in the metric, have one each.

@@ -77,7 +77,7 @@ def pivots(prefix: str) -> AbstractContextManager[None]:
 class Factors(Protocol):
     """Factors ``lu``, or ``cholesky`` (LDL^t, which also counts the inertia), of matrices given one after the other.
 
-    ``regular`` tells whether the last one could be solved with: none is exactly singular.
+    ``regular`` is false where the last one was exactly singular, so that it has no solutions.
     """
 
     regular: bool

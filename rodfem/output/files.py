@@ -46,7 +46,7 @@ MEANING = {
 }
 """Columns in words, as they stand in the file."""
 UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
-"""What ``negative`` counts where loads have no potential."""
+"""Meaning of ``negative`` where loads have no potential."""
 
 
 def as_data(

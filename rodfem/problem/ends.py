@@ -1,4 +1,4 @@
-"""What holds and loads a rod: its ends, things attached along it, and constraints.
+"""Supports and loads of a rod: its ends, attachments along it, and constraints.
 
 Everything here is plain immutable data.  Functions of the named constants ``c`` return expressions that work on UFL and
 on numbers alike; functions ``f(x, c)`` of a *place* receive the state of the rod there:

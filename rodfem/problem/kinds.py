@@ -1,4 +1,4 @@
-"""Validation of what the user gives, numbers, vectors, scalars: the kind, or one sentence with the kind expected."""
+"""Validation of arguments, numbers, vectors, scalars: the kind, or one sentence with the kind expected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the functions of a scene receive: its named constants, and the state of the rod at a place."""
+"""Arguments of the functions of a scene: its named constants, and the state of the rod at a place."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class NoCentreline(SceneError):
 
 
 class Known(SimpleNamespace):
-    """A place; asking for what it does not have is a :class:`SceneError`."""
+    """A place; an attribute that it does not have is a :class:`SceneError`."""
 
     def __getattr__(self, name: str) -> Any:
         """Say what a place has."""

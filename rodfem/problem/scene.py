@@ -1,4 +1,4 @@
-"""What a person states: a rod, its ends, its loads, and what to record.
+"""The statement of a problem: a rod, its ends, its loads, and the ordinate to record.
 
 A :class:`Scene` is plain immutable data without meshes or matrices.  Functions in it receive a namespace ``c`` of
 named constants (``c.lam``, ``c.C``, ...; ``c.s`` is the arclength) and work on UFL expressions and on numbers alike.

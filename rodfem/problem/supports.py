@@ -246,7 +246,7 @@ def foundation_of(scene: Scene, sample: Sample) -> tuple[Floats, Floats] | None:
 
 
 def ties_of(scene: Scene, samples: Sequence[Sample]) -> list[list[Tie]]:
-    """What each constraint of a scene keeps, in states given by :meth:`~rodfem.fem.shape.Shape.sample`."""
+    """Geometry that each constraint of a scene keeps, in states given by :meth:`~rodfem.fem.shape.Shape.sample`."""
     load = float(samples[0]["load"])
     whole = [_of_the_ends(scene, x, load) if x.whole else None for x in scene.constraints]
     return [[_tie(scene, x, a, sample) for sample in samples] for x, a in zip(scene.constraints, whole, strict=True)]

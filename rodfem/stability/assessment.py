@@ -42,11 +42,11 @@ class Verdict:
     band
         Half width of the interval about zero, relative to the system's metric, in which inertia alone decides nothing.
     inside, uncertainty
-        Rayleigh quotients of what the band holds, and what of them is round-off.
+        Rayleigh quotients of the eigenvalues inside the band, and their round-off.
     certified
         Whether counts prove that none is missing among the values.
     seconds, factorisations
-        What it took.
+        Cost of the verdict.
     method, reason
         How it was done, and why so.
     """
@@ -85,7 +85,7 @@ class Judge(Workspace):
     """Judges states of one system; keeps matrices, symbolic factorisations and the last modes for the next state."""
 
     def __init__(self, source: Any) -> None:
-        """Take a :class:`~rodfem.fem.system.System`, or what has one (a solver)."""
+        """Keep a :class:`~rodfem.fem.system.System`, given itself or by its solver."""
         super().__init__(source)
         self._methods: dict[str, Method] = {}
 

@@ -6,7 +6,7 @@ has full column rank, Sylvester's law of inertia gives
     (negative eigenvalues of S) - (number of constraints) = number of negative eigenvalues of K on the kernel of C,
 
 and likewise for ``S - sigma M`` the number of eigenvalues below ``sigma``.  Counting at ``sigma = -tol`` and
-``+tol`` tells zero eigenvalues from small ones without ever factoring a singular matrix.  Symmetry modes do not
+``+tol`` separates zero eigenvalues from small ones without ever factoring a singular matrix.  Symmetry modes do not
 disturb: the phase condition counts as one more constraint, and takes the zero mode out of the kernel.
 """
 
@@ -58,7 +58,7 @@ class Inertia:
     """Matrix ``S`` and its factors, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`.
 
     Eigenvalues ``mu`` are relative to the system's metric.  ``tolerance`` is the half width of what counts as zero, the
-    larger of 1e-7 of the rod's lowest bending eigenvalue and of ``resolution``: what the arithmetic resolves.
+    larger of 1e-7 of the rod's lowest bending eigenvalue and of ``resolution``, the band of round-off.
     ``vectors`` are those that :meth:`Factored.nearest` found last.
     """
 
@@ -133,7 +133,7 @@ class Inertia:
 
 
 class Factored:
-    """``S`` at one state, and what its factors tell: a count, the eigenvalues nearest zero, solutions.
+    """``S`` at one state, and the results of its factors: a count, the eigenvalues nearest zero, solutions.
 
     Raises :class:`RuntimeError` where the matrix holds another state by now, or what is asked for needs factors
     (:meth:`below`, :meth:`count`) that were not made: a number of another state is never returned.

@@ -1,4 +1,4 @@
-"""What a method to decide stability is: a class of :mod:`rodfem.stability.methods` derived from :class:`Method`."""
+"""Interface of a method to decide stability; those of :mod:`rodfem.stability.methods` derive from :class:`Method`."""
 
 from __future__ import annotations
 

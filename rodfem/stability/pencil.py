@@ -89,7 +89,7 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
 
     ``g`` being an eigenvector (of ``mu = 0``), what they leave of the spectrum is all the rest of it, unchanged; and
     the inertia counts it.  Returns the modes that have mass, orthonormal in it: a Krylov space is kept off them by
-    deflation, too, or round-off brings them in where ``mu`` is large beside the rest.
+    deflation, too, or round-off adds them where ``mu`` is large beside the rest.
 
     ``modes`` are by the number of the drift scalar of the ``system``; ``matrix`` and ``mass`` are its pencil.
     """
@@ -171,7 +171,7 @@ def with_factors(
 ) -> SLEPc.EPS:
     """Set up the same with the ``inverse`` of ``matrix - target mass`` from factors made elsewhere, and a first vector.
 
-    Vectors of a symmetric pencil are right up to what has no mass: who has the factors purifies all of them at once.
+    Vectors of a symmetric pencil are right up to massless unknowns: purification corrects all of them at once.
     Eigenvectors that are ``deflated`` are not found. ``number`` and ``symmetric`` are those of :func:`shift_invert`;
     ``start`` is the first vector.
     """
