@@ -294,7 +294,7 @@ def start_branch(
 
 
 def index_beside(special: SpecialPoint, load: float, ways: int) -> int | None:
-    """Index with which a branch begins that leaves towards ``load``; None where that of the trunk does not determine it.
+    """Index with which a branch begins that leaves towards ``load``; None where the trunk's does not determine it.
 
     By exchange of stability the eigenvalue that crosses zero has the sign opposite to that on the trunk at the same
     load.  Of one way to leave the eigenvalues of the other null vectors belong to a symmetry, and stay zero.

@@ -248,7 +248,7 @@ def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float)
 def starts(point: Point, name: str) -> list[Branch]:
     """Branches of one point each that set out from a found one to higher and to lower loads.
 
-    :meth:`rodfem.diagram.explorer.Explorer.trace` follows them, and :func:`rodfem.continuation.solvers.follow` their
+    :meth:`rodfem.diagram.tracer.Tracer.trace` follows them, and :func:`rodfem.continuation.solvers.follow` their
     ``points``. ``name`` is that of the branches.  Raises :class:`ValueError` for a point without a tangent.
     """
     if point.tangent is None:
