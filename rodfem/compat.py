@@ -183,7 +183,7 @@ def assemble_matrix(matrix: PETSc.Mat, form: Any, rows: np.ndarray, columns: np.
     """Add a real form to a PETSc matrix, without the final exchange between ranks.
 
     ``rows`` and ``columns`` are the global numbers of the local degrees of freedom, -1 for what is left out; the matrix
-    has them as its maps too.  Where PETSc's numbers are complex the form is assembled by dolfinx alone first. ``form``
+    has them as its maps too.  Where PETSc's numbers are complex the form is assembled by dolfinx alone first.  ``form``
     is a compiled bilinear form, and ``matrix`` has a pattern that holds all its entries.
     """
     if not COMPLEX:

@@ -187,7 +187,7 @@ class Meshes:
         """Last points of a branch solved on another mesh: pairs of old and new, in order.
 
         Points whose index is another there are left out, so that an eigenvalue that passes zero is met again.  The
-        start of a branch keeps its load; a branch point from which one leaves is not carried. Raises
+        start of a branch keeps its load; a branch point from which one leaves is not carried.  Raises
         :class:`ConvergenceError` where no point is left.
         """
         starts = history[0].arclength == 0.0

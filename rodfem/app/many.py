@@ -40,7 +40,7 @@ def many(
     ``work`` gets no communicator but must use ``MPI.COMM_SELF``, and returns what JSON can hold.  Where it raises
     :class:`InputError` or :class:`ConvergenceError` the result is ``{"error": sentence}``, and the others go on.
     ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`InputError` where ``folder``
-    cannot be written, or has a result in another or a newer format. ``scenes`` are shared among the ranks of ``comm``.
+    cannot be written, or has a result in another or a newer format.  ``scenes`` are shared among the ranks of ``comm``.
     """
     writable(folder, comm)
     files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]

@@ -57,13 +57,28 @@ def run(
 ) -> Diagram:
     """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
-    By default 8 elements of degree 6 (few elements to start with where the plan has an accuracy), the scene's own span,
-    and the folder ``results/<name>``.  Files are updated after every branch: an interrupted run keeps all completed
-    branches.  Each line on the terminal is reworded by ``words``.  Returns the diagram.  Raises
+    Files are updated after every branch: an interrupted run keeps all completed branches.  Returns the diagram.  Raises
     :class:`~rodfem.errors.InputError` for bad input, before any computation, and
-    :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found. The ``discretization`` is a
-    :class:`~rodfem.fem.fields.Discretization`.  Pictures are drawn if ``figures``.  The ranks of ``comm`` share the
-    rod.  With ``quiet`` nothing is printed.
+    :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
+
+    Parameters
+    ----------
+    scene
+        Statement of the problem.
+    discretization
+        By default 8 elements of degree 6, or a few to start with where the plan has an accuracy.
+    plan
+        By default the range of the scene.
+    output
+        Folder, by default ``results/<name>``.
+    figures
+        Whether pictures are drawn.
+    comm
+        The ranks that share the rod.
+    quiet
+        Whether nothing is printed.
+    words
+        Rewords each line on the terminal.
     """
     plan = plan or Plan()
     output = output or Path("results") / scene.name

@@ -141,7 +141,7 @@ class Singular:
         """Point of the locus on the plane through ``(p, x)`` across ``tangent``; raises :class:`ConvergenceError`.
 
         With None for the state's part of the tangent the plane is that of the parameters alone: a line of theirs.
-        ``near`` is a point of the curve whose null vectors are close by. ``reach`` bounds how far ``x`` may move, in
+        ``near`` is a point of the curve whose null vectors are close by.  ``reach`` bounds how far ``x`` may move, in
         the metric.
         """
         self._adopt(near.modes, near.left)

@@ -181,7 +181,7 @@ class Corrector:
         """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
 
         As :func:`rodfem.fem.newton.iterate`; also the state whose factors served last, on the way.  None, with ``x`` as
-        it was, where ``S`` is too near singular. ``most``, ``reach`` and ``tolerance`` are those of that function.
+        it was, where ``S`` is too near singular.  ``most``, ``reach`` and ``tolerance`` are those of that function.
         """
         origin, singular, at = x.copy(), False, None
 

@@ -57,7 +57,7 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
     """Load at which ``D`` of a cluster vanishes, from about ``load``; raises :class:`ConvergenceError`.
 
     Chebyshev interpolation on a piece that is moved to the zero and shrunk until the last coefficient says that it is
-    sharp.  The cluster is taken over from where its eigenvalues are farthest apart. ``at`` computes eigenvalues at a
+    sharp.  The cluster is taken over from where its eigenvalues are farthest apart.  ``at`` computes eigenvalues at a
     load, ``width`` is the first half length of the piece, in the load.
     """
     half, best = width, Located(load, np.inf, cluster)

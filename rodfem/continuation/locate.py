@@ -105,7 +105,7 @@ def eigenvalue(
 ) -> tuple[float, PETSc.Vec]:
     """Eigenvalue number ``order`` (0 is the left-most) of the state ``x``, one of those near zero, and its vector.
 
-    Eigenvalues of the vectors ``still``, zero on the whole branch, are not numbered. ``solver`` has the mesh.  Raises
+    Eigenvalues of the vectors ``still``, zero on the whole branch, are not numbered.  ``solver`` has the mesh.  Raises
     :class:`ConvergenceError` where that eigenvalue is not among the nearest dozen.
     """
     found = solver.inertia.at(x)
@@ -134,7 +134,7 @@ def sample(
     For a ``mode`` near the null vector this is the eigenvalue that vanishes, up to second order in their difference,
     but unlike the ordered eigenvalues it is smooth where others come by; its zero is where ``S`` is singular.
     Eigenvalues within the tolerance of zero, of which ``persistent`` stay zero, count by its sign.  Unless ``counted``,
-    they are among those below: one factorisation instead of two. ``solver`` has the mesh, and ``curve(s)`` returns a
+    they are among those below: one factorisation instead of two.  ``solver`` has the mesh, and ``curve(s)`` returns a
     predicted state and the direction of the branch there.
     """
     x = solve_at(solver, curve, s)
@@ -153,7 +153,7 @@ class Located:
     """A zero found on a piece of a branch: parameter, state, direction, load, slope of the load, uncertainty, index.
 
     The ``uncertainty`` is of the load, ``along`` is that of the parameter, and ``arithmetic`` the part of the first
-    that no sharper interpolation lowers. At the parameter ``s`` the state is ``x``, the direction ``tangent``, and
+    that no sharper interpolation lowers.  At the parameter ``s`` the state is ``x``, the direction ``tangent``, and
     ``slope`` the load's derivative along it; the index is ``before`` and ``after`` it.
     """
 
@@ -174,8 +174,8 @@ def interpolate(samples: list[Sample], test_function: str, guess: float, noise: 
 
     The uncertainty of the load is what the last coefficients of the two interpolants can contribute at the zero, at
     least what the solver's tolerance leaves open, and what round-off of size ``noise`` in ``mu``, the same in all
-    samples, moves the zero by. ``samples`` are at Chebyshev nodes; ``test_function`` is ``mu`` or ``slope``; of several
-    zeros the one nearest to the parameter ``guess`` is taken.
+    samples, moves the zero by.  ``samples`` are at Chebyshev nodes; ``test_function`` is ``mu`` or ``slope``; of
+    several zeros the one nearest to the parameter ``guess`` is taken.
     """
     s = np.array([p.s for p in samples])
     middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
@@ -243,7 +243,7 @@ def refine(
     """Solve at Chebyshev nodes around ``center``, moved until the zero lies among them, shrunk until it is sharp.
 
     Where only the distance of its load from the one ``beside`` it is wanted, that to :data:`PART` of itself is sharp
-    enough, :data:`FEWER` nodes do, and nothing is counted. ``curve(s)`` returns a predicted state and direction on the
+    enough, :data:`FEWER` nodes do, and nothing is counted.  ``curve(s)`` returns a predicted state and direction on the
     mesh of ``solver``; ``half`` is the first half length of the piece.  ``test_function`` is ``mu`` or ``slope``,
     ``mode`` is near the null vector, and ``persistent`` eigenvalues stay zero.  Raises :class:`ConvergenceError` where
     no zero is found near by.
@@ -286,7 +286,7 @@ def crossing_mode(
 ) -> tuple[float, PETSc.Vec]:
     """Where on a piece of a branch eigenvalue ``order`` changes its sign, nearly, and its vector there.
 
-    To a tenth of what is interpolated, or so near that it is among the eigenvalues nearest to zero. ``solver``,
+    To a tenth of what is interpolated, or so near that it is among the eigenvalues nearest to zero.  ``solver``,
     ``curve`` and ``still`` are those of :func:`eigenvalue` and :func:`sample`; ``ends`` are parameters.  Raises
     :class:`ConvergenceError` where the eigenvalue does not change its sign.
     """
@@ -316,7 +316,7 @@ def bracket(
     By bisection with counts: they know the number of an eigenvalue however many others lie nearer to zero.  The end
     where it is negative is returned: on the other side it may have changed its number with positive ones that stay near
     zero (torsion of a taut string, say).  Where the counts at both ends agree it is zero next to an end: the one at
-    which it is smaller. ``solver``, ``curve`` and ``still`` are those of :func:`eigenvalue` and :func:`sample`;
+    which it is smaller.  ``solver``, ``curve`` and ``still`` are those of :func:`eigenvalue` and :func:`sample`;
     ``ends`` are parameters.
     """
     low, high = ends
@@ -370,7 +370,7 @@ def locate_event(
     """Parameter, state and uncertainty of the parameter of an event on a piece of a branch.
 
     Where it happens at a branch point, at which the equations across the branch are singular, states beside it serve.
-    Raises :class:`ConvergenceError` without a change of sign. The ``event`` changes its sign between the parameters
+    Raises :class:`ConvergenceError` without a change of sign.  The ``event`` changes its sign between the parameters
     ``low`` and ``high`` of the ``curve``, on the mesh of ``solver``.
     """
     aside = ASIDE * (high - low)

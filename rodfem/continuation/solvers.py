@@ -225,8 +225,8 @@ class BranchSolver(StaticSolver):
         """Correct a prediction in place; also its unit tangent on the side of ``row``, and its index.
 
         The tangent is None without convergence, the index where the factors that served the correction do not determine
-        it. ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at
-        ``x`` itself and not at the prediction. ``row`` is the normal of the plane on which the equilibrium lies, and
+        it.  ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at
+        ``x`` itself and not at the prediction.  ``row`` is the normal of the plane on which the equilibrium lies, and
         ``reach`` bounds how far ``x`` may move, in the metric.
         """
         corrected = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)
@@ -350,7 +350,7 @@ def follow(
 
     ``bounds`` are the least and the greatest load; the branch ends exactly on them.  The caller appends (and may
     insert) points in ``points``.  The direction is that of the last point's tangent.  ``reach`` bounds the step from a
-    point. ``solver`` has the mesh, ``steps`` chooses the lengths of steps.
+    point.  ``solver`` has the mesh, ``steps`` chooses the lengths of steps.
     """
     system, step = solver.system, steps.begin()
     span = abs(system.scene.span[1] - system.scene.span[0])

@@ -45,7 +45,7 @@ def special_at(
 ) -> SpecialPoint:
     """Evaluate and classify a located point: multiplicity, null vectors, coupling to the load, kind.
 
-    Vectors of eigenvalues that are zero on the whole branch (``still``) are none of its null vectors. ``solver`` has
+    Vectors of eigenvalues that are zero on the whole branch (``still``) are none of its null vectors.  ``solver`` has
     the mesh, ``located`` is the zero found there, ``arclength`` that of the point.  Raises :class:`ConvergenceError`
     where no null vector is left.
     """
@@ -95,7 +95,7 @@ def find_special(
     Where the load turns back there is a fold, or a branch point at which this branch ends on another one.  The
     eigenvalues number ``orders`` (0 is the left-most) change sign from ``a`` to ``b``: those that a fold does not
     explain do so at branch points, or further folds.  ``persistent`` eigenvalues are zero all along, beside those of
-    symmetries, and are not numbered. ``solver`` has the mesh.
+    symmetries, and are not numbered.  ``solver`` has the mesh.
     """
     found: list[SpecialPoint] = []
     rest = list(orders)
@@ -240,7 +240,7 @@ def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, fir
 
     The amplitude is halved until the point lies where the direction says, within half of its distance.  Where that
     fails, a family of equilibria may leave at once, at each of which the Jacobian is singular (an elastica whose ends
-    meet turns as a rigid body about any axis): then Newton's method is damped along the family. ``solver`` has the
+    meet turns as a rigid body about any axis): then Newton's method is damped along the family.  ``solver`` has the
     mesh, ``first`` is a length in the metric.
     """
     system = solver.system

@@ -12,7 +12,7 @@ def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[i
     """Known state turned by a smooth rotation that respects clamps, its vector of that root mean square size.
 
     The vector is a random combination of the lowest four waves along the rod that vanish where directors are clamped.
-    It depends on the nodes and the seed only, not on how the rod is shared among ranks. ``base`` is the known state of
+    It depends on the nodes and the seed only, not on how the rod is shared among ranks.  ``base`` is the known state of
     the ``system``, ``amplitude`` the size in radian, ``seed`` that of the random numbers.
     """
     f = system.fields

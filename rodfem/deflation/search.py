@@ -209,8 +209,8 @@ def find_equilibria(
 
     Each stands for all that the scene's symmetries make of it, and carries its index, energy, ordinate and a tangent in
     the direction of increasing load.  How the tries ended goes to the ``observer``; :class:`Deflation` has the numbers.
-    Raises :class:`InputError` for a load that is not admissible, or known equilibria at another one. ``solver`` has the
-    mesh, and ``seed`` is that of the random guesses.
+    Raises :class:`InputError` for a load that is not admissible, or known equilibria at another one.  ``solver`` has
+    the mesh, and ``seed`` is that of the random guesses.
     """
     search = Deflation(solver, load, known, seed)
     found = search.run(tries)
@@ -249,7 +249,7 @@ def starts(point: Point, name: str) -> list[Branch]:
     """Branches of one point each that set out from a found one to higher and to lower loads.
 
     :meth:`rodfem.diagram.tracer.Tracer.trace` follows them, and :func:`rodfem.continuation.solvers.follow` their
-    ``points``. ``name`` is that of the branches.  Raises :class:`ValueError` for a point without a tangent.
+    ``points``.  ``name`` is that of the branches.  Raises :class:`ValueError` for a point without a tangent.
     """
     if point.tangent is None:
         raise ValueError("A point without a tangent is no start of a branch.")

@@ -170,7 +170,7 @@ class Solver:
         """Equilibria at ``load`` beside the ``known`` ones, by ``tries`` deflated Newton iterations.
 
         Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, for known equilibria at another
-        one, and where a load has no potential. ``seed`` is that of the random guesses.
+        one, and where a load has no potential.  ``seed`` is that of the random guesses.
         """
         if not isinstance(self.equilibria, BranchSolver):
             raise InputError(

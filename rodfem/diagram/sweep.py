@@ -79,7 +79,7 @@ class Sweep:
         """Allocate the pencil; the plan must have passed its check.
 
         ``solver`` has the mesh, the ``observer`` hears of the progress, ``finished()`` is called when the sweep is
-        complete. The ``plan`` names the loads.
+        complete.  The ``plan`` names the loads.
         """
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.span = plan.over(solver.system.scene)

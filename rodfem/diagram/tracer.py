@@ -46,7 +46,7 @@ class Tracer:
         """Start with no branch; the plan must have passed its :meth:`Plan.check`.
 
         ``solver`` has the first mesh, the ``observer`` hears of the progress, ``finished()`` is called after each
-        branch. The ``plan`` has range, depth and steps.
+        branch.  The ``plan`` has range, depth and steps.
         """
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.scene = solver.system.scene
@@ -277,7 +277,7 @@ class Tracer:
     def user(self, guess: PETSc.Vec, load: float, s: float, increasing: bool) -> Point:
         """Point at exactly ``load`` from a guess; raises :class:`ConvergenceError`.
 
-        Its arclength is about ``s``; its tangent is on the side on which the load is ``increasing``, or decreases. The
+        Its arclength is about ``s``; its tangent is on the side on which the load is ``increasing``, or decreases.  The
         ``guess`` is a state.
         """
         self.solver.system.set_phase(guess)

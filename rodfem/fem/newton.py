@@ -40,7 +40,7 @@ def correct(
 ) -> NewtonResult:
     """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place, with LU factors.
 
-    As :func:`iterate`; fails at a singular matrix, too. ``system`` has the equations, ``row`` (n,) is the last row of
+    As :func:`iterate`; fails at a singular matrix, too.  ``system`` has the equations, ``row`` (n,) is the last row of
     the bordered matrix; ``most`` and ``reach`` are those of :func:`iterate`.
     """
     step = system.new_vector()

@@ -21,7 +21,7 @@ def factors_of(
     """Factors for matrices of ``unknowns`` rows on a communicator, the last ``scalars`` of which may be dense.
 
     ``controls`` are MUMPS's ICNTL, ``thresholds`` its CNTL; PETSc's options begin with ``rodfem_lu_`` or
-    ``rodfem_cholesky_``, or with another ``prefix``. ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the
+    ``rodfem_cholesky_``, or with another ``prefix``.  ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the
     matrices.
     """
     prefix = prefix or f"rodfem_{kind}_"

@@ -111,7 +111,7 @@ def save_modes(
     ``about`` says in the file's attributes what rod it is.  Group ``/branches/<branch>/<row>``, named as in
     ``states.h5``, has the state's ``load``, ``s``, ``r``, ``q`` and the arrays of :class:`Modes`; a complex number is a
     compound of ``r`` and ``i``.  Of a ``scene``, if given, what holds and loads it is written for pictures, as in
-    ``states.h5`` (see :func:`rodfem.problem.supports.write`). ``modes`` are those of row ``row`` of ``branch``;
+    ``states.h5`` (see :func:`rodfem.problem.supports.write`).  ``modes`` are those of row ``row`` of ``branch``;
     ``path`` is that of the file.
     """
     with h5py.File(path, "w" if first else "a") as file:

@@ -70,7 +70,8 @@ def hinged(
 ) -> End:
     """Return an end that turns freely about one ``axis`` only, given along the directors of ``rotation``.
 
-    ``position(c)`` (3,) is that of the end, and ``force(c)`` (3,) a dead force where a component of it is None.
+    ``position(c)`` (3,) is that of the end; components that are None are free, and ``force(c)`` (3,) is a dead force
+    there.
     """
     return End(position=position, rotation=rotation, hinge=axis, force=force)
 

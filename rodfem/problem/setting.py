@@ -122,7 +122,7 @@ class Setting:
     ``section`` has arclengths (n,) and second moments of area (n, 2, 2) up to a factor; ``distributed`` arclengths (n,)
     and forces per length (n, 3) in the frame of space and along the directors; ``foundation`` arclengths (n,) and
     stiffnesses per length (n, 3, 3) along e1, e2, e3.  ``notes`` names in words what acts and has no place in a
-    picture. ``supports`` are what holds and loads the rod at points, and ``ties`` what constraints keep.
+    picture.  ``supports`` are what holds and loads the rod at points, and ``ties`` what constraints keep.
     """
 
     supports: tuple[Support, ...] = ()

@@ -118,7 +118,7 @@ def stiffness_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floa
     """Stiffness of springs with the potential ``energy(x, c)`` at ``s``, in translation and rotation, (2, 3, 3).
 
     By differences about the position ``r`` (3,) and the unit quaternion ``q`` (4,); of translation, or of rotation,
-    zero where the second derivative is not positive semidefinite, so that the potential is no spring's. ``c`` are the
+    zero where the second derivative is not positive semidefinite, so that the potential is no spring's.  ``c`` are the
     constants, ``length`` is that of the rod, for the steps.
     """
     out = np.zeros((2, 3, 3))
@@ -161,7 +161,7 @@ def load_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floats, q
     """Force and moment (2, 3) of a potential at ``s``, in the frame of space, where it is no spring's.
 
     Of springs of translation, with the stiffness ``springs[0]``, what is across all their directions; of springs of
-    rotation, with ``springs[1]``, nothing. ``energy(x, c)`` is the potential with the constants ``c``, ``length`` that
+    rotation, with ``springs[1]``, nothing.  ``energy(x, c)`` is the potential with the constants ``c``, ``length`` that
     of the rod; the state at ``s`` is the position ``r`` (3,) and the unit quaternion ``q`` (4,).
     """
     out = -derivative_of(energy, c, s, length, r, q)

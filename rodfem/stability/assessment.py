@@ -109,7 +109,7 @@ class Judge(Workspace):
 
         ``interval`` (low, high) is where slicing looks, by default where the ``number`` left-most are.  Raises
         :class:`InputError` for a method that does not exist or apply and for dependent constraints,
-        :class:`ConvergenceError` where an eigensolver fails. ``method`` is a name of :mod:`rodfem.stability.methods`,
+        :class:`ConvergenceError` where an eigensolver fails.  ``method`` is a name of :mod:`rodfem.stability.methods`,
         or ``auto``.
         """
         name, reason = self.choose(method, number)

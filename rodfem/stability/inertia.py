@@ -210,7 +210,7 @@ class Factored:
 
         Block inverse iteration from the vectors of the last call, with a Rayleigh-Ritz projection of ``S``, until the
         ``number`` wanted values change by less than ``accuracy`` relative to themselves (or by what the arithmetic
-        resolves).  The block has ``spare`` more vectors. At most ``most`` iterations are made.
+        resolves).  The block has ``spare`` more vectors.  At most ``most`` iterations are made.
         """
         own, factors, block = self._own(), self.factors, number + spare
         vectors = own.vectors[:block] + [own.seed(i) for i in range(len(own.vectors), block)]

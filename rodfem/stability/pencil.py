@@ -110,7 +110,7 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
 def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex, *, symmetric: bool) -> SLEPc.EPS:
     """Set up Krylov-Schur with shift-invert (LU) for the ``number`` eigenvalues nearest to ``target``.
 
-    Raises :class:`PETSc.Error` where the shifted matrix is singular. The pencil is ``matrix - mu mass``; ``symmetric``
+    Raises :class:`PETSc.Error` where the shifted matrix is singular.  The pencil is ``matrix - mu mass``; ``symmetric``
     says that both are.
     """
     solver = SLEPc.EPS().create(matrix.comm)
@@ -172,7 +172,7 @@ def with_factors(
     """Set up the same with the ``inverse`` of ``matrix - target mass`` from factors made elsewhere, and a first vector.
 
     Vectors of a symmetric pencil are right up to massless unknowns: purification corrects all of them at once.
-    Eigenvectors that are ``deflated`` are not found. ``number`` and ``symmetric`` are those of :func:`shift_invert`;
+    Eigenvectors that are ``deflated`` are not found.  ``number`` and ``symmetric`` are those of :func:`shift_invert`;
     ``start`` is the first vector.
     """
     solver = SLEPc.EPS().create(matrix.comm)
