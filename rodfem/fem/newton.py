@@ -71,7 +71,7 @@ def iterate(
     With damping ``d`` a correction of size c along a family of equilibria is that by a force ``d c``, which no mesh
     makes exactly zero: one that no longer shrinks is accepted where that force is within the tolerance.
 
-    ``system`` has the equations; ``tolerance`` is the least correction, in the metric, that is asked for.
+    ``system`` has the equations; an error below ``tolerance``, of the size of a correction, is small enough.
     """
     equations, origin = system.new_vector(), x.copy()
     still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
