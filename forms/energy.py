@@ -27,7 +27,7 @@ def hemitropic(v: Expr, k: Expr, *, stretching: Expr, coupling: Expr, twisting: 
 
     Gives ``n3 = stretching (v3 - 1) + coupling k3``, ``m3 = twisting k3 + coupling (v3 - 1)`` and
     ``m1, m2 = bending (k1, k2)``: Healey, Math. Mech. Solids 7 (2002), and Kumar & Healey (2010), section 5.2.
-    Convex where ``stretching * twisting > coupling^2`` and ``bending > 0``.
+    Convex where ``stretching * twisting > coupling^2`` and ``bending > 0``.  ``v`` (3,) and ``k`` (3,) are the strains.
     """
     e = v[2] - 1
     return (

@@ -17,7 +17,10 @@ def spin(q: Expr, dq: Expr) -> Expr:
 
 
 def rotary(q: Expr, dq1: Expr, dq2: Expr, rho_I: tuple[Expr, Expr, Expr]) -> Expr:
-    """Rotary inertia ``w1 . (rho I) w2`` per unit length, with ``rho I = diag(rho_I)`` in the body frame."""
+    """Rotary inertia ``w1 . (rho I) w2`` per unit length, with ``rho I = diag(rho_I)`` in the body frame.
+
+    The spins ``w1``, ``w2`` are those of the changes ``dq1``, ``dq2`` (4,) of the unit quaternion ``q`` (4,).
+    """
     w1, w2 = spin(q, dq1), spin(q, dq2)
     return sum(rho_I[i] * w1[i] * w2[i] for i in range(3))
 

@@ -28,7 +28,8 @@ from ufl.core.expr import Expr
 def pointwise(W: Expr, R: Expr, v: Expr, dr: Expr, n: Expr) -> Expr:
     """Integrand of ``L`` with the centreline as a field, without loads and the unit-norm term.
 
-    ``dr = r'`` and the field ``n`` have shape (3,).
+    ``dr = r'`` and the field ``n`` have shape (3,).  ``W`` is the stored energy per length, ``R`` (3, 3) the rotation,
+    ``v`` (3,) the strain.
     """
     return W + ufl.dot(n, dr - ufl.dot(R, v))
 
@@ -36,8 +37,9 @@ def pointwise(W: Expr, R: Expr, v: Expr, dr: Expr, n: Expr) -> Expr:
 def reduced(W: Expr, R: Expr, v: Expr, n: Expr, chord_per_length: Expr) -> Expr:
     """Integrand of ``L_reduced``, without the unit-norm term.
 
-    ``n`` of shape (3,) is constant along the rod; ``chord_per_length = (r(l) - r(0)) / l`` of shape (3,) is zero in
-    the components in which ``n`` is a known dead force.
+    ``n`` of shape (3,) is constant along the rod; ``chord_per_length = (r(l) - r(0)) / l`` of shape (3,) is zero in the
+    components in which ``n`` is a known dead force.  ``W`` is the stored energy per length, ``R`` (3, 3) the rotation,
+    ``v`` (3,) the strain.
     """
     return W + ufl.dot(n, chord_per_length - ufl.dot(R, v))
 

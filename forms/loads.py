@@ -45,7 +45,8 @@ def pressure(r: Expr, dr: Expr, p: Any, normal: Sequence[float] = (0.0, 1.0, 0.0
 
     Minus ``p`` times the area that the rod sweeps about the origin: its force is ``p n x r'``, at right angles to the
     deformed rod (so that it follows), and per unit of deformed length.  It has a potential where the ends do not move,
-    move on straight lines through the origin, or are joined.
+    move on straight lines through the origin, or are joined.  ``r`` (3,) and its derivative ``dr`` (3,) are the
+    centreline's.
     """
     n = ufl.as_vector(list(normal))
     return 0.5 * p * ufl.dot(n, ufl.cross(r, dr))

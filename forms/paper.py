@@ -71,6 +71,7 @@ class State:
     """Rotation matrix ``R``, strain ``v``, contact force ``n`` and moment ``m`` (space frame), and elastic moduli.
 
     The moduli are the second derivatives of the stored energy, (3, 3) each: ``W_vv``, ``W_vk`` (rows: v), ``W_kk``.
+    ``W_v`` (3,) is the first derivative in ``v``.
     """
 
     R: Expr
@@ -85,9 +86,9 @@ class State:
 
 @dataclass(frozen=True)
 class Perturbation:
-    """Spin ``theta`` and its derivative, ``dv`` (body frame, zero where a rod is stiff), ``dn``, derivative of ``dr``.
+    """Spin ``theta``, its derivative ``theta_s``, ``dv`` (body frame, zero where a rod is stiff), ``dn``, and ``dr_s``.
 
-    All of shape (3,).  Without a centreline (mixed formulation) the derivative of ``dr`` is zero.
+    All of shape (3,).  ``dr_s`` is the derivative of ``dr``: zero without a centreline (mixed formulation).
     """
 
     theta: Expr
@@ -103,7 +104,10 @@ def tangent(theta: Expr, q: Expr) -> Expr:
 
 
 def state(energy: Callable[[Expr, Expr], Expr], R: Expr, v: Expr, k: Expr, n: Expr) -> State:
-    """State of a rod with the stored energy ``energy(v, k)``."""
+    """State of a rod with the stored energy ``energy(v, k)``.
+
+    ``R`` (3, 3) is its rotation, ``v`` (3,) and ``k`` (3,) are its strains, ``n`` (3,) its contact force.
+    """
     v, k = ufl.variable(v), ufl.variable(k)
     W = energy(v, k)
     W_v, W_k = ufl.diff(W, v), ufl.diff(W, k)

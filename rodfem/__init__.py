@@ -30,7 +30,7 @@ finds and classifies the points where it is lost, follows what branches off, and
   an :class:`Attachment` at any point (:mod:`forms.loads` has potentials).  Loads without a potential make
   ``Scene.conservative`` False: then frequencies are computed, and flutter.
 * **Constraints**: :func:`at` a point, :func:`integral` over the rod, :func:`everywhere` along it.
-* **Ordinate**: what a diagram shows, a number at a point or an integral over the rod (its energy, its twist).
+* **Ordinate**: the number that a diagram shows, at a point or an integral over the rod (its energy, its twist).
 * **Parameters**: any of them can be the load, :meth:`Scene.varying`; :func:`locus` follows a special point in the plane
   of two of them.
 * **Plane**: ``planar="e2"`` keeps the rod in the plane across e2, and records its index in space besides.
@@ -47,11 +47,10 @@ finds and classifies the points where it is lost, follows what branches off, and
 Continuous symmetries (a rod free to turn about its axis, a ring that may go anywhere) are found, not stated: each state
 that breaks one has a zero eigenvalue for it, which is counted as zero.
 
-Data flows, and imports go, one way: ``ends``, ``scene`` -> ``fields`` -> ``equations`` -> ``symmetries``,
-``invariance``, ``system`` (the bordered saddle point) -> ``newton``, ``stability`` -> ``continuation`` -> ``locate``,
-``bifurcation`` -> ``accuracy`` -> ``tracer``, ``explore``, ``sweep``, ``loci``, ``search``, ``mode_finder`` ->
-``diagram``, ``runner`` -> ``cli``. ``plot``, ``plot_modes`` and ``render`` draw from saved files alone. The
-mathematics is in ``forms``.
+Data flows one way: ``problem.scene`` -> ``fem.system`` (the bordered saddle point) -> ``fem.newton`` ->
+``stability.inertia`` -> ``continuation.solvers``, ``continuation.special_points`` -> ``diagram.explorer`` ->
+``output.files``, and imports go the other way.  Pictures are drawn from saved files alone.  The mathematics is in
+``forms``.
 
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
 Type checkers read ``__init__.pyi``.

@@ -65,7 +65,7 @@ def factors_by(package: str) -> bool:
 
 
 def interval_mesh(comm: Any, elements: int, a: float, b: float) -> Any:
-    """Uniform mesh of ``[a, b]``."""
+    """Uniform mesh of ``[a, b]`` with so many ``elements``, shared among the ranks of ``comm``."""
     mesh = dolfinx.mesh.create_interval(comm, elements, [a, b])
     if hasattr(ufl, "VectorElement"):
         # FFCx 0.5 gives the coordinate element this variant while it compiles, in place: a form signed before
@@ -162,7 +162,10 @@ def compile_forms(forms: Sequence[Any]) -> list[Any]:
 
 
 def expression(form: Any, points: np.ndarray, mesh: Any, cells: int) -> Callable[[], np.ndarray]:
-    """Compile a UFL vector to be evaluated at reference ``points`` (m, 1) of the first cells: (cells, m * size)."""
+    """Compile a UFL vector to be evaluated at reference ``points`` (m, 1) of the first cells: (cells, m * size).
+
+    ``form`` is the vector, on cells of ``mesh``, of which the first ``cells`` are evaluated.
+    """
     with _quiet():
         compiled = fem.Expression(form, points, dtype=REAL)
     chosen = np.arange(cells, dtype=np.int32)
@@ -179,8 +182,9 @@ def expression(form: Any, points: np.ndarray, mesh: Any, cells: int) -> Callable
 def assemble_matrix(matrix: PETSc.Mat, form: Any, rows: np.ndarray, columns: np.ndarray) -> None:
     """Add a real form to a PETSc matrix, without the final exchange between ranks.
 
-    ``rows`` and ``columns`` are the global numbers of the local degrees of freedom, -1 for what is left out; the
-    matrix has them as its maps too.  Where PETSc's numbers are complex the form is assembled by dolfinx alone first.
+    ``rows`` and ``columns`` are the global numbers of the local degrees of freedom, -1 for what is left out; the matrix
+    has them as its maps too.  Where PETSc's numbers are complex the form is assembled by dolfinx alone first.  ``form``
+    is a compiled bilinear form, and ``matrix`` has a pattern that holds all its entries.
     """
     if not COMPLEX:
         fem.petsc.assemble_matrix(matrix, form)

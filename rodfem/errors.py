@@ -26,7 +26,7 @@ class Remedy:
     """What to try: words in which each ``{}`` stands for an argument."""
 
     def __init__(self, words: str, *arguments: Argument) -> None:
-        """Take both."""
+        """Keep words and arguments."""
         self.words, self.arguments = words, arguments
 
     def __str__(self) -> str:

@@ -183,7 +183,7 @@ class Watch:
     def _index(point: Point, richer: Enriched, again: Again) -> int:
         """Index on the richer mesh; the point's own where eigenvalues that are zero on one of the two make up for it.
 
-        One factorisation tells that it is the same; only where it does not a second tells zero eigenvalues from others.
+        One factorisation suffices where it is the same; otherwise a second one separates zero eigenvalues from others.
         """
         inertia, drifts = richer.solver.inertia, richer.system.active_drifts()
         found = inertia.at(again.x)

@@ -56,16 +56,19 @@ def halved(degree: int) -> float:
 
 
 def bound(value: complex, richer: complex, left: float, rho: float) -> float:
-    """Bound of the error of a value of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``."""
+    """Bound of the error of a value of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``.
+
+    Both results ``value`` and ``richer`` are loads, ordinates or coefficients, and ``left`` is in their unit.
+    """
     return abs(richer - value) / (1 - rho) + left
 
 
 @dataclass(frozen=True)
 class Again:
-    """A point computed again: state, load and ordinate, what location and arithmetic leave open of these two.
+    """A point computed again: state ``x``, ``load``, ``ordinate``, and uncertainties of the two by location, round-off.
 
-    ``rho`` is the part of the errors of the first discretisation that is left; the strains of the state or of its null
-    vector, the one that did so more, have ``changed`` by that part of themselves.
+    These are ``load_left`` and ``ordinate_left``.  ``rho`` is the part of the first errors that is left,
+    ``changed`` the relative change of the strains of the state or of its null vector, the larger one.
     """
 
     x: PETSc.Vec

@@ -38,7 +38,7 @@ NEGLIGIBLE = 1e-12
 
 @dataclass(frozen=True)
 class Smoothness:
-    """Decay of the strains of a state on the elements of a mesh: ``|coefficient j| < amplitude decay^-j``.
+    """Decay of the strains of a state on elements of a ``degree``: ``|coefficient j| < amplitude decay^-j``.
 
     ``vertices`` has shape (E + 1,), ``amplitude`` and ``decay`` (E,).
     """
@@ -50,7 +50,7 @@ class Smoothness:
 
     @property
     def indicator(self) -> float:
-        """Squared norm of what elements of this degree miss of the strains: as the error of a load, up to a factor."""
+        """Squared norm of the interpolation error of the strains: proportional to the error of a load."""
         missed = self.amplitude * self.decay ** -float(self.degree)
         return float(np.sum(np.diff(self.vertices) * missed**2))
 
@@ -174,7 +174,11 @@ def pieces_of(scene: Scene) -> np.ndarray:
 
 
 def first_mesh(scene: Scene, formulation: str, elements: int, degree: int) -> Discretization:
-    """About so many elements of nearly equal size."""
+    """About so many elements of nearly equal size.
+
+    There are ``elements`` of them, of this ``degree``, or a few more: breaks of the ``scene`` are vertices.  The
+    ``formulation`` is ``auto``, ``pointwise`` or ``reduced``.
+    """
     pieces = pieces_of(scene)
     counts = np.maximum(np.ceil(np.diff(pieces) / scene.length * elements - 1e-6).astype(int), 1)
     inner = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]

@@ -54,7 +54,11 @@ def internal_accuracy(scene: Scene, accuracy: float) -> float:
 
 
 def start_mesh(scene: Scene, formulation: str, accuracy: float, comm: MPI.Comm) -> Discretization:
-    """Discretisation to start with: few elements, of a degree that grows with the digits asked for."""
+    """Discretisation to start with: few elements, of a degree that grows with the digits asked for.
+
+    The ``accuracy`` is that of loads and ordinates, relative to values greater than one.  The ``scene`` and the
+    ``formulation`` are kept; on the ranks of ``comm`` no rank is without an element.
+    """
     degree = round(4 - log10(internal_accuracy(scene, accuracy)) / 2)
     return first_mesh(scene, formulation, max(4, comm.size), min(max(degree, 4), 9))
 
@@ -68,7 +72,11 @@ class TooCoarse(Exception):
     def __init__(
         self, point: Point, error: float, directions: Sequence[PETSc.Vec] = (), order: float = 1.0, why: str = ""
     ) -> None:
-        """Keep what a new mesh is chosen from, and in words what was found."""
+        """Keep the data from which a new mesh is chosen, and the finding in words.
+
+        ``point`` is the state with the ``error``; ``directions`` and ``order`` are those above, and ``why`` is a
+        sentence.
+        """
         super().__init__(why or f"estimated error {error:.0e}")
         self.point, self.error, self.directions, self.order = point, error, list(directions), order
 
@@ -139,7 +147,10 @@ class Meshes:
         return target.shape.restore(self.solvers[source].shape.sample(x))
 
     def direction(self, d: PETSc.Vec, x: PETSc.Vec, source: int, target: BranchSolver) -> PETSc.Vec:
-        """Change of the state ``x`` of one mesh interpolated on another: the difference of two states."""
+        """Change of the state ``x`` of one mesh interpolated on another: the difference of two states.
+
+        ``d`` is the change, ``source`` the number of its mesh, ``target`` the solver of the other one.
+        """
         moved = x.copy()
         moved.axpy(1.0, d)
         out = self.state(moved, source, target)
@@ -176,7 +187,8 @@ class Meshes:
         """Last points of a branch solved on another mesh: pairs of old and new, in order.
 
         Points whose index is another there are left out, so that an eigenvalue that passes zero is met again.  The
-        start of a branch keeps its load; a branch point from which one leaves is not carried.
+        start of a branch keeps its load; a branch point from which one leaves is not carried.  Raises
+        :class:`ConvergenceError` where no point is left.
         """
         starts = history[0].arclength == 0.0
         first = 1 if starts and from_branch_point else 0

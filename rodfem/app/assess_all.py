@@ -30,7 +30,9 @@ def judge_users(
 ) -> None:
     """Judge the states at the loads of the plan; save and draw their modes, if they are wanted.
 
-    Each on the mesh on which it was computed.
+    Each on the mesh on which it was computed.  ``branches`` are those of the diagram, ``solvers`` those of their meshes
+    by number.  The ``plan`` names method, loads and number of modes.  Files go to the folder ``output``, pictures too
+    if ``figures``, sentences to the ``report``.
     """
     system = solvers[0].system
     scene = system.scene

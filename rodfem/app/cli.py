@@ -89,7 +89,11 @@ def parser_for(
     degree: int,
     formulation: str = "auto",
 ) -> Parser:
-    """Return the options that every demo has; a demo adds its own constants."""
+    """Return the options that every demo has; a demo adds its own constants.
+
+    ``name`` and ``description`` head the help; ``load`` names the load, of range ``span``; ``elements``, ``degree`` and
+    ``formulation`` are the defaults of the discretisation.
+    """
     parser = Parser(
         prog=f"{name}.py",
         description=description,
@@ -166,6 +170,8 @@ def main(
     """Parse the command line, build the scene, run it; bad input ends with one sentence and status 2.
 
     ``defaults`` gives values that the other options call for, by name, for options that the user does not give.
+    ``parser`` is that of :func:`parser_for`, ``scene_of`` makes the scene from the parsed options, and ``arguments``
+    replace those of the command line.  Bad input is an :class:`~rodfem.errors.InputError`.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])

@@ -23,7 +23,7 @@ Work = Callable[[Scene], dict[str, Any]]
 
 
 def key_of(scene: Scene) -> dict[str, Any]:
-    """What a saved result must agree in with a scene to be used again."""
+    """Properties of a scene in which a saved result must agree with it to be used again."""
     constants = {name: p.value for name, p in scene.parameters.items()}
     return {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants}
 
@@ -40,7 +40,7 @@ def many(
     ``work`` gets no communicator but must use ``MPI.COMM_SELF``, and returns what JSON can hold.  Where it raises
     :class:`InputError` or :class:`ConvergenceError` the result is ``{"error": sentence}``, and the others go on.
     ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`InputError` where ``folder``
-    cannot be written, or has a result in another or a newer format.
+    cannot be written, or has a result in another or a newer format.  ``scenes`` are shared among the ranks of ``comm``.
     """
     writable(folder, comm)
     files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]

@@ -23,7 +23,7 @@ from rodfem.output.typical import typical_state
 from rodfem.problem.scene import Scene
 
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
-"""What a picture's caption shows for TeX names."""
+"""Plain text for TeX names in the caption of a picture."""
 
 ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
 
@@ -57,11 +57,28 @@ def run(
 ) -> Diagram:
     """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
-    By default 8 elements of degree 6 (few elements to start with where the plan has an accuracy), the scene's own span,
-    and the folder ``results/<name>``.  Files are updated after every branch: an interrupted run keeps all completed
-    branches.  What the terminal prints is what ``words`` makes of each line.  Returns the diagram.  Raises
+    Files are updated after every branch: an interrupted run keeps all completed branches.  Returns the diagram.  Raises
     :class:`~rodfem.errors.InputError` for bad input, before any computation, and
     :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
+
+    Parameters
+    ----------
+    scene
+        Statement of the problem.
+    discretization
+        By default 8 elements of degree 6, or a few to start with where the plan has an accuracy.
+    plan
+        By default the range of the scene.
+    output
+        Folder, by default ``results/<name>``.
+    figures
+        Whether pictures are drawn.
+    comm
+        The ranks that share the rod.
+    quiet
+        Whether nothing is printed.
+    words
+        Rewords each line on the terminal.
     """
     plan = plan or Plan()
     output = output or Path("results") / scene.name
@@ -97,7 +114,11 @@ class Terminal(Report):
     def __init__(
         self, plan: Plan, output: Path, comm: MPI.Comm, quiet: bool, words: Callable[[str], str] = str
     ) -> None:
-        """Write into the folder ``output``, which there is; with ``quiet`` print nothing."""
+        """Write into the folder ``output``, which there is; with ``quiet`` print nothing.
+
+        The ``plan`` says what is printed; ``comm`` has the ranks, of which the first one writes; ``words`` rewords each
+        line.
+        """
         super().__init__(comm, words=words)
         if quiet:
             self.on = self.live = False

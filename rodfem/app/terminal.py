@@ -1,4 +1,4 @@
-"""What the terminal shows, on rank 0 only: what is solved, special points as they are found, a final table."""
+"""Terminal output, on rank 0 only: the problem, special points as they are found, a final table."""
 
 from __future__ import annotations
 
@@ -118,7 +118,11 @@ class Report(Observer):
         )
 
     def frequency_mesh(self, mesh: Discretization, number: int, change: float, asked: float) -> None:
-        """Say which mesh was chosen for frequencies, and by how much they still change."""
+        """Say which mesh was chosen for frequencies, and by how much they still change.
+
+        ``number`` frequencies change by ``change`` from ``mesh`` to the next one; ``asked`` is the accuracy asked for.
+        Both are relative.
+        """
         word = "" if change <= asked else f", above the {asked:g} asked for: round-off"
         self.say(
             f"{mesh.elements} elements of degree {mesh.degree} for an accuracy of {asked:g}: with half as many more "
@@ -238,7 +242,11 @@ class Report(Observer):
             self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
 
     def verdict(self, name: str, load: str, found: Verdict, modes: Modes | None = None) -> None:
-        """Print what a judgement says of one state, with its modes where they were found."""
+        """Print the verdict on one state, with its modes if they were computed.
+
+        ``name`` is that of the branch, ``load`` the load in words, ``found`` the verdict, ``modes`` the modes, if
+        computed.
+        """
         many = "s"[: found.negative != 1]
         unstable = f"unstable in {found.negative} direction{many}"
         if self.count == UNSTABLE:

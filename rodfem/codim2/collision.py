@@ -50,7 +50,8 @@ class Collision:
     ) -> LocusPoint:
         """Point of the curve on the line through ``p`` across ``tangent``; raises :class:`ConvergenceError`.
 
-        ``near`` is a point of the curve whose double eigenvalue and invariant subspace (``modes``) are close by.
+        ``near`` is a point of the curve whose double eigenvalue and invariant subspace (``modes``) are close by.  ``p``
+        (2,) and the state ``x`` are the prediction; ``reach`` bounds how far ``x`` may move, in the metric.
         """
         width, forward = self.plane.width, tangent[0] / self.plane.width
         forward = forward / np.linalg.norm(forward)

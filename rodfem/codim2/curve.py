@@ -20,7 +20,7 @@ LOCATED = 1e-8
 
 
 class Criterion(Protocol):
-    """What defines a locus: corrects a guess to it."""
+    """Defining equations of a locus: a corrector onto it."""
 
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Size of a step."""
@@ -33,7 +33,11 @@ class Criterion(Protocol):
         near: LocusPoint,
         reach: float = 1.0,
     ) -> LocusPoint:
-        """Point of the locus on the plane through ``(p, x)`` across ``tangent``."""
+        """Point of the locus on the plane through ``(p, x)`` across ``tangent``.
+
+        ``near`` is a point of the locus whose null vectors, or invariant subspace, are close by.  ``reach`` bounds how
+        far ``x`` may move, in the metric.
+        """
 
 
 @dataclass
@@ -175,7 +179,10 @@ class Tracer:
         return [(node, kind)]
 
     def crossed(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
-        """Point between two neighbours at which a parameter has a value; none where it cannot be located."""
+        """Point between two neighbours at which a parameter has a value; none where it cannot be located.
+
+        The neighbours are ``a`` and ``b``; parameter number ``which`` (0 or 1) has the given ``value`` there.
+        """
         return [node for node, _ in self._located(a, b, lambda n: float(n.p[which]) - value, "")]
 
     def _last(self, half: Half, a: LocusPoint, b: LocusPoint, f: Callable[[LocusPoint], float], sentence: str) -> str:

@@ -56,6 +56,10 @@ class Mark:
 class Locus:
     """A curve of special points in the plane of two parameters, one row a point, in order along the curve.
 
+    ``scene`` and ``title`` name the rod, ``labels`` are those of the two parameters in mathematics, and
+    ``ordinate_name`` is that of the ordinate.  ``constants`` holds all parameters of the scene, and ``discretization``
+    formulation, elements and degree.
+
     Attributes
     ----------
     kind
@@ -271,7 +275,7 @@ def _guess(solver: StaticSolver, special: SpecialPoint, p: np.ndarray) -> LocusP
 
 
 def _criterion(solver: StaticSolver, plane: Plane, kind: str, near: LocusPoint) -> Criterion:
-    """What defines the locus of a kind of special points, one of which is ``near``."""
+    """Defining equations of the locus of a kind of special points, one of which is ``near``."""
     if kind == FLUTTER:
         return Collision(solver, plane)
     return Singular(solver, plane, near.modes, kind == FOLD, near.left)

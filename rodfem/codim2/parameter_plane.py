@@ -26,6 +26,7 @@ class LocusPoint:
     (2,) is the derivative of the equations in the two parameters along the null vector, in units of the bounds, and
     ``curvature`` the second one along it.  ``omega2`` is a double eigenvalue.  ``modes`` are the null vectors, or a
     basis of the double eigenvalue's invariant subspace; ``left`` the left null vectors where they are others.
+    ``located_to`` (2,) are the uncertainties of the parameters, and ``ordinate`` is the scene's.
     """
 
     p: np.ndarray

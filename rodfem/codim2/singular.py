@@ -60,12 +60,12 @@ FEWER = 1e-5
 
 
 class Destroyed(ConvergenceError):
-    """A special point that does not go on to be what it was; says why."""
+    """The special point changes its kind, or ends, along the locus; the message says why."""
 
 
 @dataclass
 class _Linear:
-    """What is known at a state: residual solve, responses to the two parameters, right and left null vectors, G_z."""
+    """Linearisation at a state: residual solve, responses to both parameters, right and left null vectors, G_z."""
 
     s0: PETSc.Vec
     b0: np.ndarray
@@ -91,7 +91,11 @@ class Singular:
         fold: bool,
         left: list[PETSc.Vec] | None = None,
     ) -> None:
-        """Take the null vectors of a special point, and the ``left`` ones where the matrix is not symmetric."""
+        """Border with the null vectors of a special point, and the ``left`` ones where the matrix is not symmetric.
+
+        ``solver`` has the mesh, ``plane`` the two parameters; there are as many ``vectors`` as eigenvalues vanish.  At
+        a ``fold`` the single null vector is coupled to the load; otherwise the points are branch points.
+        """
         self.solver, self.system, self.plane, self.fold = solver, solver.system, plane, fold
         self.saddle = solver.inertia if isinstance(solver, BranchSolver) else Inertia(solver.system)
         self.metric = self.saddle.metric
@@ -137,10 +141,12 @@ class Singular:
         """Point of the locus on the plane through ``(p, x)`` across ``tangent``; raises :class:`ConvergenceError`.
 
         With None for the state's part of the tangent the plane is that of the parameters alone: a line of theirs.
-        ``near`` is a point of the curve whose null vectors are close by.
+        ``near`` is a point of the curve whose null vectors are close by.  ``reach`` bounds how far ``x`` may move, in
+        the metric.
         """
         self._adopt(near.modes, near.left)
         p, x, origin = np.array(p, dtype=float), x.copy(), (np.array(p, dtype=float), x.copy())
+        # pseudo-arclength equation, in the metric of states and with parameters over the widths of their bounds
         self.system.set_phase(x)
         row_p = tangent[0] / self.plane.width**2
         row_x = None if tangent[1] is None else self.metric * tangent[1]
@@ -160,6 +166,7 @@ class Singular:
                 break
             if size < TOLERANCE or (STALLED > size > 0.5 * before):
                 return self._node(p, x, tangent, abs(dp))
+            # chord step: the third derivatives, which cost most, serve again where corrections shrink tenfold
             old = now if size < 0.1 * before and size < 0.02 else None
             before = size
         raise ConvergenceError("Newton's method does not converge")
@@ -168,6 +175,7 @@ class Singular:
         self, at: _Linear, row_p: np.ndarray, row_x: PETSc.Vec | None, along: float, scale: float
     ) -> tuple[np.ndarray, PETSc.Vec]:
         """Newton's correction of parameters and state."""
+        # dx = s0 + response dp (+ xi v at a fold): left are G = 0, arclength and, at a fold, phi.F = 0 in (dp, xi)
         free = [at.s0, *at.response] + ([at.v[0]] if self.fold else [])
         g = np.array([at.grad_x.dot(w) for w in free])
         g[0] += at.g
@@ -218,13 +226,14 @@ class Singular:
         saddle = self.saddle.at(x)
         rest = bordered.factor(saddle.matrix, self.psi, self.phi)
         gauge = np.zeros(k)
-        if not self.fold:
+        if not self.fold:  # psi.(x - x0) = 0 keeps the state symmetric: beta, in b0, then is the imperfection
             gone = x.copy()
             gone.axpy(-1.0, reference)
             gauge = np.array([-w.dot(gone) for w in self.phi])
         s0, b0 = bordered.solve(right, gauge)
         solved = [bordered.solve(None, e) for e in np.eye(k)]
         v, G = [w for w, _ in solved], np.array([row for _, row in solved])
+        # where a symmetry relates the null vectors G is a multiple of the identity: one equation, its trace
         g = float(np.trace(G)) / k
         spread = float(abs(G - g * np.eye(k)).max())
         if old is not None:
@@ -275,6 +284,7 @@ class Singular:
         g = (np.array([at.grad_x.dot(w) for w in at.response]) + at.grad_p) * width
         curvature = at.grad_x.dot(at.v[0])
         coupling = at.b[:, 0] * width
+        # the tangent is the null vector of (phi.F_p 0; G_p phi.S_phi phi); without coupling of G_p alone
         if self.fold:
             a, b = np.array([*coupling, at.g]), np.array([*g, curvature])
             z = np.cross(a / max(np.linalg.norm(a), 1e-300), b / np.linalg.norm(b))
@@ -314,6 +324,7 @@ def null_vectors(saddle: Inertia, x: PETSc.Vec, number: int) -> tuple[list[PETSc
     transposed = matrix.transpose(PETSc.Mat())
     straight, turned = (Bordered(system, side, number, None) for side in (matrix, transposed))
     right = left = [saddle.seed(i) for i in range(number)]
+    # each solve of the bordered equations is a step of inverse iteration, and its result the better border
     for _ in range(3):
         orthonormalize(right, metric)
         orthonormalize(left, metric)

@@ -1,4 +1,4 @@
-"""One branch: pseudo-arclength continuation, special points, their local laws."""
+"""One branch: pseudo-arclength continuation, test functions, special points, their normal forms."""
 
 from rodfem.lazy import attributes
 

@@ -21,16 +21,40 @@ NOT_TRACED = "not traced"
 
 @dataclass(repr=False)
 class Point:
-    """One equilibrium: state ``x``, unit ``tangent``, ``arclength`` from the start of the branch, and records.
+    """One equilibrium, a row of a branch.  Numbers are nondimensional, or in the units of the scene.
 
-    ``energy`` is the stored energy ``int W ds`` alone, without the potential of the loads: of two equilibria at one
-    load the one with less of it need not be the one with less total energy.  ``slope`` is the load's component of the
-    tangent, ``drift`` the largest drift scalar (zero but for round-off), ``error`` the last Newton correction, ``mesh``
-    the number of the discretisation that ``x`` belongs to, and ``estimate`` the error of the discretisation in load and
-    ordinate, where an accuracy was asked for.  ``determinant`` is the logarithm of the size of the saddle matrix's
-    determinant, at the state whose factors told the index.  Of
-    frequencies ``omega2`` are the eigenvalues (real and imaginary part), ``motion`` what the rod does in each, and
-    ``curve`` the numbers of their curves against the load.
+    Attributes
+    ----------
+    x, tangent
+        State vector, and unit tangent of the branch in the metric; None where no branch is followed.
+    arclength
+        Length of the branch from its start, in the metric.
+    load, ordinate
+        The two numbers of the diagram.
+    energy
+        Stored energy ``int W ds`` alone, without the potential of the loads: of two equilibria at one load the one with
+        less of it need not be the one with less total energy.
+    stretch
+        Smallest stretch ``v3`` along the rod.
+    negative, zero
+        Numbers of negative eigenvalues (the index) and of zero ones.
+    slope
+        The load's component of the tangent.
+    drift, error
+        Largest drift scalar, zero but for round-off, and the last correction of Newton's method.
+    spectrum
+        Left-most eigenvalues, where they were asked for.
+    omega2, motion, curve
+        Of frequencies: eigenvalues (real and imaginary part), types of motion, numbers of their curves against the
+        load.
+    negative_in_space
+        Index in space of a planar rod; None: not computed.
+    mesh
+        Number of the discretisation that ``x`` belongs to.
+    estimate
+        Error of the discretisation in load and ordinate, where an accuracy was asked for.
+    determinant
+        Logarithm of the size of the saddle matrix's determinant, at the state whose factors gave the index.
     """
 
     x: PETSc.Vec
@@ -72,7 +96,7 @@ class Point:
 
 @dataclass
 class NormalForm:
-    """``load = load_b + coefficient x^power + ...``, a bound of the coefficient's error, and the kind of bifurcation.
+    """``load = load_b + coefficient x^power + ...`` at a bifurcation of a ``kind``; the coefficient's ``uncertainty``.
 
     ``side`` is the sign of the load's change on the bifurcating branch.
     """
@@ -92,17 +116,46 @@ class NormalForm:
 
 @dataclass(repr=False)
 class SpecialPoint:
-    """A special point: what it is, how precisely it was located, its null vectors, and the index on either side.
+    """A special point: kind, precision of its location, null vectors, and the index on either side.
 
-    ``located_to`` is the uncertainty of the load for the given mesh; ``error_estimate`` bounds its error, that of the
-    discretisation included: of the load for folds and branch points, of the ordinate at user points and ends;
-    ``ordinate_error`` bounds that of the ordinate at all (see :mod:`rodfem.adaptivity.error_estimate`).  Where the mesh
-    has not ``resolved`` the state they are what the errors may well exceed; None: not examined.  ``coupling`` is the
-    cosine between the null vector and the derivative of the equations in the load: zero at a branch point, not at a
-    fold. ``unfolding`` is the size of the unfolding parameters that make it a branch point, relative to the metric as
-    eigenvalues are (:mod:`rodfem.continuation.unfolding`): round-off, unless an imperfection has taken it apart.
-    ``omega2`` is the double eigenvalue of flutter, ``cluster`` the :class:`~rodfem.stability.cluster.Cluster` of the
-    eigenvalues that collide.
+    Attributes
+    ----------
+    kind, point, row
+        One of :mod:`rodfem.continuation.kinds`, the equilibrium, and the number of its row in the branch.
+    negative_before, negative_after
+        Index on either side, in order of arclength.
+    located_to
+        Uncertainty of the load for the given mesh.
+    null_vectors
+        Vectors of metric norm 1, one for each eigenvalue that vanishes.
+    coupling
+        Cosine between the null vector and the derivative of the equations in the load: zero at a branch point, not at a
+        fold.
+    error_estimate, ordinate_error
+        Bound of the error, that of the discretisation included: of the load for folds and branch points, of the
+        ordinate at user points and ends; and that of the ordinate for all (see
+        :mod:`rodfem.adaptivity.error_estimate`).
+    resolved
+        Whether the mesh resolves the state; else errors may well exceed their bounds.  None: not examined.
+    connects_to
+        Branch, and number of its special point, that this branch meets here.
+    switched
+        Whether the branches that leave here have been sought.
+    test_function
+        The test function whose zero was located: the eigenvalue ``mu``, the ``slope`` of the load, the least
+        ``stretch``.
+    note
+        Remark in words.
+    law
+        Normal form of the branch that leaves here.
+    omega2, omega2_error, cluster
+        Double eigenvalue of flutter, the bound of its error, and the :class:`~rodfem.stability.cluster.Cluster` of the
+        eigenvalues that collide.
+    unfolding
+        Size of the unfolding parameters that make it a branch point, relative to the metric as eigenvalues are
+        (:mod:`rodfem.continuation.unfolding`): round-off, unless an imperfection has taken it apart.
+    event
+        The event that happens here, of those that the plan asks for.
     """
 
     kind: Kind
@@ -150,7 +203,7 @@ class SpecialPoint:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """Two neighbouring rows between which the index changes from ``before`` to ``after`` without a special point."""
+    """Neighbouring rows ``a``, ``b``: the index changes from ``before`` to ``after`` without a special point."""
 
     a: Point
     b: Point
@@ -169,9 +222,12 @@ class Unexplained:
 class Branch:
     """A connected piece of equilibria: its points in order, its special points, where it came from and why it ended.
 
-    ``begins`` is the index right after the branch point that it leaves, where the indices of the trunk tell it.
+    ``begins`` is the index right after the branch point that it leaves, where the indices of the trunk determine it.
     ``singular_start`` is the number of eigenvalues that vanish at the first state of a range and not all along the
-    branch: a branch point there, if it is one, is not located.
+    branch: a branch point there, if it is one, is not located.  ``name`` is unique in the diagram; ``parent`` is the
+    branch and the number of its special point that this one left, and ``depth`` the number of such switches.
+    ``points`` and ``special`` are in order of arclength, ``ended`` says why no more follow, and ``unexplained`` lists
+    changes of index without a special point.
     """
 
     name: str

@@ -117,6 +117,7 @@ class Corrector:
             below = found.below(0.0)
         except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong
             return None
+        # inverse iteration: one step a point along a branch, three from generic vectors
         for _ in range(1 if self._started else 3):
             for i in range(BLOCK):
                 self._block[i].axpy(FRESH, self._fresh[i])
@@ -126,12 +127,14 @@ class Corrector:
         if not self._started:
             self.restart()
             return None
+        # y.S v for the first vector y of the block: the eigenvalue itself, and its couplings to the rest of the block
         found.matrix.mult(self._block[0], self._image)
         projected = np.array([self._image.dot(v) for v in self._block])
         return Regular(x.copy(), found, below, nearest, tangent, projected)
 
     def _project_at(self, x: PETSc.Vec, step: float) -> np.ndarray:
         """The same of ``S`` at the equilibrium ``x``, by a difference of the equations over ``step``."""
+        # F(x) = 0, so that F(x + step y) / step is S y up to first order in the step: no matrix is assembled
         self._beside.waxpy(step, self._block[0], x)
         self.system.at(self._beside).residual(self._image)
         return np.array([self._image.dot(v) for v in self._block]) / step
@@ -153,7 +156,7 @@ class Corrector:
             found.factors.solve_all(self._right, self._solved)
             solved = self._solved.getDenseArray()
             self._step.array[:] = solved[:, 0]
-            tangent = system.new_vector()
+            tangent = system.new_vector()  # z = (-S^-1 F_lam, 1)
             tangent.array[:] = -solved[:, 1]
             system.set_load(tangent, 1.0)
             tangent.scale(1.0 / system.norm(tangent))
@@ -161,11 +164,12 @@ class Corrector:
             for i, (v, image, size) in enumerate(zip(self._block, self._images, sizes, strict=True)):
                 v.array[:] = solved[:, 2 + i]
                 inertia.metric.mult(v, image)
+                # |S^-1 M v| / |v| is at most one over the distance of the nearest eigenvalue from zero
                 grown = max(image.dot(v), 1e-300) ** 0.5
                 growth = max(growth, grown / size) if isfinite(grown) else float("inf")
                 v.scale(1.0 / grown)
                 image.scale(1.0 / grown)
-                for j in range(i):
+                for j in range(i):  # else all vectors of the block become the same one
                     along = image.dot(self._block[j])
                     v.axpy(-along, self._block[j])
                     image.axpy(-along, self._images[j])
@@ -177,7 +181,7 @@ class Corrector:
         """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
 
         As :func:`rodfem.fem.newton.iterate`; also the state whose factors served last, on the way.  None, with ``x`` as
-        it was, where ``S`` is too near singular.
+        it was, where ``S`` is too near singular.  ``most``, ``reach`` and ``tolerance`` are those of that function.
         """
         origin, singular, at = x.copy(), False, None
 
@@ -191,6 +195,7 @@ class Corrector:
             if not fresh:
                 with self.system.clock("solve"):
                     at.found.factors.solve(equations, self._step)
+            # J^-1 (r, 0) = y - z (row . y) / (row . z): the step stays on the plane across row
             self._step.axpy(-row.dot(self._step) / row.dot(at.tangent), at.tangent)
             return self._step
 
@@ -213,6 +218,7 @@ class Corrector:
         if moved:
             projected = self._project_at(x, max(DIFFERENCE * moved, 1e-7))
             change = float(np.linalg.norm(projected - at.projected))
+            # the count at the prediction holds only if no eigenvalue can have crossed zero on the way from there
             if at.nearest < least + SENSITIVE * moved * inertia.scale + SAFE * change:
                 there = self.factor(x)
                 if there is None:

@@ -1,9 +1,9 @@
 """Which eigenvalue of a sweep goes on from which of the load before: curves of frequencies against the load.
 
 Curves cross where two motions have nothing to do with one another and their eigenvalues pass by each other, and meet
-where two become a complex pair.  Eigenvalues alone cannot tell which; their vectors do.  A vector goes on from a curve
-as far as it lies in the span of that curve's vectors at the load before, in the mass: all of them, where an eigenvalue
-is multiple.
+where two become a complex pair.  Eigenvalues alone do not distinguish the two; eigenvectors do.  A vector goes on from
+a curve as far as it lies in the span of that curve's vectors at the load before, in the mass: all of them, where an
+eigenvalue is multiple.
 """
 
 from __future__ import annotations

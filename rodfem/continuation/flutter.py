@@ -56,8 +56,9 @@ def unmatched(found: Frequencies, others: np.ndarray) -> list[list[int]]:
 def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> Located:
     """Load at which ``D`` of a cluster vanishes, from about ``load``; raises :class:`ConvergenceError`.
 
-    Chebyshev interpolation on a piece that is moved to the zero and shrunk until the last coefficient says that
-    it is sharp.  The cluster is taken over from where its eigenvalues are farthest apart.
+    Chebyshev interpolation on a piece that is moved to the zero and shrunk until the last coefficient says that it is
+    sharp.  The cluster is taken over from where its eigenvalues are farthest apart.  ``at`` computes eigenvalues at a
+    load, ``width`` is the first half length of the piece, in the load.
     """
     half, best = width, Located(load, np.inf, cluster)
     t = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)

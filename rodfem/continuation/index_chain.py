@@ -38,7 +38,11 @@ class Row:
 
 
 def chained(low: int, high: int, specials: Sequence[SpecialPoint], last_low: int, last_high: int) -> bool:
-    """Whether special points in order lead from an index between ``low`` and ``high`` to one between the others."""
+    """Whether special points in order lead from an index between ``low`` and ``high`` to one between the others.
+
+    The index is between ``low`` and ``high`` before the ``specials``, and between ``last_low`` and ``last_high`` after
+    them.
+    """
     intervals = [(low, high)]
     for special in specials:
         intervals += [(special.negative_before,) * 2, (special.negative_after,) * 2]
@@ -83,7 +87,7 @@ def explain(branch: Branch) -> None:
 
 
 def merge_doubles(branch: Branch) -> None:
-    """Make one of neighbouring branch points that the error of the discretisation does not tell apart.
+    """Merge neighbouring branch points that are closer than the error of the discretisation.
 
     A mesh that lacks a symmetry of the rod splits a multiple eigenvalue: its zeros are apart by no more than the error.
     """

@@ -1,8 +1,9 @@
-r"""Location of zeros of an eigenvalue or of the slope of the load on a branch.
+r"""Location of special points: zeros of a test function, an eigenvalue or the slope of the load, on a branch.
 
-The bordered system is (nearly) singular near such a point, where equilibria are therefore not computed.  The branch is
-solved at Chebyshev nodes on a short interval around the point; the eigenvalue, the load and the state are smooth
-functions of arclength, and are interpolated with spectral accuracy.
+The slope of the load vanishes at a fold (turning point), an eigenvalue there and at branch points.  The bordered system
+is (nearly) singular near such a point, where equilibria are therefore not computed.  The branch is solved at Chebyshev
+nodes on a short interval around the point; the eigenvalue, the load and the state are smooth functions of arclength,
+and are interpolated with spectral accuracy.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
 
 @dataclass
 class Sample:
-    """A solved point of a piece of a branch: parameter ``s``, state, load, the eigenvalue looked at, and the index.
+    """A solved point of a piece of a branch: parameter ``s``, state ``x``, load, eigenvalue ``mu``, index ``below``.
 
     ``found`` are its factors, until the next sample.
     """
@@ -75,7 +76,10 @@ def solve_at(solver: BranchSolver, curve: Curve, s: float) -> PETSc.Vec:
 
 
 def solve_beside(solver: BranchSolver, curve: Curve, s: float, aside: float) -> tuple[PETSc.Vec, float]:
-    """Solve at ``s``, or at ``s + aside`` if the bordered matrix is singular there; returns state and parameter."""
+    """Solve at ``s``, or at ``s + aside`` if the bordered matrix is singular there; returns state and parameter.
+
+    ``solver`` has the mesh, and ``curve(s)`` returns a predicted state and the direction of the branch there.
+    """
     try:
         return solve_at(solver, curve, s), s
     except ConvergenceError:
@@ -87,6 +91,7 @@ def across(system: System, vectors: Sequence[PETSc.Vec], still: Sequence[PETSc.V
     known, out = list(still), []
     for vector in vectors:
         rest = vector.copy()
+        # a remainder of less than half is round-off, or the error of the vectors: it spans nothing new
         project_out(rest, known, system.metric, times=2)
         if (size := system.norm(rest)) > 0.5 * system.norm(vector) or not still:
             rest.scale(1.0 / size)
@@ -100,10 +105,12 @@ def eigenvalue(
 ) -> tuple[float, PETSc.Vec]:
     """Eigenvalue number ``order`` (0 is the left-most) of the state ``x``, one of those near zero, and its vector.
 
-    Eigenvalues of the vectors ``still``, zero on the whole branch, are not numbered.
+    Eigenvalues of the vectors ``still``, zero on the whole branch, are not numbered.  ``solver`` has the mesh.  Raises
+    :class:`ConvergenceError` where that eigenvalue is not among the nearest dozen.
     """
     found = solver.inertia.at(x)
     below = found.count().negative
+    # its place among the eigenvalues of its sign, by their distance from zero
     position = order - below if order >= below else below - 1 - order
     for wanted in (position + 1, position + 3, position + 6, position + 12):
         values, vectors = found.nearest(wanted + len(still), accuracy=1e-4)
@@ -124,10 +131,11 @@ def sample(
 ) -> Sample:
     """Solve at ``s`` and evaluate ``1 / (mode . M S^-1 M mode)`` there.
 
-    For a ``mode`` near the null vector this is the eigenvalue that vanishes, up to second order in their
-    difference, but unlike the ordered eigenvalues it is smooth where others come by; its zero is where ``S`` is
-    singular.  Eigenvalues within the tolerance of zero, of which ``persistent`` stay zero, count by its sign.  Unless
-    ``counted``, they are among those below: one factorisation instead of two.
+    For a ``mode`` near the null vector this is the eigenvalue that vanishes, up to second order in their difference,
+    but unlike the ordered eigenvalues it is smooth where others come by; its zero is where ``S`` is singular.
+    Eigenvalues within the tolerance of zero, of which ``persistent`` stay zero, count by its sign.  Unless ``counted``,
+    they are among those below: one factorisation instead of two.  ``solver`` has the mesh, and ``curve(s)`` returns a
+    predicted state and the direction of the branch there.
     """
     x = solve_at(solver, curve, s)
     found = solver.inertia.at(x)
@@ -145,7 +153,8 @@ class Located:
     """A zero found on a piece of a branch: parameter, state, direction, load, slope of the load, uncertainty, index.
 
     The ``uncertainty`` is of the load, ``along`` is that of the parameter, and ``arithmetic`` the part of the first
-    that no sharper interpolation lowers.
+    that no sharper interpolation lowers.  At the parameter ``s`` the state is ``x``, the direction ``tangent``, and
+    ``slope`` the load's derivative along it; the index is ``before`` and ``after`` it.
     """
 
     s: float
@@ -165,7 +174,8 @@ def interpolate(samples: list[Sample], test_function: str, guess: float, noise: 
 
     The uncertainty of the load is what the last coefficients of the two interpolants can contribute at the zero, at
     least what the solver's tolerance leaves open, and what round-off of size ``noise`` in ``mu``, the same in all
-    samples, moves the zero by.
+    samples, moves the zero by.  ``samples`` are at Chebyshev nodes; ``test_function`` is ``mu`` or ``slope``; of
+    several zeros the one nearest to the parameter ``guess`` is taken.
     """
     s = np.array([p.s for p in samples])
     middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
@@ -173,6 +183,7 @@ def interpolate(samples: list[Sample], test_function: str, guess: float, noise: 
     loads, values = np.array([p.load for p in samples]), np.array([p.mu for p in samples])
     load = chebyshev.chebfit(t, loads - loads[0], len(t) - 1)
     slope = chebyshev.chebder(load)
+    # the test function: an eigenvalue at a branch point, the load's derivative at a fold (turning point)
     f = chebyshev.chebfit(t, values, len(t) - 1) if test_function == "mu" else slope
     root = real_root(f, (guess - middle) / half)
     if root is None:
@@ -180,6 +191,7 @@ def interpolate(samples: list[Sample], test_function: str, guess: float, noise: 
     load_at = float(chebyshev.chebval(root, load)) + loads[0]
     slope_at = float(chebyshev.chebval(root, slope))
     left = zero_uncertainty(f, root)
+    # the last coefficients bound what the series leaves out; a shift of the zero moves the load by its slope
     tail = abs(load[-1]) + abs(slope_at) * left
     floor = round_off(load_at)
     moved = abs(noise / float(chebyshev.chebval(root, chebyshev.chebder(f)))) if test_function == "mu" else 0.0
@@ -231,7 +243,10 @@ def refine(
     """Solve at Chebyshev nodes around ``center``, moved until the zero lies among them, shrunk until it is sharp.
 
     Where only the distance of its load from the one ``beside`` it is wanted, that to :data:`PART` of itself is sharp
-    enough, :data:`FEWER` nodes do, and nothing is counted.
+    enough, :data:`FEWER` nodes do, and nothing is counted.  ``curve(s)`` returns a predicted state and direction on the
+    mesh of ``solver``; ``half`` is the first half length of the piece.  ``test_function`` is ``mu`` or ``slope``,
+    ``mode`` is near the null vector, and ``persistent`` eigenvalues stay zero.  Raises :class:`ConvergenceError` where
+    no zero is found near by.
     """
     best: Located | None = None
     count = NODES if beside is None else FEWER
@@ -239,8 +254,10 @@ def refine(
         nodes = center + half * np.cos(np.pi * (np.arange(count)[::-1] + 0.5) / count)
         samples = [sample(solver, curve, s, mode, persistent, counted=beside is None) for s in nodes]
         located = interpolate(samples, test_function, center, samples[-1].found.noise(mode))
+        # inside the nodes the interpolant is trusted: sharpen; outside it, move there; without a zero, by a secant
         if located is not None and abs(located.s - center) <= half:
             sharp = SHARP if beside is None else max(SHARP, PART * abs(located.load - beside))
+            # a shorter piece that gains less than a digit has met round-off
             settled = best is not None and located.uncertainty > 0.1 * best.uncertainty
             if settled or located.uncertainty - located.arithmetic < sharp:
                 return located if best is None or located.uncertainty < best.uncertainty else best
@@ -269,7 +286,9 @@ def crossing_mode(
 ) -> tuple[float, PETSc.Vec]:
     """Where on a piece of a branch eigenvalue ``order`` changes its sign, nearly, and its vector there.
 
-    To a tenth of what is interpolated, or so near that it is among the eigenvalues nearest to zero.
+    To a tenth of what is interpolated, or so near that it is among the eigenvalues nearest to zero.  ``solver``,
+    ``curve`` and ``still`` are those of :func:`eigenvalue` and :func:`sample`; ``ends`` are parameters.  Raises
+    :class:`ConvergenceError` where the eigenvalue does not change its sign.
     """
     width = 0.1 * min(WINDOW, ends[1] - ends[0])
     for _ in range(NARROWER):
@@ -295,9 +314,10 @@ def bracket(
     """Where on a piece of a branch eigenvalue ``order`` changes its sign, to ``width``.
 
     By bisection with counts: they know the number of an eigenvalue however many others lie nearer to zero.  The end
-    where it is negative is returned: on the other side it may have changed its number with positive ones that stay
-    near zero (torsion of a taut string, say).  Where the counts at both ends agree it is zero next to an end: the one
-    at which it is smaller.
+    where it is negative is returned: on the other side it may have changed its number with positive ones that stay near
+    zero (torsion of a taut string, say).  Where the counts at both ends agree it is zero next to an end: the one at
+    which it is smaller.  ``solver``, ``curve`` and ``still`` are those of :func:`eigenvalue` and :func:`sample`;
+    ``ends`` are parameters.
     """
     low, high = ends
     h = high - low
@@ -306,7 +326,7 @@ def bracket(
         return solver.inertia.at(solve_beside(solver, curve, s, OFF * h)[0]).count().negative > order
 
     first = passed(low)
-    if first == passed(high):
+    if first == passed(high):  # the zero is nearer to an end than a state can be solved
         left, right = (eigenvalue(solver, solve_beside(solver, curve, s, OFF * h)[0], order, still)[0] for s in ends)
         return low if abs(left) < abs(right) else high
     while high - low > width:
@@ -318,7 +338,11 @@ def bracket(
 def locate(
     solver: BranchSolver, a: Point, b: Point, order: int, test_function: str, still: Sequence[PETSc.Vec] = ()
 ) -> Located:
-    """Locate the zero of eigenvalue ``order`` (or of the load's slope) between two points of a branch."""
+    """Locate the zero of eigenvalue ``order`` (or of the load's slope) between two points of a branch.
+
+    The points ``a`` and ``b`` are neighbours on the mesh of ``solver``; ``test_function`` is ``mu`` or ``slope``, and
+    ``still`` are the persistent null vectors.  Raises :class:`ConvergenceError` where no zero is found.
+    """
 
     def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
         return hermite(a, b, s)
@@ -346,7 +370,8 @@ def locate_event(
     """Parameter, state and uncertainty of the parameter of an event on a piece of a branch.
 
     Where it happens at a branch point, at which the equations across the branch are singular, states beside it serve.
-    Raises :class:`ConvergenceError` without a change of sign.
+    Raises :class:`ConvergenceError` without a change of sign.  The ``event`` changes its sign between the parameters
+    ``low`` and ``high`` of the ``curve``, on the mesh of ``solver``.
     """
     aside = ASIDE * (high - low)
 

@@ -1,4 +1,4 @@
-"""The local law of a bifurcating branch: how its load leaves that of the branch point.
+"""Normal form of a bifurcating branch: the leading power of its load's change from the branch point.
 
 With ``x`` the change of the scene's ordinate, a pitchfork obeys ``load = load_b + c x + ...`` where ``x`` is
 quadratic in the amplitude (a shortening, say), ``load = load_b + c x^2 + ...`` where it is linear (a
@@ -27,7 +27,7 @@ BESIDE = 1e-3
 
 @dataclass(frozen=True)
 class Origin:
-    """A branch point: state, load and ordinate, and the uncertainties of the latter two by its location."""
+    """A branch point: state ``x``, ``load``, ``ordinate``; uncertainties ``load_left``, ``ordinate_left`` of these."""
 
     x: PETSc.Vec
     load: float
@@ -53,7 +53,7 @@ def ordinate_along(solver: BranchSolver, x: PETSc.Vec, direction: PETSc.Vec) -> 
 
 
 def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -> NormalForm | None:
-    """Normal form of the branch that leaves ``origin`` along ``direction``; None if nearby points do not tell it.
+    """Normal form of the branch that leaves ``origin`` along ``direction``; None if nearby points do not determine it.
 
     At a pitchfork the load is an even function of the amplitude, and the ordinate an even or an odd one;
     polynomials through four amplitudes give their leading coefficients.  Uncertain is what those through three miss,

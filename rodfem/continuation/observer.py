@@ -1,4 +1,4 @@
-"""Observers of a computation: what is told of it while it goes on.
+"""Observers of a computation: the events that it reports while it runs.
 
 The computation itself prints nothing and writes no file.  A terminal (:class:`rodfem.app.terminal.Report`), a writer of
 files or a notebook derives from :class:`Observer` and overrides the events that it wants; events are the same on all
@@ -30,7 +30,7 @@ class Observer:
         """A scene has been discretised; an ``accuracy`` may be asked for."""
 
     def frequency_mesh(self, mesh: Discretization, number: int, change: float, asked: float) -> None:
-        """A mesh was chosen on which ``number`` frequencies still ``change``, relative; an error was ``asked`` for."""
+        """On the chosen ``mesh`` ``number`` frequencies still ``change``, relative; an error was ``asked`` for."""
 
     def branch(self, branch: Branch) -> None:
         """A branch begins."""

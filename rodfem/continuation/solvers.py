@@ -163,7 +163,7 @@ class BranchSolver(StaticSolver):
         return self.inertia.at(x).count().negative == 0
 
     def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, NewtonResult]:
-        """As for any equilibria, but with the symmetric factors where they serve."""
+        """As for any equilibrium, with the symmetric factors unless they are too near singular."""
         x = guess.copy()
         self.system.set_load(x, load)
         corrected = self.corrector.correct(x, self.axis, reach=reach)
@@ -177,7 +177,11 @@ class BranchSolver(StaticSolver):
         outcome: NewtonResult | None = None,
         index: Index | None = None,
     ) -> Point:
-        """Evaluate all records of the equilibrium ``x``; its index is counted unless given."""
+        """Evaluate all records of the equilibrium ``x``; its index is counted unless given.
+
+        ``arclength`` and ``tangent`` are its place on the branch, ``outcome`` is the Newton iteration that led to it,
+        ``index`` that of the factors, if they are those of ``x``.
+        """
         system = self.system
         if index is None:
             index = decide(self.inertia.at(x)).index
@@ -220,9 +224,10 @@ class BranchSolver(StaticSolver):
     ) -> tuple[NewtonResult, PETSc.Vec | None, Index | None]:
         """Correct a prediction in place; also its unit tangent on the side of ``row``, and its index.
 
-        The tangent is None without convergence, the index where the factors that served the correction do not tell it.
-        ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at ``x``
-        itself and not at the prediction.
+        The tangent is None without convergence, the index where the factors that served the correction do not determine
+        it.  ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at
+        ``x`` itself and not at the prediction.  ``row`` is the normal of the plane on which the equilibrium lies, and
+        ``reach`` bounds how far ``x`` may move, in the metric.
         """
         corrected = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)
         outcome, at = corrected or (correct(self.system, x, row, most=8, reach=reach), None)
@@ -302,7 +307,10 @@ def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def predict(points: list[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """Extrapolate a branch to arclength ``s``: state and direction, from up to four points or one and its tangent."""
+    """Extrapolate a branch to arclength ``s``: state and direction, from up to four points or one and its tangent.
+
+    Raises :class:`ValueError` for one point without a tangent.
+    """
     last = points[-1]
     if len(points) < 3:
         if last.tangent is None:
@@ -317,7 +325,10 @@ def predict(points: list[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
 
 
 def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """Cubic through two points with their tangents at arclength ``s`` between them: state and direction."""
+    """Cubic through two points with their tangents at arclength ``s`` between them: state and direction.
+
+    Raises :class:`ValueError` for a point without a tangent.
+    """
     if a.tangent is None or b.tangent is None:
         raise ValueError("Both ends of a piece of a branch need a tangent.")
     h = b.arclength - a.arclength
@@ -339,7 +350,7 @@ def follow(
 
     ``bounds`` are the least and the greatest load; the branch ends exactly on them.  The caller appends (and may
     insert) points in ``points``.  The direction is that of the last point's tangent.  ``reach`` bounds the step from a
-    point.
+    point.  ``solver`` has the mesh, ``steps`` chooses the lengths of steps.
     """
     system, step = solver.system, steps.begin()
     span = abs(system.scene.span[1] - system.scene.span[0])

@@ -1,4 +1,4 @@
-r"""Special points: detection and classification of folds and branch points, and branch switching.
+r"""Special points: detection and classification of folds (turning points) and branch points; branch switching.
 
 Between two points of a branch with different indices an eigenvalue of the second variation crosses zero; where the
 load turns back, its slope does.  With ``phi`` the null vector (left and right, as the saddle matrix ``S`` is symmetric)
@@ -27,7 +27,7 @@ from rodfem.stability.round_off import decide
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
 UNCOUPLED = 1e-9
-"""Below this it is round-off.  Between the two the index tells, and then the unfolding parameters."""
+"""Below this it is round-off.  Between the two the index decides, and then the unfolding parameters."""
 LEVEL = 1e-3
 """Slope of the load, relative to its span, below which it is taken for zero."""
 INSENSITIVE = 1e-10
@@ -45,7 +45,9 @@ def special_at(
 ) -> SpecialPoint:
     """Evaluate and classify a located point: multiplicity, null vectors, coupling to the load, kind.
 
-    Vectors of eigenvalues that are zero on the whole branch (``still``) are none of its null vectors.
+    Vectors of eigenvalues that are zero on the whole branch (``still``) are none of its null vectors.  ``solver`` has
+    the mesh, ``located`` is the zero found there, ``arclength`` that of the point.  Raises :class:`ConvergenceError`
+    where no null vector is left.
     """
     system, inertia = solver.system, solver.inertia
     x = located.x
@@ -93,7 +95,7 @@ def find_special(
     Where the load turns back there is a fold, or a branch point at which this branch ends on another one.  The
     eigenvalues number ``orders`` (0 is the left-most) change sign from ``a`` to ``b``: those that a fold does not
     explain do so at branch points, or further folds.  ``persistent`` eigenvalues are zero all along, beside those of
-    symmetries, and are not numbered.
+    symmetries, and are not numbered.  ``solver`` has the mesh.
     """
     found: list[SpecialPoint] = []
     rest = list(orders)
@@ -150,7 +152,7 @@ def midpoint(solver: BranchSolver, a: Point, b: Point) -> Point | None:
 
 
 def point_between(solver: BranchSolver, a: Point, b: Point, s: float) -> Point | None:
-    """Point of a branch at arclength ``s`` between two of its points; None where it is not between them."""
+    """Point at arclength ``s`` between the points ``a`` and ``b`` of a branch of ``solver``; None where it is not."""
     try:
         x = solve_at(solver, lambda t: hermite(a, b, t), s)
     except ConvergenceError:
@@ -238,7 +240,8 @@ def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, fir
 
     The amplitude is halved until the point lies where the direction says, within half of its distance.  Where that
     fails, a family of equilibria may leave at once, at each of which the Jacobian is singular (an elastica whose ends
-    meet turns as a rigid body about any axis): then Newton's method is damped along the family.
+    meet turns as a rigid body about any axis): then Newton's method is damped along the family.  ``solver`` has the
+    mesh, ``first`` is a length in the metric.
     """
     system = solver.system
     row, before = solver.row(direction), system.damping
@@ -272,6 +275,8 @@ def start_branch(
     The second is nearer where the load has turned back before it, or its index is not that with which the branch
     begins: the fold, or the branch point, that says why is on the branch.  So it is where its load is out of bounds.
     Nor is it farther away than the branch that it leaves began: beside a nearly double point branches are short.
+    ``name``, ``parent`` and ``depth`` are recorded in the branch; ``solver`` has the mesh, and ``bounds`` are the least
+    and the greatest load.
     """
     amplitude = FIRST if depth < 2 else max(min(FIRST, special.point.arclength), NEAREST)
     first = leave(solver, special, direction, amplitude)
@@ -289,7 +294,7 @@ def start_branch(
 
 
 def index_beside(special: SpecialPoint, load: float, ways: int) -> int | None:
-    """Index with which a branch begins that leaves towards ``load``; None where the index of the trunk does not tell.
+    """Index with which a branch begins that leaves towards ``load``; None where the trunk's does not determine it.
 
     By exchange of stability the eigenvalue that crosses zero has the sign opposite to that on the trunk at the same
     load.  Of one way to leave the eigenvalues of the other null vectors belong to a symmetry, and stay zero.

@@ -11,7 +11,7 @@ solved there.  Successive parabolic interpolation (Brent 1973, chapter 5) ends a
 lowest value that is not zero.  Determinants come with the factors that count the index: they cost nothing.
 
 A row may happen to lie beside such a pair.  Its determinant is then lower than those of both neighbours by orders of
-magnitude, and three rows tell nothing of the pair: two states nearer and nearer to that row take the neighbours' place.
+magnitude, and three rows do not show the pair: two states nearer and nearer to that row replace its neighbours.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ Sample = tuple[float, float]
 
 
 class Touching:
-    """The last rows of a branch, and what their determinants tell of the steps between them."""
+    """The last rows of a branch, and the test for pairs of crossings in the steps between them, by determinants."""
 
     def __init__(self) -> None:
         """No row yet."""
@@ -79,7 +79,11 @@ class Touching:
 
 
 def inside(solver: BranchSolver, rows: Sequence[Point], p: Point, q: Point) -> list[Point]:
-    """A state between the neighbours ``p`` and ``q`` among three rows whose index is not theirs, if there is one."""
+    """A state between the neighbours ``p`` and ``q`` among three rows whose index is not theirs, if there is one.
+
+    ``solver`` has the mesh, and ``rows`` are consecutive.
+    """
+    # det^(1/m) is a parabola near m coinciding crossings; its vertex is tried for each m
     for multiplicity in MULTIPLICITIES:
         samples = [(row.arclength, relative(row, p, multiplicity)) for row in rows]
         if all(isfinite(value) for _, value in samples):
@@ -94,6 +98,7 @@ def around(solver: BranchSolver, rows: Sequence[Point]) -> list[Point]:
     p, a, b = rows
     if p.negative != a.negative or not relative(a, min(p, b, key=lambda row: row.determinant), 1) < DEEP:
         return []
+    # states nearer and nearer to the low row, until a parabola through them sees the pair
     step = min(a.arclength - p.arclength, b.arclength - a.arclength)
     size = step / NEARER
     while size > LEAST * step:
@@ -114,12 +119,17 @@ def around(solver: BranchSolver, rows: Sequence[Point]) -> list[Point]:
 
 def relative(row: Point, other: Point, multiplicity: int) -> float:
     """Root of the determinant at a row over that at another, with the sign that the indices say; nan if not known."""
+    # determinants are logarithms; the sign of det changes with each negative eigenvalue
     exponent = (row.determinant - other.determinant) / multiplicity
     return float((-1) ** (row.negative - other.negative) * exp(min(exponent, 600.0)))
 
 
 def lowest(solver: BranchSolver, samples: list[Sample], p: Point, q: Point, multiplicity: int) -> Point | None:
-    """State between two rows, towards the lowest value that the samples lead to, if its index differs from theirs."""
+    """State between two rows, towards the lowest value that the samples lead to, if its index differs from theirs.
+
+    The rows are ``p`` and ``q``, on the mesh of ``solver``.  ``samples`` are arclengths and values of :func:`relative`,
+    for as many coinciding eigenvalues as ``multiplicity`` says.
+    """
     known = [sample for sample in samples if sample[0] in (p.arclength, q.arclength)]
     least = min(value for _, value in known)
     margin = MARGIN * (q.arclength - p.arclength)
@@ -137,6 +147,7 @@ def lowest(solver: BranchSolver, samples: list[Sample], p: Point, q: Point, mult
             break
         least = size
         known = sorted([*known, (s, size)])
+        # the next parabola goes through the lowest value and its two neighbours
         middle = known.index((s, size))
         samples = known[middle - 1 : middle + 2]
     return None

@@ -53,7 +53,8 @@ class Unfolded:
     """A singular state without coupling to the load, the unfolding parameters that make it one, and their round-off.
 
     Relative to the metric, as eigenvalues are: ``beta`` (k,) is an eigenvalue times an amplitude in radian.
-    ``directions`` are those of the two branches that would cross there, unit vectors, for one null vector.
+    ``directions`` are those of the two branches that would cross there, unit vectors, for one null vector.  ``x`` and
+    ``load`` are the state, ``noise`` is the round-off of the size of ``beta``.
     """
 
     x: PETSc.Vec

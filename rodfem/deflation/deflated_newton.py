@@ -56,6 +56,7 @@ class DeflatedNewton:
             system.set_phase(None)
             state = system.at(x)
             state.residual(equations)
+            # backward Euler for M x' = -F(x), linearised: (S + alpha M) dx = -F
             matrix = state.jacobian(self.solver.axis)
             shift = alpha * self.solver.inertia.scale
             matrix.axpy(shift, system.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
@@ -83,6 +84,7 @@ class DeflatedNewton:
             size = system.norm(step)
             if not isfinite(size):
                 return MOST
+            # the plain step measures the distance from a solution of F = 0: plain Newton converges from here
             if max(size, step.norm() / (1.0 + x.norm())) < NEAR:
                 return number
             factor = self.rescaling(x, step)
@@ -93,6 +95,7 @@ class DeflatedNewton:
 
     def rescaling(self, x: PETSc.Vec, step: PETSc.Vec) -> float:
         """Factor that makes a plain Newton step at ``x`` the step of the deflated equations."""
+        # grad log M . p, a sum over the known equilibria: see the module
         image = self.system.metric * step
         slope = 0.0
         for d, apart in self.known.nearest(x):

@@ -102,7 +102,11 @@ def _misfit(system: System, values: np.ndarray) -> np.ndarray:
 
 
 def generic_state(system: System, like: PETSc.Vec, amplitude: float, seed: int) -> PETSc.Vec:
-    """Add to a state smooth changes of all fields that no symmetry leaves alone; clamps are kept."""
+    """Add to a state smooth changes of all fields that no symmetry leaves alone; clamps are kept.
+
+    The state ``like`` of the ``system`` is changed by about ``amplitude``, in radian and lengths of the rod; ``seed``
+    is that of the random numbers.
+    """
     f, named = system.fields, system.at(like).named
     rng = np.random.default_rng(seed)
     a, b = system.scene.interval

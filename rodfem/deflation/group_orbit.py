@@ -32,7 +32,10 @@ class Orbit:
     def __init__(
         self, system: System, y: PETSc.Vec, symmetry: int, seen: Callable[[PETSc.Vec], PETSc.Vec] = lambda x: x
     ) -> None:
-        """Split the velocity of ``y`` by frequency; distances are those of what is ``seen`` of states, a projection."""
+        """Split the velocity of ``y`` by frequency; distances are those of what is ``seen`` of states, a projection.
+
+        ``symmetry`` is the number of one of the ``system``'s.
+        """
         zero = system.at(system.new_vector()).generator(symmetry)
         powers = [system.at(y).generator(symmetry)]
         for _ in range(5):

@@ -11,8 +11,9 @@ from rodfem.fem.system import System
 def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[int]) -> PETSc.Vec:
     """Known state turned by a smooth rotation that respects clamps, its vector of that root mean square size.
 
-    The vector is a random combination of the lowest four waves along the rod that vanish where directors are
-    clamped.  It depends on the nodes and the seed only, not on how the rod is shared among ranks.
+    The vector is a random combination of the lowest four waves along the rod that vanish where directors are clamped.
+    It depends on the nodes and the seed only, not on how the rod is shared among ranks.  ``base`` is the known state of
+    the ``system``, ``amplitude`` the size in radian, ``seed`` that of the random numbers.
     """
     f = system.fields
     rng = np.random.default_rng(seed)

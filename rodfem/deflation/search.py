@@ -54,7 +54,7 @@ class Try:
 
 @dataclass
 class SearchLog:
-    """What a search did: the load in words, all tries in order, and the mirrors that the scene turned out to have.
+    """What a search did: its ``load`` in words, all ``tries`` in order, and the ``mirrors`` (symmetries) of the scene.
 
     ``nearly`` counts equilibria that are nearly mirror images of others, which an imperfection makes different ones.
     """
@@ -95,7 +95,10 @@ class Deflation(DeflatedNewton):
     """
 
     def __init__(self, solver: BranchSolver, load: float, known: Sequence[Point] = (), seed: int = 0) -> None:
-        """Deflate the known equilibria and their images; :class:`InputError` where one is at another load."""
+        """Deflate the known equilibria and their images; :class:`InputError` where one is at another load.
+
+        ``solver`` has the mesh, ``load`` is that of all ``known`` points, and ``seed`` that of the random guesses.
+        """
         super().__init__(solver)
         self.load, self.seed = load, seed
         scene = self.system.scene
@@ -206,7 +209,8 @@ def find_equilibria(
 
     Each stands for all that the scene's symmetries make of it, and carries its index, energy, ordinate and a tangent in
     the direction of increasing load.  How the tries ended goes to the ``observer``; :class:`Deflation` has the numbers.
-    Raises :class:`InputError` for a load that is not admissible, or known equilibria at another one.
+    Raises :class:`InputError` for a load that is not admissible, or known equilibria at another one.  ``solver`` has
+    the mesh, and ``seed`` is that of the random guesses.
     """
     search = Deflation(solver, load, known, seed)
     found = search.run(tries)
@@ -216,7 +220,7 @@ def find_equilibria(
 
 
 def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float) -> list[Point]:
-    """Equilibria of traced branches at exactly ``load``: what a search for further ones should know.
+    """Equilibria of traced branches at exactly ``load``, which a search for further ones deflates.
 
     Raises :class:`ConvergenceError` where there is none between two points on either side of the load.
     """
@@ -244,8 +248,8 @@ def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float)
 def starts(point: Point, name: str) -> list[Branch]:
     """Branches of one point each that set out from a found one to higher and to lower loads.
 
-    :meth:`rodfem.diagram.explorer.Explorer.trace` follows them, and :func:`rodfem.continuation.solvers.follow` their
-    ``points``.
+    :meth:`rodfem.diagram.tracer.Tracer.trace` follows them, and :func:`rodfem.continuation.solvers.follow` their
+    ``points``.  ``name`` is that of the branches.  Raises :class:`ValueError` for a point without a tangent.
     """
     if point.tangent is None:
         raise ValueError("A point without a tangent is no start of a branch.")

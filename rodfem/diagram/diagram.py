@@ -42,11 +42,11 @@ class Diagram:
     branches
         All branches.
     solvers
-        What computes on each mesh, by the number that a point has in ``mesh``.
+        Solver of each mesh, by the number that a point has in ``mesh``.
     warnings, notes
         Sentences on what went wrong without stopping the computation, and on what is worth knowing.
     clock
-        Where the time went.
+        Seconds by purpose.
     """
 
     def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[StaticSolver]) -> None:
@@ -60,7 +60,7 @@ class Diagram:
 
     @property
     def clock(self) -> Clock:
-        """Seconds by purpose, of the computation and of what was asked since."""
+        """Seconds by purpose, of the computation and of later requests."""
         return self.solvers[0].system.clock
 
     @property

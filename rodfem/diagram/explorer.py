@@ -73,7 +73,7 @@ class Explorer(Tracer):
         return any(apart < SAME for apart, _ in known.nearest(point.x))
 
     def _detached(self, gap: Gap, depth: int) -> None:
-        """Trace the branch on the other side of a gap: what no step from this side reaches."""
+        """Trace the branch on the other side of a gap, which no step from this side reaches."""
         self.use(gap.point.mesh)
         for point in arms(self.solver, gap):
             if self.low < point.load < self.high and not self._on_branch(point):
@@ -214,7 +214,7 @@ class Explorer(Tracer):
         return self.low - margin, self.high + margin
 
     def _law(self, special: SpecialPoint, direction: PETSc.Vec) -> None:
-        """Find the local law at a branch point: of what leaves, or of this branch where it ends on another."""
+        """Find the normal form at a branch point: of the branch that leaves, or of this one if it ends on another."""
         if special.law is not None:
             return
         from_the_side = special.test_function == "slope"

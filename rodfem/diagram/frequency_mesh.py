@@ -39,6 +39,9 @@ def frequency_mesh(
 
     The change is relative (to one, for values mu = omega^2 smaller than that).  Where refinement stops to help, at
     round-off, the best one is returned: its change says that it is worse than asked for.
+
+    ``scene`` and ``formulation`` are those of the discretisation, ``accuracy`` is the change asked for, ``span`` are
+    the loads, and the ranks of ``comm`` share the rod.
     """
     loads = np.linspace(span[0], span[1], 3)
     mesh = replace(start_mesh(scene, formulation, accuracy, comm), vertices=None)

@@ -21,23 +21,41 @@ COUNTS = {
     Argument("Plan", "spectrum"): "number of eigenvalues",
     MODES: "number of modes",
 }
-"""What is not negative."""
+"""Arguments that are not negative, in words."""
 GIVE_LOADS = Remedy("give them in {}", Argument("Plan", "at"))
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What to explore: range of the load (start first), loads to stop at, depth of switches, steps, error bars.
+    """Range of the load, loads to stop at, depth of switches, steps, and further results that are wanted.
 
-    Without a ``span`` the range is that of the scene.  Branches are followed from branch points of branches of a depth
-    less than ``depth``; the first branch has depth 0.
-    ``spectrum`` left-most eigenvalues of every state are found besides its index; at the loads ``at`` states are judged
-    by ``method`` (where one is named), and their ``modes`` left-most modes are found; ``tries`` deflated iterations at
-    each of these loads look for equilibria that no branch has reached; ``locus = (parameter, low, high)`` follows every
-    special point in the plane of the load and that parameter.  With an ``accuracy`` meshes are chosen and raised on the
-    way such that every row's load and ordinate, and those of every special point, are in error by less than that
-    (relative to values greater than one).  ``events`` are numbers of the state whose zeros are special points, too
-    (conservative scenes).
+    Parameters
+    ----------
+    span
+        Range of the load, start first; by default that of the scene.
+    at
+        Loads to stop at.
+    depth
+        Branches are followed from branch points of branches of a depth less than this; the first branch has depth 0.
+    steps
+        Control of the lengths of steps.
+    error_bars
+        Whether a second computation bounds the errors.
+    spectrum
+        Number of left-most eigenvalues of every state, besides its index.
+    tries
+        Number of deflated iterations at each load of ``at``, which look for equilibria that no branch has reached.
+    locus
+        ``(parameter, low, high)``: every special point is followed in the plane of the load and that parameter.
+    method
+        Name of the method by which states at the loads ``at`` are assessed; empty for none.
+    modes
+        Number of left-most modes of these states.
+    accuracy
+        Meshes are chosen and raised on the way such that load and ordinate of every row and special point are in error
+        by less than this (relative to values greater than one).
+    events
+        Numbers of the state whose zeros are special points, too (conservative scenes).
     """
 
     span: tuple[float, float] | None = None

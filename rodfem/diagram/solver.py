@@ -150,7 +150,10 @@ class Solver:
         return judge(self.equilibria, state_of(point), method, number)
 
     def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
-        """Left-most modes of an equilibrium on this mesh, each with its value, motion and error."""
+        """Left-most modes of an equilibrium on this mesh, each with its value, motion and error.
+
+        There are ``number`` of them.  Raises :class:`~rodfem.errors.InputError` for fewer than one.
+        """
         if isinstance(number, bool) or not isinstance(number, int) or number < 1:
             raise InputError(f"{number!r} modes cannot be computed: ask for 1 or more, as in modes(point, 3).")
         return self._finder(state_of(point), number, method)[1]
@@ -167,7 +170,7 @@ class Solver:
         """Equilibria at ``load`` beside the ``known`` ones, by ``tries`` deflated Newton iterations.
 
         Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, for known equilibria at another
-        one, and where a load has no potential.
+        one, and where a load has no potential.  ``seed`` is that of the random guesses.
         """
         if not isinstance(self.equilibria, BranchSolver):
             raise InputError(

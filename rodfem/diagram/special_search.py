@@ -59,7 +59,7 @@ class SpecialSearch:
         self._touching.restart(last)
 
     def after(self, a: Point, b: Point) -> list[SpecialPoint]:
-        """Special points that the row ``b`` after ``a`` tells of, in order of arclength.
+        """Special points that the row ``b`` after ``a`` shows, in order of arclength.
 
         An eigenvalue within the tolerance of zero has no sign yet: rows with one wait until it has.  One that stays
         zero to working accuracy belongs to a family of equilibria at one load, and is not waited for.
@@ -74,7 +74,7 @@ class SpecialSearch:
         self._on(b)
         rows = [self._here(p) for p in self._open]
         self.level = min(rows[0].zero, b.zero)
-        if b.zero > self.level:
+        if b.zero > self.level:  # the sign of an eigenvalue within the tolerance is settled by the rows that follow
             self._open.append(b)
             if len(self._open) <= PATIENCE or self.row(b).decided:
                 return []
@@ -137,6 +137,7 @@ class SpecialSearch:
         """
         rows, found = [self.row(p) for p in points], []
         why: list[str] = []
+        # invariant: from one decided row to the next the special points in between explain the change of the index
         sure = [rows[0], *(row for row in rows[1:-1] if row.decided), rows[-1]]
         for p, q in pairwise(sure):
             specials = self._between(p, q, why)
@@ -165,6 +166,7 @@ class SpecialSearch:
         load derivative is asked, too, and is one if the equations of a branch point have no solution.
         """
         for special in specials:
+            # phi.F_lam is nearly zero: fold or branch point is decided by the unfolding parameters
             weak = special.kind == FOLD and special.coupling <= COUPLED
             if weak or special.kind == BRANCH_POINT or special.negative_before == special.negative_after:
                 gap = self.gaps.examine(self.solver, special)
@@ -188,6 +190,7 @@ class SpecialSearch:
             why = str(trouble)
         if not why and chained(p.low, p.high, found, q.low, q.high):
             return found
+        # bisection: on a shorter piece fewer crossings fall together, until each half explains its own ends
         middle = midpoint(self.solver, p.point, q.point) if halvings else None
         if middle is None:
             if why:

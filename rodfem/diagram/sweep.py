@@ -76,7 +76,11 @@ class Sweep:
     """Sweeps the load of a scene over a range from its start state; used like the explorer of conservative scenes."""
 
     def __init__(self, solver: StaticSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
-        """Allocate the pencil; the plan must have passed its check."""
+        """Allocate the pencil; the plan must have passed its check.
+
+        ``solver`` has the mesh, the ``observer`` hears of the progress, ``finished()`` is called when the sweep is
+        complete.  The ``plan`` names the loads.
+        """
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.span = plan.over(solver.system.scene)
         self.vibration = Vibration(solver.system)
@@ -371,7 +375,10 @@ class Sweep:
 
 
 def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
-    """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none."""
+    """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none.
+
+    Raises :class:`SceneError` where a load drives a motion that nothing holds.
+    """
     system, name = solver.system, solver.system.scene.load
     system.set_phase(guess)
     x, outcome = solver.at_load(guess, load)

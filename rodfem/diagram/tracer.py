@@ -43,7 +43,11 @@ class Tracer:
     """
 
     def __init__(self, solver: BranchSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
-        """Start with no branch; the plan must have passed its :meth:`Plan.check`."""
+        """Start with no branch; the plan must have passed its :meth:`Plan.check`.
+
+        ``solver`` has the first mesh, the ``observer`` hears of the progress, ``finished()`` is called after each
+        branch.  The ``plan`` has range, depth and steps.
+        """
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.scene = solver.system.scene
         self.span = plan.over(self.scene)
@@ -88,7 +92,10 @@ class Tracer:
             self.observer.warn(str(trouble))
 
     def trace_whole(self, point: Point, name: str, depth: int) -> None:
-        """Follow a branch through a point in both directions, as one."""
+        """Follow a branch through a point in both directions, as one.
+
+        Raises :class:`ValueError` for a point without a tangent.
+        """
         if point.tangent is None:
             raise ValueError("A point without a tangent is no start of a branch.")
         back = Branch(name, None, depth, [reversed_point(point, 0.0)])
@@ -268,7 +275,11 @@ class Tracer:
         return f"No equilibrium at {self.scene.load} = {load:g} between two points of the branch: use another load."
 
     def user(self, guess: PETSc.Vec, load: float, s: float, increasing: bool) -> Point:
-        """Point at exactly ``load`` from a guess; raises :class:`ConvergenceError`."""
+        """Point at exactly ``load`` from a guess; raises :class:`ConvergenceError`.
+
+        Its arclength is about ``s``; its tangent is on the side on which the load is ``increasing``, or decreases.  The
+        ``guess`` is a state.
+        """
         self.solver.system.set_phase(guess)
         x, outcome = self.solver.at_load(guess, load, reach=1.0)
         if not outcome.converged:
@@ -399,7 +410,7 @@ class Tracer:
             self._say_zeros(recent[0], point, extra)
 
     def _say_zeros(self, before: Point, point: Point, extra: int) -> None:
-        """Say of eigenvalues that count as zero at two rows whether round-off tells them from zero, or they are it."""
+        """Report eigenvalues that count as zero at two rows: within round-off, or persistently zero."""
         system, inertia, still = self.solver.system, self.solver.inertia, 0
         own = point.zero - system.active_drifts() - extra
         for p in (before, point):
@@ -452,7 +463,11 @@ class Tracer:
 
 
 def equivalent(a: Point, b: Point, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:
-    """Whether two points agree in all that a symmetry leaves alone: load, energy and stretch."""
+    """Whether two points agree in all that a symmetry leaves alone: load, energy and stretch.
+
+    Loads and energies of ``a`` and ``b`` may differ by ``tolerance``, relative to values greater than one; so may
+    stretches, or by ``of_strain`` where that is larger.
+    """
     strain = max(tolerance, of_strain)
     pairs = ((a.load, b.load, tolerance), (a.energy, b.energy, tolerance), (a.stretch, b.stretch, strain))
     return all(abs(p - q) <= allowed * unit(p, q) for p, q, allowed in pairs)

@@ -2,7 +2,8 @@
 
 The second derivative of ``W`` in the free strains and curvatures must be positive definite (the Legendre-Hadamard
 condition of a rod; Antman, Nonlinear Problems of Elasticity, 2005, chapter 8): where it is not, neither are equilibria
-regular functions of the load nor does the index mean stability.  For a quadratic energy the undeformed state tells all.
+regular functions of the load nor does the index mean stability.  For a quadratic energy the undeformed state decides
+for all.
 """
 
 from __future__ import annotations

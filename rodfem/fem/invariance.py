@@ -56,17 +56,20 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
         row, size = asked(state, single, changes)
         rows.append(row)
         sizes.append(size)
+        # conditions on the weights a of a symmetry: invariance, and no motion of what an end holds
         held.append(changes[:, _held(fields)].T)
         free = changes[:, fields.number >= 0]
         moved += fields.comm.allreduce(free @ free.T, op=MPI.SUM)
     free = _null_space(np.vstack(fields.comm.allgather(np.linalg.qr(np.vstack(held), mode="r"))))
     greatest = np.nan_to_num(np.max(sizes, axis=1), nan=np.inf)
     asked_at = np.flatnonzero(greatest <= WILD * greatest.min())
+    # the null space is relative to the magnitudes of the terms that cancel in each combination
     terms = abs(free.T) @ np.max([sizes[i] for i in asked_at], axis=0)
     terms = np.where(terms > 0, terms, 1.0)
     null = free @ (_null_space(np.vstack([rows[i] for i in asked_at]) @ free / terms) / terms[:, None])
     if null.shape[1] == 0:
         return []
+    # combinations that change no free unknown are no symmetries
     null = np.linalg.qr(null)[0]
     scale = np.diag(moved).max(initial=1e-300)
     squares, combinations = np.linalg.eigh(null.T @ (moved / scale) @ null)
@@ -95,6 +98,7 @@ def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
         held.append(changes[:-1, _held(fields)].T)
     free = _null_space(np.vstack(held))
     exact, along = np.array(rows)[:, :-1] @ free, np.array(rows)[:, -1]
+    # dL[derivative] + sum_j a_j dL[g_j] = 0 at all states, for one a: least squares, and its residual decides
     weights = np.linalg.lstsq(exact, -along, rcond=SLIDING)[0]
     if abs(exact @ weights + along).max() > SLIDING:
         return None
@@ -106,6 +110,7 @@ def _null_space(rows: np.ndarray) -> np.ndarray:
     """Orthonormal null vectors of conditions (..., m) of size one, (m, number)."""
     if rows.shape[1] == 0:
         return np.zeros((0, 0))
+    # the small factor R has the null space of all rows; zero rows below it make the decomposition a full one
     _, singular, vectors = np.linalg.svd(np.linalg.qr(np.vstack([rows, np.zeros((rows.shape[1],) * 2)]), mode="r"))
     return np.asarray(vectors[singular < EXACT * max(singular[0], 1.0)].T)
 

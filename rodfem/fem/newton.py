@@ -1,4 +1,4 @@
-"""Newton's method on the bordered system, with chord steps where they converge fast enough."""
+"""Newton's method for the residual of the bordered system, with chord steps where they converge fast enough."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STALLED = 1e-6
 
 @dataclass(frozen=True)
 class NewtonResult:
-    """How a Newton iteration ended.
+    """How a Newton iteration ended: whether ``converged``, after how many ``iterations``.
 
     ``error`` is what the observed rate of convergence leaves after the last correction (that one's size, if the factors
     were new), ``moved`` the size of all corrections together.
@@ -40,7 +40,8 @@ def correct(
 ) -> NewtonResult:
     """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place, with LU factors.
 
-    As :func:`iterate`; fails at a singular matrix, too.
+    As :func:`iterate`; fails at a singular matrix, too.  ``system`` has the equations, ``row`` (n,) is the last row of
+    the bordered matrix; ``most`` and ``reach`` are those of :func:`iterate`.
     """
     step = system.new_vector()
 
@@ -69,6 +70,8 @@ def iterate(
 
     With damping ``d`` a correction of size c along a family of equilibria is that by a force ``d c``, which no mesh
     makes exactly zero: one that no longer shrinks is accepted where that force is within the tolerance.
+
+    ``system`` has the equations; an error below ``tolerance``, of the size of a correction, is small enough.
     """
     equations, origin = system.new_vector(), x.copy()
     still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
@@ -88,10 +91,12 @@ def iterate(
         size = max(distance, step.norm() / (1.0 + x.norm()))
         if not isfinite(size) or distance > reach:
             break
+        # chord steps converge linearly: their rate, doubled for safety, says what the next correction would be
         left = size if fresh else min(2.0 * size / previous, 1.0) * size
         if size < TOLERANCE or left < tolerance or (fresh and still > size > 0.5 * previous):
             origin.aypx(-1.0, x)
             return NewtonResult(True, iteration, left, system.norm(origin))
+        # far from a solution, or where the old factors gain less than a digit, new ones are worth their cost
         refactor = size > 0.02 or size > 0.1 * previous
         previous = size
     origin.aypx(-1.0, x)
@@ -105,6 +110,9 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Newt
     -F``, with ``M`` the metric: it goes downhill, to a state that is stable if one can be reached.  The time step grows
     while the steps are small, and Newton's method takes over near the end (Kelley & Keyes, SIAM J. Numer. Anal. 35
     (1998) 508-523).
+
+    ``system`` has the equations, ``row`` (n,) is the last row of the bordered matrix, and at most ``most`` steps are
+    taken.
     """
     equations, step = system.new_vector(), system.new_vector()
     tau, trial = 1e-2 / system.stiffness_scale, x.copy()
@@ -118,6 +126,7 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Newt
         if not isfinite(size):
             break
         x.axpy(-(1.0 if size < 0.4 else 0.4 / size), step)  # constraints are mended in one step, however long
+        # switched evolution: longer time steps while the motion is slow, shorter where it is fast
         tau *= 2.0 if size < 0.2 else 0.5 if size > 0.4 else 1.0
         if (iteration % 5 == 4 and size < 0.1) or size < 1e-3:  # not earlier: it might jump to a state uphill
             x.copy(trial)

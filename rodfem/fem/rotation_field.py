@@ -56,7 +56,10 @@ class QuaternionField:
         return np.tile(IDENTITY, (s.size, 1)) if start is None else np.asarray(start(s), dtype=float)
 
     def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
-        """Value (size,) at an end at ``s`` that is clamped with the given unit quaternion."""
+        """Value (size,) at an end at ``s`` that is clamped with the given unit quaternion.
+
+        ``rotation`` (4,) is that quaternion; ``start`` is the first guess, ``interval`` the arclengths of the ends.
+        """
         return np.array(rotation)
 
 
@@ -111,7 +114,10 @@ class AngleField:
         return np.asarray(angles[place.ravel()[1001:], None])
 
     def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
-        """Value (size,) at an end at ``s`` that is clamped with a unit quaternion: the one next to the start."""
+        """Value (size,) at an end at ``s`` that is clamped with a unit quaternion: the one next to the start.
+
+        ``rotation`` (4,) is that quaternion; ``start`` is the first guess, ``interval`` the arclengths of the ends.
+        """
         angle = self._angle(np.array(rotation))
         near = self.start(start, np.array([s]), interval)[0]
         return np.asarray(angle + TWICE * np.round((near - angle) / TWICE))

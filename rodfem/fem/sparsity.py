@@ -72,7 +72,10 @@ def _own_rows(fields: Fields, names: list[str]) -> sp.csr_matrix:
 
 
 def new_matrix(fields: Fields, pattern: sp.csr_matrix, rows: PETSc.LGMap, columns: PETSc.LGMap) -> PETSc.Mat:
-    """Zero PETSc AIJ matrix with ``pattern`` and the maps from local degrees of freedom to its rows and columns."""
+    """Zero PETSc AIJ matrix with ``pattern``, on the ranks of ``fields``.
+
+    ``rows`` and ``columns`` are the maps from local degrees of freedom to its rows and columns.
+    """
     size = (fields.local_unknowns, fields.unknowns)
     matrix = PETSc.Mat().createAIJ((size, size), comm=fields.comm)
     matrix.setPreallocationCSR(

@@ -80,7 +80,11 @@ class State(Evaluation):
     """
 
     def __init__(self, system: System, local: np.ndarray, drifts: np.ndarray, line: Line) -> None:
-        """Own the values from now on."""
+        """Own the values from now on.
+
+        ``local`` are the nodal values of this rank with its ghosts, ``line`` the parameters that the load stands for,
+        and the state belongs to the ``system``.
+        """
         super().__init__(system.equations, local, line)
         self.system, self.drifts = system, drifts
 

@@ -26,7 +26,10 @@ from rodfem.problem.scene import Scene
 
 @dataclass(frozen=True)
 class Elementary:
-    """A generator of one target (a field or a group of scalars): ``change = matrix value + constant``."""
+    """A generator of one ``target`` (a field or a group of scalars): ``change = matrix value + constant``.
+
+    ``name`` is that of the motion, in words.
+    """
 
     target: str
     matrix: Matrix
@@ -111,7 +114,7 @@ def derivative(state: NodalValues) -> np.ndarray:
 def mismatch(state: NodalValues) -> float:
     """Greatest jump between elements of the derivative of rotation or centreline.
 
-    It tells how far the mesh is from moving along itself.
+    It measures how far the mesh is from the invariance under the motion along itself.
     """
     fields, worst = state.fields, 0.0
     for block in (b for b in fields.blocks if b.name in (fields.turning.name, "r")):
@@ -177,7 +180,7 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
 
 
 def add_change(state: NodalValues, target: str, matrix: np.ndarray, constant: np.ndarray, out: np.ndarray) -> None:
-    """Add to ``out`` the change ``matrix value + constant`` of one target of a state, a field or a group of scalars."""
+    """Add ``matrix value + constant`` to ``out`` for one ``target`` of a ``state``, a field or a group of scalars."""
     fields = state.fields
     if target in fields.dofs:
         dofs, values = fields.dofs[target], state.values(target)

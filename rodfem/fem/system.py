@@ -76,7 +76,11 @@ class System:
         mesh: Any = None,
         symmetries: Sequence[Symmetry] | None = None,
     ) -> None:
-        """Compile the forms and allocate all matrices once; on a given mesh, with known symmetries if they are."""
+        """Compile the forms and allocate all matrices once; on a given mesh, with known symmetries if they are.
+
+        The ``scene`` on the mesh of ``discretization`` is shared among the ranks of ``comm``; ``clock`` measures times;
+        ``mesh`` and ``symmetries`` are those of another system of the scene.
+        """
         self.scene, self.comm, self.damping = scene, comm, 0.0
         self.clock = clock or Clock()
         self.fields = Fields(scene, discretization, comm, mesh)
@@ -231,7 +235,7 @@ class System:
     # --- symmetry ----------------------------------------------------------------------------------------------
 
     def set_phase(self, reference: PETSc.Vec | None) -> None:
-        """Take the phase conditions at ``reference``: as many as it breaks symmetries; None: none active.
+        """Set the phase conditions at ``reference``, one for each symmetry that it breaks; None: none active.
 
         The symmetries form a linear space.  Those combinations of their generators that vanish at the reference state
         are its own symmetries and have no phase condition; the others, orthonormal in the metric, have one each.

@@ -166,7 +166,7 @@ class Verification:
         return out
 
     def _across_closing(self, matrix: PETSc.Mat, left: PETSc.Vec) -> None:
-        """Take from ``left`` what multipliers that close a ring make up for, in place."""
+        """Project ``left`` across the columns of the multipliers that close a ring, in place."""
         if self._closing is None:
             fields, self._closing = self.system.fields, []
             for unknown in fields.unknown_scalars:

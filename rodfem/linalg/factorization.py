@@ -77,7 +77,7 @@ def pivots(prefix: str) -> AbstractContextManager[None]:
 class Factors(Protocol):
     """Factors ``lu``, or ``cholesky`` (LDL^t, which also counts the inertia), of matrices given one after the other.
 
-    ``regular`` tells whether the last one could be solved with: none is exactly singular.
+    ``regular`` is false where the last one was exactly singular, so that it has no solutions.
     """
 
     regular: bool
@@ -217,11 +217,11 @@ class Klu:
         self.solve_all(right, out)
 
     def inertia(self) -> tuple[int, int]:
-        """LU factors count none."""
+        """LU factors count none: raises :class:`TypeError`."""
         raise TypeError("LU factors have no inertia: LDL^t factors have")
 
     def determinant(self) -> float:
-        """None is kept of LU factors."""
+        """None is kept of LU factors: raises :class:`TypeError`."""
         raise TypeError("LU factors keep no determinant: LDL^t factors do")
 
 
@@ -240,7 +240,10 @@ class Mumps:
         thresholds: dict[int, float] | None = None,
         prefix: str = "",
     ) -> None:
-        """Keep MUMPS's integer ``controls`` (ICNTL) and real ``thresholds`` (CNTL) for when there is a matrix."""
+        """Keep MUMPS's integer ``controls`` (ICNTL) and real ``thresholds`` (CNTL) for when there is a matrix.
+
+        ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``prefix`` that of PETSc's options.
+        """
         self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
         self.prefix = prefix or f"rodfem_{kind}_"
         self.room = 50

@@ -14,7 +14,7 @@ def first_of(comm: MPI.Comm, count: int) -> int:
 
 
 def block_matrix(blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -> sp.csr_matrix:
-    """Sparse matrix with dense ``blocks`` (b, r, c) at ``rows`` (b, r) and ``columns`` (b, c)."""
+    """Sparse matrix of a ``shape`` with dense ``blocks`` (b, r, c) at ``rows`` (b, r) and ``columns`` (b, c)."""
     i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
     return sp.csr_matrix((blocks.ravel(), (i.ravel(), j.ravel())), shape=shape)
 

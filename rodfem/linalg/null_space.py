@@ -122,7 +122,11 @@ class Chain:
     """
 
     def __init__(self, C: sp.csr_matrix, group: np.ndarray, scale: float, found: Kernel) -> None:
-        """Sort the rows of ``C`` (m, p) into links; ``group`` (p,) numbers the group of each column."""
+        """Sort the rows of ``C`` (m, p) into links; ``group`` (p,) numbers the group of each column.
+
+        Rows below round-off of ``scale`` depend on others; null vectors go to ``found``.  Raises :class:`InputError`
+        for a row that couples more than two neighbouring groups.
+        """
         self.scale, self.kernel = scale, found
         order = np.argsort(group, kind="stable")
         self.widths = np.bincount(group)

@@ -12,7 +12,10 @@ TINY = 1e-300
 
 
 def project_out(vector: PETSc.Vec, basis: Sequence[PETSc.Vec], metric: PETSc.Mat, times: int = 1) -> None:
-    """Make ``vector`` orthogonal to orthonormal ones, in place; done ``times`` two also where little of it is left."""
+    """Make ``vector`` orthogonal to orthonormal ones, in place; done ``times`` two also where little of it is left.
+
+    The ``basis`` is orthonormal in the ``metric`` (n, n), as is the result.
+    """
     for _ in range(times):
         for other in basis:
             vector.axpy(-(metric * other).dot(vector), other)

@@ -28,7 +28,7 @@ class Copy:
     """
 
     def __init__(self, matrix: PETSc.Mat) -> None:
-        """Take pattern and values of ``matrix``, on all ranks together."""
+        """Gather pattern and values of ``matrix``; collective."""
         self.comm = matrix.comm.tompi4py()
         starts, columns, values = matrix.getValuesCSR()
         lengths, columns = zip(*self.comm.allgather((np.diff(starts), columns)), strict=True)

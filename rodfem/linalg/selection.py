@@ -21,7 +21,8 @@ def factors_of(
     """Factors for matrices of ``unknowns`` rows on a communicator, the last ``scalars`` of which may be dense.
 
     ``controls`` are MUMPS's ICNTL, ``thresholds`` its CNTL; PETSc's options begin with ``rodfem_lu_`` or
-    ``rodfem_cholesky_``, or with another ``prefix``.
+    ``rodfem_cholesky_``, or with another ``prefix``.  ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the
+    matrices.
     """
     prefix = prefix or f"rodfem_{kind}_"
     lu = kind == "lu" and lu_package(MPI.COMM_SELF, prefix) != "mumps"
@@ -32,6 +33,9 @@ def factors_of(
 
 
 def solving(counting: Factors, comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
-    """The fastest factors for solutions with a symmetric matrix: its LDL^t factors ``counting``, or LU factors."""
+    """The fastest factors for solutions with a symmetric matrix: its LDL^t factors ``counting``, or LU factors.
+
+    The matrix has ``unknowns`` rows on ``comm``, the last ``scalars`` of which may be dense.
+    """
     same = lu_package(MPI.COMM_SELF, "rodfem_lu_") == "mumps"
     return counting if same else factors_of("lu", comm, unknowns, scalars, {})

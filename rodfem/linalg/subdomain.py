@@ -62,6 +62,7 @@ class Piece:
         corner = np.flatnonzero(~mine & right)
         self._corner = corner, number[rows[corner]], number[columns[corner]]
         self._sent, self._counts = np.array([], dtype=int), ([0], [0])
+        # C_r is the transpose of B_r in a symmetric matrix; else its rows are on the ranks that own the interface
         if not symmetric:
             self._sent, row, column = self._exchange(rows, columns, np.flatnonzero(~mine & ~right), ranges)
             i, j = np.append(i, place[row]), np.append(j, place[column])
@@ -89,6 +90,7 @@ class Piece:
         between = ((columns < ranges[rank]) | (columns >= ranges[rank + 1])) & (columns < first) & (rows < first)
         row, owner = rows[between], np.searchsorted(ranges, columns[between], side="right") - 1
         facing = [np.unique(row[owner == r]) for r in range(size)]
+        # of two coupled ranks the one with fewer boundary unknowns gives them to the interface, at a tie the lower rank
         counts = np.array(self.comm.allgather([len(found) for found in facing]))
         given = [facing[r] for r in range(size) if (counts[rank, r], rank) < (counts[r, rank], r)]
         return np.unique(np.concatenate([*given, np.array([], dtype=int)]))

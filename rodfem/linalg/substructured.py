@@ -95,9 +95,11 @@ class Condensed(Spread):
             negative, determinant = self.factors.inertia()[0], self.factors.determinant()
         elif not trouble:
             determinant = float(np.log(abs(springs)).sum())
+        # one message: an error is raised on all ranks, and D is made of the compliances and springs of all of them
         parts = piece.comm.allgather((trouble, negative, springs, compliance, determinant))
         if any(part[0] for part in parts):
             raise ConvergenceError(next(part[0] for part in parts if part[0]))
+        # Haynsworth: negative(A) = sum_r [negative(P_r) - m_r] + negative(D), the last added where D is factored
         self._negative, self._zero = sum(part[1] - len(part[2]) for part in parts), 1
         self._determinant = sum(part[4] for part in parts)
         self.regular = all(np.isfinite(part).all() for part in (corner, *(part[3] for part in parts)))
@@ -108,6 +110,7 @@ class Condensed(Spread):
         """Factor this rank's piece; springs (m,) and compliance ``X`` (m, m), nan where it is singular with any."""
         piece, m = self.piece, len(diagonal)
         sizes, stiffness = piece.border()
+        # a zero diagonal (multiplier, scalar) gives no spring: minus the sum of magnitudes of its column does
         usual = np.where(sizes > NOTHING * stiffness, -sizes, 1.0)
         usual = np.where(abs(diagonal) > SOFT * sizes, diagonal, usual)
         self._columns = np.zeros((piece.size + m, m), dtype=PETSc.ScalarType)
@@ -127,15 +130,17 @@ class Condensed(Spread):
             compliance = self._columns[piece.size :]
             if self.symmetric:
                 compliance = (compliance + compliance.T) / 2
+            # |T|^1/2 X |T|^1/2 is of size one where the springs carry the piece, large where it is nearly singular
             scale = np.sqrt(abs(springs))
             if abs(compliance * np.outer(scale, scale)).max(initial=0.0) < GROWTH:
                 return springs, compliance
         return usual, np.full((m, m), np.nan)
 
     def _join(self, corner: np.ndarray, springs: list[np.ndarray], compliances: list[np.ndarray]) -> None:
-        """Factor ``D``, scaled."""
+        """Factor the interface matrix ``D``, scaled."""
         forces = sum(len(part) for part in springs)
         held = np.concatenate(self.touched)
+        # D = (-X 1; 1 G - sum T): the artificial springs are taken away again
         joint = scipy.linalg.block_diag(*[-part for part in compliances], corner)
         every = np.concatenate(springs)
         joint[np.arange(forces), forces + held] = joint[forces + held, np.arange(forces)] = 1.0
@@ -162,12 +167,14 @@ class Condensed(Spread):
         if piece.size:
             local[: piece.size] = right[piece.inner]
             local = self._block.solve(local)
+        # right-hand side of D: compatibility (y at the interface), then balance (c); each rank has its own part of it
         shared = np.zeros((len(self._scale), k), dtype=PETSc.ScalarType)
         shared[self._forces] = local[piece.size :]
         shared[self._number + piece.held] = right[piece.own]
         piece.comm.Allreduce(MPI.IN_PLACE, shared)
         solved = self._back(self._lu, self._pivots, self._scale[:, None] * shared)[0] * self._scale[:, None]
         out = np.empty(right.shape, dtype=PETSc.ScalarType)
+        # back substitution: x_r = y_r + Z_r l_r
         out[piece.inner] = local[: piece.size] + self._columns[: piece.size] @ solved[self._forces]
         out[piece.own] = solved[self._number + piece.held]
         return out

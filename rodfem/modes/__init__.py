@@ -1,4 +1,4 @@
-"""What a rod does in a perturbation, and its left-most modes."""
+"""Motion of a rod in a perturbation, and its left-most modes."""
 
 from rodfem.lazy import attributes
 

@@ -1,4 +1,4 @@
-"""Finds the modes of a state, from the eigenvectors that a judgement leaves: see :mod:`rodfem.modes.modes`."""
+"""Finds the modes of a state from the eigenvectors of its assessment: see :mod:`rodfem.modes.modes`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ModeFinder:
     """Finds the modes of states of one :class:`~rodfem.fem.system.System`."""
 
     def __init__(self, solver: StaticSolver, error_bars: bool = True) -> None:
-        """Take what computes equilibria; ``error_bars`` are from a second, richer discretisation."""
+        """Keep the solver of the equilibria; ``error_bars`` are from a second, richer discretisation."""
         self.judge, self.motions = Judge(solver), Motions(solver.system)
         self.system, self.error_bars = solver.system, error_bars
         self._richer: tuple[StaticSolver, Judge, Transfer] | None = None

@@ -1,4 +1,4 @@
-r"""Modes as one wants them: what the rod does in its left-most eigenvectors, and how to find them in what it does.
+r"""Modes: the motion of the rod in its left-most eigenvectors, and their amplitudes in a measured motion.
 
 A mode is a motion ``(u, w)`` of the rod: displacement and infinitesimal rotation along it, in the space frame, with its
 eigenvalue ``mu``.  It has unit kinetic energy, ``int rhoA u.u + w.(rhoI) w ds = 1`` (a symmetry that moves nothing with
@@ -111,7 +111,8 @@ def save_modes(
     ``about`` says in the file's attributes what rod it is.  Group ``/branches/<branch>/<row>``, named as in
     ``states.h5``, has the state's ``load``, ``s``, ``r``, ``q`` and the arrays of :class:`Modes`; a complex number is a
     compound of ``r`` and ``i``.  Of a ``scene``, if given, what holds and loads it is written for pictures, as in
-    ``states.h5`` (see :func:`rodfem.problem.supports.write`).
+    ``states.h5`` (see :func:`rodfem.problem.supports.write`).  ``modes`` are those of row ``row`` of ``branch``;
+    ``path`` is that of the file.
     """
     with h5py.File(path, "w" if first else "a") as file:
         if first:
@@ -151,7 +152,7 @@ def load_modes(path: Path, branch: str, row: int) -> Modes:
 
 
 def load_setting(path: Path, branch: str, row: int) -> Setting:
-    """What holds and loads the rod whose modes a file has, as far as it says so."""
+    """Supports and loads of the rod whose modes are in a file, as far as it has them."""
     with h5py.File(path, "r") as file:
         return read(file[f"branches/{branch}/{row}"])
 
@@ -163,7 +164,7 @@ def heading(path: Path) -> str:
 
 
 def _contents(path: Path) -> str:
-    """What a file of modes has, in words."""
+    """Contents of a file of modes, in words."""
     try:
         with h5py.File(path, "r") as file:
             return "it has " + "; ".join(f"{name}, row {', '.join(rows)}" for name, rows in file["branches"].items())

@@ -46,7 +46,7 @@ MEANING = {
 }
 """Columns in words, as they stand in the file."""
 UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
-"""What ``negative`` counts where loads have no potential."""
+"""Meaning of ``negative`` where loads have no potential."""
 
 
 def as_data(
@@ -59,7 +59,8 @@ def as_data(
     """Diagram as nested dicts and lists of plain numbers and strings (nondimensional, or in the units of the scene).
 
     ``systems`` are those of the meshes that the points name by their number; ``discretization`` is the one with most
-    unknowns, and ``meshes`` has all.
+    unknowns, and ``meshes`` has all.  ``branches`` are those of the diagram, ``span`` the range of the load,
+    ``accuracy`` that of the plan; ``clock`` has the times.
     """
     system = max(systems, key=lambda s: s.fields.unknowns)
     scene = system.scene
@@ -185,7 +186,7 @@ def save_states(branch: Branch, solvers: Sequence[StaticSolver], path: Path, fir
     displacement ``r``, ``rotation`` in the space frame, and the change of ``q``.  Below it are the groups of
     :func:`rodfem.problem.supports.write`, for pictures; the file has the name of the ``first`` branch and the bending
     stiffness under ``section``.  ``solvers`` are those of the meshes that points name; the rows of a mesh with fewer
-    nodes end in nan.
+    nodes end in nan.  ``path`` is that of the file.
     """
     import h5py
 
@@ -245,7 +246,8 @@ def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
     Raises :class:`InputError` where the file has another or a newer format, or no such row, has it in the other
-    formulation, or lacks an unknown of the follower's scene.
+    formulation, or lacks an unknown of the follower's scene.  ``path`` is that of ``states.h5``, ``row`` the number of
+    the row of ``branch``; the state is one of ``solver``.
     """
     import h5py
 

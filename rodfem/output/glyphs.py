@@ -85,7 +85,7 @@ def glyphs_of(
 
 
 def _body(support: Support, at: Floats, home: Floats, R: Floats, away: Floats, size: float, up: Floats) -> list[Solid]:
-    """Body by what the directors may do, and rails by what the position may.
+    """Body by the freedom of the directors, and rails by that of the position.
 
     The rails are where ``home`` (3,) has them.  ``away`` is the direction from the other end of the rod, zero inside of
     it; ``size`` half the size of a block.

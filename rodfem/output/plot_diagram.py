@@ -70,7 +70,7 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
 
 
 def figure_of(diagram: Mapping[str, Any]) -> Figure:
-    """Figure of a diagram, as :func:`draw_diagram` writes it; raises as that does."""
+    """Figure of a diagram, as :func:`draw_diagram` writes it; raises :class:`ValueError` as that does."""
     DIAGRAM.check(diagram, "The diagram")
     branches = diagram.get("branches")
     if not branches:

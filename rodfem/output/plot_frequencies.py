@@ -71,7 +71,7 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
 
 
 def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
-    """Figure of the frequencies of a diagram, as :func:`draw_frequencies` writes it; raises as that does."""
+    """Figure of the frequencies, as :func:`draw_frequencies` writes it; raises :class:`ValueError` as that does."""
     DIAGRAM.check(diagram, "The diagram", ("branches",))
     branches = [b for b in diagram["branches"] if b["columns"].get("omega2")]
     if not branches:

@@ -27,7 +27,7 @@ APART = 30.0
 
 
 class Piece(NamedTuple):
-    """Consecutive segments of a branch with one index.
+    """Consecutive segments of a ``branch`` with one index, drawn in one ``colour``.
 
     ``curve`` (k, 2) has loads and ordinates, ``negative`` is the index, of a planar rod in its plane, ``in_space`` that
     among all perturbations (None where it is not known).

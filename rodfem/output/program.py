@@ -1,4 +1,4 @@
-"""What the programs that draw share: the picture's name, or one sentence on standard error."""
+"""Shared by the programs that draw: the picture's name on output, or one sentence on standard error."""
 
 from __future__ import annotations
 

@@ -273,6 +273,8 @@ def draw_shape_safely(
 ) -> str | None:
     """Draw as `draw_shape` does, but in a process of its own, which may crash without harm.
 
+    ``states``, ``branch``, ``row``, ``path`` and ``options`` are as there.
+
     Parameters
     ----------
     states, branch, row, path, **options

@@ -1,4 +1,4 @@
-"""What all plots share: size, fonts, colours, text, the line at the foot, and how they are written."""
+"""Shared by all plots: size, fonts, colours, text, the line at the foot, and how they are written."""
 
 from __future__ import annotations
 

@@ -42,7 +42,9 @@ def snapshot(
 ) -> Snapshot:
     """Draw a point of a diagram: pictures are made from files, so that its state is written to a temporary one.
 
-    The first of the ``branches`` is drawn in grey, as the reference; ``solvers`` are those of the meshes.
+    The first of the ``branches`` is drawn in grey, as the reference; ``solvers`` are those of the meshes.  ``point`` is
+    one of theirs, or any other of these meshes; ``path`` is that of the picture (None: none is kept), and ``caption``
+    its text.
     """
     from rodfem.output.render import draw_shape
 

@@ -46,7 +46,10 @@ def loft(rings: Floats, color: str) -> Solid:
 
 
 def sweep(path: ArrayLike, radii: ArrayLike, color: str, sides: int = SIDES) -> Solid:
-    """Round solid along a path (n, 3) of radii (n,); a point may be repeated, with another radius."""
+    """Round solid along a ``path`` (n, 3) of ``radii`` (n,); a point may be repeated, with another radius.
+
+    It has ``sides`` faces around, of one ``color``.
+    """
     path = np.asarray(path, dtype=float)
     radii = np.broadcast_to(np.asarray(radii, dtype=float), len(path))
     tangents = np.gradient(path, axis=0)
@@ -69,7 +72,10 @@ def across(direction: Floats) -> Floats:
 
 
 def box(centre: Floats, frame: Floats, half: ArrayLike, color: str, top: float = 1.0) -> Solid:
-    """Box about a centre (3,) of half sizes (3,) along the columns of ``frame``; ``top`` scales one end's sides."""
+    """Box about ``centre`` (3,) of sizes 2 ``half`` (3,) along the columns of ``frame`` (3, 3), of one ``color``.
+
+    ``top`` scales the sides of one end.
+    """
     a, b, c = np.asarray(half, dtype=float)
     corners = np.array([(a, b), (-a, b), (-a, -b), (a, -b)])
     rings = [np.column_stack([size * corners, np.full(4, z)]) for size, z in ((1.0, -c), (top, c))]
@@ -84,7 +90,11 @@ def ball(centre: Floats, radius: float, color: str) -> Solid:
 
 
 def coil(start: Floats, end: Floats, radius: float, wire: float, turns: int, color: str) -> Solid:
-    """Spring from a point to another, with straight ends."""
+    """Spring from a point to another, with straight ends.
+
+    From ``start`` (3,) to ``end`` (3,) there are so many ``turns`` of the ``radius``, of a wire of radius ``wire``;
+    ``color`` is its colour.
+    """
     direction = end - start
     a = across(direction)
     b = np.cross(direction / np.linalg.norm(direction), a)
@@ -104,7 +114,7 @@ def arrow(path: ArrayLike, radius: float, color: str) -> Solid:
 
 
 def straight_arrow(start: Floats, end: Floats, radius: float, color: str) -> Solid:
-    """Arrow from a point to another."""
+    """Arrow from ``start`` (3,) to ``end`` (3,), with a shaft of this ``radius``, of one ``color``."""
     size = float(np.linalg.norm(end - start))
     neck = end - min(6.5 * radius / size, 0.7) * (end - start)
     return arrow([start, neck, end], radius, color)
@@ -114,6 +124,8 @@ def round_arrow(centre: Floats, axis: Floats, size: float, radius: float, color:
     """Arrow three quarters of the way about an axis (3,), in the sense of a moment along it.
 
     It winds along the axis a little, and its head is in the direction ``front``, so that it is seen from all sides.
+    ``centre`` (3,) and ``axis`` (3,) are its own, ``size`` is the radius of the arc, ``radius`` that of the shaft,
+    ``color`` its colour.
     """
     axis = axis / np.linalg.norm(axis)
     a = front - (front @ axis) * axis
@@ -126,7 +138,11 @@ def round_arrow(centre: Floats, axis: Floats, size: float, radius: float, color:
 
 
 def rod(centres: Floats, frames: Floats, profile: Floats, color: str) -> Solid:
-    """Rod with the cross-sections of :func:`profile_of`, (n, k, 2), in the planes of d1 and d2 of ``frames``."""
+    """Rod with the cross-sections of :func:`profile_of`, (n, k, 2), in the planes of d1 and d2 of ``frames``.
+
+    ``centres`` (n, 3) and ``frames`` (n, 3, 3) are those of the cross-sections, ``profile`` their outlines, ``color``
+    its colour.
+    """
     return loft(centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], profile), color)
 
 

@@ -15,7 +15,11 @@ INSIDE = 0.6
 
 @dataclass(frozen=True)
 class Stretch:
-    """Consecutive rows of a branch that have one index, away from special points: places and numbers of the rows."""
+    """Consecutive rows of a branch that have one index, away from special points: places and numbers of the rows.
+
+    ``branch`` is its name, which ``is_first`` or ``leaves_first``; ``negative`` and ``in_space`` are the index in the
+    plane and in space; ``places`` (n,) are arclengths of the branch, ``rows`` (n,) numbers.
+    """
 
     branch: str
     leaves_first: bool

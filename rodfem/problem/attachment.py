@@ -1,4 +1,4 @@
-"""Things attached along the rod."""
+"""Attachments along the rod: springs, masses, loads at a point."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class Constraint(Contribution):
     letter: ClassVar[str] = "g"
     """Beginning of the name of its multiplier: constraints of one letter are numbered together."""
     words: ClassVar[str] = ""
-    """What it is, for a picture in which it has no place."""
+    """Name of the constraint, for a picture in which it has no place."""
     whole: ClassVar[bool] = False
     """Whether it is one of the whole rod, by an integral."""
 
@@ -40,7 +40,7 @@ class Constraint(Contribution):
         yield at.y[0] * self.value(at.x, at.c)
 
     def value(self, x: Place, c: Constants) -> Any:
-        """What is zero; of an integral the integrand."""
+        """Expression that is zero; of an integral the integrand."""
         return self.of(x, c)
 
 
@@ -55,7 +55,7 @@ class Integral(Constraint):
     whole = True
 
     def value(self, x: Place, c: Constants) -> Any:
-        """Integrand of what is zero."""
+        """Integrand of the integral that is zero."""
         return self.of(x, c) - self.equals(c) / x.length
 
 
@@ -72,7 +72,7 @@ class Everywhere(Constraint):
         return []
 
     def blocks(self, number: int, degree: int) -> list[Block]:
-        """Multiplier, of the degree of what the equation is about."""
+        """Multiplier, of the degree of the field that is constrained."""
         return [Block(f"{self.letter}{number}", 1, degree if self.nodal else degree - 1, self.nodal, True, True)]
 
 

@@ -1,4 +1,4 @@
-"""What a part of a scene contributes to its problem: scalar unknowns, terms of the Lagrangian, virtual work.
+"""Contributions of a part of a scene to its problem: scalar unknowns, terms of the Lagrangian, virtual work.
 
 An end, an attachment, a constraint, and the scene itself with what acts along the rod, are each a
 :class:`Contribution`.  Unknowns, equations, words and checks of a discretised scene are those of its contributions.
@@ -21,14 +21,14 @@ UNIT: tuple[Direction, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 class Motion(Enum):
-    """What a rigid motion of space does to the unknowns of a group."""
+    """Action of a rigid motion of space on the unknowns of a group."""
 
     VECTOR = auto()
-    """They turn with space."""
+    """Vectors: they rotate with space."""
     POSITION = auto()
-    """They turn and move with space."""
+    """Points: they rotate and translate with space."""
     MIXED = auto()
-    """Each may turn into each other."""
+    """A symmetry may combine any of them."""
     CLOSING = auto()
     """They follow from the others: they close a ring."""
 
@@ -79,7 +79,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Block:
-    """One field: its name, number of components, degree, continuity, and whether it is a multiplier.
+    """One field: ``name``, number of components ``size``, ``degree``, whether ``continuous``, whether a ``multiplier``.
 
     ``along`` says whether it is that of a constraint all along the rod.
     """
@@ -136,7 +136,7 @@ class Contribution:
         return []
 
     def blocks(self, number: int, degree: int) -> list[Block]:
-        """Fields that it brings, for a rotation of this degree."""
+        """Fields that it adds, for a rotation of this degree."""
         return []
 
     def held(self, c: Constants) -> list[Any]:

@@ -1,4 +1,4 @@
-"""An end of the rod: what holds and loads it, what that contributes to the problem, and what is checked of it."""
+"""An end of the rod: its support and loads, their contributions to the problem, and their checks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ALONG = 0.999
 
 @dataclass(frozen=True)
 class End(Contribution):
-    """What holds and loads one end of the rod.
+    """Support and loads of one end of the rod.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class End(Contribution):
 
     @property
     def turning(self) -> str:
-        """What the directors may do: nothing, turn about the axis of the hinge, or turn freely."""
+        """Freedom of the directors: held, rotating about the axis of the hinge, or rotating freely."""
         return TURNS if self.rotation is None else HELD if self.hinge is None else AXIS
 
     @property

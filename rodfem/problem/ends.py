@@ -1,4 +1,4 @@
-"""What holds and loads a rod: its ends, things attached along it, and constraints.
+"""Supports and loads of a rod: its ends, attachments along it, and constraints.
 
 Everything here is plain immutable data.  Functions of the named constants ``c`` return expressions that work on UFL and
 on numbers alike; functions ``f(x, c)`` of a *place* receive the state of the rod there:
@@ -68,7 +68,11 @@ def hinged(
     rotation: Quaternion | OfConstants = IDENTITY,
     force: OfConstants | None = None,
 ) -> End:
-    """Return an end that turns freely about one ``axis`` only, given along the directors of ``rotation``."""
+    """Return an end that turns freely about one ``axis`` only, given along the directors of ``rotation``.
+
+    ``position(c)`` (3,) is that of the end; components that are None are free, and ``force(c)`` (3,) is a dead force
+    there.
+    """
     return End(position=position, rotation=rotation, hinge=axis, force=force)
 
 
@@ -88,6 +92,9 @@ def elastic(
 
     The first three are along e1, e2, e3, from ``anchor``; the second about the directors of ``directors``.  See
     :func:`forms.loads.spring` and :func:`forms.loads.rotational_spring` (linear in the angle while it is small).
+
+    ``translation(c)`` is in force per length, ``rotation(c)`` in moment per radian; None is no spring.  ``force(c)``
+    (3,) is a dead force.
     """
 
     def energy(x: Place, c: Constants) -> Any:

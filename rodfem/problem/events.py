@@ -1,4 +1,4 @@
-"""Events: numbers of the state that a person asks for, whose zeros along a branch are special points."""
+"""Events: the user's own test functions, numbers of the state whose zeros along a branch are special points."""
 
 from __future__ import annotations
 

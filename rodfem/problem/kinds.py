@@ -1,4 +1,4 @@
-"""Validation of what the user gives, numbers, vectors, scalars: the kind, or one sentence with the kind expected."""
+"""Validation of arguments, numbers, vectors, scalars: the kind, or one sentence with the kind expected."""
 
 from __future__ import annotations
 
@@ -27,7 +27,10 @@ def real(name: str, value: Any, example: float) -> float:
 
 
 def reals(name: str, values: Any, example: tuple[float, ...], count: int | None = None) -> tuple[float, ...]:
-    """Return ``values`` as a tuple of floats; raises :class:`InputError` unless they are ``count`` (any) numbers."""
+    """Return ``values`` as a tuple of floats; raises :class:`InputError` unless they are ``count`` (any) numbers.
+
+    ``name`` and ``example`` are for the sentence of the error.
+    """
     given = tuple(values) if isinstance(values, Iterable) and not isinstance(values, str) else None
     if given is None or (count is not None and len(given) != count):
         raise InputError(f"{name} is {values!r}: give {count or 'a tuple of'} numbers, as in {name}={example}.")

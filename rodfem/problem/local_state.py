@@ -1,4 +1,4 @@
-"""What the functions of a scene receive: its named constants, and the state of the rod at a place."""
+"""Arguments of the functions of a scene: its named constants, and the state of the rod at a place."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class NoCentreline(SceneError):
 
 
 class Known(SimpleNamespace):
-    """A place; asking for what it does not have is a :class:`SceneError`."""
+    """A place; an attribute that it does not have is a :class:`SceneError`."""
 
     def __getattr__(self, name: str) -> Any:
         """Say what a place has."""
@@ -77,7 +77,7 @@ class Reduced(Known):
 
 
 def place(q: Any, R: Any, s: Any, r: Any = None, **more: Any) -> Place:
-    """Make a place from quaternion, rotation, arclength, centreline (None: there is none) and what else is known."""
+    """Make a place of quaternion ``q``, rotation ``R``, arclength ``s``, centreline ``r`` (None: none) and ``more``."""
     d = {f"d{i + 1}": ufl.as_vector([R[j, i] for j in range(3)]) for i in range(3)}
     kind = Reduced if r is None else Known
     known = {} if r is None else {"r": r}

@@ -74,7 +74,7 @@ class JoinedEnd(End):
             yield sign * _dot(at.y[size:], at.x.r, at.free)
 
     def check(self, side: str, scene: Scene) -> None:
-        """Check that the start of the ring closes."""
+        """Check that the start of the ring closes; raises :class:`SceneError`."""
         if scene.start is None:
             raise SceneError("A ring has no straight start: give its rotation as a function start(s).")
         first, last = np.asarray(scene.start(np.array(scene.interval)), dtype=float)

@@ -96,7 +96,8 @@ def functions_of(owner: Any, *, nested: bool = True) -> list[tuple[str, Callable
 def changes(owner: Any, visit: Visit, place: str = "", *, nested: bool = True) -> dict[str, Any]:
     """Fields of a dataclass with each function ``f``, and all in what they hold, replaced by ``visit(words, f, role)``.
 
-    A field's own default (None, say), and what is replaced by itself, is left out.
+    ``owner`` is the dataclass, ``place`` says in words where it is in the scene.  A field's own default (None, say) is
+    left out, and so is what is replaced by itself; unless ``nested`` only the dataclass's own fields are visited.
     """
     new = {}
     for f in fields(owner):

@@ -1,4 +1,4 @@
-"""What a person states: a rod, its ends, its loads, and what to record.
+"""The statement of a problem: a rod, its ends, its loads, and the ordinate to record.
 
 A :class:`Scene` is plain immutable data without meshes or matrices.  Functions in it receive a namespace ``c`` of
 named constants (``c.lam``, ``c.C``, ...; ``c.s`` is the arclength) and work on UFL expressions and on numbers alike.
@@ -162,6 +162,8 @@ class Scene(Contribution):
         Quaternion(s) of a first guess, ``start(s)`` of shape (m,) -> (m, 4); by default the identity (a straight rod).
     span
         Default range of the load, from where the continuation starts to where it ends.
+    states
+        Name of the first branch.
     """
 
     name: str
@@ -259,7 +261,10 @@ class Scene(Contribution):
         return sorted({*np.linspace(a + eps, b - eps, 9).tolist(), *(s + d for s in self.joints for d in (-eps, eps))})
 
     def varying(self, load: str, span: tuple[float, float], **values: float) -> Scene:
-        """Return the same scene with another parameter as its load, over ``span``, and other constants."""
+        """Return the same scene with another parameter as its load, over ``span``, and other constants.
+
+        Raises :class:`SceneError` for a name that is no parameter's.
+        """
         unknown = [name for name in values if name not in self.parameters]
         if unknown:
             raise SceneError(f"{unknown[0]!r} is not a parameter: choose one of {', '.join(self.parameters)}.")

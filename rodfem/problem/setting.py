@@ -24,12 +24,12 @@ T = TypeVar("T")
 SUPPORTS, DISTRIBUTED, SECTION, FOUNDATION, TIES = "supports", "distributed", "section", "foundation", "constraints"
 """Groups below that of a branch or a state, and of the file."""
 HELD, AXIS, TURNS = "held", "axis", "free"
-"""What directors may do: nothing, turn about one axis, turn freely."""
+"""Freedom of directors: held, rotating about one axis, rotating freely."""
 
 
 @dataclass(frozen=True)
 class Support:
-    """What holds and loads a rod at one place, in one state.
+    """Support and loads of a rod at one place, in one state.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Support:
     held
         Which components of the position along e1, e2, e3 are held, (3,) of bool.
     turning
-        What the directors may do: :data:`HELD`, :data:`AXIS` or :data:`TURNS`.
+        Freedom of the directors: :data:`HELD`, :data:`AXIS` or :data:`TURNS`.
     axis
         That axis along the directors, (3,); zero without one.
     frame
@@ -85,7 +85,7 @@ class Support:
 
 
 def kind_of(held: int, turning: str, sprung: bool) -> str:
-    """Name of what holds ``held`` components of the position and leaves the directors ``turning``."""
+    """Name of a support that holds ``held`` components of the position and leaves the directors ``turning``."""
     if turning == HELD:
         return "clamp" if held == 3 else "slide"
     if turning == AXIS:
@@ -95,7 +95,7 @@ def kind_of(held: int, turning: str, sprung: bool) -> str:
 
 @dataclass(frozen=True)
 class Tie:
-    """What a constraint keeps, in one state.
+    """Geometry that a constraint keeps, in one state.
 
     Attributes
     ----------
@@ -117,12 +117,12 @@ class Tie:
 
 @dataclass(frozen=True)
 class Setting:
-    """All that a file says of what holds and loads a rod in one state; empty for a file that says nothing.
+    """Supports and loads of a rod in one state, as a file records them; empty for a file without them.
 
     ``section`` has arclengths (n,) and second moments of area (n, 2, 2) up to a factor; ``distributed`` arclengths (n,)
     and forces per length (n, 3) in the frame of space and along the directors; ``foundation`` arclengths (n,) and
     stiffnesses per length (n, 3, 3) along e1, e2, e3.  ``notes`` names in words what acts and has no place in a
-    picture.
+    picture.  ``supports`` are what holds and loads the rod at points, and ``ties`` what constraints keep.
     """
 
     supports: tuple[Support, ...] = ()

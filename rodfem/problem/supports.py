@@ -118,7 +118,8 @@ def stiffness_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floa
     """Stiffness of springs with the potential ``energy(x, c)`` at ``s``, in translation and rotation, (2, 3, 3).
 
     By differences about the position ``r`` (3,) and the unit quaternion ``q`` (4,); of translation, or of rotation,
-    zero where the second derivative is not positive semidefinite, so that the potential is no spring's.
+    zero where the second derivative is not positive semidefinite, so that the potential is no spring's.  ``c`` are the
+    constants, ``length`` is that of the rod, for the steps.
     """
     out = np.zeros((2, 3, 3))
     for which in (0, 1):
@@ -160,7 +161,8 @@ def load_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floats, q
     """Force and moment (2, 3) of a potential at ``s``, in the frame of space, where it is no spring's.
 
     Of springs of translation, with the stiffness ``springs[0]``, what is across all their directions; of springs of
-    rotation, with ``springs[1]``, nothing.
+    rotation, with ``springs[1]``, nothing.  ``energy(x, c)`` is the potential with the constants ``c``, ``length`` that
+    of the rod; the state at ``s`` is the position ``r`` (3,) and the unit quaternion ``q`` (4,).
     """
     out = -derivative_of(energy, c, s, length, r, q)
     if springs[0].any():
@@ -175,7 +177,8 @@ def load_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floats, q
 def derivative_of(function: OfPlace, c: Constants, s: float, length: float, r: Floats, q: Floats) -> Floats:
     """Derivative (2, 3) of ``function(x, c)`` in the position and in the spin, both in the frame of space.
 
-    At the position ``r`` (3,) and the unit quaternion ``q`` (4,); by UFL.
+    At the position ``r`` (3,) and the unit quaternion ``q`` (4,); by UFL. ``s`` is the arclength, of a rod of that
+    ``length``.
     """
     x = ufl.variable(ufl.as_vector([*r.tolist(), 0.0, 0.0, 0.0]))
     spin = ufl.as_vector([x[3], x[4], x[5]])
@@ -243,7 +246,7 @@ def foundation_of(scene: Scene, sample: Sample) -> tuple[Floats, Floats] | None:
 
 
 def ties_of(scene: Scene, samples: Sequence[Sample]) -> list[list[Tie]]:
-    """What each constraint of a scene keeps, in states given by :meth:`~rodfem.fem.shape.Shape.sample`."""
+    """Geometry that each constraint of a scene keeps, in states given by :meth:`~rodfem.fem.shape.Shape.sample`."""
     load = float(samples[0]["load"])
     whole = [_of_the_ends(scene, x, load) if x.whole else None for x in scene.constraints]
     return [[_tie(scene, x, a, sample) for sample in samples] for x, a in zip(scene.constraints, whole, strict=True)]

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def check_kinds(scene: Scene) -> None:
-    """Check that what a scene is made of is of the right kind."""
+    """Check the kind of all that a scene is made of; raises :class:`SceneError`."""
     if not isinstance(scene.ends, Iterable) or [isinstance(end, End) for end in scene.ends] != [True, True]:
         raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
     for what, given, kind, example in (
@@ -70,7 +70,7 @@ def check_shapes(scene: Scene) -> None:
 
 
 def check_plane(scene: Scene) -> None:
-    """Check that the ends of a planar rod and the forces on it are in one plane, and moments about the normal."""
+    """Raise :class:`SceneError` for ends or forces of a planar rod off its plane, or moments not about its normal."""
     normal = scene.normal
     if normal is None:
         return
@@ -95,7 +95,7 @@ def check_plane(scene: Scene) -> None:
 
 
 def check_load(scene: Scene) -> None:
-    """Raise where nothing in the scene depends on its load, so that there is nothing to trace."""
+    """Raise :class:`SceneError` where nothing in the scene depends on its load: there is nothing to trace."""
     if scene.load not in asked_for(scene):
         raise SceneError(
             f"Nothing in the scene depends on its load {scene.load!r}: use c.{scene.load} in an end, a load or the "
@@ -116,7 +116,7 @@ def check_ordinate(scene: Scene) -> None:
 
 
 def check_start(scene: Scene) -> None:
-    """Check that the start returns quaternions, of rotations in the plane."""
+    """Check that the start returns quaternions, of rotations in the plane; raises :class:`SceneError`."""
     if scene.start is None:
         return
     s = np.linspace(*scene.interval, 5)
@@ -136,7 +136,7 @@ def check_energy(scene: Scene) -> None:
 
 
 def check_inertia(scene: Scene) -> None:
-    """Check that no inertia is negative, and that a scene whose stability is a matter of motion has one."""
+    """Raise :class:`SceneError` for a negative inertia, or none where stability is a matter of motion."""
     c = scene.constants()
     masses = [float(scene.inertia.rho_A(c)), *(float(x.mass(c)) for x in scene.attachments if x.mass)]
     rotary = [float(x) for x in scene.inertia.rho_I(c)]
@@ -166,7 +166,7 @@ def check_scene(scene: Scene) -> None:
 
 
 def check_convexity(scene: Scene) -> None:
-    """Raise where the stored energy is not strictly convex at the undeformed state."""
+    """Raise :class:`SceneError` where the stored energy is not strictly convex at the undeformed state."""
     for s in scene.samples() if scene.depends_on_s() else [None]:
         stiffness = scene.stiffness(s)
         lowest = np.linalg.eigvalsh(stiffness)[0] if stiffness.size else 1.0
@@ -187,7 +187,7 @@ def check_supports(scene: Scene) -> None:
 
 
 def check_drift(scene: Scene) -> None:
-    """Raise unless something holds the rod, or what acts on it is in balance whatever its shape."""
+    """Raise :class:`SceneError` unless something holds the rod, or its loads balance whatever its shape."""
     c = scene.constants()
     if scene.closed or any(asks_where(f, c) for _, f, _ in functions_of_places(scene)):
         return
@@ -201,7 +201,7 @@ def check_drift(scene: Scene) -> None:
 
 
 def check_reach(scene: Scene) -> None:
-    """Raise where a rod that cannot stretch is held at ends that are farther apart than it is long."""
+    """Raise :class:`SceneError` where the ends of an inextensible rod are farther apart than it is long."""
     if 2 in scene.free_strains or 0 in scene.free_strains:
         return
     for load in np.linspace(*scene.span, 9):
@@ -216,7 +216,7 @@ def check_reach(scene: Scene) -> None:
 
 
 def check_places(scene: Scene) -> None:
-    """Raise for attachments, constraints and breaks that are not on the rod."""
+    """Raise :class:`SceneError` for attachments, constraints and breaks that are not on the rod."""
     a, b = scene.interval
     places = [("attachment", x.s) for x in scene.attachments] + [("break", s) for s in scene.breaks]
     places += [("constraint", x.s) for x in scene.constraints if x.s is not None]

@@ -42,11 +42,11 @@ class Verdict:
     band
         Half width of the interval about zero, relative to the system's metric, in which inertia alone decides nothing.
     inside, uncertainty
-        Rayleigh quotients of what the band holds, and what of them is round-off.
+        Rayleigh quotients of the eigenvalues inside the band, and their round-off.
     certified
         Whether counts prove that none is missing among the values.
     seconds, factorisations
-        What it took.
+        Cost of the verdict.
     method, reason
         How it was done, and why so.
     """
@@ -85,7 +85,7 @@ class Judge(Workspace):
     """Judges states of one system; keeps matrices, symbolic factorisations and the last modes for the next state."""
 
     def __init__(self, source: Any) -> None:
-        """Take a :class:`~rodfem.fem.system.System`, or what has one (a solver)."""
+        """Keep a :class:`~rodfem.fem.system.System`, given itself or by its solver."""
         super().__init__(source)
         self._methods: dict[str, Method] = {}
 
@@ -109,7 +109,8 @@ class Judge(Workspace):
 
         ``interval`` (low, high) is where slicing looks, by default where the ``number`` left-most are.  Raises
         :class:`InputError` for a method that does not exist or apply and for dependent constraints,
-        :class:`ConvergenceError` where an eigensolver fails.
+        :class:`ConvergenceError` where an eigensolver fails.  ``method`` is a name of :mod:`rodfem.stability.methods`,
+        or ``auto``.
         """
         name, reason = self.choose(method, number)
         if number < 0:
@@ -151,5 +152,9 @@ class Judge(Workspace):
 
 
 def judge(source: Any, x: PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
-    """Judge one state of a system or solver: see :class:`Judge`, which is to be kept along a branch."""
+    """Judge one state of a system or solver: see :class:`Judge`, which is to be kept along a branch.
+
+    ``source`` is the system or solver, ``x`` its equilibrium; ``method`` and ``number`` are those of
+    :meth:`Judge.__call__`.
+    """
     return Judge(source)(x, method, number)

@@ -49,7 +49,8 @@ class Bordered:
     def factor(self, matrix: PETSc.Mat, columns: list[PETSc.Vec], rows: list[PETSc.Vec] | None = None) -> int:
         """Factor with a matrix of the same pattern; its negative eigenvalues off the borders, -1 without a count.
 
-        The ``rows`` of the borders are the same as the ``columns`` unless given.
+        The ``rows`` of the borders are the same as the ``columns`` unless given.  Raises :class:`ConvergenceError`
+        where the bordered matrix is singular, too.
         """
         self.values[: self.own][~self._border] = matrix.getValuesCSR()[2].real
         local = [np.stack([v.array_r.real for v in side], axis=1) for side in (columns, rows or columns)]

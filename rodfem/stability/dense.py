@@ -39,7 +39,8 @@ def split(matrix: np.ndarray, norm: float) -> tuple[np.ndarray, np.ndarray, np.n
 def finite_eigenpairs(S: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return all finite eigenvalues (complex, sorted by magnitude) and their vectors (n, number).
 
-    Multipliers that drop out of the reduction are zero in the vectors.  Empty for a pencil without inertia.
+    Multipliers that drop out of the reduction are zero in the vectors.  Empty for a pencil without inertia.  Raises
+    :class:`numpy.linalg.LinAlgError` for a pencil that is singular at every shift.
     """
     stiffness, inertia = (max(float(np.linalg.norm(A, ord=2)), 1e-300) for A in (S, M))
     back = np.eye(len(S))
@@ -66,7 +67,8 @@ def symmetric_eigenpairs(pencil: Pencil, below: float, number: int) -> tuple[np.
     """Left-most eigenvalues and vectors (m, k) of a small symmetric pencil, given a number below all of them.
 
     ``M z = nu (K - below M) z`` on the kernel of the constraints, ``mu = below + 1/nu``: the matrix on the right is
-    positive definite there, and the infinite eigenvalues are ``nu = 0``.
+    positive definite there, and the infinite eigenvalues are ``nu = 0``.  Raises :class:`ConvergenceError` where fewer
+    than ``number`` are finite.
     """
     K, C, M = (gathered(A).toarray() for A in (pencil.K, pencil.C, pencil.M))
     Z = scipy.linalg.null_space(C.T) if C.shape[1] else np.eye(len(K))

@@ -6,7 +6,7 @@ has full column rank, Sylvester's law of inertia gives
     (negative eigenvalues of S) - (number of constraints) = number of negative eigenvalues of K on the kernel of C,
 
 and likewise for ``S - sigma M`` the number of eigenvalues below ``sigma``.  Counting at ``sigma = -tol`` and
-``+tol`` tells zero eigenvalues from small ones without ever factoring a singular matrix.  Symmetry modes do not
+``+tol`` separates zero eigenvalues from small ones without ever factoring a singular matrix.  Symmetry modes do not
 disturb: the phase condition counts as one more constraint, and takes the zero mode out of the kernel.
 """
 
@@ -58,7 +58,7 @@ class Inertia:
     """Matrix ``S`` and its factors, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`.
 
     Eigenvalues ``mu`` are relative to the system's metric.  ``tolerance`` is the half width of what counts as zero, the
-    larger of 1e-7 of the rod's lowest bending eigenvalue and of ``resolution``: what the arithmetic resolves.
+    larger of 1e-7 of the rod's lowest bending eigenvalue and of ``resolution``, the band of round-off.
     ``vectors`` are those that :meth:`Factored.nearest` found last.
     """
 
@@ -90,6 +90,7 @@ class Inertia:
         """
         state = self.system.at(x)
         self._assemble(state)
+        # a generator that is no null vector of S is no symmetry: verify drops its phase condition, S is assembled anew
         with self.system.clock("stability"):
             sound = self.system.verify(self.matrix, state, equations)
         if not sound:
@@ -99,7 +100,7 @@ class Inertia:
 
     @property
     def held(self) -> Factored:
-        """Whatever state the matrix holds."""
+        """The state that the matrix holds now."""
         return Factored(self)
 
     def _assemble(self, state: State) -> None:
@@ -109,13 +110,14 @@ class Inertia:
             state.assemble_into(self.matrix, system.equations.jacobian, load=True)
             system.add_drifts(self.matrix)
             self.matrix.assemble()
+            # at fixed load: the column of the load becomes the border F_lam, a unit diagonal stands for its unknown
             self.matrix.mult(self._axis, self.border)
             self.matrix.diagonalScale(R=self._without_load)
             if system.has_scalars:
                 self.matrix.setValue(system.load_index, system.load_index, 1.0)
             self.matrix.assemble()
         self.shift = 0.0
-        if not self.resolution:
+        if not self.resolution:  # the band of round-off, eps |S| / m, for the smallest weight m of the metric
             mass = system.metric.getDiagonal().array_r[system.metric.getDiagonal().array_r > 0]
             smallest = system.comm.allreduce(float(mass.min()) if len(mass) else np.inf, op=MPI.MIN)
             self.resolution = 10 * EPS * self.matrix.norm(PETSc.NormType.INFINITY) / smallest
@@ -131,14 +133,14 @@ class Inertia:
 
 
 class Factored:
-    """``S`` at one state, and what its factors tell: a count, the eigenvalues nearest zero, solutions.
+    """``S`` at one state, and the results of its factors: a count, the eigenvalues nearest zero, solutions.
 
     Raises :class:`RuntimeError` where the matrix holds another state by now, or what is asked for needs factors
     (:meth:`below`, :meth:`count`) that were not made: a number of another state is never returned.
     """
 
     def __init__(self, inertia: Inertia) -> None:
-        """Be the state that the matrix was just filled for."""
+        """Stand for the state that the matrix was just filled for."""
         self.inertia, self._filled = inertia, inertia.filled
 
     def _own(self) -> Inertia:
@@ -149,7 +151,7 @@ class Factored:
 
     @property
     def factors(self) -> Factors:
-        """Factors of ``S - shift M``."""
+        """Factors of ``S - shift M``; raises :class:`RuntimeError` before a count has made them."""
         inertia = self._own()
         if inertia.factored != self._filled:
             raise RuntimeError("The matrix of this state was not factored: count first.")
@@ -167,11 +169,14 @@ class Factored:
 
     @property
     def shift(self) -> float:
-        """What the last count was below."""
+        """Shift of the last count."""
         return self._own().shift
 
     def below(self, sigma: float) -> int:
-        """Number of eigenvalues below ``sigma``; symmetry modes not counted."""
+        """Number of eigenvalues below ``sigma``; symmetry modes not counted.
+
+        Raises :class:`ConvergenceError` where the count breaks down.
+        """
         own = self._own()
         with own.system.clock("stability"):
             if sigma != own.shift:
@@ -181,6 +186,7 @@ class Factored:
             own.factors(own.matrix)
             own.factored = self._filled
             negative, zero = own.factors.inertia()
+        # Sylvester's law: each constraint, and each phase condition, has one negative eigenvalue of the saddle matrix
         below = negative - own.constraints - own.system.active_drifts()
         if zero or below < 0:
             raise ConvergenceError(
@@ -193,6 +199,7 @@ class Factored:
         """Index; two factorisations, the last of which serves :meth:`nearest`."""
         own = self._own()
         negative = self.below(-own.tolerance)
+        # a phase condition takes its symmetry mode out of both counts, and it is a zero eigenvalue of the state
         zero = self.below(own.tolerance) - negative + own.system.active_drifts()
         return Index(negative, zero, own.factors.determinant())
 
@@ -203,7 +210,7 @@ class Factored:
 
         Block inverse iteration from the vectors of the last call, with a Rayleigh-Ritz projection of ``S``, until the
         ``number`` wanted values change by less than ``accuracy`` relative to themselves (or by what the arithmetic
-        resolves).  The block has ``spare`` more vectors.
+        resolves).  The block has ``spare`` more vectors.  At most ``most`` iterations are made.
         """
         own, factors, block = self._own(), self.factors, number + spare
         vectors = own.vectors[:block] + [own.seed(i) for i in range(len(own.vectors), block)]
@@ -217,6 +224,7 @@ class Factored:
                     factors.solve(own.metric * v, out)
                 orthonormalize(solved, own.metric)
                 images = [own.matrix * y for y in solved]
+                # Rayleigh-Ritz: the quotients of S - shift M on the block, whose basis is orthonormal in M
                 theta, z = np.linalg.eigh(np.array([[y.dot(w) for w in images] for y in solved]))
                 order = np.argsort(abs(theta + own.shift))
                 last, values = values, theta[order] + own.shift

@@ -18,7 +18,7 @@ REAL = 1e-10
 
 @dataclass(frozen=True)
 class BothSides:
-    """Eigenvalues nearest zero with non-negative imaginary part, by real part (k,), their errors and motions.
+    """Eigenvalues ``values`` (k,) nearest zero of non-negative imaginary part, backward ``errors``, motions ``kinds``.
 
     ``right`` X and ``left`` Z (n, k) on this rank's n unknowns: ``X^* M X = 1`` for each, ``X^t M X`` real and
     positive, ``Z^t M X`` the unit matrix.  ``weighed`` is ``M Z``.

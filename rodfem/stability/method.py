@@ -1,4 +1,4 @@
-"""What a method to decide stability is: a class of :mod:`rodfem.stability.methods` derived from :class:`Method`."""
+"""Interface of a method to decide stability; those of :mod:`rodfem.stability.methods` derive from :class:`Method`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NEAR_ZERO = 1e-3
 
 
 class Found(NamedTuple):
-    """Eigenvalues, their vectors and backward errors, and whether counts prove that none is missing.
+    """Eigenvalues ``values`` (k,), ``vectors``, backward ``errors``; ``certified``: counts prove that none is missing.
 
     ``factorisations`` are those besides the workspace's own; a ``note`` goes after the reason for the method.
     """

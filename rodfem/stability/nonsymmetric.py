@@ -69,7 +69,7 @@ EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Frequencies:
-    """Eigenvalues ``mu = omega^2`` in ascending order of their real parts, and their backward errors.
+    """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and backward ``errors`` (k,).
 
     ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors`` (n, k) are complex, with the
     n unknowns of this rank.
@@ -82,7 +82,7 @@ class Frequencies:
 
     @property
     def noise(self) -> float:
-        """What tells an eigenvalue from zero."""
+        """Magnitude below which an eigenvalue counts as zero."""
         return REAL * max(1.0, float(abs(self.values).min(initial=np.inf)))
 
     def diverged(self) -> int:
@@ -208,7 +208,7 @@ class Vibration:
         )
 
     def _kinds(self, found: list[_Pair]) -> list[str]:
-        """Names of the motions; those of a multiple eigenvalue are the name of all that it does.
+        """Names of the motions; a multiple eigenvalue has one for its invariant subspace.
 
         Its vectors are any in its invariant subspace: bending about d1 in one state and about d2 in the next.
         """
@@ -229,7 +229,7 @@ class Vibration:
         return kinds
 
     def motion(self, basis: np.ndarray) -> str:
-        """Name of all that the vectors of a ``basis`` (n, k) do, at the state last assembled."""
+        """Type of the motion spanned by a ``basis`` (n, k), at the state last assembled."""
         return character.name(character.shares(self.system, self.turned, [*basis.real.T, *basis.imag.T]))
 
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
@@ -259,7 +259,7 @@ class Vibration:
         return np.asarray(vectors @ (turn / np.sqrt(np.maximum(squares, EPS * squares[-1]))))
 
     def _complete(self, pair: _Pair) -> None:
-        """Add to a vector, in place, the part of it along free motions, which its multipliers tell."""
+        """Add to a vector, in place, its part along free motions, which follows from its multipliers."""
         begin, end = self.matrix.getOwnershipRange()
         for index, mode in self._free.items():
             mine = [part[index - begin] if begin <= index < end else 0.0 for part in pair.parts]

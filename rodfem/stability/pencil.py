@@ -34,6 +34,8 @@ def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc
     """Assemble tangent matrix and kinetic metric at the state ``x``, without the symmetries' phase conditions.
 
     Returns the state.  Raises :class:`SceneError` for a rod without any inertia.
+
+    They are written into ``matrix`` and ``mass``, both of the ``system``.
     """
     if system.equations.massless:
         raise SceneError("A rod without inertia has no eigenvalues mu = omega^2: give it a mass or a rotary inertia.")
@@ -87,7 +89,9 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
 
     ``g`` being an eigenvector (of ``mu = 0``), what they leave of the spectrum is all the rest of it, unchanged; and
     the inertia counts it.  Returns the modes that have mass, orthonormal in it: a Krylov space is kept off them by
-    deflation, too, or round-off brings them in where ``mu`` is large beside the rest.
+    deflation, too, or round-off adds them where ``mu`` is large beside the rest.
+
+    ``modes`` are by the number of the drift scalar of the ``system``; ``matrix`` and ``mass`` are its pencil.
     """
     deflated = []
     for index, (mode, image) in weighed_modes(system, modes, mass).items():
@@ -106,7 +110,8 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
 def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex, *, symmetric: bool) -> SLEPc.EPS:
     """Set up Krylov-Schur with shift-invert (LU) for the ``number`` eigenvalues nearest to ``target``.
 
-    Raises :class:`PETSc.Error` where the shifted matrix is singular.
+    Raises :class:`PETSc.Error` where the shifted matrix is singular.  The pencil is ``matrix - mu mass``; ``symmetric``
+    says that both are.
     """
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_")
@@ -166,8 +171,9 @@ def with_factors(
 ) -> SLEPc.EPS:
     """Set up the same with the ``inverse`` of ``matrix - target mass`` from factors made elsewhere, and a first vector.
 
-    Vectors of a symmetric pencil are right up to what has no mass: who has the factors purifies all of them at once.
-    Eigenvectors that are ``deflated`` are not found.
+    Vectors of a symmetric pencil are right up to massless unknowns: purification corrects all of them at once.
+    Eigenvectors that are ``deflated`` are not found.  ``number`` and ``symmetric`` are those of :func:`shift_invert`;
+    ``start`` is the first vector.
     """
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_")
@@ -201,6 +207,7 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> 
     """Set up spectrum slicing for all eigenvalues of a symmetric pencil between two numbers that are none themselves.
 
     Options: ``-rodfem_slicing_eps_...``, ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is one.
+    The pencil is ``matrix - mu mass``, the two numbers are ``low`` and ``high``.
     """
     solver = SLEPc.EPS().create(matrix.comm)
     solver.setOptionsPrefix("rodfem_slicing_")

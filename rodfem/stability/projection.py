@@ -111,7 +111,7 @@ class ShiftedInverse:
 
         By the Rayleigh-Ritz method with the inverse, ``mu = sigma + x.Mx / x.M A^-1 Mx``: as precise as shift-invert
         near sigma, where ``x.Kx / x.Mx`` would suffer from the size of K, and the same for all transforms (SLEPc gives
-        wrong values for complex pairs under Cayley's).  What has no mass is left out.
+        wrong values for complex pairs under Cayley's).  Massless unknowns are left out.
         """
         r = self.projection
         squares = (vectors * (r.M @ vectors)).sum(axis=0)

@@ -47,7 +47,7 @@ def cayley_parameters(first: float, second: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Reduced:
-    """Eigenvalues in ascending order of their real parts (k,), vectors ``Q2 z`` in the pencil's coordinates (m, k).
+    """Eigenvalues ``values`` (k,) by their real parts, ``vectors`` ``Q2 z`` (m, k) in the pencil's coordinates.
 
     ``errors`` are backward errors ``|Q2^t (K - mu M) x| / ((|K| + |mu| |M|) |x|)``; real arrays for a symmetric pencil.
     ``certified`` says that a count by inertia found no other eigenvalue as near to the target (symmetric pencils only).

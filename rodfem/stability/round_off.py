@@ -8,7 +8,7 @@ For one smooth vector y of metric norm 1 independent errors of the entries of S 
     eps (sum_ij (S_ij y_i y_j)^2)^(1/2),
 
 smaller by some powers of h.  Eigenvalues inside the band are therefore decided by their vectors, and count as zero only
-where ten times this does not tell them from zero.
+where ten times this exceeds their magnitude.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ SPARE = 2
 
 @dataclass(frozen=True)
 class Decision:
-    """An index, the half width of what counted as zero, and the eigenvalues inside the band of the count.
+    """An ``index``, the half width of what counted as zero, and the eigenvalues inside the band of the count.
 
     Attributes
     ----------
     band
         Half width of the band in which the inertia alone decides nothing, relative to the system's metric.
     inside
-        Rayleigh quotients of what the band holds, symmetry modes left out.
+        Rayleigh quotients of the eigenvalues inside the band, symmetry modes left out.
     uncertainty
         What round-off in the matrix may make of each of them: those smaller than theirs are counted as zero.
     """

@@ -1,4 +1,4 @@
-"""What the methods for stability share on one system: matrices, symbolic factorisations, coordinates."""
+"""Shared by the methods for stability on one system: matrices, symbolic factorisations, coordinates."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Workspace:
     """Matrices and factorisations, made when they are asked for and kept for the next state."""
 
     def __init__(self, source: Any) -> None:
-        """Take a :class:`~rodfem.fem.system.System`, or what has one (a solver)."""
+        """Keep a :class:`~rodfem.fem.system.System`, given itself or by its solver."""
         self.system: System = source if isinstance(source, System) else source.system
         self.conservative = self.system.scene.conservative
         given = getattr(source, "inertia", None)

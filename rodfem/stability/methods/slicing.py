@@ -26,7 +26,10 @@ class Slicing(SymmetricMethod):
     """All eigenvalues in an interval."""
 
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
-        """In the ``interval``, or in one found by counting that holds ``number`` of them and few more."""
+        """In the ``interval``, or in one found by counting that holds ``number`` of them and few more.
+
+        Raises :class:`InputError` for an empty interval, :class:`ConvergenceError` where an end is an eigenvalue.
+        """
         spectrum = self.work.below(x)
         low, high = interval or enclose(spectrum, number)
         if not low < high:
