@@ -94,6 +94,8 @@ def parser_for(
     ``name`` and ``description`` head the help; ``load`` names the load, of range ``span``; ``elements``, ``degree`` and
     ``formulation`` are the defaults of the discretisation.
     """
+    from rodfem.fem import formulations
+
     parser = Parser(
         prog=f"{name}.py",
         description=description,
@@ -103,8 +105,8 @@ def parser_for(
     words = {
         "--elements": f"number of finite elements along the rod (default {elements})",
         "--degree": f"polynomial degree; the error falls as h^(2K) (default {degree})",
-        "--formulation": "reduced: no centreline, the contact force as scalars; pointwise: all fields "
-        f"(default {formulation}: reduced where the scene allows it)",
+        "--formulation": "; ".join(f"{made.name}: {made.words}" for made in formulations.FORMULATIONS.values())
+        + f"; {formulations.AUTO}: the first that the scene allows (default {formulation})",
         "--accuracy": "instead of elements and degree: choose meshes on the way such that loads and ordinates are in "
         "error by less than EPS (relative to values greater than one)",
         "--range": f"start at {load} = A, stay between A and B (default {span[0]:g} {span[1]:g})",
@@ -125,7 +127,7 @@ def parser_for(
         "discretisation": {
             "--elements": {"type": int, "default": elements, "metavar": "N"},
             "--degree": {"type": int, "default": degree, "metavar": "K"},
-            "--formulation": {"default": formulation, "metavar": "{auto,reduced,pointwise}"},
+            "--formulation": {"default": formulation, "metavar": f"{{{','.join(formulations.names())}}}"},
             "--accuracy": {"type": float, "metavar": "EPS"},
         },
         "what to compute": {

@@ -17,7 +17,7 @@ from forms import inertia, lagrangian
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
 from rodfem import compat
-from rodfem.fem.fields import Fields, end_positions
+from rodfem.fem.fields import Fields
 from rodfem.fem.parameters import load_line
 from rodfem.problem.contribution import Site
 from rodfem.problem.local_state import Constants, Place, place
@@ -78,7 +78,8 @@ class Equations:
         a, b = self._named(ufl.split(test), f.turned), self._named(ufl.split(trial), f.turned)
         sites = [(part.of, *self._site(part, f, (a, b), along)) for part in scene.parts]
         inside = [(of, site) for of, site, measure in sites if measure is None and not of.nodal]
-        L = (self._rod(f, c, W, along) + sum(term for of, site in inside for term in of.lagrangian(site))) * dx
+        rod = fields.formulation.integrand(self, f, c, W, along)
+        L = (rod + sum(term for of, site in inside for term in of.lagrangian(site))) * dx
         if f.eta is not None:
             L += lagrangian.unit_norm(f.eta, f.q) * dx_nodes
         for of, site, measure in sites:
@@ -107,26 +108,14 @@ class Equations:
     def _along(self, f: Any, c: Any, v: Any) -> Place:
         """Place of the functions that hold all along the rod."""
         k, R = curvature(f.q, f.q.dx(0)), rotation(f.q)
-        more = {"v": v, "k": k, "length": self.fields.scene.length}
-        if f.r is None:
-            return place(f.q, R, c.s, **more)
-        r = f.r + self._lift(c)
-        return place(f.q, R, c.s, r, dr=r.dx(0), **more)
-
-    def _rod(self, f: Any, c: Any, W: Any, along: Place) -> Any:
-        """Integrand of the rod itself: see :mod:`forms.lagrangian`."""
-        if f.r is not None:
-            return lagrangian.pointwise(W, along.R, along.v, along.dr, f.n)
-        scene = self.fields.scene
-        force = [f.scalars.get(f"n{i + 1}", scene.known_force(i, c) or 0.0) for i in range(3)]
-        left, right = end_positions(scene, c, f.scalars)
-        chord = [0.0 if x is None or y is None else y - x for x, y in zip(left, right, strict=True)]
-        return lagrangian.reduced(W, along.R, along.v, ufl.as_vector(force), ufl.as_vector(chord) / self.length)
+        r = self.fields.formulation.position(self, f, c, lambda field: field, None)
+        slope = {} if r is None else {"dr": r.dx(0)}
+        return place(f.q, R, c.s, r, v=v, k=k, length=self.fields.scene.length, **slope)
 
     def _site(self, part: Part, f: Any, variations: Any, along: Place) -> tuple[Site, Any]:
         """State where a part of the scene is, and the measure of its terms, None along the rod."""
         fields, scene = self.fields, self.fields.scene
-        names = [x.name for x in part.of.unknowns(part.number, scene.normal, f.r is not None)]
+        names = [x.name for x in part.of.unknowns(part.number, scene.normal, fields.formulation.centreline)]
         blocks = [f.fields[b.name] for b in part.of.blocks(part.number, fields.discretization.degree)]
         if part.s is None:
             x, c, at, measure = along, self.constants, lambda expression: expression, None
@@ -155,13 +144,9 @@ class Equations:
             return expression("+") if inside else expression
 
         q, c = at(f.q), self._constants(at(f.load), s)
-        if f.r is not None:
-            return place(q, rotation(q), s, at(f.r) + self._lift(c), length=scene.length), c, at, measure
-        if not inside:
-            r = end_positions(scene, c, f.scalars)[int(abs(s - scene.interval[1]) < abs(s - scene.interval[0]))]
-            if None not in r:
-                return place(q, rotation(q), s, ufl.as_vector(r), length=scene.length), c, at, measure
-        return place(q, rotation(q), s, length=scene.length), c, at, measure
+        side = None if inside else int(abs(s - scene.interval[1]) < abs(s - scene.interval[0]))
+        r = self.fields.formulation.position(self, f, c, at, side)
+        return place(q, rotation(q), s, r, length=scene.length), c, at, measure
 
     # --- names -----------------------------------------------------------------------------------------------------
 
@@ -194,7 +179,7 @@ class Equations:
         values = {name: self.base[i] + self.direction[i] * load for i, name in enumerate(self.names)}
         return Constants(s=ufl.SpatialCoordinate(self.fields.mesh)[0] if s is None else s, **values)
 
-    def _lift(self, c: Constants) -> Any:
+    def lift(self, c: Constants) -> Any:
         """Linear in s and equal to the ends' positions: the unknown ``r`` is what comes on top, zero where held."""
         x = (c.s - self.ends[0]) / self.length
         left, right = (end.held(c) for end in self.fields.scene.sides)

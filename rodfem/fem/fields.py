@@ -8,7 +8,7 @@ no number at all: PETSc drops what is added to number -1, and no Dirichlet row e
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -19,16 +19,16 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from rodfem import compat
-from rodfem.errors import POINTWISE, InputError
+from rodfem.errors import InputError
+from rodfem.fem import formulations
+from rodfem.fem.formulation import CONTACT_FORCE, Formulation
 from rodfem.fem.rotation_field import AngleField, QuaternionField, Turning
-from rodfem.problem.contribution import UNIT, Block, Group, Motion, Unknown
-from rodfem.problem.end import LETTERS, SIDES
+from rodfem.problem.contribution import Block, Group, Unknown
 from rodfem.problem.kinds import reals, whole
-from rodfem.problem.local_state import Constants, needs_centreline
+from rodfem.problem.local_state import Constants
 from rodfem.problem.scene import Scene
 
-FORMULATIONS = ("auto", "reduced", "pointwise")
-LOAD, CONTACT_FORCE = "load", "n"
+LOAD = "load"
 HIGHEST = 12
 """Highest degree of elements."""
 
@@ -37,9 +37,9 @@ HIGHEST = 12
 class Discretization:
     """How a scene is discretised: ``formulation``, number of ``elements`` and polynomial ``degree``.
 
-    ``reduced`` has no centreline, and the contact force as scalars; ``pointwise`` has all fields; ``auto`` is the first
-    where the scene allows it.  ``vertices`` are the arclengths at which elements meet, both ends included; without
-    them all elements are of nearly equal size.
+    The formulation is one of :mod:`rodfem.fem.formulations`, or ``auto``: the first that the scene allows.
+    ``vertices`` are the arclengths at which elements meet, both ends included; without them all elements are of nearly
+    equal size.
     """
 
     formulation: str = "auto"
@@ -53,8 +53,8 @@ class Discretization:
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
         if self.vertices is not None:
             object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
-        if self.formulation not in FORMULATIONS:
-            raise InputError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(FORMULATIONS)}.")
+        if self.formulation not in (known := formulations.names()):
+            raise InputError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(known)}.")
         if self.elements < 1:
             raise InputError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
         if not 1 <= self.degree <= HIGHEST:
@@ -81,68 +81,26 @@ def turning_of(scene: Scene) -> Turning:
     return QuaternionField() if scene.normal is None else AngleField(scene.normal)
 
 
-def blocks_of(scene: Scene, discretization: Discretization) -> list[Block]:
-    """Fields: ``q`` and ``eta``, in a plane ``angle``; ``v`` where strains are free; ``r`` and ``n`` if pointwise.
+def blocks_of(scene: Scene, formulation: Formulation, k: int) -> list[Block]:
+    """Fields: ``q`` and ``eta``, in a plane ``angle``; ``v`` where strains are free; those of the formulation.
 
     Besides what the parts of the scene bring: multipliers of constraints that hold all along the rod.
     """
-    k = discretization.degree
     turning = turning_of(scene)
     blocks = [Block(turning.name, turning.size, k, True, False)]
     if turning.name == "q":
         blocks.append(Block("eta", 1, k, True, True))
     if scene.free_strains:
         blocks.append(Block("v", len(scene.free_strains), k - 1, False, False))
-    if discretization.formulation == "pointwise":
-        blocks += [Block("r", 3, k, True, False), Block("n", 3, k - 1, False, True)]
-    return blocks + [block for part in scene.parts for block in part.of.blocks(part.number, k)]
+    return blocks + formulation.blocks(k) + [block for part in scene.parts for block in part.of.blocks(part.number, k)]
 
 
-def scalars_of(scene: Scene, discretization: Discretization) -> list[Unknown]:
+def scalars_of(scene: Scene, formulation: Formulation) -> list[Unknown]:
     """Scalar unknowns of a scene, without the load: those of the formulation, and of the parts of the scene."""
-    reduced = discretization.formulation == "reduced"
-    out = _unknowns_of_reduced(scene) if reduced else []
+    out = formulation.unknowns(scene)
     for part in scene.parts:
-        out += part.of.unknowns(part.number, scene.normal, not reduced)
+        out += part.of.unknowns(part.number, scene.normal, formulation.centreline)
     return list(dict.fromkeys(out))
-
-
-def _unknowns_of_reduced(scene: Scene) -> list[Unknown]:
-    """Scalar unknowns in the place of fields.
-
-    Components ``n1``.. of a constant contact force, positions ``a1``.., ``b1``.. of the left and right end where other
-    than dead forces act on it.
-    """
-    c, inside = scene.constants(), [i for i in range(3) if i != scene.normal]
-    force = Group(
-        CONTACT_FORCE,
-        "contact force",
-        "position of the ends along e{}",
-        Motion.VECTOR,
-        lambda c: [scene.known_force(i, c) for i in range(3)],
-    )
-    out = [Unknown(force, i, UNIT[i]) for i in inside if scene.known_force(i, c) is None]
-    for side, end in enumerate(scene.sides):
-        if not scene.plain(side):
-            place = Group(LETTERS[side], f"position of the {SIDES[side]} end", "", Motion.POSITION, end.held)
-            out += [Unknown(place, i, UNIT[i]) for i in inside if end.held(c)[i] is None]
-    return out
-
-
-def end_positions(
-    scene: Scene, c: Constants, scalars: Mapping[str, Any], given: Callable[[Any], Any] = lambda x: x
-) -> list[list[Any]]:
-    """Positions of the ends in the reduced formulation: ``given(held)``, a scalar unknown, or None (known force there).
-
-    Across the plane of a planar rod an end that nothing holds is where the plane is: at zero.
-    """
-    return [
-        [
-            given(x) if x is not None else scalars.get(f"{letter}{i + 1}", 0.0 if i == scene.normal else None)
-            for i, x in enumerate(end.held(c))
-        ]
-        for letter, end in zip(LETTERS, scene.sides, strict=True)
-    ]
 
 
 class Fields:
@@ -155,7 +113,7 @@ class Fields:
     number
         Global number of each local degree of freedom, -1 where clamped; (local size,) int32.
     unknown_scalars, forces
-        Scalar unknowns without load and drifts; components of the contact force among them (reduced formulation).
+        Scalar unknowns without load and drifts; components of a constant contact force among them.
     scalars
         Global number of each scalar: ``n1``.. for ``forces``, ``load``, and ``drift0``.. one for each symmetry.
     copies
@@ -173,15 +131,12 @@ class Fields:
                 f"{discretization.elements} elements cannot be shared by {comm.size} ranks: "
                 "use more elements or fewer ranks."
             )
-        reason = needs_centreline(scene)
-        if discretization.formulation == "auto":
-            discretization = replace(discretization, formulation="pointwise" if reason else "reduced")
-        if discretization.formulation == "reduced" and reason:
-            raise InputError(f"The reduced formulation has no centreline, which {reason} needs", POINTWISE)
-        self.scene, self.discretization, self.comm = scene, discretization, comm
+        self.formulation = formulations.chosen(discretization.formulation, scene)
+        self.discretization = replace(discretization, formulation=self.formulation.name)
+        self.scene, self.comm = scene, comm
         self.turning = turning_of(scene)
-        self.blocks = blocks_of(scene, discretization)
-        self.unknown_scalars = scalars_of(scene, discretization)
+        self.blocks = blocks_of(scene, self.formulation, discretization.degree)
+        self.unknown_scalars = scalars_of(scene, self.formulation)
         self.forces = [x.component for x in self.unknown_scalars if x.group.name == CONTACT_FORCE]
         names = [x.name for x in self.unknown_scalars] + [LOAD]
         self.mesh = mesh or self._mesh()
@@ -374,7 +329,7 @@ class Fields:
 
     def left_out(self) -> list[str]:
         """Fields and strains that are not unknowns of this scene, each with the reason."""
-        scene, c = self.scene, self.scene.constants()
+        scene = self.scene
         fixed = [i for i in range(3) if i not in scene.free_strains]
         lines = []
         if scene.normal is not None:
@@ -386,12 +341,4 @@ class Fields:
                 lines.append(f"the index in space: no potential there has the {loads[0]}")
         if fixed:
             lines.append(f"strain {', '.join(f'v{i + 1}' for i in fixed)}: the rod is {scene.rod}")
-        if self.discretization.formulation == "reduced":
-            lines.append(
-                "centreline r and the field of contact force: no force acts along the rod, "
-                "so that the contact force is constant"
-            )
-            known = [f"n{i + 1}" for i in range(3) if scene.known_force(i, c) is not None]
-            if known:
-                lines.append(f"contact force {', '.join(known)}: a dead force at an end that is free to move there")
-        return lines
+        return lines + self.formulation.left_out(scene)

@@ -1,9 +1,4 @@
-"""The shape of a state: centreline, rotations, and all fields in natural order along the rod.
-
-In the reduced formulation the centreline is recovered by integrating ``r' = R v`` with the quadrature of the weak
-form, so that it closes exactly where the integral constraints say it does, and is as accurate as the pointwise
-one.
-"""
+"""The shape of a state: centreline, rotations, and all fields in natural order along the rod."""
 
 from __future__ import annotations
 
@@ -16,11 +11,9 @@ from petsc4py import PETSc
 
 from forms.kinematics import UNDEFORMED
 from rodfem import compat
-from rodfem.fem.fields import LOAD, end_positions
+from rodfem.fem.fields import LOAD
 from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
-from rodfem.problem.contribution import Motion
-from rodfem.problem.end import LETTERS
 from rodfem.problem.quaternions import directors
 
 
@@ -65,7 +58,17 @@ class Gauss:
 
 
 class Shape:
-    """Evaluates shapes of the states of one :class:`~rodfem.fem.system.System`; collective over its ranks."""
+    """Evaluates shapes of the states of one :class:`~rodfem.fem.system.System`; collective over its ranks.
+
+    Attributes
+    ----------
+    cells
+        Slice of the owned cells among the local ones.
+    s
+        Arclengths of their nodes from left to right, (cells, nodes).
+    order
+        Order of the nodes of an element from left to right, (nodes,).
+    """
 
     def __init__(self, system: System) -> None:
         """Tabulate bases and quadrature."""
@@ -76,15 +79,18 @@ class Shape:
         self.size = f.vertices[cells, 1] - f.vertices[cells, 0]
         self.nodes = np.sort(compat.nodes(k))
         self.gauss = Gauss(system.equations.quadrature_degree(k) // 2 + 1)
-        self._order = np.argsort(compat.nodes(k))
+        self.order = np.argsort(compat.nodes(k))
         self._q_at_gauss = compat.lagrange_basis(k, self.gauss.points)
         self._v_at_gauss = compat.lagrange_basis(k - 1, self.gauss.points)
         self._v_dense = compat.lagrange_basis(k - 1, np.linspace(0, 1, 4 * k + 1))
         self._v_to_powers = np.linalg.inv(np.vander(2 * compat.nodes(k - 1) - 1, k, increasing=True))
         self._held_strains = np.array([0.0 if i in system.scene.free_strains else x for i, x in enumerate(UNDEFORMED)])
         self._probe_weights = [self._position_weights(s) for s in system.scene.ordinate.places]
-        self._cells = cells
-        self.reduced = f.discretization.formulation == "reduced"
+        self.cells = cells
+        self.s = self.start[:, None] + self.size[:, None] * self.nodes
+        starts = self.gather(self.start)
+        self._sequence = np.argsort(starts)
+        self._first = np.searchsorted(starts[self._sequence], self.start)
 
     def ordinate(self, x: PETSc.Vec) -> float:
         """Ordinate of the scene at the state ``x``."""
@@ -99,7 +105,7 @@ class Shape:
         """
         if 2 not in self.system.scene.free_strains:
             return 1.0
-        nodal = self.system.at(x).values("v")[self._cells, :, -1]
+        nodal = self.system.at(x).values("v")[self.cells, :, -1]
         dense = nodal @ self._v_dense.T
         cell, place = divmod(int(dense.argmin()), dense.shape[1])
         spacing = 2.0 / (dense.shape[1] - 1)
@@ -113,26 +119,15 @@ class Shape:
         continuous ones (m, components), discontinuous ones (elements, nodes, components); scalars by name.
         """
         system, f, state = self.system, self.system.fields, self.system.at(x)
-        local: dict[str, np.ndarray] = {"start": self.start}
-        for block in f.blocks:
-            local[block.name] = state.values(block.name)[self._cells][:, np.argsort(compat.nodes(block.degree)), :]
-        if self.reduced:
-            slopes = self._slopes(state)
-            local["ends"] = np.einsum("g,cgi,c->ci", self.gauss.weights, slopes, self.size)
-            local["inside"] = np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), slopes, self.size)
         out: dict[str, Any] = {"elements": f.discretization.elements}
-        order = np.argsort(all_cells := self.gather(local.pop("start")))
-        all_fields = {name: self.gather(values)[order] for name, values in local.items()}
-        h = np.diff(np.append(all_cells[order], system.scene.interval[1]))
-        out["s"] = self._unique(all_cells[order][:, None, None] + h[:, None, None] * self.nodes[None, :, None])[:, 0]
+        start = self._from_left(self.start)[:, None, None]
+        h = np.diff(start, axis=0, append=system.scene.interval[1])
+        out["s"] = unique(start + h * self.nodes[None, :, None])[:, 0]
         for block in f.blocks:
-            values = all_fields[block.name]
-            out[block.name] = self._unique(values) if block.continuous else values
-        if self.reduced:
-            ends = np.vstack([np.zeros(3), np.cumsum(all_fields["ends"], axis=0)])
-            out["r"] = self._anchor(state, ends[-1]) + self._unique(ends[:-1, None, :] + all_fields["inside"])
-        else:
-            out["r"] = out["r"] + f.lift(out["s"], state.constants())
+            values = state.values(block.name)[self.cells][:, np.argsort(compat.nodes(block.degree)), :]
+            out[block.name] = self.joined(values) if block.continuous else self._from_left(values)
+        r, chord = f.formulation.nodal(self, state)
+        out["r"] = r + f.formulation.offset(f, state, out["s"], chord)
         out["q"] = f.turning.quaternion(out[f.turning.name])
         return out | dict(zip(system.scalars, [*state.scalars.values(), *state.drifts.tolist()], strict=True))
 
@@ -152,27 +147,14 @@ class Shape:
 
         What then misses a held end is spread evenly over the rod.
         """
-        system, f, out = self.system, self.system.fields, given.local.copy()
-        slopes = self._slopes(given)
-        pieces = np.einsum("g,cgi,c->ci", self.gauss.weights, slopes, self.size)
-        starts, inside = self.start, np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), slopes, self.size)
-        order = np.argsort(self.gather(starts))
-        steps = self.gather(pieces)[order]
-        before = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
-        c = given.constants()
+        system, out, c = self.system, given.local.copy(), given.constants()
+        before, inside, chord = self.integrals(self.slopes(given))
         left, right = ([None if p is None else float(p) for p in end.held(c)] for end in system.scene.sides)
-        a = np.array([p if p is not None else (q or 0.0) - d for p, q, d in zip(left, right, before[-1], strict=True)])
-        b = np.array([q if q is not None else x + d for q, x, d in zip(right, a, before[-1], strict=True)])
-        for i, unknown in enumerate(f.unknown_scalars):
-            if unknown.group.motion is Motion.POSITION:
-                out[f.copies[:, i]] = (a, b)[LETTERS.index(unknown.group.name)][unknown.component]
-        if self.reduced:
-            return system.vector(out)
-        first = np.searchsorted(self.gather(starts)[order], starts)
-        r = a + before[:-1][first][:, None, :] + inside
-        s = starts[:, None] + self.size[:, None] * self.nodes
-        x = (s - system.scene.interval[0])[..., None] / system.scene.length
-        out[f.dofs["r"][self._cells][:, self._order]] = r + x * (b - a - before[-1]) - f.lift(s, c)
+        a = np.array([p if p is not None else (q or 0.0) - d for p, q, d in zip(left, right, chord, strict=True)])
+        b = np.array([q if q is not None else x + d for q, x, d in zip(right, a, chord, strict=True)])
+        x = (self.s - system.scene.interval[0])[..., None] / system.scene.length
+        r = a + before + inside + x * (b - a - chord)
+        system.fields.formulation.store(self, out, c, r, (a, b))
         return system.vector(out)
 
     # --- inside ------------------------------------------------------------------------------------------------
@@ -202,18 +184,35 @@ class Shape:
         """Rows of all ranks, one for each element, in the order of the ranks."""
         return values if self.system.comm.size == 1 else np.concatenate(self.system.comm.allgather(values))
 
-    @staticmethod
-    def _unique(values: np.ndarray) -> np.ndarray:
-        """Values at the nodes of a continuous field, (cells, nodes, ...) -> (m, ...)."""
-        return np.concatenate([values[:, :-1].reshape(-1, values.shape[-1]), values[-1:, -1]])
+    def _from_left(self, values: np.ndarray) -> np.ndarray:
+        """Rows of all ranks, one for each element, from left to right."""
+        return self.gather(values)[self._sequence]
 
-    def _slopes(self, state: NodalValues) -> np.ndarray:
+    def joined(self, values: np.ndarray) -> np.ndarray:
+        """Values of a continuous field at its nodes from left to right, (cells, nodes, ...) -> (m, ...)."""
+        return unique(self._from_left(values))
+
+    def nodal(self, values: np.ndarray) -> np.ndarray:
+        """The same, of nodal values of a field of the degree of the rotation."""
+        return self.joined(values[:, self.order])
+
+    def integrals(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Integrals of values at the Gauss points, (cells, points, 3).
+
+        From the left end to each cell (cells, 1, 3), from there to its nodes (cells, nodes, 3), and over the rod (3,).
+        """
+        pieces = np.einsum("g,cgi,c->ci", self.gauss.weights, values, self.size)
+        inside = np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), values, self.size)
+        before = np.vstack([np.zeros(3), np.cumsum(self._from_left(pieces), axis=0)])
+        return before[self._first][:, None, :], inside, before[-1]
+
+    def slopes(self, state: NodalValues) -> np.ndarray:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""
-        R = directors(state.fields.turning.quaternion(self._q_at_gauss @ state.turned[self._cells]))
+        R = directors(state.fields.turning.quaternion(self._q_at_gauss @ state.turned[self.cells]))
         free = list(self.system.scene.free_strains)
         slopes = R @ self._held_strains
         if free:
-            v = self._v_at_gauss @ state.values("v")[self._cells]
+            v = self._v_at_gauss @ state.values("v")[self.cells]
             slopes += (R[..., free] @ v[..., None])[..., 0]
         return np.asarray(slopes)
 
@@ -234,20 +233,15 @@ class Shape:
         ((integral, value),) = self._probe_weights
         parts = np.zeros((3, 4))
         size = f.turning.size
-        parts[0, :size] = value @ state.turned[self._cells].reshape(-1, size)
-        if self.reduced:
-            parts[1:, :3] = integral @ self._slopes(state).reshape(-1, 3)
-        else:
-            parts[1, :3] = value @ state.values("r")[self._cells].reshape(-1, 3)
+        parts[0, :size] = value @ state.turned[self.cells].reshape(-1, size)
+        parts[1:, :3] = f.formulation.sums(self, state, integral, value)
         if system.comm.size > 1:
             parts = system.comm.allreduce(parts)
-        r = parts[1, :3] + (
-            self._anchor(state, parts[2, :3]) if self.reduced else f.lift(np.array(s), state.constants())
-        )
+        r = parts[1, :3] + f.formulation.offset(f, state, np.array(s), parts[2, :3])
         q = f.turning.quaternion(parts[0, :size])
         return r, q / np.linalg.norm(q)
 
-    def _anchor(self, state: NodalValues, chord: np.ndarray) -> np.ndarray:
-        """Position of the left end: where it is held, or else a chord back from where the right end is held."""
-        left, right = end_positions(self.system.scene, state.constants(), state.scalars, float)
-        return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])
+
+def unique(values: np.ndarray) -> np.ndarray:
+    """Values at the nodes of a continuous field, (elements, nodes, ...) -> (m, ...)."""
+    return np.concatenate([values[:, :-1].reshape(-1, values.shape[-1]), values[-1:, -1]])

@@ -31,7 +31,7 @@ class Constraint(Contribution):
     whole: ClassVar[bool] = False
     """Whether it is one of the whole rod, by an integral."""
 
-    def unknowns(self, number: int, normal: int | None, pointwise: bool) -> list[Unknown]:
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """One scalar multiplier."""
         return [Unknown(MULTIPLIERS, number)]
 
@@ -67,7 +67,7 @@ class Everywhere(Constraint):
     """Whether it is one of positions or rotations: its multiplier is continuous, the equation collocated at nodes."""
     letter, words = "p", "constraint all along the rod"
 
-    def unknowns(self, number: int, normal: int | None, pointwise: bool) -> list[Unknown]:
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """No scalar."""
         return []
 

@@ -131,8 +131,8 @@ class Contribution:
     nodal = False
     """Whether its terms along the rod are collocated at nodes."""
 
-    def unknowns(self, number: int, normal: int | None, pointwise: bool) -> list[Unknown]:
-        """Scalar unknowns of contribution ``number`` of its kind; ``pointwise``: the centreline is a field."""
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
+        """Scalar unknowns of contribution ``number`` of its kind; ``centreline``: whether that is a field."""
         return []
 
     def blocks(self, number: int, degree: int) -> list[Block]:

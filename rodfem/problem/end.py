@@ -135,7 +135,7 @@ class End(Contribution):
         """Whether dead forces are all that acts on the position where it is free."""
         return self.energy is None
 
-    def unknowns(self, number: int, normal: int | None, pointwise: bool) -> list[Unknown]:
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """Moments of a moving clamp or a hinge."""
         directions = self._stiff(normal)
         motion = Motion.MIXED if len(directions) == 2 else Motion.VECTOR

@@ -58,10 +58,10 @@ class JoinedEnd(End):
         """No component is known."""
         return [None] * 3
 
-    def unknowns(self, number: int, normal: int | None, pointwise: bool) -> list[Unknown]:
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """Moments and forces that close the rod, the same of both ends."""
         moments = [Unknown(CLOSING_MOMENT, i) for i in range(4 if normal is None else 1)]
-        return moments + [Unknown(CLOSING_FORCE, i, UNIT[i]) for i in range(3) if pointwise and i != normal]
+        return moments + [Unknown(CLOSING_FORCE, i, UNIT[i]) for i in range(3) if centreline and i != normal]
 
     def lagrangian(self, at: Site) -> Iterator[Any]:
         """Share of this end in the equations of closure, with their multipliers."""

@@ -50,12 +50,12 @@ class SlidingHinge(End):
         """Whether there is no force of the guide, nor an energy."""
         return super().dead and not self._guiding()
 
-    def unknowns(self, number: int, normal: int | None, pointwise: bool) -> list[Unknown]:
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """Moments of the hinge, and forces of the guide."""
         words = f"force of the guide at the {SIDES[number]} end"
         group = Group(f"f{LETTERS[number]}", words, "guide of an end, direction {}", Motion.MIXED)
         forces = [Unknown(group, i, direction) for i, direction in enumerate(self._guiding())]
-        return super().unknowns(number, normal, pointwise) + forces
+        return super().unknowns(number, normal, centreline) + forces
 
     def lagrangian(self, at: Site) -> Iterator[Any]:
         """Terms of the hinge, and the distance from the guide with its forces."""

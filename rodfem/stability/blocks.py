@@ -101,7 +101,7 @@ class Blocks:
         """Number rows and columns; raises :class:`InputError` for coordinates that the formulation does not have."""
         if coordinates not in COORDINATES:
             raise InputError(f"Unknown coordinates {coordinates!r}: choose one of {', '.join(COORDINATES)}.")
-        if coordinates == "compatible" and system.fields.discretization.formulation != "pointwise":
+        if coordinates == "compatible" and not system.fields.formulation.centreline:
             raise InputError("Compatible coordinates need the centreline", POINTWISE)
         self.system, self.coordinates = system, coordinates
         self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
