@@ -125,7 +125,10 @@ class Fields:
     def __init__(
         self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD, mesh: Any = None
     ) -> None:
-        """Make the mesh (unless given), number the unknowns; :class:`InputError` for more ranks than elements."""
+        """Make the mesh of a ``discretization`` on the ranks of ``comm`` (unless given), number the ``scene``'s unknowns.
+
+        Raises :class:`InputError` for more ranks than elements; ``mesh`` is a dolfinx mesh of the scene's interval.
+        """
         if comm.size > discretization.elements:
             raise InputError(
                 f"{discretization.elements} elements cannot be shared by {comm.size} ranks: "

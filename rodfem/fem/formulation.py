@@ -58,13 +58,18 @@ class Formulation(ABC):
 
     @abstractmethod
     def integrand(self, equations: Equations, f: Any, c: Constants, W: Any, along: Place) -> Any:
-        """Integrand of the Lagrangian of the rod with the stored energy ``W``: see :mod:`forms.lagrangian`."""
+        """Integrand of the Lagrangian of the rod with the stored energy ``W``: see :mod:`forms.lagrangian`.
+
+        ``equations`` are those that it is made for, ``f`` their fields and scalars by name, ``c`` the constants,
+        ``along`` the place along the rod.
+        """
 
     @abstractmethod
     def position(self, equations: Equations, f: Any, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
         """Position (3,) where ``at`` restricts a field to, None where there is none.
 
-        ``side`` is 0 at the left end, 1 at the right end, None elsewhere.
+        ``equations``, ``f`` and ``c`` are as for :meth:`integrand`; ``side`` is 0 at the left end, 1 at the right end,
+        None elsewhere.
         """
 
     # --- the shape of a state, on the nodes and quadrature of a Shape -----------------------------------------------
@@ -73,8 +78,8 @@ class Formulation(ABC):
     def sums(self, shape: Shape, state: NodalValues, integral: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Share of this rank in the position at a place without its offset (3,), or in that and the chord (2, 3).
 
-        ``integral`` are weights (2, points) of slopes in their integrals to the place and over the rod, ``value``
-        (nodes,) of nodal values in the value there.
+        ``shape`` has the nodes and quadrature, ``state`` the values.  ``integral`` are weights (2, points) of slopes in
+        their integrals to the place and over the rod, ``value`` (nodes,) of nodal values in the value there.
         """
 
     @abstractmethod
@@ -83,7 +88,10 @@ class Formulation(ABC):
 
     @abstractmethod
     def offset(self, fields: Fields, state: NodalValues, s: np.ndarray, chord: np.ndarray) -> np.ndarray:
-        """What the positions at the arclengths ``s`` (...,) are more than that, (..., 3) or (3,)."""
+        """Offset of the positions of a ``state`` at the arclengths ``s`` (...,): (..., 3) or (3,).
+
+        ``fields`` are those of the state, ``chord`` (3,) is the difference of its ends.
+        """
 
     @abstractmethod
     def store(self, shape: Shape, out: np.ndarray, c: Constants, r: np.ndarray, ends: tuple[Any, Any]) -> None:

@@ -43,7 +43,11 @@ NOISE = 1e-6
 
 @dataclass(frozen=True)
 class Modes:
-    """Left-most eigenvalues in ascending order (symmetry modes left out), their vectors, and their backward errors."""
+    """Left-most eigenvalues, symmetry modes left out.
+
+    ``values`` are ascending, ``vectors`` theirs, ``errors`` backward errors; they are ``certified`` where
+    counts prove that none is missing.
+    """
 
     values: np.ndarray
     vectors: list[PETSc.Vec]
@@ -141,7 +145,10 @@ class Spectrum:
         )
 
     def below(self, sigma: float) -> int:
-        """Number of eigenvalues of the pencil last assembled below ``sigma``, symmetry modes not included."""
+        """Number of eigenvalues of the pencil last assembled below ``sigma``, symmetry modes not included.
+
+        Raises :class:`ConvergenceError` where the count breaks down: constraints depend on each other.
+        """
         self._factor(sigma, self._counting)
         negative, zero = self._counting.factors.inertia()
         below = negative - self.inertia.constraints - self.system.active_drifts()

@@ -167,11 +167,8 @@ def test_modules_are_attributes() -> None:
     text = "".join((HOME / page).read_text() for page in pages)
     named = {name for name in re.findall(r"\b((?:rodfem|forms)\.[a-zA-Z_.]*[a-zA-Z_])", text) if "XX" not in name}
     paths = re.findall(r"`([a-z_0-9]+(?:/[a-z_0-9]+)+)\.py`", (HOME / "docs" / "architecture.md").read_text())
-    named |= {
-        ("" if path.startswith("forms/") else "rodfem.") + path.replace("/", ".")
-        for path in paths
-        if "tests" not in path
-    }
+    paths = [path.removeprefix("rodfem/") for path in paths if "tests" not in path]
+    named |= {("" if path.startswith("forms/") else "rodfem.") + path.replace("/", ".") for path in paths}
     assert {"rodfem.modes.modes", "rodfem.problem.constraint", "rodfem.fem.link.link", "forms.loads"} <= named
     lines = ["import pydoc, rodfem, forms"] + [f"pydoc.render_doc({name})" for name in sorted(named)]
     environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(HOME), "HOME": str(Path.home())}

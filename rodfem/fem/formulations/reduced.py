@@ -115,9 +115,10 @@ class Reduced(Formulation):
 def end_positions(
     scene: Scene, c: Constants, scalars: Mapping[str, Any], given: Callable[[Any], Any] = lambda x: x
 ) -> list[list[Any]]:
-    """Positions of the ends: ``given(held)``, a scalar unknown, or None (known force there).
+    """Positions of the ends of a ``scene``: ``given(held)``, a scalar unknown, or None (known force there).
 
-    Across the plane of a planar rod an end that nothing holds is where the plane is: at zero.
+    ``c`` are the constants, ``scalars`` the values of the scalar unknowns by name.  Across the plane of a planar rod an
+    end that nothing holds is where the plane is: at zero.
     """
     return [
         [
@@ -133,7 +134,7 @@ def left_end(
 ) -> np.ndarray:
     """Position (3,) of the left end: where it is held, or else a ``chord`` back from where the right end is.
 
-    The other arguments are those of :func:`end_positions`.
+    ``scene``, ``c``, ``scalars`` and ``given`` are as for :func:`end_positions`.
     """
     left, right = end_positions(scene, c, scalars, given)
     return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])
