@@ -125,9 +125,9 @@ class Fields:
     def __init__(
         self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD, mesh: Any = None
     ) -> None:
-        """Make the mesh of a ``discretization`` on the ranks of ``comm`` (unless given), number the ``scene``'s unknowns.
+        """Make the mesh of a ``discretization`` on the ranks of ``comm``, and number the unknowns of the ``scene``.
 
-        Raises :class:`InputError` for more ranks than elements; ``mesh`` is a dolfinx mesh of the scene's interval.
+        A ``mesh`` of dolfinx may be given instead.  Raises :class:`InputError` for more ranks than elements.
         """
         if comm.size > discretization.elements:
             raise InputError(
