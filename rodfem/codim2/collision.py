@@ -106,5 +106,4 @@ class Collision:
         x, outcome = self.solver.at_load(guess, t)
         if not outcome.converged:
             raise ConvergenceError("no equilibrium is found there")
-        self.vibration.assemble(x)
-        return measure(self.vibration, cluster), x
+        return measure(self.vibration.at(x), cluster), x

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from rodfem.stability.nonsymmetric import ALIKE, Frequencies, Vibration, groups
+from rodfem.stability.nonsymmetric import ALIKE, Assembled, Frequencies, groups
 
 STRANGE = 1.0
 """Sum of the share of a vector outside a curve's and of the relative change, above which another curve begins."""
@@ -20,24 +20,25 @@ STRANGE = 1.0
 class Curves:
     """Numbers the curves of eigenvalues from one load to the next."""
 
-    def __init__(self, vibration: Vibration) -> None:
+    def __init__(self) -> None:
         """Begin without any curve."""
-        self.vibration, self.count = vibration, 0
+        self.count = 0
         self._last: Frequencies | None = None
         self._numbers: list[int] = []
         self._spans: list[tuple[list[int], np.ndarray]] = []
 
-    def numbers(self, found: Frequencies, *, keep: bool = True) -> list[int]:
-        """Numbers of the curves of eigenvalues found at the state last assembled, which go on from the load before.
+    def numbers(self, pencil: Assembled, found: Frequencies, *, keep: bool = True) -> list[int]:
+        """Numbers of the curves of eigenvalues found at a state, which go on from the load before.
 
         Without ``keep`` the next load goes on from the one before all the same.
         """
         numbers = [-1] * len(found.values)
         last = self._last
-        weighed = self.vibration.weighed(found.vectors)
-        energy = np.maximum(self.vibration.squares(found.vectors, weighed), 1e-300)
+        weighed = pencil.weighed(found.vectors)
+        energy = np.maximum(pencil.squares(found.vectors, weighed), 1e-300)
         if last is not None:
-            cost = self._distances(last, found, weighed, energy)
+            bases = np.concatenate([basis for _, basis in self._spans], axis=1)
+            cost = self._distances(last, found, abs(pencil.product(bases, weighed)) ** 2 / energy)
             for i, j in zip(*linear_sum_assignment(cost), strict=True):
                 if cost[i, j] < STRANGE:
                     numbers[j] = self._numbers[i]
@@ -47,18 +48,14 @@ class Curves:
             self.count += 1
         if keep:
             self._last, self._numbers = found, numbers
-            self._spans = [(group, self._span(found, group, energy)) for group in groups(found.values, ALIKE)]
+            self._spans = [(group, _span(pencil, found, group, energy)) for group in groups(found.values, ALIKE)]
         return numbers
 
-    def _span(self, found: Frequencies, group: list[int], energy: np.ndarray) -> np.ndarray:
-        """Basis of the span of some vectors, orthonormal in the mass."""
-        vectors = found.vectors[:, group]
-        return vectors / np.sqrt(energy[group]) if len(group) == 1 else self.vibration.orthonormal(vectors)
+    def _distances(self, last: Frequencies, found: Frequencies, parts: np.ndarray) -> np.ndarray:
+        """Share of each vector found outside the span of each one before, plus the relative change of the values.
 
-    def _distances(self, last: Frequencies, found: Frequencies, weighed: np.ndarray, energy: np.ndarray) -> np.ndarray:
-        """Share of each vector found outside the span of each one before, plus the relative change of the values."""
-        bases = np.concatenate([basis for _, basis in self._spans], axis=1)
-        parts = abs(self.vibration.product(bases, weighed)) ** 2 / energy
+        ``parts`` are its shares along the vectors of those spans.
+        """
         outside, begin = np.ones((len(last.values), len(found.values))), 0
         for group, basis in self._spans:
             share = parts[begin : begin + basis.shape[1]].sum(axis=0)
@@ -66,3 +63,9 @@ class Curves:
             begin += basis.shape[1]
         a, b = last.values[:, None], found.values[None, :]
         return np.asarray(outside + abs(a - b) / np.maximum(np.maximum(abs(a), abs(b)), 1.0))
+
+
+def _span(pencil: Assembled, found: Frequencies, group: list[int], energy: np.ndarray) -> np.ndarray:
+    """Basis of the span of some vectors, orthonormal in the mass."""
+    vectors = found.vectors[:, group]
+    return vectors / np.sqrt(energy[group]) if len(group) == 1 else pencil.orthonormal(vectors)

@@ -69,8 +69,7 @@ def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndar
     found = []
     for load in loads:
         x = at_load(solver, x, float(load))
-        vibration.assemble(x)
-        values = vibration.near(number + 2, -1e-3).values
+        values = vibration.at(x).near(number + 2, -1e-3).values
         found.append(values[np.argsort(abs(values))][: number + 2])
     if min(map(len, found)) < number:
         remedy = Remedy("ask for fewer ({})", Argument("Plan", "spectrum"))

@@ -30,7 +30,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
-from rodfem.stability.nonsymmetric import EPS, MULTIPLE, NEAR_ZERO, REAL, Frequencies, Vibration
+from rodfem.stability.nonsymmetric import EPS, MULTIPLE, NEAR_ZERO, REAL, Assembled, Frequencies, Vibration
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 
 LOADS = 101
@@ -85,7 +85,7 @@ class Sweep:
         self.span = plan.over(solver.system.scene)
         self.vibration = Vibration(solver.system)
         self.number = plan.spectrum or FREQUENCIES
-        self.curves, self.last = Curves(self.vibration), NONE
+        self.curves, self.last = Curves(), NONE
         self.branches: list[Branch] = []
         self._load = solver.system.scene.load
 
@@ -126,7 +126,7 @@ class Sweep:
         if self.plan.error_bars:
             self._error_bars(branch)
         self.observer.finished(branch)
-        rank, size = self.vibration.asymmetry()
+        rank, size = self.vibration.held.asymmetry()
         self.observer.note(
             f"  the load makes the tangent matrix non-symmetric by a matrix of rank {rank} "
             f"(largest entry {size:.1e} of |S|):\n"
@@ -146,8 +146,9 @@ class Sweep:
     def _point(self, x: PETSc.Vec, *, on_the_way: bool = True) -> Point:
         """Evaluate the records of the equilibrium ``x``; a special point is not ``on_the_way`` of the curves."""
         solver, system = self.solver, self.solver.system
-        found = self._leftmost(x)
-        curves = self.curves.numbers(found, keep=on_the_way)
+        pencil = self.vibration.at(x)
+        found = self._leftmost(pencil)
+        curves = self.curves.numbers(pencil, found, keep=on_the_way)
         if on_the_way:
             self.last = found
         values = found.values
@@ -170,17 +171,16 @@ class Sweep:
             curve=curves[: self.number],
         )
 
-    def _leftmost(self, x: PETSc.Vec) -> Frequencies:
+    def _leftmost(self, pencil: Assembled) -> Frequencies:
         """Left-most eigenvalues: those near the origin, and what became of the complex ones before.
 
         A complex shift looks for a pair that may be farther from the origin than all that the real shift found.
         """
-        self.vibration.assemble(x)
-        near = self.vibration.near(max(self.number, FREQUENCIES) + 6, SHIFT)
+        near = pencil.near(max(self.number, FREQUENCIES) + 6, SHIFT)
         reach = SEEN * abs(near.values).max()
         found = list(zip(_without_round_off(near.values), near.errors, near.kinds, near.vectors.T, strict=True))
         for pair in (v for v in self.last.values if v.imag > 0 and abs(v) > reach):
-            beside = self.vibration.near(2, pair * (1 + 1e-4))
+            beside = pencil.near(2, pair * (1 + 1e-4))
             for value, error, kind, vector in zip(
                 beside.values, beside.errors, beside.kinds, beside.vectors.T, strict=True
             ):
@@ -222,7 +222,7 @@ class Sweep:
 
     def _name(self, point: Point, cluster: Cluster) -> None:
         """Name the motions of the eigenvalues that collide at a point by all that they do: their vectors are one."""
-        name = self.vibration.motion(cluster.basis)
+        name = self.vibration.held.motion(cluster.basis)
         distance = [abs(complex(*value) - cluster.mean) for value in point.omega2]
         for i in np.argsort(distance, kind="stable")[: cluster.size]:
             point.motion[i] = name
@@ -255,11 +255,8 @@ class Sweep:
 
     def _collision(self, here: Point, there: Point, found: Frequencies, chosen: list[int]) -> _Event | None:
         """Collision, on the way ``there``, of eigenvalues complex ``here``; None where they are complex there too."""
-        x, vibration = here.x, self.vibration
-        vibration.assemble(x)
-        cluster = cluster_of(vibration, found, chosen)
-        vibration.assemble(there.x)
-        other = measure(vibration, cluster)
+        cluster = cluster_of(self.vibration.at(here.x), found, chosen)
+        other = measure(self.vibration.at(there.x), cluster)
         scale = abs(other.values).max()
         if abs(other.discriminant) < (MULTIPLE * scale) ** 2:
             side = ">" if here.load > there.load else "<"
@@ -272,7 +269,7 @@ class Sweep:
         if other.discriminant < 0:
             return None
         located = locate_flutter(
-            self._measured(self.solver, vibration, here.x),
+            self._measured(self.solver, self.vibration, here.x),
             cluster,
             (there.load + here.load) / 2,
             abs(here.load - there.load),
@@ -284,8 +281,7 @@ class Sweep:
         """How a cluster is measured at a load: at the equilibrium near ``guess``."""
 
         def measured(load: float, cluster: Cluster) -> Measured:
-            vibration.assemble(at_load(solver, guess, load))
-            return measure(vibration, cluster)
+            return measure(vibration.at(at_load(solver, guess, load)), cluster)
 
         return measured
 
@@ -315,17 +311,16 @@ class Sweep:
 
     def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> _Event:
         """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
-        vibration, number = self.vibration, len(loads)
-        vibration.assemble(self._state(guess, loads[0]))
-        found = vibration.near(number + 2, SHIFT)
-        cluster = cluster_of(vibration, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
-        load, uncertainty = _zero_between(self._measured(self.solver, vibration, guess), cluster, loads[0])
+        pencil, number = self.vibration.at(self._state(guess, loads[0])), len(loads)
+        found = pencil.near(number + 2, SHIFT)
+        cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
+        load, uncertainty = _zero_between(self._measured(self.solver, self.vibration, guess), cluster, loads[0])
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), 1e-11 * unit(load))
         return _Event(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
         """Real eigenvalues at a load near the origin, in ascending order."""
-        return sorted(v.real for v in self._leftmost(self._state(guess, load)).values if v.imag == 0)
+        return sorted(v.real for v in self._leftmost(self.vibration.at(self._state(guess, load))).values if v.imag == 0)
 
     def _special(self, branch: Branch, special: SpecialPoint) -> None:
         branch.special.append(special)

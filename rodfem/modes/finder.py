@@ -111,8 +111,7 @@ class ModeFinder:
 
     def _pairs(self, x: PETSc.Vec, number: int) -> dict[str, Any]:
         """Right and left modes of the eigenvalues nearest zero, biorthonormal in the mass."""
-        self.judge.vibration.assemble(x)
-        found = both_sides(self.judge.vibration, number)
+        found = both_sides(self.judge.vibration.at(x), number)
         right, left = ([self._complex(x, column) for column in part.T] for part in (found.right, found.left))
         sign = np.sign([np.real(m.r.sum() + 0.01 * m.w.sum()) or 1.0 for m in right])
         right, left = (

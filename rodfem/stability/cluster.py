@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.stability.nonsymmetric import REAL, Frequencies, Vibration
+from rodfem.stability.nonsymmetric import REAL, Assembled, Frequencies
 
 BESIDE = 1e-3
 """Distance from zero at which eigenvalues near zero are looked for: the matrix is singular there."""
@@ -54,25 +54,25 @@ class Measured:
         return float(np.sqrt(abs(self.discriminant)) / max(abs(self.values).max(), 1e-300))
 
 
-def cluster_of(vibration: Vibration, found: Frequencies, chosen: list[int]) -> Cluster:
-    """Cluster of the ``chosen`` ones of eigenvalues found at the state last assembled, closed under conjugation."""
-    return Cluster(_real_span(vibration, found.vectors[:, chosen]), float(found.values[chosen].real.mean()))
+def cluster_of(pencil: Assembled, found: Frequencies, chosen: list[int]) -> Cluster:
+    """Cluster of the ``chosen`` ones of eigenvalues found at a state, closed under conjugation."""
+    return Cluster(_real_span(pencil, found.vectors[:, chosen]), float(found.values[chosen].real.mean()))
 
 
-def measure(vibration: Vibration, cluster: Cluster) -> Measured:
-    """Find a cluster known from a state nearby at the state last assembled; raises :class:`ConvergenceError`."""
-    basis, size = _real_span(vibration, cluster.basis), cluster.size
+def measure(pencil: Assembled, cluster: Cluster) -> Measured:
+    """Find at a state a cluster known from a state nearby; raises :class:`ConvergenceError`."""
+    basis, size = _real_span(pencil, cluster.basis), cluster.size
     for number in (size + 2, 3 * size + 10):
-        found = vibration.near(number, 0.97 * cluster.mean if abs(cluster.mean) > BESIDE else -BESIDE)
-        weighed = vibration.weighed(found.vectors)
-        inside = vibration.product(basis, weighed)
-        energy = vibration.squares(found.vectors, weighed)
+        found = pencil.near(number, 0.97 * cluster.mean if abs(cluster.mean) > BESIDE else -BESIDE)
+        weighed = pencil.weighed(found.vectors)
+        inside = pencil.product(basis, weighed)
+        energy = pencil.squares(found.vectors, weighed)
         share = (abs(inside) ** 2).sum(axis=0) / energy
         chosen = sorted(np.argsort(-share, kind="stable")[:size].tolist())
         values = found.values[chosen]
         closed = abs(values.imag.sum()) < REAL * abs(values).max()
         if len(chosen) == size and closed and share[chosen].min() > LEAST:
-            here = cluster_of(vibration, found, chosen)
+            here = cluster_of(pencil, found, chosen)
             return Measured(float(((values - here.mean) ** 2).mean().real), values, here)
     raise ConvergenceError(f"the {size} eigenvalues near {cluster.mean:.6g} are not found again")
 
@@ -88,9 +88,9 @@ def as_vectors(system: System, columns: np.ndarray) -> list[PETSc.Vec]:
     return out
 
 
-def _real_span(vibration: Vibration, vectors: np.ndarray) -> np.ndarray:
+def _real_span(pencil: Assembled, vectors: np.ndarray) -> np.ndarray:
     """Real basis (n, k), orthonormal in the mass, of the span of ``vectors`` (n, k), closed under conjugation."""
     parts = np.concatenate([vectors.real, vectors.imag], axis=1) if np.iscomplexobj(vectors) else vectors
-    squares, turn = np.linalg.eigh(vibration.product(parts, vibration.weighed(parts)))
+    squares, turn = np.linalg.eigh(pencil.product(parts, pencil.weighed(parts)))
     last = slice(len(squares) - vectors.shape[1], None)
     return np.asarray(parts @ (turn[:, last] / np.sqrt(np.maximum(squares[last], 1e-300))))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodfem.errors import ConvergenceError
-from rodfem.stability.nonsymmetric import Vibration
+from rodfem.stability.nonsymmetric import Assembled
 
 SAME = 1e-6
 """Relative difference below which a left and a right eigenvalue are paired."""
@@ -32,12 +32,12 @@ class BothSides:
     weighed: np.ndarray
 
 
-def both_sides(vibration: Vibration, number: int) -> BothSides:
-    """Compute ``number`` biorthonormal left/right eigenpairs nearest zero, at the state last assembled.
+def both_sides(pencil: Assembled, number: int) -> BothSides:
+    """Compute ``number`` biorthonormal left/right eigenpairs nearest zero.
 
     Raises :class:`ConvergenceError` if a right eigenvalue has no left partner.
     """
-    right, left = (find(2 * number + 2, 0.0) for find in (vibration.near, vibration.left))
+    right, left = (find(2 * number + 2, 0.0) for find in (pencil.near, pencil.left))
     upper = right.values.imag > -SAME * abs(right.values)  # one of each pair
     nearest = [i for i in np.argsort(abs(right.values), kind="stable") if upper[i]][:number]
     chosen = sorted(nearest, key=lambda i: right.values[i].real)
@@ -50,11 +50,11 @@ def both_sides(vibration: Vibration, number: int) -> BothSides:
             raise ConvergenceError(
                 f"The left mode of the eigenvalue {value:.6g} was not found: ask for fewer modes, or change the load."
             )
-    comm = vibration.system.comm
+    comm = pencil.system.comm
     X, Z = right.vectors[:, chosen], left.vectors[:, partners]
-    X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * vibration.weighed(X), axis=0)).real)
-    X = X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * vibration.weighed(X), axis=0))))
-    Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ vibration.weighed(X)).T)
+    X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * pencil.weighed(X), axis=0)).real)
+    X = X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * pencil.weighed(X), axis=0))))
+    Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ pencil.weighed(X)).T)
     values = right.values[chosen]
     return BothSides(
         np.where(abs(values.imag) < REAL * abs(values), values.real, values),
@@ -62,5 +62,5 @@ def both_sides(vibration: Vibration, number: int) -> BothSides:
         tuple(right.kinds[i] for i in chosen),
         X,
         Z,
-        vibration.weighed(Z),
+        pencil.weighed(Z),
     )

@@ -109,30 +109,64 @@ class _Pair:
 
 
 class Vibration:
-    """Computes eigenvalues near a shift, at states of one :class:`~rodfem.fem.system.System`."""
+    """Matrices of the pencil, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`."""
 
     def __init__(self, system: System) -> None:
         """Allocate the matrices of the pencil once."""
         self.system = system
         self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
-        self.turned = np.zeros((0, 0, 4))
-        self._copies: list[Copy] = []
-        self._own = slice(None)
-        self._free: dict[int, PETSc.Vec] = {}
+        self.copies: list[Copy] = []
+        self.turned, self.free, self.filled = np.zeros((0, 0, 4)), dict[int, PETSc.Vec](), 0
 
-    def assemble(self, x: PETSc.Vec) -> None:
+    def at(self, x: PETSc.Vec) -> Assembled:
         """Assemble the pencil at the state ``x``, at which the phase conditions must be set.
 
         Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
         """
+        self.filled += 1
         with self.system.clock("assembly"):
             state = assemble_pencil(self.system, x, self.matrix, self.mass)
             self.system.verify(self.matrix, state)
             free = symmetry_modes(self.system, x)
             if free:
                 exclude_modes(self.system, free, self.matrix, self.mass)
-            self._free = {i: mode for i, (mode, _) in weighed_modes(self.system, free, self.mass).items()}
+            self.free = {i: mode for i, (mode, _) in weighed_modes(self.system, free, self.mass).items()}
             self.turned = state.turned
+        return Assembled(self)
+
+    @property
+    def held(self) -> Assembled:
+        """Whatever state the matrices hold."""
+        return Assembled(self)
+
+
+class Assembled:
+    """The pencil of one state: eigenvalues near a shift, and products in its mass.
+
+    Raises :class:`RuntimeError` where the matrices hold another state by now: a number of another state is never
+    returned.
+    """
+
+    def __init__(self, vibration: Vibration) -> None:
+        """Be the state that the matrices were just filled for."""
+        self.system, self._vibration, self._filled = vibration.system, vibration, vibration.filled
+        self._turned, self._free, self._own = vibration.turned, vibration.free, slice(None)
+
+    def _held(self) -> Vibration:
+        """Matrices, while they are those of this state."""
+        if self._vibration.filled != self._filled:
+            raise RuntimeError("The matrices hold another state by now: ask for this one again, by Vibration.at.")
+        return self._vibration
+
+    @property
+    def matrix(self) -> PETSc.Mat:
+        """Tangent matrix ``S``, and constraints against motions of symmetries."""
+        return self._held().matrix
+
+    @property
+    def mass(self) -> PETSc.Mat:
+        """Kinetic metric ``M``."""
+        return self._held().mass
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
@@ -156,7 +190,7 @@ class Vibration:
         return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if used else (0, 0.0)
 
     def near(self, number: int, target: complex) -> Frequencies:
-        """Return eigenvalues nearest to ``target`` at the state last assembled: ``number``, or more where they come.
+        """Return eigenvalues nearest to ``target``: ``number``, or more where they come.
 
         Fewer are returned only where the discretisation has no more finite ones.  A pencil hardly larger than the
         Krylov space for ``number`` of them is solved by dense reductions.
@@ -179,10 +213,9 @@ class Vibration:
         comm = self.system.comm
         if comm.size == 1 or is_cut(comm, self.matrix.getSize()[0]):
             return pencil
-        if not self._copies:
-            self._copies = [Copy(matrix) for matrix in pencil]
-            self._own = self._copies[0].own
-        whole, mass = (copy.update(matrix) for copy, matrix in zip(self._copies, pencil, strict=True))
+        copies = self._vibration.copies = self._vibration.copies or [Copy(matrix) for matrix in pencil]
+        self._own = copies[0].own
+        whole, mass = (copy.update(matrix) for copy, matrix in zip(copies, pencil, strict=True))
         return whole, mass
 
     def _near(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> Frequencies:
@@ -219,7 +252,7 @@ class Vibration:
             else:
                 basis = self.orthonormal(np.stack([found[j].vector for j in group], axis=1))
                 columns.append(np.concatenate([basis.real, basis.imag], axis=1))
-        squares = character.squares(self.system, self.turned, np.concatenate(columns, axis=1))
+        squares = character.squares(self.system, self._turned, np.concatenate(columns, axis=1))
         kinds, begin = [""] * len(found), 0
         for group, part in zip(together, columns, strict=True):
             square = squares[begin : begin + part.shape[1]].sum(axis=0)
@@ -229,8 +262,8 @@ class Vibration:
         return kinds
 
     def motion(self, basis: np.ndarray) -> str:
-        """Type of the motion spanned by a ``basis`` (n, k), at the state last assembled."""
-        return character.name(character.shares(self.system, self.turned, [*basis.real.T, *basis.imag.T]))
+        """Type of the motion spanned by a ``basis`` (n, k)."""
+        return character.name(character.shares(self.system, self._turned, [*basis.real.T, *basis.imag.T]))
 
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
         """``M X`` for real or complex vectors (n, k), with any PETSc."""

@@ -45,8 +45,7 @@ def test_nothing_is_left_in_the_database(options: PETSc.Options) -> None:
     for method in ("count", "shift-invert", "slicing"):
         judge(x, method, 2)
     system, x = plain("follower", "pointwise", 6, 3, 10.0)
-    vibration = Vibration(system)
-    vibration.assemble(x)
+    vibration = Vibration(system).at(x)
     vibration.near(2, 0.0)
     shift_invert(vibration.matrix, vibration.mass, 2, 1.0, symmetric=False).solve()
     assert options.getAll() == before
@@ -106,8 +105,7 @@ def test_symmetric_pencil(options: PETSc.Options) -> None:
 
 def test_pencil_without_symmetry(options: PETSc.Options) -> None:
     system, x = plain("follower", "pointwise", 6, 3, 10.0)
-    vibration = Vibration(system)
-    vibration.assemble(x)
+    vibration = Vibration(system).at(x)
     expected = vibration.near(2, 0.0).values[:2]
     options["rodfem_st_pc_factor_mat_solver_type"] = "mumps"
     options["rodfem_st_mat_mumps_icntl_7"], options["rodfem_st_type"] = ORDERING, "cayley"

@@ -18,8 +18,6 @@ class ShiftInvert(Method):
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
         """By the Arnoldi method."""
-        vibration = self.work.vibration
-        vibration.assemble(x)
-        near = vibration.near(number, 0.0)
+        near = self.work.vibration.at(x).near(number, 0.0)
         nearest = np.sort(np.argsort(abs(near.values), kind="stable")[:number])
         return Found(near.values[nearest], [], near.errors[nearest], factorisations=1)
