@@ -79,6 +79,7 @@ class Shape:
         self.size = f.vertices[cells, 1] - f.vertices[cells, 0]
         self.nodes = np.sort(compat.nodes(k))
         self.gauss = Gauss(system.equations.quadrature_degree(k) // 2 + 1)
+        self._to_nodes = self.gauss.integrals(self.nodes)
         self.order = np.argsort(compat.nodes(k))
         self._q_at_gauss = compat.lagrange_basis(k, self.gauss.points)
         self._v_at_gauss = compat.lagrange_basis(k - 1, self.gauss.points)
@@ -202,7 +203,7 @@ class Shape:
         From the left end to each cell (cells, 1, 3), from there to its nodes (cells, nodes, 3), and over the rod (3,).
         """
         pieces = np.einsum("g,cgi,c->ci", self.gauss.weights, values, self.size)
-        inside = np.einsum("ng,cgi,c->cni", self.gauss.integrals(self.nodes), values, self.size)
+        inside = np.einsum("ng,cgi,c->cni", self._to_nodes, values, self.size)
         before = np.vstack([np.zeros(3), np.cumsum(self._from_left(pieces), axis=0)])
         return before[self._first][:, None, :], inside, before[-1]
 
