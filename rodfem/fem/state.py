@@ -107,8 +107,9 @@ class State(Evaluation):
 
     def along(self, phase: PETSc.Vec) -> float:
         """Product with a covector that has no component along scalars."""
-        own = self.fields.free_owned
-        return float(self.fields.comm.allreduce(phase.array_r[: len(own)].real @ self.local[own], op=MPI.SUM))
+        own, comm = self.fields.free_owned, self.fields.comm
+        mine = float(phase.array_r[: len(own)].real @ self.local[own])
+        return mine if comm.size == 1 else float(comm.allreduce(mine, op=MPI.SUM))  # asked for in every residual
 
     def jacobian(self, row: PETSc.Vec) -> PETSc.Mat:
         """Jacobian into the system's matrix, with ``row`` as the row of the load."""
