@@ -10,8 +10,9 @@ which three rows determine.  Where its vertex lies inside a step, well below the
 solved there.  Successive parabolic interpolation (Brent 1973, chapter 5) ends at a state with another index, or at a
 lowest value that is not zero.  Determinants come with the factors that count the index: they cost nothing.
 
-A row may happen to lie beside such a pair.  Its determinant is then lower than those of both neighbours by orders of
-magnitude, and three rows do not show the pair: two states nearer and nearer to that row replace its neighbours.
+A row may happen to lie beside such a pair.  Its determinant is then lower than those of its neighbours by orders of
+magnitude, and three rows do not show the pair: states nearer and nearer to that row replace its neighbours, on both
+sides of it, or on the one side on which the first and the last row of a branch have any.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from math import exp, inf, isfinite
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.solvers import BranchSolver
-from rodfem.continuation.special_points import point_between
+from rodfem.continuation.special_points import midpoint, point_between
 
 LOWER = 0.5
 """A vertex below this share of the value at the lower end of a step is looked at."""
@@ -48,16 +49,17 @@ class Touching:
     def __init__(self) -> None:
         """No row yet."""
         self._rows: list[Point] = []
-        self._begun = True
+        self._begun, self._told = True, False
 
-    def restart(self, row: Point) -> None:
-        """Begin at a row."""
-        self._rows, self._begun = [row], True
+    def restart(self, rows: Sequence[Point]) -> None:
+        """Begin at the last of some rows of one branch; the step before it counts as looked at."""
+        same = [row for row in rows[-2:] if row.mesh == rows[-1].mesh]  # determinants of two meshes do not compare
+        self._rows, self._begun, self._told = same, len(rows) < 2, False
 
-    def add(self, row: Point) -> None:
-        """Go on to the next row."""
-        self._begun = len(self._rows) < 2
-        self._rows = [*self._rows[-1:], row]
+    def add(self, row: Point, *, told: bool) -> None:
+        """Go on to the next row; ``told`` is whether special points are known in the step to it."""
+        self._begun = self._begun and len(self._rows) < 2
+        self._rows, self._told = [*self._rows[-1:], row], told
 
     def between(self, solver: BranchSolver, a: Point, b: Point) -> list[Point]:
         """Rows to insert, in order of arclength, where an eigenvalue passes zero twice in the step from ``a`` to ``b``.
@@ -68,14 +70,30 @@ class Touching:
             return []
         rows = [self._rows[-2], a, b]
         found = []
-        if self._begun and rows[0].negative == a.negative:
-            early = inside(solver, rows, rows[0], a)
+        if self._begun and not self._told and rows[0].negative == a.negative:
+            early = inside(solver, rows, rows[0], a) or beside(solver, rows[0], a)
             found += [rows[0], *early, a] if early else []
-        beside = around(solver, rows) if not found else []
-        if beside and beside[0].arclength < a.arclength:
-            found = [rows[0], *beside, a]
-            beside = []
-        return found + (beside or inside(solver, rows, a, b))
+        if found or self._told:  # what lies on the other side of the row between the steps is known
+            near = beside(solver, a, b)
+        else:
+            near = around(solver, rows)
+        if near and near[0].arclength < a.arclength:
+            found = [rows[0], *near, a]
+            near = []
+        return found + (near or inside(solver, rows, a, b))
+
+    def ending(self, solver: BranchSolver) -> list[Point]:
+        """Last step of a branch that has ended, with a row inserted where an eigenvalue passes zero twice; else none.
+
+        A branch of one step has no third row, and its first one has been compared with none.
+        """
+        if len(self._rows) < 2 or self._told:
+            return []
+        a, b = self._rows
+        found = beside(solver, b, a)
+        if not found and self._begun:
+            found = beside(solver, a, b) or halved(solver, a, b)
+        return [a, *found, b] if found else []
 
 
 def inside(solver: BranchSolver, rows: Sequence[Point], p: Point, q: Point) -> list[Point]:
@@ -115,6 +133,45 @@ def around(solver: BranchSolver, rows: Sequence[Point]) -> list[Point]:
             return found
         size /= NEARER
     return []
+
+
+def beside(solver: BranchSolver, end: Point, inner: Point) -> list[Point]:
+    """A state near the row ``end`` of a branch, towards its neighbour ``inner``, whose index is not theirs.
+
+    It is looked for where the determinant at the end is far below the neighbour's.
+    """
+    if end.negative != inner.negative:
+        return []
+    step = inner.arclength - end.arclength
+    size, far = step / NEARER, inner
+    while abs(size) > LEAST * abs(step) and relative(end, far, 1) < DEEP:
+        near = point_between(solver, *sorted((end, far), key=arclength), end.arclength + size)
+        if near is None:
+            return []
+        if differs(near, end):
+            return [near]
+        rows = sorted((end, near, far), key=arclength)
+        found = inside(solver, rows, *rows[:2]) or inside(solver, rows, *rows[1:])
+        if found:
+            return found
+        far, size = near, size / NEARER
+    return []
+
+
+def halved(solver: BranchSolver, a: Point, b: Point) -> list[Point]:
+    """A state between two neighbours whose index is not theirs, found from these two and the state half-way."""
+    middle = midpoint(solver, a, b)
+    if middle is None or a.negative != b.negative:
+        return []
+    if differs(middle, a):
+        return [middle]
+    rows = [a, middle, b]
+    return inside(solver, rows, a, middle) or inside(solver, rows, middle, b)
+
+
+def arclength(row: Point) -> float:
+    """Arclength of a row along its branch."""
+    return row.arclength
 
 
 def relative(row: Point, other: Point, multiplicity: int) -> float:

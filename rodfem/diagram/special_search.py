@@ -53,10 +53,10 @@ class SpecialSearch:
         self._short = (until, short or inf, 0)
         self.level = first.zero
 
-    def resume(self, last: Point) -> None:
-        """Go on from a row, up to which everything has been found."""
-        self._open, self._before = [last], None
-        self._touching.restart(last)
+    def resume(self, history: Sequence[Point]) -> None:
+        """Go on from the last row of a branch, up to which everything has been found."""
+        self._open, self._before = [history[-1]], None
+        self._touching.restart(history)
 
     def after(self, a: Point, b: Point) -> list[SpecialPoint]:
         """Special points that the row ``b`` after ``a`` shows, in order of arclength.
@@ -87,18 +87,20 @@ class SpecialSearch:
                 rows.insert(0, self._here(self._before))  # what changes does so before that row
         self._before, self._open = rows[-1], [b]
         between = [] if changed else self._touching.between(self.solver, a, b)
-        self._touching.add(b)
+        self._touching.add(b, told=changed or any(row.arclength > a.arclength for row in between))
         return self._examined(self._among([*rows, *between, b]))
 
     def rest(self) -> list[SpecialPoint]:
-        """Special points among the last rows of a branch, where they have an eigenvalue near zero.
+        """Special points among the last rows of a branch that only its end shows.
 
-        The branch has ended: nothing is tried with shorter steps.
+        They are those of rows with an eigenvalue near zero, and pairs beside the last row.  The branch has ended:
+        nothing is tried with shorter steps.
         """
-        if len(self._open) < 2:
-            return []
         self._on(self._open[-1])
-        return self._examined(self._among([self._here(p) for p in self._open], ended=True), ended=True)
+        rows = self._open if len(self._open) > 1 else self._touching.ending(self.solver)
+        if not rows:
+            return []
+        return self._examined(self._among([self._here(p) for p in rows], ended=True), ended=True)
 
     def beyond(self, a: Point, b: Point) -> list[SpecialPoint]:
         """Special points between a row and a point past the end of its branch, as they are found on one piece."""

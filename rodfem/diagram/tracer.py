@@ -158,14 +158,10 @@ class Tracer:
 
     def _advance(self, branch: Branch, history: list[Point]) -> None:
         """Append points until the branch ends, which :attr:`Branch.ended` then says."""
-        self.specials.resume(history[-1])
+        self.specials.resume(history)
         for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self.specials.reach):
             if isinstance(item, str):
-                branch.ended = item
-                with self.solver.system.clock.purpose("location"):
-                    for special in self.specials.rest():
-                        branch.insert(special)
-                        self.observer.special(branch, special)
+                branch.ended = self._rest(branch) or item
                 return
             previous = history[-1]
             self._check_symmetry(item)
@@ -175,7 +171,8 @@ class Tracer:
                 self._end_at_zero_stretch(branch, previous, item)
                 return
             if self.solver.convexity is not None and self.solver.convexity.lowest(item.x) <= 0:
-                branch.ended = f"the stored energy is not convex any more at {self.scene.load} = {item.load:.6g}"
+                why = f"the stored energy is not convex any more at {self.scene.load} = {item.load:.6g}"
+                branch.ended = self._rest(branch) or why
                 return
             try:
                 reason = self._between(branch, previous, item)
@@ -189,7 +186,7 @@ class Tracer:
             branch.points.append(item)
             self.observer.progress(branch, item)
             if self._closes(branch, previous, item):
-                branch.ended = "closed loop"
+                branch.ended = self._rest(branch) or "closed loop"
                 return
 
     def _between(self, branch: Branch, a: Point, b: Point) -> str:
@@ -202,19 +199,24 @@ class Tracer:
         pieces = [a, *(s.point for s in specials if s.point.arclength > a.arclength), b]
         users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
         users += self.events.between(self.solver, a, b)
-        for special in specials + users:
+        return self._insert(branch, specials + users)
+
+    def _rest(self, branch: Branch) -> str:
+        """Insert the special points that only the end of a branch shows; a reason if the branch ends at one."""
+        with self.solver.system.clock.purpose("location"):
+            return self._insert(branch, self.specials.rest())
+
+    def _insert(self, branch: Branch, specials: list[SpecialPoint]) -> str:
+        """Insert special points into a branch, up to one at which it ends: then the reason."""
+        for special in specials:
             self.watch.special(special)
-        for special in sorted(specials + users, key=lambda s: s.point.arclength):
-            if special.kind.branches:
-                reason = self._meeting(branch, special)
-                branch.insert(special)
-                self.observer.special(branch, special)
-                if reason:  # it ends before a row that was taken for one of it
-                    branch.points = [p for p in branch.points if p.arclength <= special.point.arclength]
-                    return reason
-            else:
-                branch.insert(special)
-                self.observer.special(branch, special)
+        for special in sorted(specials, key=lambda s: s.point.arclength):
+            reason = self._meeting(branch, special) if special.kind.branches else ""
+            branch.insert(special)
+            self.observer.special(branch, special)
+            if reason:  # it ends before a row that was taken for one of it
+                branch.points = [p for p in branch.points if p.arclength <= special.point.arclength]
+                return reason
         return ""
 
     def _users(self, branch: Branch, p: Point, q: Point, a: Point, b: Point) -> list[SpecialPoint]:

@@ -198,6 +198,32 @@ def test_a_row_beside_a_pair_of_crossings() -> None:
     assert [(s.negative_before, s.negative_after) for s in found] == [(0, 2), (2, 4), (4, 2), (2, 0)]
 
 
+@pytest.mark.parametrize(("low", "high", "largest"), [
+    (0.2950, 0.4994, 0.2), (0.0550, 0.4991, 0.3), (0.2950, 0.4990121, 0.1),  # beside the last row
+    (0.4946, 0.6990, 0.3), (0.4940, 0.5490, 0.05),  # beside the first row
+    (0.4910, 0.5050, 0.3), (0.49499, 0.5050, 0.3),  # in the only step
+])  # fmt: skip
+def test_a_pair_of_crossings_beside_an_end_of_a_range(low: float, high: float, largest: float) -> None:
+    """The first row of a range has no row before it, and the last none after it."""
+    constants = (0.554629, 1.0, 1.0, 2.851609)
+    expected = [load for load in buckling_loads(*constants) if low < load < high]
+    plan = Plan((low, high), depth=0, steps=StepControl(largest=largest), error_bars=False)
+    (straight,) = trace(hemitropic_cases.scene(constants), Discretization("reduced", 16, 6), plan)
+    found = [s for s in straight.special if s.kind == BRANCH_POINT]
+    assert [s.point.load for s in found] == pytest.approx(expected, abs=1e-9)
+    assert [(s.negative_before, s.negative_after) for s in found[-2:]] == [(2, 4), (4, 2)]
+    assert not straight.unexplained
+
+
+def test_a_pair_of_crossings_is_listed_once() -> None:
+    """The row after a step with a pair may be so near to it that its determinant is far below its neighbours'."""
+    constants = (0.1956061749617919, 1.0, 1.0, 3.9702302229890574)
+    plan = Plan((0.42077, 0.7111), depth=0, steps=StepControl(largest=0.15), error_bars=False)
+    (straight,) = trace(hemitropic_cases.scene(constants), Discretization("reduced", 16, 6), plan)
+    found = [s.point.load for s in straight.special if s.kind == BRANCH_POINT]
+    assert found == pytest.approx([x for x in buckling_loads(*constants) if 0.42077 < x < 0.7111], abs=1e-9)
+
+
 @pytest.mark.alone
 def test_every_row_of_the_ring_demo() -> None:
     scene = demo_cases.module("ring").scene(Namespace(twisting=1.5, span=(0.0, 1.6)))
