@@ -30,7 +30,7 @@ from rodfem.continuation.corrector import Corrector
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.linalg.matrices import gathered
-from rodfem.stability.assessment import Judge
+from rodfem.stability.assessment import Assessor
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.rank import rank_of
@@ -84,27 +84,27 @@ def state(formulation: str, elements: int, degree: int, which: str = "straight")
 
 def task(method: str, system: Any, x: PETSc.Vec) -> Callable[[], Any]:
     """What is measured."""
-    to_judge = Judge(system)
-    assert to_judge.inertia is not None
+    assessor = Assessor(system)
+    assert assessor.inertia is not None
     if method == "factorisation":
-        found = to_judge.inertia.at(x)
+        found = assessor.inertia.at(x)
         return lambda: found.below(found.shift + 1e-3)
     if method == "index":
-        corrector = Corrector(to_judge.inertia)
+        corrector = Corrector(assessor.inertia)
         return lambda: corrector.factor(x)
     if method == "assembly":
-        return lambda: to_judge.inertia.at(x)
+        return lambda: assessor.inertia.at(x)
     if method == "solves":
-        found = to_judge.inertia.at(x)
+        found = assessor.inertia.at(x)
         found.below(0.0)
         right = PETSc.Mat().createDense(((len(x.array_r), None), (None, 2)), comm=PETSc.COMM_WORLD)
         right.setUp()
         right.assemble()
         solved = right.duplicate()
         return lambda: found.factors.solve_all(right, solved)
-    spectrum = to_judge.spectrum if method in ("eigenvalues", "proof", "scipy", "dense QZ") else None
+    spectrum = assessor.spectrum if method in ("eigenvalues", "proof", "scipy", "dense QZ") else None
     if spectrum is not None and method in ("eigenvalues", "proof"):
-        to_judge.system.set_phase(x)
+        assessor.system.set_phase(x)
         if method == "eigenvalues":
             return lambda: spectrum.leftmost(x, NUMBER).values
         spectrum.assemble(x)
@@ -123,7 +123,7 @@ def task(method: str, system: Any, x: PETSc.Vec) -> Callable[[], Any]:
             return np.sort(spl.eigs(S, NUMBER, M, sigma=spectrum.shift, v0=start, tol=1e-9)[0].real)
 
         return eigs
-    return lambda: to_judge(x, method, 0 if method == "count" else NUMBER).values
+    return lambda: assessor(x, method, 0 if method == "count" else NUMBER).values
 
 
 def measure(method: str, formulation: str, elements: int, degree: int, which: str = "straight") -> dict[str, Any]:

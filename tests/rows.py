@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.solvers import BranchSolver
-from rodfem.stability.assessment import judge
+from rodfem.stability.assessment import assess
 
 
 def verify(follower: BranchSolver, branches: Sequence[Branch], explained: bool = True) -> None:
@@ -21,7 +21,7 @@ def verify(follower: BranchSolver, branches: Sequence[Branch], explained: bool =
             if point.mesh != follower.mesh:
                 continue
             follower.system.set_phase(point.x)
-            verdict = judge(follower, point.x, "count")
+            verdict = assess(follower, point.x, "count")
             recorded, counted = (point.negative, point.zero), (verdict.negative, verdict.zero)
             assert recorded == counted, f"{branch.name}, row {row}, load {point.load}: {recorded}, not {counted}"
             if id(point) in special:

@@ -21,7 +21,7 @@ from benchmarks.speed.scenes import with_inertia
 from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
-from rodfem.stability.assessment import Judge
+from rodfem.stability.assessment import Assessor
 
 
 def measure(spectrum: Spectrum, formulation: str, elements: int, degree: int, runs: int) -> dict[str, Any]:
@@ -31,11 +31,11 @@ def measure(spectrum: Spectrum, formulation: str, elements: int, degree: int, ru
     x, outcome = solver.at_load(solver.start(spectrum.load), spectrum.load)
     if not outcome.converged:
         raise ConvergenceError("no straight state")
-    to_judge, times = Judge(solver.system), []
-    number = len(spectrum.values) + (0 if to_judge.conservative else 3)  # the other plane's lie between
+    assessor, times = Assessor(solver.system), []
+    number = len(spectrum.values) + (0 if assessor.conservative else 3)  # the other plane's lie between
     for _ in range(runs + 1):
         started = process_time()
-        verdict = to_judge(x, "shift-invert", number)
+        verdict = assessor(x, "shift-invert", number)
         times.append(process_time() - started)
     found = np.real(verdict.values)
     error = max(float(abs(found / value - 1).min()) for value in spectrum.values)

@@ -17,18 +17,18 @@ from rodfem.fem.system import System
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import save_modes
 from rodfem.output.plot_modes import draw_modes
-from rodfem.stability.assessment import Judge
+from rodfem.stability.assessment import Assessor
 
 
 def check_method(system: System, plan: Plan) -> None:
     """Raise :class:`InputError` for a method that does not apply, before anything is computed."""
-    Judge(system).choose(plan.method or "auto", plan.modes)
+    Assessor(system).choose(plan.method or "auto", plan.modes)
 
 
 def judge_users(
     branches: list[Branch], solvers: Sequence[StaticSolver], plan: Plan, output: Path, report: Report, figures: bool
 ) -> None:
-    """Judge the states at the loads of the plan; save and draw their modes, if they are wanted.
+    """Assessor the states at the loads of the plan; save and draw their modes, if they are wanted.
 
     Each on the mesh on which it was computed.  ``branches`` are those of the diagram, ``solvers`` those of their meshes
     by number.  The ``plan`` names method, loads and number of modes.  Files go to the folder ``output``, pictures too
@@ -49,7 +49,7 @@ def judge_users(
         finder = finders[mesh]
         try:
             if not plan.modes:
-                report.verdict(branch.name, where, finder.judge(special.point.x, plan.method))
+                report.verdict(branch.name, where, finder.assessor(special.point.x, plan.method))
                 continue
             verdict, modes = finder(special.point.x, plan.modes, plan.method or "auto")
         except (InputError, ConvergenceError) as trouble:

@@ -17,7 +17,7 @@ from rodfem.codim2.parameter_plane import LocusPoint, Plane
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure
-from rodfem.stability.nonsymmetric import Vibration
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF
 
 FIRST = 1e-4
@@ -34,7 +34,7 @@ class Collision:
     def __init__(self, solver: StaticSolver, plane: Plane) -> None:
         """Allocate the pencil."""
         self.solver, self.plane = solver, plane
-        self.vibration = Vibration(solver.system)
+        self.eigensolver = NonsymmetricSolver(solver.system)
 
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Size of a step: parameters over the widths of their bounds."""
@@ -106,4 +106,4 @@ class Collision:
         x, outcome = self.solver.at_load(guess, t)
         if not outcome.converged:
             raise ConvergenceError("no equilibrium is found there")
-        return measure(self.vibration.at(x), cluster), x
+        return measure(self.eigensolver.at(x), cluster), x

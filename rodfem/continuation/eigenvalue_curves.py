@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from rodfem.stability.nonsymmetric import ALIKE, Assembled, Frequencies, groups
+from rodfem.stability.nonsymmetric import ALIKE, Frequencies, NonsymmetricPencil, groups
 
 STRANGE = 1.0
 """Sum of the share of a vector outside a curve's and of the relative change, above which another curve begins."""
@@ -27,7 +27,7 @@ class Curves:
         self._numbers: list[int] = []
         self._spans: list[tuple[list[int], np.ndarray]] = []
 
-    def numbers(self, pencil: Assembled, found: Frequencies, *, keep: bool = True) -> list[int]:
+    def numbers(self, pencil: NonsymmetricPencil, found: Frequencies, *, keep: bool = True) -> list[int]:
         """Numbers of the curves of eigenvalues found at a state, which go on from the load before.
 
         Without ``keep`` the next load goes on from the one before all the same.
@@ -65,7 +65,7 @@ class Curves:
         return np.asarray(outside + abs(a - b) / np.maximum(np.maximum(abs(a), abs(b)), 1.0))
 
 
-def _span(pencil: Assembled, found: Frequencies, group: list[int], energy: np.ndarray) -> np.ndarray:
+def _span(pencil: NonsymmetricPencil, found: Frequencies, group: list[int], energy: np.ndarray) -> np.ndarray:
     """Basis of the span of some vectors, orthonormal in the mass."""
     vectors = found.vectors[:, group]
     return vectors / np.sqrt(energy[group]) if len(group) == 1 else pencil.orthonormal(vectors)

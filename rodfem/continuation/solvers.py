@@ -30,7 +30,7 @@ from rodfem.fem.values import NodalValues
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.round_off import decide
-from rodfem.stability.symmetric import Spectrum
+from rodfem.stability.symmetric import SymmetricSolver
 
 LEVEL = 0.05
 """Slope of the load (in spans per unit of arclength) below which it is computed anew at the corrected state, unless the
@@ -144,7 +144,7 @@ class BranchSolver(StaticSolver):
         self.inertia = Inertia(system)
         self.corrector = Corrector(self.inertia)
         self.modes = spectrum
-        self.spectrum = Spectrum(self.inertia) if spectrum else None
+        self.spectrum = SymmetricSolver(self.inertia) if spectrum else None
 
     @cached_property
     def convexity(self) -> Convexity | None:
@@ -208,7 +208,7 @@ class BranchSolver(StaticSolver):
         """Left-most eigenvalues by SLEPc, if asked for; :class:`ConvergenceError` where they contradict the inertia."""
         if self.spectrum is None:
             return []
-        modes = self.spectrum.leftmost(x, self.modes)
+        modes = self.spectrum.at(x).leftmost(self.modes)
         tolerance = self.inertia.tolerance / self.system.scene.length
         least, most = modes.negative(tolerance), modes.negative(-tolerance)
         if not least <= min(index.negative, self.modes) <= most or not modes.certified:

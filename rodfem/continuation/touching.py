@@ -145,7 +145,7 @@ def beside(solver: BranchSolver, end: Point, inner: Point) -> list[Point]:
     step = inner.arclength - end.arclength
     size, far = step / NEARER, inner
     while abs(size) > LEAST * abs(step) and relative(end, far, 1) < DEEP:
-        near = point_between(solver, *sorted((end, far), key=arclength), end.arclength + size)
+        near = point_between(solver, min(end, far, key=arclength), max(end, far, key=arclength), end.arclength + size)
         if near is None:
             return []
         if differs(near, end):

@@ -21,7 +21,7 @@ from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
-from rodfem.stability.nonsymmetric import Vibration
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import unit
 
 MARGIN = 10.0
@@ -64,12 +64,12 @@ def frequency_mesh(
 def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndarray]:
     """Eigenvalues mu nearest the origin at each of the loads, two more than ``number``."""
     solver = StaticSolver(system)
-    vibration = Vibration(solver.system)
+    eigensolver = NonsymmetricSolver(solver.system)
     x, _ = solver.first(float(loads[0]))
     found = []
     for load in loads:
         x = at_load(solver, x, float(load))
-        values = vibration.at(x).near(number + 2, -1e-3).values
+        values = eigensolver.at(x).near(number + 2, -1e-3).values
         found.append(values[np.argsort(abs(values))][: number + 2])
     if min(map(len, found)) < number:
         remedy = Remedy("ask for fewer ({})", Argument("Plan", "spectrum"))

@@ -23,7 +23,7 @@ from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
 from rodfem.problem.scene import Scene
-from rodfem.stability.assessment import Verdict, judge
+from rodfem.stability.assessment import Verdict, assess
 from rodfem.timing import Clock
 
 
@@ -147,7 +147,7 @@ class Solver:
         Raises :class:`~rodfem.errors.InputError` for a method that does not exist or apply, and
         :class:`~rodfem.errors.ConvergenceError` where an eigensolver fails.
         """
-        return judge(self.equilibria, state_of(point), method, number)
+        return assess(self.equilibria, state_of(point), method, number)
 
     def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
         """Left-most modes of an equilibrium on this mesh, each with its value, motion and error.

@@ -30,7 +30,15 @@ from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
-from rodfem.stability.nonsymmetric import EPS, MULTIPLE, NEAR_ZERO, REAL, Assembled, Frequencies, Vibration
+from rodfem.stability.nonsymmetric import (
+    EPS,
+    MULTIPLE,
+    NEAR_ZERO,
+    REAL,
+    Frequencies,
+    NonsymmetricPencil,
+    NonsymmetricSolver,
+)
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 
 LOADS = 101
@@ -83,7 +91,7 @@ class Sweep:
         """
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.span = plan.over(solver.system.scene)
-        self.vibration = Vibration(solver.system)
+        self.eigensolver = NonsymmetricSolver(solver.system)
         self.number = plan.spectrum or FREQUENCIES
         self.curves, self.last = Curves(), NONE
         self.branches: list[Branch] = []
@@ -126,7 +134,8 @@ class Sweep:
         if self.plan.error_bars:
             self._error_bars(branch)
         self.observer.finished(branch)
-        rank, size = self.vibration.held.asymmetry()
+        self.solver.system.set_phase(last.x)
+        rank, size = self.eigensolver.at(last.x).asymmetry()
         self.observer.note(
             f"  the load makes the tangent matrix non-symmetric by a matrix of rank {rank} "
             f"(largest entry {size:.1e} of |S|):\n"
@@ -146,7 +155,7 @@ class Sweep:
     def _point(self, x: PETSc.Vec, *, on_the_way: bool = True) -> Point:
         """Evaluate the records of the equilibrium ``x``; a special point is not ``on_the_way`` of the curves."""
         solver, system = self.solver, self.solver.system
-        pencil = self.vibration.at(x)
+        pencil = self.eigensolver.at(x)
         found = self._leftmost(pencil)
         curves = self.curves.numbers(pencil, found, keep=on_the_way)
         if on_the_way:
@@ -171,7 +180,7 @@ class Sweep:
             curve=curves[: self.number],
         )
 
-    def _leftmost(self, pencil: Assembled) -> Frequencies:
+    def _leftmost(self, pencil: NonsymmetricPencil) -> Frequencies:
         """Left-most eigenvalues: those near the origin, and what became of the complex ones before.
 
         A complex shift looks for a pair that may be farther from the origin than all that the real shift found.
@@ -222,7 +231,8 @@ class Sweep:
 
     def _name(self, point: Point, cluster: Cluster) -> None:
         """Name the motions of the eigenvalues that collide at a point by all that they do: their vectors are one."""
-        name = self.vibration.held.motion(cluster.basis)
+        self.solver.system.set_phase(point.x)
+        name = self.eigensolver.at(point.x).motion(cluster.basis)
         distance = [abs(complex(*value) - cluster.mean) for value in point.omega2]
         for i in np.argsort(distance, kind="stable")[: cluster.size]:
             point.motion[i] = name
@@ -255,8 +265,8 @@ class Sweep:
 
     def _collision(self, here: Point, there: Point, found: Frequencies, chosen: list[int]) -> _Event | None:
         """Collision, on the way ``there``, of eigenvalues complex ``here``; None where they are complex there too."""
-        cluster = cluster_of(self.vibration.at(here.x), found, chosen)
-        other = measure(self.vibration.at(there.x), cluster)
+        cluster = cluster_of(self.eigensolver.at(here.x), found, chosen)
+        other = measure(self.eigensolver.at(there.x), cluster)
         scale = abs(other.values).max()
         if abs(other.discriminant) < (MULTIPLE * scale) ** 2:
             side = ">" if here.load > there.load else "<"
@@ -269,7 +279,7 @@ class Sweep:
         if other.discriminant < 0:
             return None
         located = locate_flutter(
-            self._measured(self.solver, self.vibration, here.x),
+            self._measured(self.solver, self.eigensolver, here.x),
             cluster,
             (there.load + here.load) / 2,
             abs(here.load - there.load),
@@ -277,11 +287,11 @@ class Sweep:
         return _Event(FLUTTER, located.load, cluster.size, located.uncertainty, located.cluster.mean, located.cluster)
 
     @staticmethod
-    def _measured(solver: StaticSolver, vibration: Vibration, guess: PETSc.Vec) -> AtLoad:
+    def _measured(solver: StaticSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> AtLoad:
         """How a cluster is measured at a load: at the equilibrium near ``guess``."""
 
         def measured(load: float, cluster: Cluster) -> Measured:
-            return measure(vibration.at(at_load(solver, guess, load)), cluster)
+            return measure(eigensolver.at(at_load(solver, guess, load)), cluster)
 
         return measured
 
@@ -311,16 +321,18 @@ class Sweep:
 
     def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> _Event:
         """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
-        pencil, number = self.vibration.at(self._state(guess, loads[0])), len(loads)
+        pencil, number = self.eigensolver.at(self._state(guess, loads[0])), len(loads)
         found = pencil.near(number + 2, SHIFT)
         cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
-        load, uncertainty = _zero_between(self._measured(self.solver, self.vibration, guess), cluster, loads[0])
+        load, uncertainty = _zero_between(self._measured(self.solver, self.eigensolver, guess), cluster, loads[0])
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), 1e-11 * unit(load))
         return _Event(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
         """Real eigenvalues at a load near the origin, in ascending order."""
-        return sorted(v.real for v in self._leftmost(self.vibration.at(self._state(guess, load))).values if v.imag == 0)
+        return sorted(
+            v.real for v in self._leftmost(self.eigensolver.at(self._state(guess, load))).values if v.imag == 0
+        )
 
     def _special(self, branch: Branch, special: SpecialPoint) -> None:
         branch.special.append(special)
@@ -330,7 +342,7 @@ class Sweep:
         with self.solver.system.clock.purpose("error bars"):
             system = self.solver.system
             richer = StaticSolver(richer_system(system))
-            vibration, transfer = Vibration(richer.system), Transfer(system, richer.system)
+            eigensolver, transfer = NonsymmetricSolver(richer.system), Transfer(system, richer.system)
             rho = halved(system.fields.discretization.degree)
             for s in branch.special:
                 point = s.point
@@ -339,12 +351,12 @@ class Sweep:
                 left = round_off(point.ordinate)
                 s.ordinate_error = s.error_estimate = bound(point.ordinate, richer.shape.ordinate(x), left, rho)
                 if s.kind == FLUTTER:
-                    load, left, mu = self._richer_flutter(richer, vibration, transfer, guess, s)
+                    load, left, mu = self._richer_flutter(richer, eigensolver, transfer, guess, s)
                     s.error_estimate = max(bound(point.load, load, left, rho), s.located_to)
                     relative = left / max(abs(load), abs(self.span[1] - self.span[0]) * ROUND_OFF)
                     s.omega2_error = bound(s.omega2, mu, MEAN * abs(mu) * max(relative, ROUND_OFF), rho)
                 elif s.kind == DIVERGENCE:
-                    measured, cluster = self._measured(richer, vibration, x), self._transferred(transfer, s)
+                    measured, cluster = self._measured(richer, eigensolver, x), self._transferred(transfer, s)
                     load = _zero(measured, cluster, point.load)
                     s.error_estimate = max(bound(point.load, load, s.located_to, rho), s.located_to)
                 asked = self.plan.accuracy
@@ -358,10 +370,15 @@ class Sweep:
         return Cluster(np.stack(columns, axis=1), s.cluster.mean)
 
     def _richer_flutter(
-        self, richer: StaticSolver, vibration: Vibration, transfer: Transfer, guess: PETSc.Vec, s: SpecialPoint
+        self,
+        richer: StaticSolver,
+        eigensolver: NonsymmetricSolver,
+        transfer: Transfer,
+        guess: PETSc.Vec,
+        s: SpecialPoint,
     ) -> tuple[float, float, float]:
         """Flutter load on the richer discretisation, its uncertainty there, and the double eigenvalue."""
-        measured, cluster = self._measured(richer, vibration, guess), self._transferred(transfer, s)
+        measured, cluster = self._measured(richer, eigensolver, guess), self._transferred(transfer, s)
         if s.note:  # double there, whatever the mesh
             return s.point.load, 0.0, measured(s.point.load, cluster).cluster.mean
         width = max(0.05 * abs(s.point.load), 0.01 * abs(self.span[1] - self.span[0]))

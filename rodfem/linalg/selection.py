@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from rodfem.linalg.factorization import Factors, Klu, Mumps, is_cut, lu_package
 from rodfem.linalg.replicated import Copied
-from rodfem.linalg.substructured import Condensed
+from rodfem.linalg.substructured import SubstructuredFactors
 
 
 def factors_of(
@@ -29,7 +29,7 @@ def factors_of(
     factors = Klu(prefix, scalars) if lu else Mumps(kind, controls, thresholds, prefix)
     if comm.size == 1:
         return factors
-    return Condensed(scalars, factors) if is_cut(comm, unknowns) else Copied(factors)
+    return SubstructuredFactors(scalars, factors) if is_cut(comm, unknowns) else Copied(factors)
 
 
 def solving(counting: Factors, comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:

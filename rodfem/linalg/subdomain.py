@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from rodfem.linalg.matrices import first_of
 
 
-class Piece:
+class Subdomain:
     """Rows and columns of this rank's inner unknowns, and of the interface unknowns that couple to them.
 
     Interface (shared) unknowns are the last ``scalars`` ones and, for each pair of coupled ranks, the boundary

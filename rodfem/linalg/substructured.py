@@ -44,7 +44,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.factorization import Block, Klu, Mumps, Spread
-from rodfem.linalg.subdomain import Piece
+from rodfem.linalg.subdomain import Subdomain
 
 GROWTH = 100.0
 """Largest compliance of a braced piece, relative to that of its springs; the excess over one is lost in digits."""
@@ -60,7 +60,7 @@ an unknown couples to this piece alone.
 """
 
 
-class Condensed(Spread):
+class SubstructuredFactors(Spread):
     """Factors on several ranks: of each rank's piece by KLU or MUMPS, and of the interface matrix on all ranks.
 
     :class:`~rodfem.linalg.factorization.Factors` of matrices whose pattern is symmetric and stays.
@@ -77,7 +77,7 @@ class Condensed(Spread):
         """Factor ``matrix``; raises :class:`ConvergenceError` on all ranks where one gives up."""
         if self._matrix is None or matrix.handle != self._matrix.handle:
             self._matrix = matrix
-            self.piece = Piece(matrix, self.scalars, symmetric=self.symmetric)
+            self.piece = Subdomain(matrix, self.scalars, symmetric=self.symmetric)
             self.touched = self.piece.comm.allgather(self.piece.touched)
             self._block = Block(self.factors, self.piece.matrix.size[0])
             if isinstance(self.factors, Klu):

@@ -16,8 +16,8 @@ from rodfem.linalg.orthogonal import orthonormalize
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
 from rodfem.modes.perturbation import Motion, Motions
 from rodfem.stability import mode_type as character
-from rodfem.stability.assessment import Judge, Verdict
-from rodfem.stability.left_right import both_sides
+from rodfem.stability.assessment import Assessor, Verdict
+from rodfem.stability.left_right import two_sided
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
 
 EQUAL = 1e-6
@@ -33,15 +33,15 @@ class ModeFinder:
 
     def __init__(self, solver: StaticSolver, error_bars: bool = True) -> None:
         """Keep the solver of the equilibria; ``error_bars`` are from a second, richer discretisation."""
-        self.judge, self.motions = Judge(solver), Motions(solver.system)
+        self.assessor, self.motions = Assessor(solver), Motions(solver.system)
         self.system, self.error_bars = solver.system, error_bars
-        self._richer: tuple[StaticSolver, Judge, Transfer] | None = None
+        self._richer: tuple[StaticSolver, Assessor, Transfer] | None = None
 
     def __call__(self, x: PETSc.Vec, number: int, method: str = "auto") -> tuple[Verdict, Modes]:
-        """Judge the equilibrium ``x`` and find its ``number`` left-most modes (nearest zero without a potential)."""
-        verdict = self.judge(x, method, number)
+        """Assessor the equilibrium ``x`` and find its ``number`` left-most modes (nearest zero without a potential)."""
+        verdict = self.assessor(x, method, number)
         sample = self.motions.sample(x)
-        found = self._conservative(x, verdict) if self.judge.conservative else self._pairs(x, number)
+        found = self._conservative(x, verdict) if self.assessor.conservative else self._pairs(x, number)
         errors = np.full(len(found["value"]), np.nan)
         values = found["value"][: len(found["value"]) - found["motion"].count(SYMMETRY)]
         if self.error_bars:
@@ -54,16 +54,15 @@ class ModeFinder:
 
     def _conservative(self, x: PETSc.Vec, verdict: Verdict) -> dict[str, Any]:
         """Modes from the vectors of a verdict, orthonormal in the mass, and the symmetries'."""
-        spectrum = self.judge.spectrum
         if not verdict.vectors:
             raise InputError("Counting alone finds no modes: choose another method than 'count'.")
-        spectrum.assemble(x)
+        mass = self.assessor.symmetric.at(x).mass
         vectors = [v.copy() for v in verdict.vectors]
-        orthonormalize(vectors, spectrum.mass)
+        orthonormalize(vectors, mass)
         vectors = self._turned(x, verdict.values, vectors)
-        duals = [spectrum.mass * v for v in vectors]
+        duals = [mass * v for v in vectors]
         symmetries = symmetry_modes(self.system, x)
-        for vector, dual in weighed_modes(self.system, symmetries, spectrum.mass).values():
+        for vector, dual in weighed_modes(self.system, symmetries, mass).values():
             vectors.append(vector)
             duals.append(dual)
         motions = [self.motions.at(x, v) for v in vectors]
@@ -111,7 +110,7 @@ class ModeFinder:
 
     def _pairs(self, x: PETSc.Vec, number: int) -> dict[str, Any]:
         """Right and left modes of the eigenvalues nearest zero, biorthonormal in the mass."""
-        found = both_sides(self.judge.vibration.at(x), number)
+        found = two_sided(self.assessor.nonsymmetric.at(x), number)
         right, left = ([self._complex(x, column) for column in part.T] for part in (found.right, found.left))
         sign = np.sign([np.real(m.r.sum() + 0.01 * m.w.sum()) or 1.0 for m in right])
         right, left = (
@@ -145,14 +144,14 @@ class ModeFinder:
         if self._richer is None:
             richer = richer_system(self.system)
             solver = StaticSolver(richer)
-            self._richer = solver, Judge(solver), Transfer(self.system, richer)
-        solver, judge, transfer = self._richer
+            self._richer = solver, Assessor(solver), Transfer(self.system, richer)
+        solver, assessor, transfer = self._richer
         guess = transfer(x, state=True)
         solver.system.set_phase(guess)
         y, outcome = solver.at_load(guess, self.system.scalar(x), reach=1.0)
         if not outcome.converged:
             return np.full(len(values), np.inf)
-        others = judge(y, number=2 * len(values) + 2 if np.iscomplexobj(values) else len(values)).values
+        others = assessor(y, number=2 * len(values) + 2 if np.iscomplexobj(values) else len(values)).values
         rho, left = halved(self.system.fields.discretization.degree), FLOOR * max(1.0, float(abs(values).max()))
         if np.iscomplexobj(values):
             others = np.array([others[np.argmin(abs(others - v))] for v in values])

@@ -81,7 +81,7 @@ class Verdict:
         )
 
 
-class Judge(Workspace):
+class Assessor(Workspace):
     """Judges states of one system; keeps matrices, symbolic factorisations and the last modes for the next state."""
 
     def __init__(self, source: Any) -> None:
@@ -105,7 +105,7 @@ class Judge(Workspace):
         return name, "as asked"
 
     def __call__(self, x: PETSc.Vec, method: str = AUTO, number: int = 4, interval: Any = None) -> Verdict:
-        """Judge the equilibrium ``x``; sets the phase conditions there.
+        """Assessor the equilibrium ``x``; sets the phase conditions there.
 
         ``interval`` (low, high) is where slicing looks, by default where the ``number`` left-most are.  Raises
         :class:`InputError` for a method that does not exist or apply and for dependent constraints,
@@ -151,10 +151,10 @@ class Judge(Workspace):
             raise
 
 
-def judge(source: Any, x: PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
-    """Judge one state of a system or solver: see :class:`Judge`, which is to be kept along a branch.
+def assess(source: Any, x: PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
+    """Assessor one state of a system or solver: see :class:`Assessor`, which is to be kept along a branch.
 
     ``source`` is the system or solver, ``x`` its equilibrium; ``method`` and ``number`` are those of
-    :meth:`Judge.__call__`.
+    :meth:`Assessor.__call__`.
     """
-    return Judge(source)(x, method, number)
+    return Assessor(source)(x, method, number)

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.stability.nonsymmetric import REAL, Assembled, Frequencies
+from rodfem.stability.nonsymmetric import REAL, Frequencies, NonsymmetricPencil
 
 BESIDE = 1e-3
 """Distance from zero at which eigenvalues near zero are looked for: the matrix is singular there."""
@@ -54,12 +54,12 @@ class Measured:
         return float(np.sqrt(abs(self.discriminant)) / max(abs(self.values).max(), 1e-300))
 
 
-def cluster_of(pencil: Assembled, found: Frequencies, chosen: list[int]) -> Cluster:
+def cluster_of(pencil: NonsymmetricPencil, found: Frequencies, chosen: list[int]) -> Cluster:
     """Cluster of the ``chosen`` ones of eigenvalues found at a state, closed under conjugation."""
     return Cluster(_real_span(pencil, found.vectors[:, chosen]), float(found.values[chosen].real.mean()))
 
 
-def measure(pencil: Assembled, cluster: Cluster) -> Measured:
+def measure(pencil: NonsymmetricPencil, cluster: Cluster) -> Measured:
     """Find at a state a cluster known from a state nearby; raises :class:`ConvergenceError`."""
     basis, size = _real_span(pencil, cluster.basis), cluster.size
     for number in (size + 2, 3 * size + 10):
@@ -88,7 +88,7 @@ def as_vectors(system: System, columns: np.ndarray) -> list[PETSc.Vec]:
     return out
 
 
-def _real_span(pencil: Assembled, vectors: np.ndarray) -> np.ndarray:
+def _real_span(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
     """Real basis (n, k), orthonormal in the mass, of the span of ``vectors`` (n, k), closed under conjugation."""
     parts = np.concatenate([vectors.real, vectors.imag], axis=1) if np.iscomplexobj(vectors) else vectors
     squares, turn = np.linalg.eigh(pencil.product(parts, pencil.weighed(parts)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodfem.errors import ConvergenceError
-from rodfem.stability.nonsymmetric import Assembled
+from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
 SAME = 1e-6
 """Relative difference below which a left and a right eigenvalue are paired."""
@@ -17,7 +17,7 @@ REAL = 1e-10
 
 
 @dataclass(frozen=True)
-class BothSides:
+class TwoSided:
     """Eigenvalues ``values`` (k,) nearest zero of non-negative imaginary part, backward ``errors``, motions ``kinds``.
 
     ``right`` X and ``left`` Z (n, k) on this rank's n unknowns: ``X^* M X = 1`` for each, ``X^t M X`` real and
@@ -32,7 +32,7 @@ class BothSides:
     weighed: np.ndarray
 
 
-def both_sides(pencil: Assembled, number: int) -> BothSides:
+def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
     """Compute ``number`` biorthonormal left/right eigenpairs nearest zero.
 
     Raises :class:`ConvergenceError` if a right eigenvalue has no left partner.
@@ -56,7 +56,7 @@ def both_sides(pencil: Assembled, number: int) -> BothSides:
     X = X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * pencil.weighed(X), axis=0))))
     Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ pencil.weighed(X)).T)
     values = right.values[chosen]
-    return BothSides(
+    return TwoSided(
         np.where(abs(values.imag) < REAL * abs(values), values.real, values),
         right.errors[chosen],
         tuple(right.kinds[i] for i in chosen),

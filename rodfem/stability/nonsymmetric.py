@@ -33,13 +33,15 @@ from rodfem.fem.system import System
 from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, Mumps, is_cut
 from rodfem.linalg.replicated import Copy
 from rodfem.linalg.selection import factors_of
-from rodfem.linalg.substructured import Condensed
+from rodfem.linalg.substructured import SubstructuredFactors
 from rodfem.stability import mode_type as character
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.pencil import (
     FACTORS,
     LARGE,
     Inverse,
+    PencilMatrices,
+    StatePencil,
     assemble_pencil,
     exclude_modes,
     shift_invert,
@@ -108,17 +110,16 @@ class _Pair:
         return np.asarray(self.parts[0] + 1j * (0.0 if len(self.parts) < 2 else self.parts[1]))
 
 
-class Vibration:
+class NonsymmetricSolver(PencilMatrices):
     """Matrices of the pencil, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`."""
 
     def __init__(self, system: System) -> None:
         """Allocate the matrices of the pencil once."""
-        self.system = system
-        self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
+        super().__init__(system)
         self.copies: list[Copy] = []
-        self.turned, self.free, self.filled = np.zeros((0, 0, 4)), dict[int, PETSc.Vec](), 0
+        self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
 
-    def at(self, x: PETSc.Vec) -> Assembled:
+    def at(self, x: PETSc.Vec) -> NonsymmetricPencil:
         """Assemble the pencil at the state ``x``, at which the phase conditions must be set.
 
         Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
@@ -132,41 +133,16 @@ class Vibration:
                 exclude_modes(self.system, free, self.matrix, self.mass)
             self.free = {i: mode for i, (mode, _) in weighed_modes(self.system, free, self.mass).items()}
             self.turned = state.turned
-        return Assembled(self)
-
-    @property
-    def held(self) -> Assembled:
-        """Whatever state the matrices hold."""
-        return Assembled(self)
+        return NonsymmetricPencil(self)
 
 
-class Assembled:
-    """The pencil of one state: eigenvalues near a shift, and products in its mass.
+class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
+    """The pencil of one state: eigenvalues near a shift, and products in its mass."""
 
-    Raises :class:`RuntimeError` where the matrices hold another state by now: a number of another state is never
-    returned.
-    """
-
-    def __init__(self, vibration: Vibration) -> None:
+    def __init__(self, shared: NonsymmetricSolver) -> None:
         """Be the state that the matrices were just filled for."""
-        self.system, self._vibration, self._filled = vibration.system, vibration, vibration.filled
-        self._turned, self._free, self._own = vibration.turned, vibration.free, slice(None)
-
-    def _held(self) -> Vibration:
-        """Matrices, while they are those of this state."""
-        if self._vibration.filled != self._filled:
-            raise RuntimeError("The matrices hold another state by now: ask for this one again, by Vibration.at.")
-        return self._vibration
-
-    @property
-    def matrix(self) -> PETSc.Mat:
-        """Tangent matrix ``S``, and constraints against motions of symmetries."""
-        return self._held().matrix
-
-    @property
-    def mass(self) -> PETSc.Mat:
-        """Kinetic metric ``M``."""
-        return self._held().mass
+        super().__init__(shared)
+        self._turned, self._free, self._own = shared.turned, shared.free, slice(None)
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
@@ -213,7 +189,7 @@ class Assembled:
         comm = self.system.comm
         if comm.size == 1 or is_cut(comm, self.matrix.getSize()[0]):
             return pencil
-        copies = self._vibration.copies = self._vibration.copies or [Copy(matrix) for matrix in pencil]
+        copies = self._shared.copies = self._shared.copies or [Copy(matrix) for matrix in pencil]
         self._own = copies[0].own
         whole, mass = (copy.update(matrix) for copy, matrix in zip(copies, pencil, strict=True))
         return whole, mass
@@ -394,7 +370,7 @@ class Assembled:
         shifted.axpy(-target, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         dense_rows = self.system.fields.dense_rows
         if doubled:
-            factors: Factors = Condensed(dense_rows, Mumps("lu", {8: 0}, prefix=FACTORS))
+            factors: Factors = SubstructuredFactors(dense_rows, Mumps("lu", {8: 0}, prefix=FACTORS))
         else:
             factors = factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=FACTORS)
         factors(shifted)

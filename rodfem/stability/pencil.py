@@ -8,6 +8,7 @@ else ``-rodfem_lu_...`` (see :mod:`rodfem.linalg.factorization`).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Generic, TypeVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -28,6 +29,47 @@ LARGE = 5000
 """Rows of a pencil from which MUMPS factors it: a dense row may fill in KLU's factors."""
 LEAST = 6
 """How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
+
+
+class PencilMatrices:
+    """Matrices of a pencil, allocated once, which the states of one system share; ``filled`` counts those states."""
+
+    def __init__(self, system: System) -> None:
+        """Hold no state yet."""
+        self.system = system
+        self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
+        self.filled = 0
+
+
+Matrices = TypeVar("Matrices", bound=PencilMatrices)
+
+
+class StatePencil(Generic[Matrices]):
+    """The pencil of one state.
+
+    Raises :class:`RuntimeError` where the matrices hold another state by now: a number of another state is never
+    returned.
+    """
+
+    def __init__(self, shared: Matrices) -> None:
+        """Be the state that the matrices were just filled for."""
+        self.system, self._shared, self._filled = shared.system, shared, shared.filled
+
+    def _held(self) -> Matrices:
+        """Matrices, while they are those of this state."""
+        if self._shared.filled != self._filled:
+            raise RuntimeError("The matrices hold another state by now: ask for this one again, by the solver's at().")
+        return self._shared
+
+    @property
+    def matrix(self) -> PETSc.Mat:
+        """Tangent matrix ``S``, and constraints against motions of symmetries."""
+        return self._held().matrix
+
+    @property
+    def mass(self) -> PETSc.Mat:
+        """Kinetic metric ``M``."""
+        return self._held().mass
 
 
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> State:

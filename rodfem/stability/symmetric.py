@@ -26,7 +26,15 @@ from rodfem.fem.system import dense_columns
 from rodfem.linalg.factorization import Factors
 from rodfem.linalg.selection import solving
 from rodfem.stability.inertia import Inertia, inertia_factors
-from rodfem.stability.pencil import Inverse, assemble_pencil, exclude_modes, symmetry_modes, with_factors
+from rodfem.stability.pencil import (
+    Inverse,
+    PencilMatrices,
+    StatePencil,
+    assemble_pencil,
+    exclude_modes,
+    symmetry_modes,
+    with_factors,
+)
 
 HIT = 1e-8
 """A shift nearer to an eigenvalue than this, relative to the farthest one found, spoils the others by round-off."""
@@ -35,6 +43,8 @@ HIT = 1e-8
 EXTRA = (1, 4, 14)
 """How many eigenvalues more than wanted are computed, at the first, the second and the third attempt."""
 
+DISTINCT = 1e-6
+"""Eigenvalues closer than this, relative to the greatest, are one where the values found are counted."""
 CONVERGED = 1e-7
 """Residual, relative to the stiffness, above which a pair is rejected: the Krylov space broke down."""
 NOISE = 1e-6
@@ -71,8 +81,8 @@ class _Shifted:
     at: float = np.nan
 
 
-class Spectrum:
-    """Computes left-most eigenvalues at states of the system of an :class:`~rodfem.stability.inertia.Inertia`.
+class SymmetricSolver(PencilMatrices):
+    """Matrices and factorisations of the pencil, which the states of one system share: see :meth:`at`.
 
     Attributes
     ----------
@@ -85,37 +95,60 @@ class Spectrum:
 
     def __init__(self, inertia: Inertia) -> None:
         """Allocate the matrices of the pencil once."""
-        self.inertia, self.system = inertia, inertia.system
-        self.matrix = self.system.state_matrix()
-        self.mass = self.system.metric_matrix()
+        super().__init__(inertia.system)
+        self.inertia = inertia
         system, sizes = self.system, (self.system.fields.unknowns, self.system.fields.dense_rows)
         counting = inertia_factors(system.comm, *sizes)
-        self._counting = self._solving = _Shifted(counting, system.state_matrix())
+        self.counting = self.solving = _Shifted(counting, system.state_matrix())
         solver = solving(counting, system.comm, *sizes)
         if solver is not counting:
-            self._solving = _Shifted(solver, system.state_matrix())
+            self.solving = _Shifted(solver, system.state_matrix())
         self.shift = -inertia.scale
         self.factorisations = 0
-        self._last = np.zeros(0)
-        self._deflated: list[PETSc.Vec] = []
+        self.last = np.zeros(0)
+        self.deflated: list[PETSc.Vec] = []
 
-    def assemble(self, x: PETSc.Vec) -> None:
+    def at(self, x: PETSc.Vec) -> SymmetricPencil:
         """Assemble the pencil of the state ``x``, at which the phase conditions must be set."""
         system = self.system
+        self.filled += 1
         with system.clock("assembly"):
             modes = symmetry_modes(system, x)
             assemble_pencil(system, x, self.matrix, self.mass)
-            self._deflated = exclude_modes(system, modes, self.matrix, self.mass)
-        self._counting.at = self._solving.at = np.nan
+            self.deflated = exclude_modes(system, modes, self.matrix, self.mass)
+        self.counting.at = self.solving.at = np.nan
+        return SymmetricPencil(self)
 
-    def leftmost(self, x: PETSc.Vec, number: int) -> Modes:
-        """Return the ``number`` left-most eigenvalues of the state ``x``, at which the phase conditions must be set.
+    def factor(self, sigma: float, shifted: _Shifted) -> None:
+        """Factor ``S - sigma M``, unless that is what was factored last."""
+        if sigma == shifted.at:
+            return
+        self.matrix.copy(shifted.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        shifted.matrix.axpy(-sigma, self.mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        shifted.matrix.stateIncrease()
+        shifted.factors(shifted.matrix)
+        shifted.at = sigma
+        self.factorisations += 1
 
-        Raises :class:`ConvergenceError` where SLEPc finds fewer.
-        """
-        self.assemble(x)
+
+class SymmetricPencil(StatePencil[SymmetricSolver]):
+    """The pencil of one state: its left-most eigenvalues, and counts below a number."""
+
+    def __init__(self, shared: SymmetricSolver) -> None:
+        """Be the state that the matrices were just filled for."""
+        super().__init__(shared)
+        self.inertia = shared.inertia
+
+    @property
+    def shift(self) -> float:
+        """Where the next computation starts."""
+        return self._held().shift
+
+    def leftmost(self, number: int) -> Modes:
+        """Return the ``number`` left-most eigenvalues; raises :class:`ConvergenceError` where SLEPc finds fewer."""
+        held = self._held()
         with self.system.clock("stability"):
-            modes = self._solve(number, EXTRA[0]) if len(self._last) else NOTHING
+            modes = self._solve(number, EXTRA[0]) if len(held.last) else NOTHING
             if not modes.certified:
                 self.go_below()
                 for extra in EXTRA:
@@ -128,16 +161,17 @@ class Spectrum:
                 "richer discretisation."
             )
         spread = modes.values[-1] - modes.values[0] + 1e-3 * abs(modes.values).max()
-        self.shift = modes.values[0] - 0.1 * spread
+        held.shift = modes.values[0] - 0.1 * spread
         return modes
 
     def go_below(self) -> None:
         """Move the shift to below the spectrum; raises :class:`ConvergenceError` where it has no lower end."""
-        step = max(abs(self.shift), self.inertia.scale)
+        held = self._held()
+        step = max(abs(held.shift), self.inertia.scale)
         for _ in range(40):
-            if self.below(self.shift) == 0:
+            if self.below(held.shift) == 0:
                 return
-            self.shift -= step
+            held.shift -= step
             step *= 3
         raise ConvergenceError(
             "The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness; give the rod a "
@@ -145,12 +179,13 @@ class Spectrum:
         )
 
     def below(self, sigma: float) -> int:
-        """Number of eigenvalues of the pencil last assembled below ``sigma``, symmetry modes not included.
+        """Number of eigenvalues below ``sigma``, symmetry modes not included.
 
         Raises :class:`ConvergenceError` where the count breaks down: constraints depend on each other.
         """
-        self._factor(sigma, self._counting)
-        negative, zero = self._counting.factors.inertia()
+        held = self._held()
+        held.factor(sigma, held.counting)
+        negative, zero = held.counting.factors.inertia()
         below = negative - self.inertia.constraints - self.system.active_drifts()
         if zero or below < 0:
             raise ConvergenceError(
@@ -159,16 +194,15 @@ class Spectrum:
             )
         return int(below)
 
-    def _factor(self, sigma: float, shifted: _Shifted) -> None:
-        """Factor ``S - sigma M``, unless that is what was factored last."""
-        if sigma == shifted.at:
-            return
-        self.matrix.copy(shifted.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        shifted.matrix.axpy(-sigma, self.mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        shifted.matrix.stateIncrease()
-        shifted.factors(shifted.matrix)
-        shifted.at = sigma
-        self.factorisations += 1
+    def certifies(self, values: np.ndarray) -> bool:
+        """Whether counts find none below the least of ``values``, and as many as there are below the greatest."""
+        small = DISTINCT * max(abs(values).max(), self.inertia.scale)
+        distinct = values < values[-1] - small
+        return (
+            self.below(values[0] - small) == 0
+            and self.below(values[-1] - small) == distinct.sum()
+            and self.below(values[-1] + small) >= len(values)
+        )
 
     def _solve(self, number: int, extra: int) -> Modes:
         """Solve for ``number`` values and some more, and count whether any is missing among the first ``number``.
@@ -176,18 +210,19 @@ class Spectrum:
         A Krylov method finds the second of two equal eigenvalues late, by round-off: it is there when more are
         asked for.
         """
-        self._factor(self.shift, self._solving)
-        if not self._solving.factors.regular:
-            self.shift -= self.inertia.scale
+        held = self._held()
+        held.factor(held.shift, held.solving)
+        if not held.solving.factors.regular:
+            held.shift -= self.inertia.scale
             return self._solve(number, extra)
         values, vectors, errors = self._krylov_schur(number, number + extra)
-        reach = max(values[-1] - self.shift, self.inertia.scale) if len(values) else np.inf
-        if len(values) and values[0] - self.shift < HIT * reach:
-            self.shift -= reach
+        reach = max(values[-1] - held.shift, self.inertia.scale) if len(values) else np.inf
+        if len(values) and values[0] - held.shift < HIT * reach:
+            held.shift -= reach
             return self._solve(number, extra)
         if len(values) < number:
             return Modes(values, vectors, errors, False)
-        self._last = sum(vector.array_r for vector in vectors)
+        held.last = sum(vector.array_r for vector in vectors)
         cut = values[number - 1] + 1e-6 * max(abs(values[number - 1]), self.inertia.scale)
         known = int((values < cut).sum())
         return Modes(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
@@ -197,12 +232,12 @@ class Spectrum:
 
         Where it asks for more than there are finite ones, the Krylov space breaks down, and what comes is no eigenpair.
         """
-        start = self.inertia.seed(1)
-        if len(self._last):  # a space that is invariant already would miss all else
+        held, start = self._held(), self.inertia.seed(1)
+        if len(held.last):  # a space that is invariant already would miss all else
             start.scale(NOISE / self.system.norm(start))
-            start.array[:] += self._last
-        inverse = Inverse(self._solving.factors)
-        solver = with_factors(self.matrix, self.mass, number, self.shift, inverse, start, self._deflated)
+            start.array[:] += held.last
+        inverse = Inverse(held.solving.factors)
+        solver = with_factors(held.matrix, held.mass, number, held.shift, inverse, start, held.deflated)
         solver.solve()
         found = solver.getConverged()
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
@@ -234,9 +269,10 @@ class Spectrum:
         right, solved = dense_columns(self.system, len(vectors)), dense_columns(self.system, len(vectors))
         for i, vector in enumerate(vectors):
             right.getDenseArray()[:, i] = (self.mass * vector).array_r
-        self._solving.factors.solve_all(right, solved)
+        held = self._held()
+        held.solving.factors.solve_all(right, solved)
         for i, (value, vector) in enumerate(zip(values, vectors, strict=True)):
-            vector.array[:] = (value - self.shift) * solved.getDenseArray()[:, i]
+            vector.array[:] = (value - held.shift) * solved.getDenseArray()[:, i]
 
     def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:
         """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""

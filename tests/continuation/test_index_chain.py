@@ -45,7 +45,7 @@ from rodfem.continuation.special_points import directions, leave
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.tracer import equivalent
 from rodfem.output.files import _branch_data
-from rodfem.stability.assessment import judge
+from rodfem.stability.assessment import assess
 
 EULER = pi**2 / 4
 """Buckling load of the clamped-free column."""
@@ -76,7 +76,7 @@ def test_a_rod_under_high_tension() -> None:
     assert {p.negative for p in buckled.points[1:]} == {1}
     for point in buckled.points[10::8]:
         solver.system.set_phase(point.x)
-        assert judge(solver, point.x, "reduction").negative == 1
+        assert assess(solver, point.x, "reduction").negative == 1
 
 
 @pytest.mark.parametrize("apart", [3e-3, 1e-4, 1e-6])

@@ -22,7 +22,7 @@ from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.output.plot_frequencies import curves, draw_frequencies
 from rodfem.problem.scene import Scene
-from rodfem.stability.nonsymmetric import Vibration
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 
 def swept(scene: Scene, monkeypatch: pytest.MonkeyPatch, loads: int = 26) -> tuple[Branch, dict, str]:
@@ -110,7 +110,7 @@ def test_long_pencil_on_any_number_of_ranks() -> None:
     solver = Solver(classics.partly_following(1.0, (0.0, 25.0)), Discretization("pointwise", 2000, 1)).equilibria
     x, outcome = solver.at_load(solver.start(10.0), 10.0)
     assert outcome.converged
-    vibration = Vibration(solver.system).at(x)
+    vibration = NonsymmetricSolver(solver.system).at(x)
     for target in (1.0, 26 + 3j):
         values = vibration.near(2, target).values
         assert abs(values - column(26.7885149853, 10.0)).min() < 3e-7 * 26.8

@@ -16,8 +16,8 @@ from rodfem.fem.system import System
 from rodfem.linalg.factorization import Klu, Mumps, lu_package
 from rodfem.linalg.matrices import gathered
 from rodfem.linalg.replicated import Copied
-from rodfem.linalg.substructured import Condensed
-from rodfem.stability.assessment import Judge
+from rodfem.linalg.substructured import SubstructuredFactors
+from rodfem.stability.assessment import Assessor
 from rodfem.stability.inertia import Inertia
 
 pytestmark = pytest.mark.short
@@ -39,10 +39,10 @@ def at(name: str, state: str, formulation: str, load: float) -> tuple[System, PE
     return system, x
 
 
-def symmetric(system: System, shared: str) -> Condensed | Copied:
+def symmetric(system: System, shared: str) -> SubstructuredFactors | Copied:
     """LDL^t factors."""
     factors = Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3})
-    return Copied(factors) if shared == "copies" else Condensed(system.fields.dense_rows, factors)
+    return Copied(factors) if shared == "copies" else SubstructuredFactors(system.fields.dense_rows, factors)
 
 
 def whole(vector: PETSc.Vec) -> np.ndarray:
@@ -114,7 +114,7 @@ def test_matrix_without_symmetry(formulation: str, name: str, load: float, packa
         formulation = "pointwise"
     system, x = at(name, "plain", formulation, load)
     alone = Klu(LU, system.fields.dense_rows) if package == "klu" else Mumps("lu", {8: 0})
-    factors = Copied(alone) if shared == "copies" else Condensed(system.fields.dense_rows, alone)
+    factors = Copied(alone) if shared == "copies" else SubstructuredFactors(system.fields.dense_rows, alone)
     row = system.metric * x
     system.set_load(row, 1.0)
     matrix = system.at(x).jacobian(row)
@@ -145,7 +145,7 @@ def frequencies(n: int) -> np.ndarray:
 def test_pieces_may_be_singular_where_the_whole_is_not() -> None:
     """At eigenvalues of all parts of the chain the whole is counted right, and solved with."""
     n = 24
-    factors = Condensed(1, Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
+    factors = SubstructuredFactors(1, Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
     exact = frequencies(n)
     for sigma in np.unique(np.round([s for m in range(1, n) for s in frequencies(m)], 12)):
         if abs(exact - sigma).min() < 1e-6:
@@ -168,11 +168,11 @@ def test_long_rods_are_cut(formulation: str, elements: int) -> None:
         solver = Solver(small_states.scene("cord"), Discretization(formulation, elements, 1), comm).equilibria
         system = solver.system
         for factors in (solver.inertia.factors, system.lu):
-            assert isinstance(factors, Condensed) == (comm.size > 1)
+            assert isinstance(factors, SubstructuredFactors) == (comm.size > 1)
         system.set_phase(None)
         x, outcome = solver.at_load(solver.start(20.0), 20.0)
         assert outcome.converged
-        verdict = Judge(solver)(x, number=3)
+        verdict = Assessor(solver)(x, number=3)
         assert verdict.certified
         factored = solver.inertia.at(x)
         factored.count()

@@ -18,7 +18,7 @@ from scipy.special import ellipe, ellipk, jv
 from shooting_solver import Rod
 
 from rodfem import Discretization, End, Scene, Solver, clamped
-from rodfem.stability.nonsymmetric import Vibration
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 
 def root(f: Callable[[float], float], a: float, b: float) -> float:
@@ -417,7 +417,7 @@ def test_torque_on_a_cantilever(kind: str) -> None:
     for T in (0.3, 0.6, 0.9):
         x, outcome = solver.at_load(x, T)
         assert outcome.converged
-        values = Vibration(solver.system).at(x).near(4, -1e-3).values
+        values = NonsymmetricSolver(solver.system).at(x).near(4, -1e-3).values
 
         def frequency(mu: complex, T: float = T) -> complex:  # w'''' - i T w''' = mu w, where w = x + i y
             A = np.eye(4, k=1, dtype=complex)

@@ -21,18 +21,18 @@ from rodfem.continuation.branch import Branch
 from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
-from rodfem.stability.nonsymmetric import Assembled, Vibration
+from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 
 DEMO = Path(__file__).parents[2] / "demos" / "follower.py"
 
 
 @cache
-def vibration(P: float, elements: int = 8, degree: int = 6, **constants: object) -> Assembled:
+def vibration(P: float, elements: int = 8, degree: int = 6, **constants: object) -> NonsymmetricPencil:
     """The pencil of the demo at one load."""
     solver = Solver(scene("follower", **constants), Discretization("pointwise", elements, degree)).equilibria
     x, outcome = solver.at_load(solver.start(P), P)
     assert outcome.converged
-    return Vibration(solver.system).at(x)
+    return NonsymmetricSolver(solver.system).at(x)
 
 
 @cache

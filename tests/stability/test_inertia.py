@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.solvers import BranchSolver
-from rodfem.stability.symmetric import Spectrum
+from rodfem.stability.symmetric import SymmetricSolver
 
 SMALL = (6, 3)
 FORMULATIONS = pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
@@ -115,8 +115,8 @@ def test_counts_below_large_values() -> None:
 def test_spectrum_is_that_of_dense_matrices(formulation: str, branch: int, load: float) -> None:
     f, p = follower(formulation, *SMALL), state(formulation, branch, load)
     f.system.set_phase(p.x)
-    spectrum = Spectrum(f.inertia)
-    modes = spectrum.leftmost(p.x, 6)
+    spectrum = SymmetricSolver(f.inertia)
+    modes = spectrum.at(p.x).leftmost(6)
     mu = eigenvalues(dense(spectrum.matrix), dense(spectrum.mass), f)
     mu = mu[abs(mu) > f.inertia.tolerance]
     np.testing.assert_allclose(modes.values, mu[:6], rtol=1e-7, atol=1e-9)
@@ -130,7 +130,7 @@ def test_spectrum_of_the_straight_rod(load: float) -> None:
     f.system.set_phase(None)
     x, outcome = f.at_load(f.start(load), load)
     assert outcome.converged
-    modes = Spectrum(f.inertia).leftmost(x, 8)
+    modes = SymmetricSolver(f.inertia).at(x).leftmost(8)
     np.testing.assert_allclose(modes.values, closed_form_hemitropic.spectrum(load, *DEFAULT)[:8], rtol=1e-7, atol=1e-9)
     assert modes.errors.max() < 1e-8
 
@@ -138,9 +138,9 @@ def test_spectrum_of_the_straight_rod(load: float) -> None:
 def test_spectrum_counts_as_inertia_does_along_branches() -> None:
     """Sylvester's law: the number of negative eigenvalues does not depend on the metric."""
     f = follower("reduced", 8, 6)
-    spectrum = Spectrum(f.inertia)
+    spectrum = SymmetricSolver(f.inertia)
     for branch in explored("reduced", 8, 6):
         for p in branch.points[1::6]:
             if p.zero == branch.depth:
                 f.system.set_phase(p.x)
-                assert spectrum.leftmost(p.x, 6).negative(f.inertia.tolerance) == p.negative
+                assert spectrum.at(p.x).leftmost(6).negative(f.inertia.tolerance) == p.negative

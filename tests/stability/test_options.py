@@ -12,9 +12,9 @@ from small_states import plain
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.factorization import Klu
-from rodfem.stability.assessment import Judge
+from rodfem.stability.assessment import Assessor
 from rodfem.stability.blocks import Blocks
-from rodfem.stability.nonsymmetric import Vibration
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.stability.pencil import in_interval, shift_invert, with_factors
 from rodfem.stability.projection import PREFIX
 from rodfem.stability.reduction import Reduction
@@ -41,11 +41,11 @@ def test_nothing_is_left_in_the_database(options: PETSc.Options) -> None:
     before = options.getAll()
     system, x = cord()
     system.at(x).factor(system.load_axis())
-    judge = Judge(system)
+    assessor = Assessor(system)
     for method in ("count", "shift-invert", "slicing"):
-        judge(x, method, 2)
+        assessor(x, method, 2)
     system, x = plain("follower", "pointwise", 6, 3, 10.0)
-    vibration = Vibration(system).at(x)
+    vibration = NonsymmetricSolver(system).at(x)
     vibration.near(2, 0.0)
     shift_invert(vibration.matrix, vibration.mass, 2, 1.0, symmetric=False).solve()
     assert options.getAll() == before
@@ -80,9 +80,9 @@ def test_factors(options: PETSc.Options) -> None:
     options["rodfem_lu_pc_factor_mat_solver_type"] = "mumps"
     system, x = cord()
     system.at(x).factor(system.load_axis())
-    judge = Judge(system)
-    assert judge(x, "count").negative == 1
-    for factors in (system.lu, judge.inertia.factors):
+    assessor = Assessor(system)
+    assert assessor(x, "count").negative == 1
+    for factors in (system.lu, assessor.inertia.factors):
         assert factors.factor.getMumpsIcntl(7) == ORDERING
     del options["rodfem_lu_mat_mumps_icntl_7"], options["rodfem_cholesky_mat_mumps_icntl_7"]
 
@@ -90,10 +90,10 @@ def test_factors(options: PETSc.Options) -> None:
 def test_symmetric_pencil(options: PETSc.Options) -> None:
     options["rodfem_eps_ncv"], options["rodfem_eps_tol"] = 17, 1e-7
     system, x = cord()
-    judge = Judge(system)
-    expected = judge(x, "shift-invert", 3).values
-    spectrum = judge.spectrum
-    solver = with_factors(spectrum.matrix, spectrum.mass, 3, -9.0, spectrum._solving.factors, spectrum.inertia.seed(1))
+    assessor = Assessor(system)
+    expected = assessor(x, "shift-invert", 3).values
+    spectrum = assessor.symmetric
+    solver = with_factors(spectrum.matrix, spectrum.mass, 3, -9.0, spectrum.solving.factors, spectrum.inertia.seed(1))
     assert (solver.getDimensions()[1], solver.getTolerances()[0]) == (17, 1e-7)
     options["rodfem_slicing_eps_tol"], options["rodfem_slicing_st_mat_mumps_icntl_7"] = 1e-8, ORDERING
     solver = in_interval(spectrum.matrix, spectrum.mass, -20.0, 30.0)
@@ -105,7 +105,7 @@ def test_symmetric_pencil(options: PETSc.Options) -> None:
 
 def test_pencil_without_symmetry(options: PETSc.Options) -> None:
     system, x = plain("follower", "pointwise", 6, 3, 10.0)
-    vibration = Vibration(system).at(x)
+    vibration = NonsymmetricSolver(system).at(x)
     expected = vibration.near(2, 0.0).values[:2]
     options["rodfem_st_pc_factor_mat_solver_type"] = "mumps"
     options["rodfem_st_mat_mumps_icntl_7"], options["rodfem_st_type"] = ORDERING, "cayley"

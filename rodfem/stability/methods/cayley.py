@@ -8,7 +8,8 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError
 from rodfem.stability.method import Found, Interval, SymmetricMethod
 from rodfem.stability.reduction import FACTORISATIONS, Reduction, cayley_parameters
-from rodfem.stability.workspace import DISTINCT, Workspace
+from rodfem.stability.symmetric import DISTINCT
+from rodfem.stability.workspace import Workspace
 
 APART = 1e-3
 """Eigenvalues closer than this, relative to the greatest, are one for the parameters of the transform."""
@@ -26,13 +27,13 @@ class Cayley(SymmetricMethod):
 
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
         """With the parameters of the last state; with new ones where a count finds some missing."""
-        spectrum = self.work.below(x)
+        below = self.work.below(x)
         reduction = Reduction(self.work.pencil(x))
         most = reduction.projection.kernel.dimension
         made, note = 0, ""
         for fresh in (False, True):
             if self._estimates is None or fresh:
-                self._estimates = two_distinct(reduction.near(3, spectrum.shift).values)
+                self._estimates = two_distinct(reduction.near(3, below.shift).values)
                 made += FACTORISATIONS
             shift, antishift = cayley_parameters(*self._estimates)
             try:
@@ -42,16 +43,16 @@ class Cayley(SymmetricMethod):
                 continue
             made += FACTORISATIONS
             first = found.values[0] - DISTINCT * max(abs(found.values).max(), LEAST)
-            if found.certified and spectrum.below(first) == 0:
+            if found.certified and below.below(first) == 0:
                 break
         else:
-            found = reduction.near(number, spectrum.shift)
+            found = reduction.near(number, below.shift)
             made += FACTORISATIONS
             note = ", but a count found some missing (equal eigenvalues): completed by shift-invert"
         if number > 1:
             self._estimates = two_distinct(found.values)
         values, vectors = found.values[:number], self.work.lift(found.vectors[:, :number])
-        return Found(values, vectors, found.errors[:number], self.work.certifies(values), made, note)
+        return Found(values, vectors, found.errors[:number], below.certifies(values), made, note)
 
 
 def two_distinct(values: np.ndarray) -> tuple[float, float]:

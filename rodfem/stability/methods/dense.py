@@ -26,9 +26,9 @@ class Dense(Method):
 
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
         """By the symmetric eigenvalue problem in the metric of the mass."""
-        shift = self.work.below(x).shift
-        values, vectors = symmetric_eigenpairs(self.work.pencil(x), shift, number)
-        return Found(values, self.work.lift(vectors), np.full(len(values), EXACT), self.work.certifies(values))
+        below = self.work.below(x)
+        values, vectors = symmetric_eigenpairs(self.work.pencil(x), below.shift, number)
+        return Found(values, self.work.lift(vectors), np.full(len(values), EXACT), below.certifies(values))
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
         """By the QZ algorithm."""

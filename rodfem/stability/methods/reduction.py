@@ -13,9 +13,9 @@ class Reduction(Method):
 
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
         """With a shift below the spectrum."""
-        shift = self.work.below(x).shift
-        found = reduction.Reduction(self.work.pencil(x)).near(number, shift)
-        certified = self.work.certifies(found.values)
+        below = self.work.below(x)
+        found = reduction.Reduction(self.work.pencil(x)).near(number, below.shift)
+        certified = below.certifies(found.values)
         return Found(found.values, self.work.lift(found.vectors), found.errors, certified, reduction.FACTORISATIONS)
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:

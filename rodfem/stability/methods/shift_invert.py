@@ -13,11 +13,11 @@ class ShiftInvert(Method):
 
     def leftmost(self, x: PETSc.Vec, number: int, interval: Interval | None) -> Found:
         """By the Lanczos method."""
-        modes = self.work.spectrum.leftmost(x, number)
+        modes = self.work.symmetric.at(x).leftmost(number)
         return Found(modes.values, modes.vectors, modes.errors, modes.certified)
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
         """By the Arnoldi method."""
-        near = self.work.vibration.at(x).near(number, 0.0)
+        near = self.work.nonsymmetric.at(x).near(number, 0.0)
         nearest = np.sort(np.argsort(abs(near.values), kind="stable")[:number])
         return Found(near.values[nearest], [], near.errors[nearest], factorisations=1)

@@ -8,7 +8,7 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.stability.method import Found, Interval, SymmetricMethod
 from rodfem.stability.pencil import in_interval
-from rodfem.stability.symmetric import Spectrum
+from rodfem.stability.symmetric import SymmetricPencil
 
 WIDER = (0.0, 1e-9, 1e-7, 1e-5)
 """By how much of itself an interval is widened where what SLEPc finds in it does not match the counts at its ends."""
@@ -30,15 +30,15 @@ class Slicing(SymmetricMethod):
 
         Raises :class:`InputError` for an empty interval, :class:`ConvergenceError` where an end is an eigenvalue.
         """
-        spectrum = self.work.below(x)
-        low, high = interval or enclose(spectrum, number)
+        pencil = self.work.below(x)
+        low, high = interval or enclose(pencil, number)
         if not low < high:
             raise InputError(f"An interval from {low:g} to {high:g} is empty: give its lower end first.")
         for wider in WIDER:  # an end on an eigenvalue is moved off it
             low, high = low - wider * (high - low), high + wider * (high - low)
-            wanted = spectrum.below(high) - spectrum.below(low)
+            wanted = pencil.below(high) - pencil.below(low)
             try:
-                solver = in_interval(spectrum.matrix, spectrum.mass, low, high)
+                solver = in_interval(pencil.matrix, pencil.mass, low, high)
                 solver.solve()
             except PETSc.Error as trouble:
                 if trouble.ierr != PETSC_ERR_PLIB:
@@ -55,22 +55,22 @@ class Slicing(SymmetricMethod):
             solver.getEigenvector(int(i), vector)
         solver.destroy()
         values = values[order]
-        return Found(values, vectors, spectrum.backward_errors(values, vectors), complete, FACTORISATIONS)
+        return Found(values, vectors, pencil.backward_errors(values, vectors), complete, FACTORISATIONS)
 
 
-def enclose(spectrum: Spectrum, number: int) -> Interval:
+def enclose(pencil: SymmetricPencil, number: int) -> Interval:
     """Interval from below the spectrum that holds at least ``number`` eigenvalues, and not many more."""
-    low, step = spectrum.shift, max(abs(spectrum.shift), spectrum.inertia.scale) * STEP
+    low, step = pencil.shift, max(abs(pencil.shift), pencil.inertia.scale) * STEP
     high = low + step
     inside = low
-    while spectrum.below(high) < number:
+    while pencil.below(high) < number:
         inside, step = high, 2 * step
         high = inside + step
     for _ in range(HALVINGS):
-        if spectrum.below(high) <= 2 * number:
+        if pencil.below(high) <= 2 * number:
             break
         middle = inside + CUT * (high - inside)
-        if spectrum.below(middle) < number:
+        if pencil.below(middle) < number:
             inside = middle
         else:
             high = middle
