@@ -146,7 +146,6 @@ class Watch:
             return
         system = solver.system
         row = solver.axis if self._at_bound(point) else solver.row(point.tangent)
-        system.set_phase(point.x)
         point.error = correct(system, point.x, row, reach=1e-3).error
         point.load, point.ordinate = system.scalar(point.x), solver.shape.ordinate(point.x)
         point.energy, point.stretch = solver.energy(point.x), solver.shape.stretch(point.x)
@@ -165,7 +164,6 @@ class Watch:
         negative = self._index(point, richer, again)
         if negative != point.negative and point.arclength > self.excused:
             solver = self.meshes.solvers[point.mesh]
-            solver.system.set_phase(point.x)
             found = solver.inertia.at(point.x)
             found.count()
             modes = found.nearest(abs(negative - point.negative), accuracy=1e-2)[1]
@@ -185,8 +183,9 @@ class Watch:
 
         One factorisation suffices where it is the same; otherwise a second one separates zero eigenvalues from others.
         """
-        inertia, drifts = richer.solver.inertia, richer.system.active_drifts()
+        inertia = richer.solver.inertia
         found = inertia.at(again.x)
+        drifts = found.drifts
         below = found.below(-inertia.tolerance)
         if below < point.negative:
             index = found.count()

@@ -145,7 +145,6 @@ class Enriched:
         row = self.solver.axis
         if not fixed_load and point.tangent is not None:
             row = self.solver.row(self.transfer(point.tangent, state=False))
-        system.set_phase(x)
         if not correct(system, x, row, reach=1.0).converged:
             raise ConvergenceError(
                 f"the richer discretisation has no equilibrium near load {point.load:.8g}: use more elements"

@@ -109,7 +109,6 @@ def arms(solver: BranchSolver, gap: Gap) -> list[Point]:
         for sign in (1.0, -1.0):
             x = gap.unfolded.x.copy()
             x.axpy(sign * ARM, direction)
-            system.set_phase(x)
             outcome = correct(system, x, row, reach=ARM)
             if outcome.converged:
                 out.append(solver.point(x, 0.0, solver.tangent(row, at=x), outcome))

@@ -171,7 +171,6 @@ class Meshes:
         if guess.tangent is None:
             return None
         x, system = guess.x, target.system
-        system.set_phase(x)
         row = target.axis if fixed_load else target.row(guess.tangent)
         outcome = correct(system, x, row, reach=0.5)
         if fixed_load and not outcome.converged:  # too far from a state on a far finer mesh: from the scene's start

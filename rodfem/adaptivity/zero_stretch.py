@@ -34,7 +34,6 @@ def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
         state = fine.shape.restore(sample)
 
         def stretch(load: float, fine: StaticSolver = fine, guess: PETSc.Vec = state) -> float:
-            fine.system.set_phase(guess)
             x, outcome = fine.at_load(guess, load, reach=1.0)
             if not outcome.converged:
                 raise ConvergenceError(f"no equilibrium near load {load:.8g} on the finer mesh")

@@ -102,7 +102,6 @@ class Collision:
 
     def _measured(self, t: float, guess: PETSc.Vec, cluster: Cluster) -> tuple[Measured, PETSc.Vec]:
         """The cluster at ``t`` on the system's line of parameters, and the state there."""
-        self.solver.system.set_phase(None)
         x, outcome = self.solver.at_load(guess, t)
         if not outcome.converged:
             raise ConvergenceError("no equilibrium is found there")

@@ -267,7 +267,6 @@ def _guess(solver: StaticSolver, special: SpecialPoint, p: np.ndarray) -> LocusP
         modes = as_vectors(solver.system, special.cluster.basis)
     if special.kind == DIVERGENCE:
         number = abs(special.negative_after - special.negative_before)
-        solver.system.set_phase(x)
         modes, left = null_vectors(Inertia(solver.system), x, number)
     return LocusPoint(
         p, x, p, x, p, omega2=special.omega2 if special.kind == FLUTTER else np.nan, modes=modes, left=left

@@ -13,7 +13,7 @@ from rodfem.continuation.solvers import lagrange
 from rodfem.errors import SceneError
 from rodfem.fem.parameters import Line, line
 from rodfem.fem.system import System
-from rodfem.stability.inertia import combine
+from rodfem.linalg.orthogonal import combine
 
 Interval = tuple[float, float]
 
@@ -98,11 +98,11 @@ class Plane:
     def kept(self) -> Iterator[None]:
         """Restore on exit all that a locus changes: the line of parameters and the phase conditions."""
         system = self.system
-        before = system.line, list(system.phases), list(system.phase_offsets)
+        before = system.line, system.phase
         try:
             yield
         finally:
-            system.line, system.phases[:], system.phase_offsets[:] = before
+            system.line, system.phase = before
 
 
 def predict(nodes: list[LocusPoint], s: float) -> tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]:

@@ -46,9 +46,9 @@ from rodfem.codim2.parameter_plane import LocusPoint, Plane
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import STALLED, TOLERANCE
-from rodfem.linalg.orthogonal import orthonormalize, project_out
+from rodfem.linalg.orthogonal import combine, orthonormalize, project_out
 from rodfem.stability.bordered import Bordered
-from rodfem.stability.inertia import Factored, Inertia, combine
+from rodfem.stability.inertia import Factored, Inertia
 from rodfem.tolerances import ROUND_OFF
 
 DIFFERENCE = 1e-4

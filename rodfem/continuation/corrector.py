@@ -183,6 +183,7 @@ class Corrector:
         As :func:`rodfem.fem.newton.iterate`; also the state whose factors served last, on the way.  None, with ``x`` as
         it was, where ``S`` is too near singular.  ``most``, ``reach`` and ``tolerance`` are those of that function.
         """
+        self.system.set_phase(x)
         origin, singular, at = x.copy(), False, None
 
         def solve(state: State, equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
@@ -211,7 +212,7 @@ class Corrector:
         The count of the factors holds where no eigenvalue can have crossed zero on the way to ``x``; else ``S`` is
         factored at ``x``.
         """
-        inertia, drifts = self.inertia, self.system.active_drifts()
+        inertia = self.inertia
         self._image.waxpy(-1.0, at.x, x)
         moved = self.system.norm(self._image)
         least = NEAR * inertia.scale + 10 * inertia.tolerance
@@ -224,4 +225,4 @@ class Corrector:
                 if there is None:
                     return None
                 at = there
-        return Index(at.below, drifts, at.found.factors.determinant()) if at.nearest >= least else None
+        return Index(at.below, at.found.drifts, at.found.factors.determinant()) if at.nearest >= least else None

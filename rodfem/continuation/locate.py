@@ -20,8 +20,8 @@ from rodfem.continuation.branch import Point
 from rodfem.continuation.solvers import BranchSolver, hermite
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
-from rodfem.fem.system import System, combine
-from rodfem.linalg.orthogonal import project_out
+from rodfem.fem.system import System
+from rodfem.linalg.orthogonal import combine, project_out
 from rodfem.problem.events import Event
 from rodfem.stability.inertia import Factored
 from rodfem.tolerances import round_off
@@ -65,7 +65,6 @@ class Sample:
 def solve_at(solver: BranchSolver, curve: Curve, s: float) -> PETSc.Vec:
     """Equilibrium on the plane through ``curve(s)`` across its direction; raises :class:`ConvergenceError`."""
     x, direction = curve(s)
-    solver.system.set_phase(x)
     outcome = correct(solver.system, x, solver.row(direction))
     if not outcome.converged:
         raise ConvergenceError(
@@ -144,7 +143,7 @@ def sample(
         return Sample(s, x, solver.system.scalar(x), found.response(mode), below, found)
     index = found.count()
     mu = found.response(mode)
-    crossing = index.zero - solver.system.active_drifts() - persistent  # small ones take the sign of this one
+    crossing = index.zero - found.drifts - persistent  # small ones take the sign of this one
     return Sample(s, x, solver.system.scalar(x), mu, index.negative + (crossing if mu < 0 else 0), found)
 
 

@@ -94,7 +94,6 @@ def _near(
     system = solver.system
     x = origin.x.copy()
     x.axpy(amplitude, direction)
-    system.set_phase(x)
     if not correct(system, x, row, reach=2.0 * abs(amplitude)).converged:
         return None
     return system.scalar(x) - origin.load, solver.shape.ordinate(x) - origin.ordinate

@@ -25,8 +25,9 @@ from rodfem.fem.convexity import Convexity
 from rodfem.fem.fields import LOAD
 from rodfem.fem.newton import TOLERANCE, NewtonResult, correct, relax
 from rodfem.fem.shape import Shape
-from rodfem.fem.system import System, combine
+from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
+from rodfem.linalg.orthogonal import combine
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.round_off import decide
@@ -77,7 +78,7 @@ class StaticSolver:
         return self.shape.with_centreline(NodalValues(f, f.filled(named), system.line))
 
     def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, NewtonResult]:
-        """Equilibrium at exactly ``load`` by Newton's method from ``guess``; the phase reference must be set."""
+        """Equilibrium at exactly ``load`` by Newton's method from ``guess``."""
         x = guess.copy()
         self.system.set_load(x, load)
         outcome = correct(self.system, x, self.axis, reach=reach)
@@ -90,7 +91,6 @@ class StaticSolver:
         Also where Newton's method ends at an unstable one that is nowhere near the start.
         """
         guess = self.start(load)
-        self.system.set_phase(guess)
         x, outcome = self.at_load(guess, load)
         if outcome.converged and (outcome.moved < STRAYED or self.is_stable(x)):
             return x, outcome
@@ -110,11 +110,9 @@ class StaticSolver:
         first: tuple[PETSc.Vec, NewtonResult] | None = None
         for bent in (0.0, 0.4, 0.8):
             x = self.start(load, bent)
-            self.system.set_phase(x)
             outcome = relax(self.system, x, self.axis)
             for _ in range(3):  # phase conditions taken far away may hold a state off the equilibrium
                 if outcome.converged and self.system.drift(x) > HELD * self.system.stiffness_scale:
-                    self.system.set_phase(x)
                     x, outcome = self.at_load(x, load)
             if outcome.converged and self.is_stable(x):
                 return x, outcome
@@ -262,6 +260,7 @@ class BranchSolver(StaticSolver):
     def _tangent(self, row: PETSc.Vec, at: PETSc.Vec | None = None) -> PETSc.Vec:
         """The same by LU factors."""
         if at is not None:
+            self.system.set_phase(at)
             self.system.at(at).factor(row)
         tangent = self.system.new_vector()
         solved = self.system.solve(self.axis, tangent)
@@ -370,7 +369,6 @@ def follow(
         if low <= load <= high:
             row = solver.row(direction)
             if last.tangent is None or row.dot(last.tangent) > 0:  # else an extrapolation that turns back
-                system.set_phase(x)
                 outcome, tangent, index = solver.correct(x, row, 0.5 * step, last.slope)
                 if outcome.converged:
                     load = system.scalar(x)
@@ -391,8 +389,8 @@ def follow(
         step /= 2
         if step < min(steps.smallest, 0.01 * most):
             why = f"steps below {steps.smallest:g}"
-            if last.zero > system.active_drifts():
-                why += f"; {last.zero - system.active_drifts()} eigenvalues vanish there to working accuracy"
+            if last.zero > (drifts := system.active_drifts(last.x)):
+                why += f"; {last.zero - drifts} eigenvalues vanish there to working accuracy"
             yield f"no convergence at {system.scene.load} = {last.load:.6g} ({why})"
             return
     yield f"{steps.most} points reached"
@@ -424,7 +422,6 @@ def _to_load(
     length = max(fraction * step, least)
     x, direction = predict(points, last.arclength + fraction * step)
     row = solver.row(direction)
-    system.set_phase(x)
     x, outcome = solver.at_load(x, load, reach=0.5 * length)
     if not outcome.converged:
         return None

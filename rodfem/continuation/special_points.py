@@ -51,12 +51,11 @@ def special_at(
     """
     system, inertia = solver.system, solver.inertia
     x = located.x
-    system.set_phase(x)
     tangent = located.tangent
     tangent.scale(1.0 / system.norm(tangent))
     found = inertia.at(x)
     point = solver.point(x, arclength, tangent, index=decide(found).index)
-    null_count = point.zero - system.active_drifts()
+    null_count = point.zero - found.drifts
     if null_count < 1:  # what was interpolated has no zero there: two branches were taken for one
         raise ConvergenceError(
             f"No eigenvalue vanishes at load {point.load:.8g}, where one was expected to", SMALLER_STEPS
@@ -121,7 +120,6 @@ def renew(solver: BranchSolver, point: Point, *, turning: bool) -> None:
 
     The recorded ones may have been told from a prediction near by.
     """
-    solver.system.set_phase(point.x)
     index = decide(solver.inertia.at(point.x)).index
     point.negative, point.zero = index.negative, index.zero
     if turning and point.tangent is not None:
@@ -167,7 +165,6 @@ def _persistent(solver: BranchSolver, a: Point, count: int) -> list[PETSc.Vec]:
     """Vectors of the eigenvalues that are zero all along a branch, at the point ``a``."""
     if not count:
         return []
-    solver.system.set_phase(a.x)
     found = solver.inertia.at(a.x)
     found.count()
     return found.nearest(count, accuracy=1e-8)[1]
@@ -198,7 +195,6 @@ def directions(solver: BranchSolver, special: SpecialPoint) -> list[PETSc.Vec]:
     """
     system, tangent = solver.system, special.point.tangent
     known = [] if tangent is None else [tangent.copy()]
-    system.set_phase(special.point.x)
     out: list[PETSc.Vec] = []
     candidates = list(special.null_vectors)
     if abs(special.point.slope) < LEVEL * abs(system.scene.span[1] - system.scene.span[0]):
@@ -250,7 +246,6 @@ def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, fir
         while amplitude > 1e-4:
             x = special.point.x.copy()
             x.axpy(amplitude, direction)
-            system.set_phase(x)
             outcome = correct(system, x, row, reach=2.0 * amplitude)
             if outcome.converged:
                 apart = distance(system, special.point.x, x)

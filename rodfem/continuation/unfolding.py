@@ -32,7 +32,8 @@ from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
-from rodfem.fem.system import System, combine
+from rodfem.fem.system import System
+from rodfem.linalg.orthogonal import combine
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import EPS
 
@@ -73,7 +74,6 @@ def unfold(solver: BranchSolver, special: SpecialPoint) -> Unfolded | None:
     """Solve for a branch point with unfolding parameters; None where there is none near the ``special`` point."""
     system, inertia = solver.system, solver.inertia
     k, x = len(special.null_vectors), special.point.x.copy()
-    system.set_phase(x)
     bordered = Bordered(system, inertia.at(x).matrix, k, inertia.constraints)
     psi = [inertia.metric * v for v in special.null_vectors]
     equations = system.new_vector()

@@ -17,8 +17,8 @@ from collections.abc import Callable
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.fem.system import System, combine
-from rodfem.linalg.orthogonal import orthonormalize
+from rodfem.fem.system import System
+from rodfem.linalg.orthogonal import combine, orthonormalize
 
 FREQUENCIES = (0.5, 1.0)
 AMOUNTS = np.linspace(-2 * np.pi, 2 * np.pi, 96, endpoint=False)

@@ -29,7 +29,7 @@ from rodfem.deflation.discrete_symmetries import Mirror, mirrors
 from rodfem.deflation.guesses import turned_state
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import correct
-from rodfem.fem.system import combine
+from rodfem.linalg.orthogonal import combine
 
 IMAGE = 1e-12
 """Relative difference of stored energies above which a state is no mirror image of another."""
@@ -178,14 +178,12 @@ class Deflation(DeflatedNewton):
     def _judge(self, x: PETSc.Vec) -> tuple[Point | None, str]:
         """Polish a candidate by the plain Newton method; the point, if it is a new equilibrium, and the outcome."""
         system, solver = self.system, self.solver
-        system.set_phase(x)
         outcome = correct(system, x, solver.axis, reach=0.1)
         system.set_load(x, self.load)  # steps at fixed load may have moved it by round-off
         if not outcome.converged:
             return None, FAILED
         if self.nearest_known(x) < SAME:
             return None, KNOWN
-        system.set_phase(x)
         try:
             point = solver.point(x, 0.0, solver.load_tangent(x, True), outcome)
         except ConvergenceError:  # an index that cannot be counted
@@ -237,7 +235,6 @@ def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float)
             s = a.arclength + t * (b.arclength - a.arclength)
             smooth = a.tangent is not None and b.tangent is not None and b.arclength > a.arclength
             guess = hermite(a, b, s)[0] if smooth else combine([a.x, b.x], np.array([1 - t, t]))
-            solver.system.set_phase(guess)
             x, outcome = solver.at_load(guess, load, reach=1.0)
             if not outcome.converged:
                 raise ConvergenceError(f"No equilibrium at load {load:g} between two points of {branch.name}.")

@@ -42,7 +42,6 @@ def _special(solver: BranchSolver, event: Event, a: Point, b: Point) -> SpecialP
 
     margin = INSIDE * (b.arclength - a.arclength)
     s, x, along = locate_event(solver, event, curve, a.arclength + margin, b.arclength - margin)
-    solver.system.set_phase(x)
     tangent = solver.tangent(solver.row(curve(s)[1]), at=x)
     point = solver.point(x, s, tangent)
     left = abs(point.slope) * along + round_off(point.load)

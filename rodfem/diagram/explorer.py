@@ -128,9 +128,8 @@ class Explorer(Tracer):
                 f"The stored energy is not convex somewhere along the first state, at {self.scene.load} = {start:g}: "
                 "choose constants that make it so."
             )
-        solver.system.set_phase(x)
         point = solver.point(x, 0.0, solver.load_tangent(x, stop > start), outcome)
-        family = point.zero - solver.system.active_drifts()
+        family = point.zero - solver.system.active_drifts(x)
         if family > 0:
             self._leave_family(point, family, stop > start)
         return point
@@ -170,7 +169,7 @@ class Explorer(Tracer):
     def _switch(self, parent: Branch, i: int, special: SpecialPoint) -> None:
         special.switched = True
         self.use(special.point.mesh)
-        self.solver.damp(special.point.zero - self.solver.system.active_drifts() - special.multiplicity)
+        self.solver.damp(special.point.zero - self.solver.system.active_drifts(special.point.x) - special.multiplicity)
         try:
             ways = directions(self.solver, special)
         except ConvergenceError as trouble:

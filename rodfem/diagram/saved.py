@@ -149,7 +149,6 @@ def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[S
         known = {f.name for f in fields(NormalForm)}
         special.law = NormalForm(**{name: _number(v) for name, v in entry["law"].items() if name in known})
     if isinstance(solver, BranchSolver) and special.kind.singular and entry["multiplicity"]:
-        solver.system.set_phase(point.x)
         found = solver.inertia.at(point.x)
         found.count()
         special.null_vectors = found.nearest(entry["multiplicity"], accuracy=1e-8)[1]

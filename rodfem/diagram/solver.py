@@ -100,7 +100,6 @@ class Solver:
         """Evaluate the records of the equilibrium ``x``: ordinate, energy, index; frequencies without a potential."""
         if not isinstance(self.equilibria, BranchSolver):
             return self._sweep.at(x)
-        self.equilibria.system.set_phase(x)
         return self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True))
 
     def equilibrium(self, load: float, guess: Point | PETSc.Vec | None = None) -> Point:
@@ -123,7 +122,6 @@ class Solver:
             x, outcome = found.first(load)
         else:
             known = guess.x if isinstance(guess, Point) else guess
-            found.system.set_phase(known)
             x, outcome = found.at_load(known, load)
         if not outcome.converged:
             raise ConvergenceError(

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from math import inf
 
+from petsc4py import PETSc
+
 from rodfem.adaptivity.gaps import Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
@@ -106,7 +108,7 @@ class SpecialSearch:
         """Special points between a row and a point past the end of its branch, as they are found on one piece."""
         self._on(b)
         self.level = min(a.zero, b.zero)
-        return find_special(self.solver, a, b, self.row(a).crossing(self.row(b)), self._persistent())
+        return find_special(self.solver, a, b, self.row(a).crossing(self.row(b)), self._persistent(a.x))
 
     def reach(self, point: Point) -> float:
         """Largest step from a point: near gaps, and where the indices are not explained, short ones."""
@@ -118,7 +120,6 @@ class SpecialSearch:
         """Index of a point, small eigenvalues by their Rayleigh quotients."""
         if point.zero <= self.level:
             return Row(point, point.negative, point.negative)
-        self.solver.system.set_phase(point.x)
         return Row(point, *resolve(self.solver.inertia.at(point.x)))
 
     def _on(self, point: Point) -> None:
@@ -127,9 +128,9 @@ class SpecialSearch:
     def _here(self, point: Point) -> Point:
         return self.meshes.here(point, self.solver)
 
-    def _persistent(self) -> int:
-        """Number of eigenvalues that stay zero without a symmetry."""
-        return max(self.level - self.solver.system.active_drifts(), 0)
+    def _persistent(self, x: PETSc.Vec) -> int:
+        """Number of eigenvalues that stay zero without a symmetry, at a state on the way."""
+        return max(self.level - self.solver.system.active_drifts(x), 0)
 
     def _among(self, points: Sequence[Point], ended: bool = False) -> list[SpecialPoint]:
         """Special points among rows, all but the first and the last of which have an eigenvalue near zero.
@@ -187,7 +188,7 @@ class SpecialSearch:
         """
         found, why = [], ""
         try:
-            found = find_special(self.solver, p.point, q.point, p.crossing(q), self._persistent())
+            found = find_special(self.solver, p.point, q.point, p.crossing(q), self._persistent(p.point.x))
         except ConvergenceError as trouble:
             why = str(trouble)
         if not why and chained(p.low, p.high, found, q.low, q.high):

@@ -112,7 +112,7 @@ class Sweep:
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
         x, _ = self.solver.first(a)
         grid: list[Point] = []
-        for motion in self.solver.system.free_motions():
+        for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         for load in loads if a < b else loads[::-1]:
             x = self._state(x, float(load))
@@ -134,7 +134,6 @@ class Sweep:
         if self.plan.error_bars:
             self._error_bars(branch)
         self.observer.finished(branch)
-        self.solver.system.set_phase(last.x)
         rank, size = self.eigensolver.at(last.x).asymmetry()
         self.observer.note(
             f"  the load makes the tangent matrix non-symmetric by a matrix of rank {rank} "
@@ -146,7 +145,6 @@ class Sweep:
 
     def at(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of an equilibrium that is not on the way of the sweep."""
-        self.solver.system.set_phase(x)
         return self._point(x, on_the_way=False)
 
     def _state(self, guess: PETSc.Vec, load: float) -> PETSc.Vec:
@@ -171,7 +169,7 @@ class Sweep:
             energy=solver.energy(x),
             stretch=solver.shape.stretch(x),
             negative=found.unstable(found.noise),
-            zero=int((abs(values) < REAL).sum()) + system.active_drifts(),
+            zero=int((abs(values) < REAL).sum()) + system.active_drifts(x),
             slope=float("nan"),
             drift=0.0,
             error=0.0,
@@ -231,7 +229,6 @@ class Sweep:
 
     def _name(self, point: Point, cluster: Cluster) -> None:
         """Name the motions of the eigenvalues that collide at a point by all that they do: their vectors are one."""
-        self.solver.system.set_phase(point.x)
         name = self.eigensolver.at(point.x).motion(cluster.basis)
         distance = [abs(complex(*value) - cluster.mean) for value in point.omega2]
         for i in np.argsort(distance, kind="stable")[: cluster.size]:
@@ -392,14 +389,13 @@ def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     Raises :class:`SceneError` where a load drives a motion that nothing holds.
     """
     system, name = solver.system, solver.system.scene.load
-    system.set_phase(guess)
     x, outcome = solver.at_load(guess, load)
     if not outcome.converged:
         raise ConvergenceError(f"No equilibrium at {name} = {load:g}: use a smaller range.")
     if system.drift(x) > DRIVEN * system.stiffness_scale:
         raise SceneError(
             f"There is no equilibrium at {name} = {load:g}: nothing holds the rod against the "
-            f"{' or the '.join(system.free_motions())}, and the loads drive it; hold that motion at one end, or "
+            f"{' or the '.join(system.free_motions(guess))}, and the loads drive it; hold that motion at one end, or "
             "balance the loads."
         )
     return x

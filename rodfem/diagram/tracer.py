@@ -79,7 +79,6 @@ class Tracer:
             self.observer.branch(branch)
         self.use(branch.points[-1].mesh)
         self.watch = Watch(self.meshes, (self.low, self.high))
-        self.solver.system.set_phase(branch.points[-1].x)
         self.solver.damp(self._extra(branch.points[-1]) if branch.parent else 0)
         self._attempt(branch)
         self._finish(branch)
@@ -255,7 +254,6 @@ class Tracer:
         the branch it does not, and the load is a function of arclength there, whose zero is found.
         """
         system, (p, q), guess = self.solver.system, rows, hermite(a, b, s)[0]
-        system.set_phase(guess)
         x, outcome = self.solver.at_load(guess, load, reach=1.0)
         on_branch = outcome.converged and (
             a.x is not p.x or distance(system, guess, x) < 0.5 * distance(system, a.x, x) or p.load == load
@@ -282,7 +280,6 @@ class Tracer:
         Its arclength is about ``s``; its tangent is on the side on which the load is ``increasing``, or decreases.  The
         ``guess`` is a state.
         """
-        self.solver.system.set_phase(guess)
         x, outcome = self.solver.at_load(guess, load, reach=1.0)
         if not outcome.converged:
             raise ConvergenceError(self._no_equilibrium(load))
@@ -379,7 +376,6 @@ class Tracer:
             return False
         s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
         guess = hermite(a, b, s)[0]
-        self.solver.system.set_phase(guess)
         x, outcome = self.solver.at_load(guess, first.load, reach=1.0)
         if not outcome.converged:  # beside a fold, say: not there
             return False
@@ -414,9 +410,8 @@ class Tracer:
     def _say_zeros(self, before: Point, point: Point, extra: int) -> None:
         """Report eigenvalues that count as zero at two rows: within round-off, or persistently zero."""
         system, inertia, still = self.solver.system, self.solver.inertia, 0
-        own = point.zero - system.active_drifts() - extra
+        own = point.zero - system.active_drifts(point.x) - extra
         for p in (before, point):
-            system.set_phase(p.x)
             low, high = resolve(inertia.at(p.x))
             still = min(max(still, high - low - own), extra)
         if still:
@@ -432,16 +427,16 @@ class Tracer:
             )
 
     def _extra(self, point: Point) -> int:
-        """Zero eigenvalues, beside symmetries' and the branch's own, of the point at which phases were last set."""
+        """Zero eigenvalues, beside symmetries' and the branch's own, of a point."""
         vertical = abs(point.slope) < VERTICAL * (self.high - self.low)  # the branch itself is a family at one load
-        return point.zero - self.solver.system.active_drifts() - vertical
+        return point.zero - self.solver.system.active_drifts(point.x) - vertical
 
     def _finish(self, branch: Branch) -> None:
         branch.renumber()
         explain(branch)
         self._singular_start(branch)
         last = branch.points[-1]
-        if branch.ended == "end of range" and last.zero > self.solver.system.active_drifts():
+        if branch.ended == "end of range" and last.zero > self.solver.system.active_drifts(last.x):
             self._singular_end(branch, last)
             last = branch.points[-1]
         if not any(s.point is last for s in branch.special):

@@ -40,9 +40,11 @@ def correct(
 ) -> NewtonResult:
     """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place, with LU factors.
 
-    As :func:`iterate`; fails at a singular matrix, too.  ``system`` has the equations, ``row`` (n,) is the last row of
-    the bordered matrix; ``most`` and ``reach`` are those of :func:`iterate`.
+    As :func:`iterate`, with the phase conditions of the guess ``x``; fails at a singular matrix, too.  ``system`` has
+    the equations, ``row`` (n,) is the last row of the bordered matrix; ``most`` and ``reach`` are those of
+    :func:`iterate`.
     """
+    system.set_phase(x)
     step = system.new_vector()
 
     def solve(state: State, equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
@@ -114,6 +116,7 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Newt
     ``system`` has the equations, ``row`` (n,) is the last row of the bordered matrix, and at most ``most`` steps are
     taken.
     """
+    system.set_phase(x)
     equations, step = system.new_vector(), system.new_vector()
     tau, trial = 1e-2 / system.stiffness_scale, x.copy()
     for iteration in range(most):

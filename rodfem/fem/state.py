@@ -97,10 +97,10 @@ class State(Evaluation):
             out.setValues(system.equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)
             out.assemble()
             for i, value in enumerate(self.drifts.tolist()):
-                phase = system.phases[i]
+                phase = system.phase.conditions[i]
                 if phase is not None:
                     out.axpy(value, phase)
-                    value = self.along(phase) - system.phase_offsets[i]
+                    value = self.along(phase) - system.phase.offsets[i]
                 if system.has_scalars:
                     out.setValue(system.drifts[i], value)
                 out.assemble()

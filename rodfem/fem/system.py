@@ -24,11 +24,13 @@ from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Discretization, Fields
 from rodfem.fem.invariance import find_motion_along, find_symmetries
 from rodfem.fem.parameters import Line
+from rodfem.fem.phase import no_phase, phase_at
 from rodfem.fem.sparsity import bordered_pattern, metric_pattern, new_matrix
 from rodfem.fem.state import State
-from rodfem.fem.symmetries import Symmetry, may_slide, mismatch
+from rodfem.fem.symmetries import Symmetry, may_slide
 from rodfem.fem.values import NodalValues
 from rodfem.fem.verification import Verification
+from rodfem.linalg.orthogonal import combine
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.scene import Scene
 from rodfem.timing import Clock
@@ -37,12 +39,6 @@ FEW = 4000
 """Number of unknowns up to which symmetries are sought on the mesh itself."""
 FINE = 128
 """Number of elements of a mesh on which a rod may move along itself as well as in truth."""
-SYMMETRIC_STATE = 1e-6
-"""A generator smaller than this (in the metric) is zero: the state has the symmetry itself."""
-
-
-MESH = 10.0
-"""Times the mismatch of a mesh with the motion of a ring along itself, below which a generator is the mesh's error."""
 
 
 class System:
@@ -107,10 +103,7 @@ class System:
         source = PETSc.IS().createGeneral(sources, comm=PETSc.COMM_SELF)
         self._gather = PETSc.Scatter().create(self.workspace, source, self._gathered, None)
         self.metric = self._assemble_metric()
-        self.phases: list[PETSc.Vec | None] = [None] * len(self.drifts)
-        self.broken: dict[int, np.ndarray] = {}
-        self.phase_offsets = [0.0] * len(self.drifts)
-        self._reference: PETSc.Vec | None = None
+        self.phase = no_phase(len(self.drifts))
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
         self.lu = factors_of("lu", comm, self.fields.unknowns, self.fields.dense_rows, {8: 0})
@@ -202,7 +195,7 @@ class System:
 
     def add_drifts(self, matrix: PETSc.Mat) -> None:
         """Add rows and columns of the drift scalars: the generators, or a one where a drift is switched off."""
-        for phase, index in zip(self.phases, self.drifts, strict=True):
+        for phase, index in zip(self.phase.conditions, self.drifts, strict=True):
             if phase is None:
                 if self.has_scalars:
                     matrix.setValue(index, index, 1.0, addv=True)
@@ -235,39 +228,11 @@ class System:
     # --- symmetry ----------------------------------------------------------------------------------------------
 
     def set_phase(self, reference: PETSc.Vec | None) -> None:
-        """Set the phase conditions at ``reference``, one for each symmetry that it breaks; None: none active.
-
-        The symmetries form a linear space.  Those combinations of their generators that vanish at the reference state
-        are its own symmetries and have no phase condition; the others, orthonormal in the metric, have one each.
-        """
-        count, dropped = len(self.drifts), self.verification.dropped
-        self.phases, self.phase_offsets, self.kept = [None] * count, [0.0] * count, np.eye(count)
-        self.broken, self._reference = {}, None if reference is None else reference.copy()
-        if reference is None or count == len(dropped):
-            return
-        state = self.at(reference)
-        generators = [state.generator(i) for i in range(count)]
-        images = [self.metric * g for g in generators]
-        exact = [i for i, s in enumerate(self.symmetries) if not s.along and i not in dropped]
-        gram = np.array([[np.real(generators[i].dot(images[j])) for j in exact] for i in exact])
-        squares, turn = np.linalg.eigh(gram.reshape(len(exact), len(exact)))
-        combinations, sizes = list((np.eye(count)[:, exact] @ turn).T), list(np.sqrt(np.maximum(squares, 0.0)))
-        least = [SYMMETRIC_STATE] * len(exact)
-        last = self.symmetries[-1]
-        if last.along and count - 1 not in dropped:  # what of the motion along itself the exact ones do not do as well
-            rest = np.eye(count)[-1]
-            for weights, size in zip(combinations, sizes, strict=True):
-                if size >= SYMMETRIC_STATE:
-                    rest = rest - weights / size**2 * np.real(combine(images, weights).dot(generators[-1]))
-            combinations.append(rest / np.linalg.norm(rest))
-            sizes.append(self.norm(combine(generators, combinations[-1])))
-            least.append(max(MESH * mismatch(state), 10 * SYMMETRIC_STATE))
-        broken = np.array(sizes) >= least
-        self.kept = np.array(combinations)[~broken]
-        for i in np.flatnonzero(broken):
-            phase = combine(images, combinations[i] / sizes[i])
-            self.phases[i], self.phase_offsets[i] = phase, state.along(phase)
-            self.broken[self.drifts[i]] = combinations[i] / sizes[i]
+        """Set the phase conditions at ``reference`` (:mod:`rodfem.fem.phase`); None: none active."""
+        if reference is None:
+            self.phase = no_phase(len(self.drifts))
+        elif not self.phase.belongs_to(reference):
+            self.phase = phase_at(self, reference, self.verification.dropped)
 
     def verify(self, matrix: PETSc.Mat, state: State, equations: PETSc.Vec | None = None) -> bool:
         """Verify the symmetries at a state, where ``S`` is ``matrix`` and the equations are given (None: zero).
@@ -277,7 +242,9 @@ class System:
         """
         if not self.symmetries or self.verification(matrix, state, equations):
             return True
-        self.set_phase(self._reference)
+        reference = self.phase.reference
+        self.phase = no_phase(len(self.drifts))
+        self.set_phase(reference)
         return False
 
     def drift(self, x: PETSc.Vec) -> float:
@@ -285,10 +252,8 @@ class System:
         return float(abs(self.at(x).drifts).max(initial=0.0))
 
     def equivalent_directions(self, x: PETSc.Vec, direction: PETSc.Vec) -> list[PETSc.Vec]:
-        """Directions into which the symmetries that the state ``x`` has itself carry a direction, to first order.
-
-        The symmetries kept by the state last given to :meth:`set_phase`, which must be ``x``.
-        """
+        """Directions into which the symmetries that the state ``x`` has itself carry a direction, to first order."""
+        self.set_phase(x)
         moved = x.copy()
         moved.axpy(1.0, direction)
         before, after, changes = self.at(x), self.at(moved), []
@@ -296,20 +261,17 @@ class System:
             change = after.generator(i)
             change.axpy(-1.0, before.generator(i))
             changes.append(change)
-        return [combine(changes, weights) for weights in self.kept]
+        return [combine(changes, weights) for weights in self.phase.kept]
 
-    def active_drifts(self) -> int:
-        """Number of symmetries that the current reference state breaks: as many zero eigenvalues belong to it."""
-        return sum(phase is not None for phase in self.phases)
+    def active_drifts(self, x: PETSc.Vec) -> int:
+        """Number of symmetries that the state ``x`` breaks: as many of its zero eigenvalues belong to them."""
+        self.set_phase(x)
+        return self.phase.count
 
-    def free_motions(self) -> list[str]:
-        """In words the motions that carry the reference state through equivalent ones, one for each phase condition."""
-        out = []
-        for weights in self.broken.values():
-            sums = sum((w * s.weights for w, s in zip(weights, self.symmetries, strict=True)), 0.0 * weights[:1])
-            along = sum(w * s.along for w, s in zip(weights, self.symmetries, strict=True))
-            out.append(str(Symmetry(sums, self.symmetries[0].parts, along)))
-        return out
+    def free_motions(self, x: PETSc.Vec) -> list[str]:
+        """In words the motions that carry the state ``x`` through equivalent ones, one for each phase condition."""
+        self.set_phase(x)
+        return self.phase.motions(self.symmetries)
 
     # --- set-up ------------------------------------------------------------------------------------------------
 
@@ -331,11 +293,3 @@ def dense_columns(system: System, count: int) -> PETSc.Mat:
     columns.setUp()
     columns.assemble()
     return columns
-
-
-def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:
-    """Linear combination of vectors."""
-    out = vectors[0].duplicate()
-    out.set(0.0)
-    out.maxpy(list(weights), vectors)
-    return out

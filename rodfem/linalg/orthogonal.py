@@ -33,3 +33,11 @@ def orthonormalize(vectors: list[PETSc.Vec], metric: PETSc.Mat) -> None:
             normalize(v, metric)
             project_out(v, vectors[:i], metric)
             normalize(v, metric)
+
+
+def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:
+    """Linear combination of vectors."""
+    out = vectors[0].duplicate()
+    out.set(0.0)
+    out.maxpy(list(weights), vectors)
+    return out

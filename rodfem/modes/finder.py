@@ -10,9 +10,8 @@ from petsc4py import PETSc
 from rodfem.adaptivity.error_estimate import bound, halved
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.errors import InputError
-from rodfem.fem.system import combine
 from rodfem.fem.transfer import Transfer, richer_system
-from rodfem.linalg.orthogonal import orthonormalize
+from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
 from rodfem.modes.perturbation import Motion, Motions
 from rodfem.stability import mode_type as character
@@ -147,7 +146,6 @@ class ModeFinder:
             self._richer = solver, Assessor(solver), Transfer(self.system, richer)
         solver, assessor, transfer = self._richer
         guess = transfer(x, state=True)
-        solver.system.set_phase(guess)
         y, outcome = solver.at_load(guess, self.system.scalar(x), reach=1.0)
         if not outcome.converged:
             return np.full(len(values), np.inf)

@@ -105,7 +105,7 @@ class Assessor(Workspace):
         return name, "as asked"
 
     def __call__(self, x: PETSc.Vec, method: str = AUTO, number: int = 4, interval: Any = None) -> Verdict:
-        """Assessor the equilibrium ``x``; sets the phase conditions there.
+        """Assess the equilibrium ``x``.
 
         ``interval`` (low, high) is where slicing looks, by default where the ``number`` left-most are.  Raises
         :class:`InputError` for a method that does not exist or apply and for dependent constraints,
@@ -116,12 +116,11 @@ class Assessor(Workspace):
         if number < 0:
             raise InputError(f"{number} eigenvalues cannot be computed: ask for none or more.")
         started = perf_counter()
-        self.system.set_phase(x)
         if self.inertia is None:
             found = self._method(name).nearest(x, max(number, 1))
             scale = ZERO * self.system.stiffness_scale / self.system.scene.length
             bad = int(((found.values.real < -scale) | (abs(found.values.imag) > scale)).sum())
-            index, zero, nothing = bad, self.system.active_drifts(), np.zeros(0)
+            index, zero, nothing = bad, self.system.active_drifts(x), np.zeros(0)
             inside: tuple[float, np.ndarray, np.ndarray] = 0.0, nothing, nothing
             made = 0
         else:

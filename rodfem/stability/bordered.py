@@ -69,7 +69,7 @@ class Bordered:
                     raise ConvergenceError("another eigenvalue vanishes")
                 return -1
             negative, zero = self.factors.inertia()
-        rest = negative - self.constraints - self.system.active_drifts() - self.k
+        rest = negative - self.constraints - self.system.phase.count - self.k
         if zero or rest < 0:
             raise ConvergenceError("another eigenvalue vanishes")
         return int(rest)

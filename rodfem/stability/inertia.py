@@ -20,9 +20,9 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.state import State
-from rodfem.fem.system import System, combine
+from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors
-from rodfem.linalg.orthogonal import orthonormalize
+from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.linalg.selection import factors_of
 
 EPS = float(np.finfo(float).eps)
@@ -84,10 +84,13 @@ class Inertia:
         self.shift, self.filled, self.factored = 0.0, 0, 0
 
     def at(self, x: PETSc.Vec, equations: PETSc.Vec | None = None) -> Factored:
-        """Assemble ``S`` at ``x``, with the phase conditions that are active.
+        """Assemble ``S`` at ``x``, with the phase conditions of that state.
 
-        The symmetries are verified there; ``equations`` are those at ``x``, None at an equilibrium.
+        The symmetries are verified there.  ``equations`` are those at ``x``, an iterate of Newton's method, whose phase
+        conditions stay; None at an equilibrium.
         """
+        if equations is None:
+            self.system.set_phase(x)
         state = self.system.at(x)
         self._assemble(state)
         # a generator that is no null vector of S is no symmetry: verify drops its phase condition, S is assembled anew
@@ -141,7 +144,7 @@ class Factored:
 
     def __init__(self, inertia: Inertia) -> None:
         """Stand for the state that the matrix was just filled for."""
-        self.inertia, self._filled = inertia, inertia.filled
+        self.inertia, self._filled, self.drifts = inertia, inertia.filled, inertia.system.phase.count
 
     def _own(self) -> Inertia:
         """Matrix and factors, while they are those of this state."""
@@ -187,7 +190,7 @@ class Factored:
             own.factored = self._filled
             negative, zero = own.factors.inertia()
         # Sylvester's law: each constraint, and each phase condition, has one negative eigenvalue of the saddle matrix
-        below = negative - own.constraints - own.system.active_drifts()
+        below = negative - own.constraints - self.drifts
         if zero or below < 0:
             raise ConvergenceError(
                 f"The count of eigenvalues below {sigma:.2g} broke down ({zero} zero pivots, {negative} negative ones "
@@ -200,7 +203,7 @@ class Factored:
         own = self._own()
         negative = self.below(-own.tolerance)
         # a phase condition takes its symmetry mode out of both counts, and it is a zero eigenvalue of the state
-        zero = self.below(own.tolerance) - negative + own.system.active_drifts()
+        zero = self.below(own.tolerance) - negative + self.drifts
         return Index(negative, zero, own.factors.determinant())
 
     def nearest(

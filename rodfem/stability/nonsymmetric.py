@@ -120,7 +120,7 @@ class NonsymmetricSolver(PencilMatrices):
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
 
     def at(self, x: PETSc.Vec) -> NonsymmetricPencil:
-        """Assemble the pencil at the state ``x``, at which the phase conditions must be set.
+        """Assemble the pencil at the state ``x``.
 
         Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
         """

@@ -16,8 +16,9 @@ from slepc4py import SLEPc
 
 from rodfem.errors import SceneError
 from rodfem.fem.state import State
-from rodfem.fem.system import System, combine
+from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors, lu_package, ordering, pivots, preferred
+from rodfem.linalg.orthogonal import combine
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
@@ -95,11 +96,12 @@ def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc
 
 def symmetry_modes(system: System, x: PETSc.Vec) -> dict[int, PETSc.Vec]:
     """Generators at ``x`` of the symmetries that it breaks, by the global number of their drift scalars."""
-    if not system.broken:
+    system.set_phase(x)
+    if not system.phase.count:
         return {}
     state = system.at(x)
     generators = [state.generator(i) for i in range(len(system.drifts))]
-    return {index: combine(generators, weights) for index, weights in system.broken.items()}
+    return {system.drifts[i]: combine(generators, weights) for i, weights in system.phase.broken.items()}
 
 
 def weighed_modes(

@@ -50,7 +50,7 @@ def decide(found: Factored) -> Decision:
     Factorisations are those of the count alone, the last of which serves :meth:`~Factored.nearest` here and afterwards.
     """
     index, inertia = found.count(), found.inertia
-    known = inertia.system.active_drifts()
+    known = found.drifts
     inside = index.zero - known
     least = 1e-7 * inertia.scale
     if inside == 0 or inertia.resolution <= least:
@@ -72,7 +72,7 @@ def resolve(found: Factored) -> tuple[int, int]:
     numbers is zero to working accuracy.  Modes of symmetries are left out.
     """
     index = found.count()
-    near = index.zero - found.inertia.system.active_drifts()
+    near = index.zero - found.drifts
     if near <= 0:
         return index.negative, index.negative
     theta, vectors = found.nearest(near + SPARE, accuracy=1e-8)

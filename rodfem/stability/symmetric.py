@@ -109,7 +109,7 @@ class SymmetricSolver(PencilMatrices):
         self.deflated: list[PETSc.Vec] = []
 
     def at(self, x: PETSc.Vec) -> SymmetricPencil:
-        """Assemble the pencil of the state ``x``, at which the phase conditions must be set."""
+        """Assemble the pencil of the state ``x``."""
         system = self.system
         self.filled += 1
         with system.clock("assembly"):
@@ -137,7 +137,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
     def __init__(self, shared: SymmetricSolver) -> None:
         """Be the state that the matrices were just filled for."""
         super().__init__(shared)
-        self.inertia = shared.inertia
+        self.inertia, self._drifts = shared.inertia, shared.system.phase.count
 
     @property
     def shift(self) -> float:
@@ -186,7 +186,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         held = self._held()
         held.factor(sigma, held.counting)
         negative, zero = held.counting.factors.inertia()
-        below = negative - self.inertia.constraints - self.system.active_drifts()
+        below = negative - self.inertia.constraints - self._drifts
         if zero or below < 0:
             raise ConvergenceError(
                 f"The count of eigenvalues below {sigma:.6g} broke down ({zero} zero pivots, {negative} negative ones "
