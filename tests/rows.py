@@ -6,24 +6,30 @@ from collections.abc import Sequence
 
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.solvers import BranchSolver
+from rodfem.continuation.solvers import ALIGNED, BranchSolver
 from rodfem.stability.assessment import assess
 
 
 def verify(follower: BranchSolver, branches: Sequence[Branch], explained: bool = True) -> None:
-    """Assert that each recorded index is that of two shifts at the row's own state, and that all changes are explained.
+    """Assert that recorded indices and tangents are those of the rows' own states, and that all changes are explained.
 
-    What the prediction's factors tell and what these tell is independent: other matrices, other factors, other code.
+    What the prediction's factors tell and what two shifts tell is independent: other matrices, other factors, other
+    code.  A tangent may be off by what the step control allows between two rows.
     """
     for branch in branches:
         special = {id(s.point): s for s in branch.special if s.kind in (FOLD, BRANCH_POINT)}
         for row, point in enumerate(branch.points):
             if point.mesh != follower.mesh:
                 continue
-            follower.system.set_phase(point.x)
             verdict = assess(follower, point.x, "count")
             recorded, counted = (point.negative, point.zero), (verdict.negative, verdict.zero)
             assert recorded == counted, f"{branch.name}, row {row}, load {point.load}: {recorded}, not {counted}"
+            if point.tangent is not None and verdict.zero == follower.system.active_drifts(point.x):  # else singular
+                row_of = follower.row(point.tangent)
+                cosine = row_of.dot(follower.tangent(row_of, at=point.x))
+                assert cosine > ALIGNED, (
+                    f"{branch.name}, row {row}, load {point.load}: tangent off, cosine {cosine:.3f}"
+                )
             if id(point) in special:
                 before, after = special[id(point)].negative_before, special[id(point)].negative_after
                 assert point.negative <= min(before, after), f"{branch.name}, row {row}"

@@ -47,6 +47,8 @@ SENSITIVE = 100.0
 """Least change of an eigenvalue assumed when the state moves by one radian, in the same units."""
 DIFFERENCE = 0.05
 """Step of the differences, relative to how far the equilibrium is from the prediction."""
+LEAST_DIFFERENCE = 1e-7
+"""Least step of them, in the metric."""
 SAFE = 10.0
 """Least distance of all eigenvalues from zero, over the measured change of those carried along."""
 
@@ -75,6 +77,11 @@ class Regular:
     nearest: float
     tangent: PETSc.Vec
     projected: np.ndarray
+
+    @property
+    def index(self) -> Index:
+        """Index and zeros by the count of the factors."""
+        return Index(self.below, self.found.drifts, self.found.factors.determinant())
 
     def along(self, row: PETSc.Vec) -> PETSc.Vec:
         """Unit tangent on the side to which ``row`` points."""
@@ -206,18 +213,18 @@ class Corrector:
             return None
         return outcome, at
 
-    def index(self, x: PETSc.Vec, at: Regular) -> Index | None:
-        """Index of ``x``, a state near the one factored last, ``at``; None where one of its eigenvalues may be zero.
+    def settled(self, x: PETSc.Vec, at: Regular) -> Regular | None:
+        """State whose index and tangent serve for ``x``: ``at``, factored near by, or else ``x`` itself.
 
-        The count of the factors holds where no eigenvalue can have crossed zero on the way to ``x``; else ``S`` is
-        factored at ``x``.
+        Those of ``at`` hold where no eigenvalue can have come near zero, let alone crossed it, on the way to ``x``.
+        None where one of them may be zero.
         """
         inertia = self.inertia
         self._image.waxpy(-1.0, at.x, x)
         moved = self.system.norm(self._image)
         least = NEAR * inertia.scale + 10 * inertia.tolerance
         if moved:
-            projected = self._project_at(x, max(DIFFERENCE * moved, 1e-7))
+            projected = self._project_at(x, max(DIFFERENCE * moved, LEAST_DIFFERENCE))
             change = float(np.linalg.norm(projected - at.projected))
             # the count at the prediction holds only if no eigenvalue can have crossed zero on the way from there
             if at.nearest < least + SENSITIVE * moved * inertia.scale + SAFE * change:
@@ -225,4 +232,4 @@ class Corrector:
                 if there is None:
                     return None
                 at = there
-        return Index(at.below, at.found.drifts, at.found.factors.determinant()) if at.nearest >= least else None
+        return at if at.nearest >= least else None

@@ -236,7 +236,10 @@ class BranchSolver(StaticSolver):
         if new * slope <= 0 or abs(new) < min(LEVEL, SENSITIVE * outcome.moved) * span:
             at = self.corrector.factor(x)
             tangent = at.along(row) if at else self._tangent(row, x)
-        return outcome, tangent, self.corrector.index(x, at) if at else None
+        settled = self.corrector.settled(x, at) if at else None
+        if at and settled is not at:  # near a special point the tangent differs from that at the prediction
+            tangent = settled.along(row) if settled else self._tangent(row, x)
+        return outcome, tangent, settled.index if settled else None
 
     def damp(self, freedoms: int) -> None:
         """Keep Newton's method from moving along families of equilibria at one load, where there are any."""
