@@ -5,11 +5,11 @@
 #     tools/test.sh PYTHON MPIRUN SECONDS [options for pytest]        (as `make test` does)
 #
 # Two ranks do without the tests marked `alone` that are not `short`.  With quick=yes in the environment the serial run
-# does so, too, two ranks run the short ones only, and three ranks none.
+# has those marked `short` or `versions`, two ranks run the short ones only, and three ranks none.
 set -eu
 cd "$(dirname "$0")/.."
 marks="not alone or short" serial=
-[ "${quick-}" != yes ] || serial=$marks marks=short
+[ "${quick-}" != yes ] || serial="short or versions" marks=short
 python=$1 mpirun=$2 limit=$3
 shift 3
 

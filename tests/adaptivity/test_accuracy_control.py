@@ -104,6 +104,7 @@ def pulled(accuracy: float) -> Diagram:
 
 
 @ACCURACIES
+@pytest.mark.alone
 def test_every_row_of_a_taut_rod(accuracy: float) -> None:
     """Boundary layers that become thirty times thinner on the way, down to a thousandth of the rod."""
     found = pulled(accuracy)

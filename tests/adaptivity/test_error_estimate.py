@@ -89,6 +89,7 @@ def test_deep_arch_to_an_accuracy(accuracy: float) -> None:
     assert abs(fold.point.load - DEEP) <= fold.error_estimate <= accuracy * DEEP
 
 
+@pytest.mark.alone
 def test_arithmetic_of_many_elements() -> None:
     """Where the discretisation is exact the eigenvalue that vanishes has the round-off of a stiff matrix."""
     for mesh in ((64, 4), (64, 6), (128, 4)):
@@ -126,6 +127,7 @@ def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
         assert "does not resolve" in stream.getvalue()
 
 
+@pytest.mark.alone
 def test_an_accuracy_is_not_reached_by_accident() -> None:
     """Points that agree on two meshes to the accuracy asked for, and are not resolved, are computed on a finer one."""
     (s,) = coarse(1e-2).special("user", "branch 1")
@@ -165,6 +167,7 @@ LAWS = {
 }
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("mesh", [(4, 3), (4, 5), (8, 6)])
 @pytest.mark.parametrize("name", LAWS)
 def test_coefficient_of_a_pitchfork(name: str, mesh: tuple[int, int]) -> None:

@@ -152,6 +152,7 @@ def test_a_fold_beside_the_branch_point_that_it_comes_from() -> None:
     assert found.values[row] == pytest.approx([fold.point.load, -2.31], abs=1e-9)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("largest", [0.05, 0.15])
 def test_a_fold_and_a_branch_point_of_opposite_sign_in_one_step(largest: float) -> None:
     """On a foundation of k = 240 the second branch turns back 0.017 after its index has gone from 3 to 4.
@@ -167,6 +168,7 @@ def test_a_fold_and_a_branch_point_of_opposite_sign_in_one_step(largest: float) 
     assert [s.point.load for s in branch.special[1:3]] == pytest.approx([31.28043, 31.27381], abs=1e-5)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(("longer", "apart"), [(1e-3, 0.0265), (1e-4, 8.39e-3), (1e-6, 8.39e-4)])
 def test_an_eigenvalue_that_passes_zero_twice_in_one_step(longer: float, apart: float) -> None:
     """Two double branch points of the straight rod, ``apart`` by the closed form: the index is 2 on either side.
@@ -198,6 +200,7 @@ def test_a_row_beside_a_pair_of_crossings() -> None:
     assert [(s.negative_before, s.negative_after) for s in found] == [(0, 2), (2, 4), (4, 2), (2, 0)]
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(("low", "high", "largest"), [
     (0.2950, 0.4994, 0.2), (0.0550, 0.4991, 0.3), (0.2950, 0.4990121, 0.1),  # beside the last row
     (0.4946, 0.6990, 0.3), (0.4940, 0.5490, 0.05),  # beside the first row
@@ -215,6 +218,7 @@ def test_a_pair_of_crossings_beside_an_end_of_a_range(low: float, high: float, l
     assert not straight.unexplained
 
 
+@pytest.mark.alone
 def test_a_pair_of_crossings_is_listed_once() -> None:
     """The row after a step with a pair may be so near to it that its determinant is far below its neighbours'."""
     constants = (0.1956061749617919, 1.0, 1.0, 3.9702302229890574)
@@ -258,6 +262,7 @@ def test_what_is_not_explained_is_kept() -> None:
     assert not chained(a.low, a.high, singular[::-1], b.low, b.high)
 
 
+@pytest.mark.alone
 def test_steps_that_do_not_explain_are_repeated() -> None:
     """A ring whose stiffness varies by 1e-4 along it: the double point at P = 3 is broken, and passed without a jump.
 
@@ -279,6 +284,7 @@ def test_steps_that_do_not_explain_are_repeated() -> None:
     assert abs(branch.points[-1].ordinate - 2.0) > 0.3
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("short", [0.0, 1e-9, 1e-4])
 def test_branches_that_leave_at_the_end_of_the_range(short: float) -> None:
     """All rows are within the range; a branch of which it has nothing is none."""
@@ -311,6 +317,7 @@ def test_eigenvalues_beside_a_critical_load_are_no_family_of_equilibria() -> Non
     assert "without being zero: a critical load is close to P = 2.4674011" in said
 
 
+@pytest.mark.alone
 def test_mirror_images_are_compared_at_one_load() -> None:
     """First points at distances that differ by 1e-4, relative, are of a branch and its image all the same."""
     scene = column("mirror", (clamped(), free(push)), (0.0, 6.0))

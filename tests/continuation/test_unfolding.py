@@ -135,6 +135,7 @@ def test_what_steps_do_not_resolve_is_called_imperfect() -> None:
     assert special.unfolding == pytest.approx(1e-13 * np.sqrt(2) * 2 / pi, rel=1e-3)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("beside", [1e-12, 1e-9, 1e-6])
 def test_a_load_beside_a_branch_point(beside: float) -> None:
     """The branch that leaves there has its row at that load, and goes on: sqrt(P) = K(k), tip 2 k / sqrt(P).
@@ -160,6 +161,7 @@ def test_a_search_finds_the_detached_branch_once() -> None:
     assert [s.kind for s in found.branches[1].special if s.kind != "user"] == ["end", "fold", "end"]
 
 
+@pytest.mark.alone
 def test_folds_that_are_nearly_uncoupled_from_the_load() -> None:
     """Past a turn of 2 pi the null vector of a clamped rod is nearly orthogonal to the load derivative, also at a fold.
 
@@ -187,6 +189,7 @@ def test_folds_that_are_nearly_uncoupled_from_the_load() -> None:
     assert below[1] / below[2] == pytest.approx(10 ** (2 / 3), rel=1e-3)
 
 
+@pytest.mark.alone
 def test_the_bend_of_a_broken_pitchfork_with_default_steps() -> None:
     """A twisted rod, curved a little, under thrust: its branch bends at 39.2, where a step may end just before.
 

@@ -84,6 +84,7 @@ def test_cord_beyond_what_was_explored() -> None:
         assert (p.load, p.error < 1e-9) == (40.0, True)
 
 
+@pytest.mark.alone
 def test_hemitropic() -> None:
     """A circle of states counts as one, and the states are those of the branches."""
     follower = hemitropic_cases.follower()

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from golden_cases import cases, record
 
-pytestmark = pytest.mark.alone
+pytestmark = [pytest.mark.alone, pytest.mark.versions]
 NUMBERS: dict[str, Any] = json.loads((Path(__file__).parents[1] / "golden" / "numbers.json").read_text())
 
 

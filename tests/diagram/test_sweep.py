@@ -37,7 +37,9 @@ def named(kinds: Callable[[str], bool], data: dict) -> bool:
     return all(kinds(name) for row in data["branches"][0]["columns"]["motion"] for name in row)
 
 
-@pytest.mark.parametrize(("span", "loads"), [((0.0, 1.0), 11), ((-1.0, 1.0), 11), ((0.0, 36.0), 61)])
+@pytest.mark.parametrize(
+    ("span", "loads"), [((0.0, 1.0), 11), ((-1.0, 1.0), 11), pytest.param((0.0, 36.0), 61, marks=pytest.mark.alone)]
+)
 def test_flutter_at_any_torque(span: tuple[float, float], loads: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nicolai: the frequencies of a cantilever are double without torque, Euler's and Bernoulli's, and complex with it.
 
@@ -74,12 +76,14 @@ def test_curves_go_on_where_they_cross(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(line.loads) >= len(branch.points) - 1
 
 
+@pytest.mark.alone
 def test_double_frequencies_have_one_name(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the rod bends alike in all planes the vectors of a frequency are any in a plane, its name is not."""
     for scene in (classics.partly_following(1.0, (0.0, 25.0), 1.0), classics.partly_following(0.2, (0.0, 25.0), 1.0)):
         assert named(lambda name: name == "bending", swept(scene, monkeypatch)[1])
 
 
+@pytest.mark.alone
 def test_divergence_is_marked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _, data, _ = swept(classics.partly_following(0.4, (0.0, 25.0)), monkeypatch)
     drawn: list[Figure] = []

@@ -78,6 +78,7 @@ def test_a_motion_that_a_load_drives(kind: str) -> None:
 
 
 @KINDS
+@pytest.mark.alone
 def test_a_double_divergence_is_one(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside zero round-off makes a complex pair of a double eigenvalue: it is not two simple ones, nor flutter."""
     monkeypatch.setattr(sweep, "LOADS", 15)

@@ -194,6 +194,7 @@ def test_formulations_agree_within_their_estimates() -> None:
     )
 
 
+@pytest.mark.alone
 def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
     """Where ``2 E(m) = K(m)``, at ``P0 = 4 K^2``, the ends of a pinned column meet: its loop may turn about any axis.
 
@@ -230,6 +231,7 @@ def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
             assert (p.negative, p.zero) == (1, 2)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("apart", [1e-3, 1e-5])
 def test_a_branch_point_right_after_the_beginning_of_a_branch(apart: float) -> None:
     """Pinned column on a foundation k = 4 pi^4 (1 + d), where modes 1 and 2 nearly meet at P = 5 pi^2.

@@ -80,6 +80,7 @@ def test_divergence_under_a_force_that_turns_partly() -> None:
     assert len(after) == 1
 
 
+@pytest.mark.alone
 def test_beck_on_a_foundation() -> None:
     """An elastic foundation does not change the load of flutter (Smith & Herrmann 1972)."""
     rod = column(
@@ -89,6 +90,7 @@ def test_beck_on_a_foundation() -> None:
     assert sweep(rod).loads("flutter") == pytest.approx([20.0509536], rel=1e-8)
 
 
+@pytest.mark.alone
 def test_hauger() -> None:
     """Tangential thrust ``P (1 - s)`` along a rod that bends alike in all planes, against polynomials of degree 15."""
     x, weight = np.polynomial.legendre.leggauss(40)

@@ -99,6 +99,7 @@ def test_nothing_happens_the_easy_way() -> None:
     assert tip(found, plane.points[-1]) == pytest.approx(end[7:10], abs=1e-9)
 
 
+@pytest.mark.alone
 def test_inextensible_limit() -> None:
     stretchings = np.array([1e5, 1e6])
     loads = []
@@ -110,6 +111,7 @@ def test_inextensible_limit() -> None:
     assert limit == pytest.approx(lateral_buckling(4.62, inf), abs=1e-9)
 
 
+@pytest.mark.alone
 def test_formulations_agree() -> None:
     for one, other in zip(default("reduced").branches, default("pointwise").branches, strict=True):
         assert (one.name, one.ended) == (other.name, other.ended)

@@ -35,7 +35,7 @@ from rodfem.problem.scene import Parameter, Scene
 HOME = Path(__file__).parents[2]
 PAGE = (HOME / "docs" / "files.md").read_text()
 MESH, POINTWISE = Discretization("auto", 4, 6), Discretization("pointwise", 4, 6)
-pytestmark = pytest.mark.alone
+pytestmark = [pytest.mark.alone, pytest.mark.versions]
 
 
 def column() -> Scene:

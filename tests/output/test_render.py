@@ -39,7 +39,7 @@ from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 from rodfem.problem.setting import read
 from rodfem.problem.supports import foundation_of, supports_of, ties_of, write, write_section
 
-pytestmark = pytest.mark.alone
+pytestmark = [pytest.mark.alone, pytest.mark.versions]
 
 E1, E2, E3 = np.eye(3)
 S = np.linspace(0.0, 1.0, 31)
