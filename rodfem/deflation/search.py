@@ -5,8 +5,7 @@ equations from which the known equilibria are divided out (:mod:`rodfem.deflatio
 makes of a known equilibrium is known too: a continuous symmetry makes it a circle
 (:mod:`rodfem.deflation.group_orbit`), discrete ones a few isolated images
 (:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain Newton method, and kept if it is
-new and admissible.  It is the start of branches (:func:`starts`), and states of known branches are found by
-:func:`equilibria_at`.
+new and admissible.  States of known branches are found by :func:`equilibria_at`.
 
 A search can show that there are more equilibria, and never that there are no more.
 """
@@ -15,7 +14,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -240,20 +239,3 @@ def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float)
                 raise ConvergenceError(f"No equilibrium at load {load:g} between two points of {branch.name}.")
             found.append(solver.point(x, s, solver.load_tangent(x, True), outcome))
     return found
-
-
-def starts(point: Point, name: str) -> list[Branch]:
-    """Branches of one point each that set out from a found one to higher and to lower loads.
-
-    :meth:`rodfem.diagram.tracer.Tracer.trace` follows them, and :func:`rodfem.continuation.solvers.follow` their
-    ``points``.  ``name`` is that of the branches.  Raises :class:`ValueError` for a point without a tangent.
-    """
-    if point.tangent is None:
-        raise ValueError("A point without a tangent is no start of a branch.")
-    out = []
-    for sign, words in ((1.0, "up"), (-1.0, "down")):
-        tangent = point.tangent.copy()
-        tangent.scale(sign if point.slope >= 0 else -sign)
-        first = replace(point, tangent=tangent, arclength=0.0, slope=sign * abs(point.slope))
-        out.append(Branch(f"{name} {words}", None, 0, [first]))
-    return out
