@@ -29,6 +29,7 @@ from rodfem.deflation.guesses import turned_state
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import combine
+from rodfem.tolerances import DRIFT, SAME_LOAD
 
 IMAGE = 1e-12
 """Relative difference of stored energies above which a state is no mirror image of another."""
@@ -36,8 +37,8 @@ SAME = 1e-5
 """Equilibria nearer to each other than this, in the metric, are one."""
 LEAST, GREATEST = 0.3, 3.0
 """Root mean square rotation, in radian, of the first and of the last guess from the state that it starts from."""
-DRIFT = 1e-6
-"""Largest drift scalar of an equilibrium, over the rod's lowest bending eigenvalue."""
+SAME_ENERGY, LEAST_ENERGY = 1e-6, 1e-12
+"""Equilibria that slide are one if their energies differ by less than this part of them, or of the latter: absolute."""
 
 NEW, KNOWN, FAILED, INADMISSIBLE = "new", "known", "without convergence", "not admissible"
 
@@ -103,7 +104,7 @@ class Deflation(DeflatedNewton):
         scene = self.system.scene
         scene.parameters[scene.load].check(scene.load, load)
         for point in known:
-            if abs(point.load - load) > 1e-9 * abs(scene.span[1] - scene.span[0]):
+            if abs(point.load - load) > SAME_LOAD * abs(scene.span[1] - scene.span[0]):
                 raise InputError(
                     f"A known equilibrium is at {scene.load} = {point.load:.8g}, not {load:.8g}: "
                     "give equilibria at the load of the search (diagram.at(load) computes them)."
@@ -187,7 +188,7 @@ class Deflation(DeflatedNewton):
             point = solver.point(x, 0.0, solver.load_tangent(x, True), outcome)
         except ConvergenceError:  # an index that cannot be counted
             return None, FAILED
-        if self.slides and any(abs(point.energy - e) <= 1e-6 * max(abs(e), 1e-12) for e in self.energies):
+        if self.slides and any(abs(point.energy - e) <= SAME_ENERGY * max(abs(e), LEAST_ENERGY) for e in self.energies):
             return None, KNOWN
         if point.drift > DRIFT * solver.inertia.scale or not point.stretch > 0:
             return None, INADMISSIBLE
