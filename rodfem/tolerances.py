@@ -1,14 +1,38 @@
-"""Tolerances that mean the same in several packages; all others stand where they are used."""
+"""Numerical policy: what is relative to what, and the constants that mean the same in several packages.
+
+A tolerance has no unit.  Arclengths are relative to the rod's length, loads and ordinates to themselves or to one,
+differences of loads to the span, eigenvalues to the rod's lowest bending eigenvalue (``Inertia.scale``), and entries of
+matrices to the largest one.  Distances of states and lengths along a branch are in the metric: about the root mean
+square of the rotation, in radian.  What is absolute says so.
+
+All other constants stand at the top of the module that uses them.  A user changes ``Plan.accuracy``, ``Plan.steps``
+(:class:`~rodfem.continuation.step_control.StepControl`) and the mesh; the others belong to the methods, and a change of
+one is a change of results (``tests/golden``).  ``tests/house/test_literals.py`` finds those without a name.
+"""
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
+TINY = 1e-300
+"""Floor of a number that may be zero and is divided by, or has its root or logarithm taken: absolute."""
+NEGLIGIBLE = 1e-12
+"""A difference or a part below this, relative to the whole, is round-off of arithmetic: nothing was solved for."""
 ROUND_OFF = 1e-12
 """Uncertainty of a load or an ordinate, relative to it or to one, by Newton's tolerance and the conditioning near a
 singular point."""
 INSIDE = 1e-9
 """Part of a step that is left out at its ends: what happens there belongs to the row."""
+SAME_PLACE = 1e-9
+"""Arclengths that differ by less than this, relative to the rod's length, are one place."""
+SAME_LOAD = 1e-9
+"""Loads that differ by less than this, relative to the span, are one: that of a bound, or of a search."""
 SAME_STATE, SAME_SPECIAL = 1e-7, 1e-6
 """Equilibria, and special points, that agree to this in load, energy and stretch are one, up to a symmetry."""
+DRIFT = 1e-6
+"""Largest drift scalar of an equilibrium, over the lowest bending eigenvalue: beyond it a mesh breaks a symmetry."""
 
 
 def unit(*values: float) -> float:
@@ -19,3 +43,8 @@ def unit(*values: float) -> float:
 def round_off(value: float) -> float:
     """Uncertainty of a load or an ordinate that is solved for, or given."""
     return ROUND_OFF * unit(value)
+
+
+def same_place(x: Any, s: float, length: float) -> Any:
+    """Whether arclengths ``x``, a number or an array, are ``s`` to round-off, on a rod of this ``length``."""
+    return np.isclose(x, s, rtol=0, atol=SAME_PLACE * length)

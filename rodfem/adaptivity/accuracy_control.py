@@ -20,10 +20,15 @@ from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
-from rodfem.tolerances import unit
+from rodfem.stability.inertia import ROUGH
+from rodfem.tolerances import SAME_LOAD, unit
 
 SHARP = 1e-9
 """For a better accuracy than this points get one more step of Newton's method, to round-off."""
+POLISHED = 1e-3
+"""Distance, in the metric, that it may move a point by at most."""
+LEAST = 1e-30
+"""Floor of the indicator that others are divided by: it is zero where the mesh has the state exactly."""
 TRIES, MOST = 4, 16
 """Meshes tried at one place, and in a run."""
 SURE = 10.0
@@ -73,7 +78,7 @@ class Watch:
                 return
         with solver.system.clock.purpose("error bars"):
             point.estimate = self._computed(point)
-        self.checked = Checked(max(indicator, 1e-30), point.estimate)
+        self.checked = Checked(max(indicator, LEAST), point.estimate)
         if point.estimate * GROWN > self.accuracy and point.arclength > self.excused:
             raise TooCoarse(point, point.estimate)
 
@@ -146,12 +151,12 @@ class Watch:
             return
         system = solver.system
         row = solver.axis if self._at_bound(point) else solver.row(point.tangent)
-        point.error = correct(system, point.x, row, reach=1e-3).error
+        point.error = correct(system, point.x, row, reach=POLISHED).error
         point.load, point.ordinate = system.scalar(point.x), solver.shape.ordinate(point.x)
         point.energy, point.stretch = solver.energy(point.x), solver.shape.stretch(point.x)
 
     def _at_bound(self, point: Point) -> bool:
-        return min(abs(point.load - bound) for bound in self.bounds) < 1e-9 * abs(self.bounds[1] - self.bounds[0])
+        return min(abs(point.load - bound) for bound in self.bounds) < SAME_LOAD * abs(self.bounds[1] - self.bounds[0])
 
     def _computed(self, point: Point) -> float:
         """Error of a point across its branch, or at its load on a bound; :class:`TooCoarse` where its index errs."""
@@ -164,9 +169,7 @@ class Watch:
         negative = self._index(point, richer, again)
         if negative != point.negative and point.arclength > self.excused:
             solver = self.meshes.solvers[point.mesh]
-            found = solver.inertia.at(point.x)
-            found.count()
-            modes = found.nearest(abs(negative - point.negative), accuracy=1e-2)[1]
+            modes = solver.inertia.modes_near_zero(point.x, abs(negative - point.negative), ROUGH)
             raise TooCoarse(
                 point,
                 float("inf"),

@@ -22,6 +22,7 @@ from rodfem import compat
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.fem.fields import Discretization, Fields, turning_of
 from rodfem.problem.scene import Scene
+from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY, same_place
 
 DEGREES = range(4, 11)
 """Degrees to choose from."""
@@ -32,8 +33,8 @@ KEEP = 0.15
 LARGEST = 3.0
 """No element grows by more than this factor at a time: the decay was measured on the element that there is."""
 LEAST_DECAY, MOST_DECAY = 1.5, 1e3
-NEGLIGIBLE = 1e-12
-"""Coefficients below this, of the largest, are round-off."""
+ALMOST = 1e-6
+"""Part of an element that a piece of the rod may have more than a whole number of them."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ def _decay(vertices: np.ndarray, coefficients: np.ndarray) -> Smoothness:
     """Fit ``A rho^-j`` to the monotone envelope of the last coefficients of each element above round-off."""
     elements, degree = coefficients.shape
     envelope = np.maximum.accumulate(coefficients[:, ::-1], axis=1)[:, ::-1]
-    floor = max(NEGLIGIBLE * coefficients.max(), 1e-300)
+    floor = max(NEGLIGIBLE * coefficients.max(), TINY)
     amplitude, decay = np.full(elements, floor), np.full(elements, MOST_DECAY)
     for e, row in enumerate(envelope):
         last = int(np.count_nonzero(row > floor))
@@ -165,10 +166,10 @@ def pieces_of(scene: Scene) -> np.ndarray:
     The centreline is as accurate as a load at vertices only, and far less inside of elements.
     """
     a, b = scene.interval
-    inner = [s for s in (*scene.joints, *scene.ordinate.places) if min(s - a, b - s) > 1e-9 * scene.length]
+    inner = [s for s in (*scene.joints, *scene.ordinate.places) if min(s - a, b - s) > SAME_PLACE * scene.length]
     out = [a]
     for s in sorted(inner):
-        if s - out[-1] > 1e-9 * scene.length:
+        if not same_place(s, out[-1], scene.length):
             out.append(s)
     return np.array([*out, b])
 
@@ -180,7 +181,7 @@ def first_mesh(scene: Scene, formulation: str, elements: int, degree: int) -> Di
     ``formulation`` is ``auto``, ``pointwise`` or ``reduced``.
     """
     pieces = pieces_of(scene)
-    counts = np.maximum(np.ceil(np.diff(pieces) / scene.length * elements - 1e-6).astype(int), 1)
+    counts = np.maximum(np.ceil(np.diff(pieces) / scene.length * elements - ALMOST).astype(int), 1)
     inner = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(pieces, pieces[1:], counts, strict=False)]
     vertices = tuple(map(float, np.concatenate([pieces[:1], *inner])))
     return Discretization(formulation, len(vertices) - 1, degree, vertices)

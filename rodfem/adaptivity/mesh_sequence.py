@@ -23,7 +23,7 @@ from rodfem.fem.newton import correct
 from rodfem.fem.symmetries import may_slide
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
-from rodfem.tolerances import unit
+from rodfem.tolerances import TINY, unit
 
 FINEST, COARSEST = 1e-10, 1e-1
 """Least and greatest accuracy that can be asked for; the former is near round-off."""
@@ -119,7 +119,7 @@ class Meshes:
         error = trouble.error if isfinite(trouble.error) else 1e3 * self.accuracy
         found = self.gauge(old.mesh)(trouble.point.x, trouble.directions)
         gain = self.accuracy / (error * MARGIN * FURTHER**tries)
-        indicator = max(found.indicator, 1e-300) * gain**trouble.order
+        indicator = max(found.indicator, TINY) * gain**trouble.order
         mesh = cheapest(old, found, indicator)
         fields = old.system.fields
         affordable = 1.2 * cost(fields, mesh.elements, mesh.degree)

@@ -15,7 +15,12 @@ from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import HIGHEST
 from rodfem.fem.system import System
-from rodfem.tolerances import unit
+from rodfem.tolerances import ROUND_OFF, unit
+
+LOCATED = 1e-10
+"""Uncertainty of the load at which the stretch vanishes on one mesh, relative to it or to one."""
+FIRST = 2e-4
+"""First step, in spans, from there to where it vanishes on a richer mesh."""
 
 
 def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
@@ -47,7 +52,7 @@ def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
     (load2, ordinate2, *_), (load, ordinate, energy, last) = found
     x = solver.shape.restore(sample)
     point = replace(coarse, x=x, load=load, ordinate=ordinate, energy=energy, stretch=last)
-    special = SpecialPoint(END, point, point.negative, point.negative, 1e-10 * unit(load), test_function="stretch")
+    special = SpecialPoint(END, point, point.negative, point.negative, LOCATED * unit(load), test_function="stretch")
     left = 1.0 if d.degree == 1 else 0.25
     special.error_estimate = max(left * abs(load - load2), special.located_to)
     special.ordinate_error = max(left * abs(ordinate - ordinate2), special.located_to)
@@ -58,10 +63,10 @@ def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
 def _bracketed_zero(stretch: Callable[[float], float], coarse: Point, span: float) -> float:
     """Load at which ``stretch`` vanishes: bracketed by steps from the coarse load along the branch, then solved for."""
     a, value = coarse.load, stretch(coarse.load)
-    step = np.copysign(2e-4 * span, coarse.slope if value > 0 else -coarse.slope)
+    step = np.copysign(FIRST * span, coarse.slope if value > 0 else -coarse.slope)
     for _ in range(14):
         b, other = a + step, stretch(a + step)
         if value * other <= 0:
-            return float(brentq(stretch, a, b, xtol=1e-12 * span))
+            return float(brentq(stretch, a, b, xtol=ROUND_OFF * span))
         a, value, step = b, other, 1.7 * step
     raise ConvergenceError("the zero of the stretch was not found on the finer mesh")

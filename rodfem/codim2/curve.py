@@ -17,6 +17,14 @@ from rodfem.errors import ConvergenceError
 
 LOCATED = 1e-8
 """Arclength to which turning points and cusps are located: their parameters are so to its square."""
+AHEAD = 1e-9
+"""Arclength after which a curve that begins on a bound shows whether it leaves the plane."""
+REACH = 1e-6
+"""Distance, in the metric, that a point on a bound may move by, however short the step."""
+BESIDE = 1e-3
+"""Share of the plane's width by which the last point may miss the two nodes that it is between."""
+CLOSED = 1e-9
+"""Difference of ordinates that a closed curve may end with, where they do not change along it: absolute."""
 
 
 class Criterion(Protocol):
@@ -59,7 +67,7 @@ class Tracer:
     def run(self, start: LocusPoint) -> Half:
         """Follow to an end."""
         half, history, step = Half([start]), [start], self.steps.first
-        ahead = start.p + 1e-9 * start.dp
+        ahead = start.p + AHEAD * start.dp
         over = self.plane.outside(ahead)
         if over is not None:
             half.ended = self._bound(*over)
@@ -115,7 +123,7 @@ class Tracer:
         p, x, dp, dx = predict(history, last.s + share * step)
         p[which] = bound
         axis = (np.arange(2) == which) * self.plane.width
-        node = self.criterion.correct(p, x, (axis, None), last, max(0.5 * step, 1e-6))
+        node = self.criterion.correct(p, x, (axis, None), last, max(0.5 * step, REACH))
         node.p[which] = bound
         node = self._after(last, node if self._cosine(node, dp, dx) >= 0 else node.reversed())
         other = self.plane.outside(node.p)
@@ -189,7 +197,7 @@ class Tracer:
         """End at a node where ``f`` vanishes."""
         found = self._located(a, b, f, sentence)
         where = (a.p + b.p) / 2
-        if found and not np.any(abs(found[0][0].p - where) > abs(b.p - a.p) + 1e-3 * self.plane.width):
+        if found and not np.any(abs(found[0][0].p - where) > abs(b.p - a.p) + BESIDE * self.plane.width):
             half.marks[len(half.nodes)] = sentence
             half.nodes.append(found[0][0])
             where = found[0][0].p
@@ -202,4 +210,4 @@ class Tracer:
         if not size or not 0 < part @ whole <= size**2 or self._cosine(b, start.dp, start.dx) < 0.5:
             return False
         aside = abs(part[0] * whole[1] - part[1] * whole[0]) / size
-        return aside < 0.05 * size and abs(start.ordinate - a.ordinate) <= 2 * abs(b.ordinate - a.ordinate) + 1e-9
+        return aside < 0.05 * size and abs(start.ordinate - a.ordinate) <= 2 * abs(b.ordinate - a.ordinate) + CLOSED

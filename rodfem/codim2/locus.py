@@ -42,6 +42,8 @@ STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000
 """Steps of a locus, as shares of the bounds."""
 SAME = 1e-6
 """Loads of special points that differ by less than this, relative, may be one and the same point of a curve."""
+CUSP = 1e-3
+"""Part of the tangent in the plane, as a share of the bounds, below which a node is at a cusp."""
 
 
 @dataclass
@@ -301,7 +303,7 @@ def _estimate(
         if criterion is None:
             criterion = _criterion(richer, other, kind, near)
         along = node.dp
-        if np.linalg.norm(along / plane.width) < 1e-3:  # a cusp
+        if np.linalg.norm(along / plane.width) < CUSP:
             along = nodes[min(row + 1, len(nodes) - 1)].p - nodes[max(row - 1, 0)].p
         try:
             error[row] = np.maximum(abs(criterion.correct(node.p, x, (along, None), near, 0.1).p - node.p), 0)

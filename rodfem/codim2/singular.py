@@ -45,11 +45,11 @@ from petsc4py import PETSc
 from rodfem.codim2.parameter_plane import LocusPoint, Plane
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.errors import ConvergenceError
-from rodfem.fem.newton import STALLED, TOLERANCE
+from rodfem.fem.newton import KEPT, SHRUNK, STALLED, TOLERANCE
 from rodfem.linalg.orthogonal import combine, orthonormalize, project_out
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import Factored, Inertia
-from rodfem.tolerances import ROUND_OFF
+from rodfem.tolerances import ROUND_OFF, TINY
 
 DIFFERENCE = 1e-4
 """Step of the central differences for the third derivatives, in the metric: their errors do not enter the result."""
@@ -167,7 +167,7 @@ class Singular:
             if size < TOLERANCE or (STALLED > size > 0.5 * before):
                 return self._node(p, x, tangent, abs(dp))
             # chord step: the third derivatives, which cost most, serve again where corrections shrink tenfold
-            old = now if size < 0.1 * before and size < 0.02 else None
+            old = now if size < SHRUNK * before and size < KEPT else None
             before = size
         raise ConvergenceError("Newton's method does not converge")
 
@@ -287,7 +287,7 @@ class Singular:
         # the tangent is the null vector of (phi.F_p 0; G_p phi.S_phi phi); without coupling of G_p alone
         if self.fold:
             a, b = np.array([*coupling, at.g]), np.array([*g, curvature])
-            z = np.cross(a / max(np.linalg.norm(a), 1e-300), b / np.linalg.norm(b))
+            z = np.cross(a / max(np.linalg.norm(a), TINY), b / np.linalg.norm(b))
             dp, free, weights = z[:2] * width, [*at.response, at.v[0]], np.array([*(z[:2] * width), z[2]])
         else:
             dp = np.array([-g[1], g[0]]) * width

@@ -35,20 +35,19 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import NewtonResult, iterate
 from rodfem.fem.state import State
 from rodfem.fem.system import dense_columns
-from rodfem.stability.inertia import Factored, Index, Inertia
+from rodfem.stability.inertia import FRESH, Factored, Index, Inertia
+from rodfem.tolerances import TINY
 
 BLOCK = 2
 """Number of vectors that are iterated along a branch."""
-FRESH = 1e-3
-"""Weight of a generic vector that is added to each vector of the block before it is iterated."""
 NEAR = 1e-3
 """Distance of an eigenvalue from zero, over the lowest bending eigenvalue, below which the two shifts count."""
 SENSITIVE = 100.0
 """Least change of an eigenvalue assumed when the state moves by one radian, in the same units."""
 DIFFERENCE = 0.05
 """Step of the differences, relative to how far the equilibrium is from the prediction."""
-LEAST_DIFFERENCE = 1e-7
-"""Least step of them, in the metric."""
+SHORTEST = 1e-7
+"""Least of these steps, in the metric: shorter ones differ by round-off."""
 SAFE = 10.0
 """Least distance of all eigenvalues from zero, over the measured change of those carried along."""
 
@@ -172,7 +171,7 @@ class Corrector:
                 v.array[:] = solved[:, 2 + i]
                 inertia.metric.mult(v, image)
                 # |S^-1 M v| / |v| is at most one over the distance of the nearest eigenvalue from zero
-                grown = max(image.dot(v), 1e-300) ** 0.5
+                grown = max(image.dot(v), TINY) ** 0.5
                 growth = max(growth, grown / size) if isfinite(grown) else float("inf")
                 v.scale(1.0 / grown)
                 image.scale(1.0 / grown)
@@ -224,7 +223,7 @@ class Corrector:
         moved = self.system.norm(self._image)
         least = NEAR * inertia.scale + 10 * inertia.tolerance
         if moved:
-            projected = self._project_at(x, max(DIFFERENCE * moved, LEAST_DIFFERENCE))
+            projected = self._project_at(x, max(DIFFERENCE * moved, SHORTEST))
             change = float(np.linalg.norm(projected - at.projected))
             # the count at the prediction holds only if no eigenvalue can have crossed zero on the way from there
             if at.nearest < least + SENSITIVE * moved * inertia.scale + SAFE * change:

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from rodfem.stability.nonsymmetric import ALIKE, Frequencies, NonsymmetricPencil, groups
+from rodfem.tolerances import TINY
 
 STRANGE = 1.0
 """Sum of the share of a vector outside a curve's and of the relative change, above which another curve begins."""
@@ -35,7 +36,7 @@ class Curves:
         numbers = [-1] * len(found.values)
         last = self._last
         weighed = pencil.weighed(found.vectors)
-        energy = np.maximum(pencil.squares(found.vectors, weighed), 1e-300)
+        energy = np.maximum(pencil.squares(found.vectors, weighed), TINY)
         if last is not None:
             bases = np.concatenate([basis for _, basis in self._spans], axis=1)
             cost = self._distances(last, found, abs(pencil.product(bases, weighed)) ** 2 / energy)

@@ -9,15 +9,18 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.optimize import linear_sum_assignment
 
-from rodfem.continuation.locate import real_root, zero_uncertainty
+from rodfem.continuation.locate import SHARP, real_root, zero_uncertainty
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured
 from rodfem.stability.nonsymmetric import MULTIPLE, Frequencies, groups
+from rodfem.tolerances import ROUND_OFF
 
 MOVED = 0.3
 """A complex eigenvalue that changes by more than this, relative, in a step may be another one."""
 RANK = 1e-6
 """Relative distance of eigenvalues above which their vectors span their invariant subspace well."""
+ENOUGH = 1e-8
+"""Uncertainty of a load, relative to it, at which an interval that is no better than the last one ends the search."""
 
 AtLoad = Callable[[float, Cluster], Measured]
 
@@ -76,12 +79,12 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
             continue
         load += half * root
         cluster = Cluster(cluster.basis, float(chebyshev.chebval(root, chebyshev.chebfit(t, mean, 5))))
-        uncertainty = max(half * zero_uncertainty(series, root), 1e-12 * abs(load))
+        uncertainty = max(half * zero_uncertainty(series, root), ROUND_OFF * abs(load))
         if abs(root) < 1 and uncertainty < best.uncertainty:
             best = Located(load, uncertainty, cluster)
-        elif best.uncertainty < 1e-8 * abs(load):
+        elif best.uncertainty < ENOUGH * abs(load):
             break
-        if best.uncertainty < 1e-11 * abs(load):
+        if best.uncertainty < SHARP * abs(load):
             break
         half /= 4
     if not np.isfinite(best.uncertainty):

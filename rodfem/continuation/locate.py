@@ -23,7 +23,7 @@ from rodfem.fem.newton import correct
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, project_out
 from rodfem.problem.events import Event
-from rodfem.stability.inertia import Factored
+from rodfem.stability.inertia import ROUGH, Factored
 from rodfem.tolerances import round_off
 
 NODES, FEWER = 6, 4
@@ -39,6 +39,10 @@ OFF = 1e-3
 """Distance beside a singular state at which one is solved for instead, relative to the piece."""
 ASIDE = 1e-6
 """Distance beside a singular point at which an event's equations are solved, relative to the piece."""
+REAL = 1e-6
+"""Imaginary part below which a zero of an interpolant, in half lengths of its interval, is real."""
+ORDERED = 1e-4
+"""Relative change of eigenvalues nearest zero at which their order is known."""
 ALONG = 1e-13
 """Arclength to which an event is located, in the metric."""
 NARROWER = 6
@@ -112,7 +116,7 @@ def eigenvalue(
     # its place among the eigenvalues of its sign, by their distance from zero
     position = order - below if order >= below else below - 1 - order
     for wanted in (position + 1, position + 3, position + 6, position + 12):
-        values, vectors = found.nearest(wanted + len(still), accuracy=1e-4)
+        values, vectors = found.nearest(wanted + len(still), ORDERED)
         if still:
             moving = [i for i, v in enumerate(vectors) if across(solver.system, [v], still)]
             values, vectors = values[moving], [vectors[i] for i in moving]
@@ -209,7 +213,7 @@ def interpolate(samples: list[Sample], test_function: str, guess: float, noise: 
 def real_root(series: np.ndarray, guess: float) -> float | None:
     """Real zero nearest to ``guess`` of a Chebyshev series on [-1, 1], or a little outside; None without one."""
     roots = chebyshev.chebroots(series)
-    real = roots[abs(roots.imag) < 1e-6].real
+    real = roots[abs(roots.imag) < REAL].real
     real = real[abs(real) <= 1.5]
     return float(real[np.argmin(abs(real - guess))]) if len(real) else None
 
@@ -349,9 +353,7 @@ def locate(
     h = b.arclength - a.arclength
     if test_function == "slope":
         x, guess = solve_beside(solver, curve, a.arclength + h * a.slope / (a.slope - b.slope), OFF * h)
-        found = solver.inertia.at(x)
-        found.count()
-        mode = found.nearest(1, accuracy=1e-2)[1][0]
+        (mode,) = solver.inertia.modes_near_zero(x, 1, ROUGH)
     else:
         piece = a.arclength + OFF * h, b.arclength - OFF * h
         guess, mode = crossing_mode(solver, curve, piece, order, still)

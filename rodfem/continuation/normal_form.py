@@ -23,6 +23,8 @@ AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 """Amplitudes, in the metric, at which the branch is solved: the positive half of eight Chebyshev nodes."""
 BESIDE = 1e-3
 """Distance along a branch, in the metric, over which the slope of the ordinate is taken."""
+CONSTANT = 1e-12
+"""Leading coefficient of the ordinate in the amplitude below which it does not change: absolute."""
 
 
 @dataclass(frozen=True)
@@ -122,4 +124,4 @@ def _leading(loads: np.ndarray, ordinates: np.ndarray, odd: bool, count: int) ->
     load = np.linalg.solve(powers, loads[-count:] / a**2)[0]
     x = np.linalg.solve(powers, ordinates[-count:] / (a if odd else a**2))[0]
     scale = x**2 if odd else x
-    return float(load / scale) if abs(scale) > 1e-12 else float("nan")
+    return float(load / scale) if abs(scale) > CONSTANT else float("nan")

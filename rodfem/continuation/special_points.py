@@ -22,7 +22,9 @@ from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance, hermit
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import project_out
+from rodfem.stability.inertia import NULL
 from rodfem.stability.round_off import decide
+from rodfem.tolerances import TINY
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
@@ -34,6 +36,10 @@ INSENSITIVE = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
 FIRST, NEAREST = 0.05, 1e-3
 """Distance of the first point of a branch from the branch point that it leaves: usually, and at least."""
+SHORTEST = 1e-4
+"""Amplitude, in the metric, below which no further one is tried from a branch point."""
+FIXED = 1e-6
+"""Norm of a unit direction's image by a symmetry below which it moves nothing."""
 APART = 1e-7
 """Arclength above which there is a state to count at between two special points."""
 SHIFT = 1e-6
@@ -60,8 +66,7 @@ def special_at(
         raise ConvergenceError(
             f"No eigenvalue vanishes at load {point.load:.8g}, where one was expected to", SMALLER_STEPS
         )
-    _, vectors = found.nearest(null_count, accuracy=1e-8)
-    vectors = across(system, vectors, still)
+    vectors = across(system, found.nearest(null_count, NULL)[1], still)
     if not vectors:
         raise ConvergenceError(
             f"The null vector near load {located.load:.8g} is in the span of those that persist along the branch",
@@ -165,9 +170,7 @@ def _persistent(solver: BranchSolver, a: Point, count: int) -> list[PETSc.Vec]:
     """Vectors of the eigenvalues that are zero all along a branch, at the point ``a``."""
     if not count:
         return []
-    found = solver.inertia.at(a.x)
-    found.count()
-    return found.nearest(count, accuracy=1e-8)[1]
+    return solver.inertia.modes_near_zero(a.x, count)
 
 
 def _special(
@@ -203,13 +206,13 @@ def directions(solver: BranchSolver, special: SpecialPoint) -> list[PETSc.Vec]:
         d = candidate.copy()
         project_out(d, known, system.metric, times=2)
         size = system.norm(d)
-        if size < 0.1 * max(system.norm(candidate), 1e-300):
+        if size < 0.1 * max(system.norm(candidate), TINY):
             continue
         d.scale(1.0 / size)
         out.append(d)
         known.append(d)
         for image in system.equivalent_directions(special.point.x, d):
-            if system.norm(image) > 1e-6:
+            if system.norm(image) > FIXED:
                 image.scale(1.0 / system.norm(image))
                 known.append(image)
     return out
@@ -243,7 +246,7 @@ def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, fir
     row, before = solver.row(direction), system.damping
     for damping in dict.fromkeys((before, before or solver.inertia.tolerance)):
         system.damping, amplitude = damping, first
-        while amplitude > 1e-4:
+        while amplitude > SHORTEST:
             x = special.point.x.copy()
             x.axpy(amplitude, direction)
             outcome = correct(system, x, row, reach=2.0 * amplitude)

@@ -36,11 +36,14 @@ from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import EPS
+from rodfem.tolerances import TINY
 
 DIFFERENCE = 1e-4
 """Step of the differences, in the metric."""
 MOST = 10
 """Newton steps."""
+STALLED = 1e-7
+"""Below this, in the metric, a step that no longer shrinks is round-off."""
 FARTHEST = 0.5
 """A point farther than this from where it is expected, in the metric, is another one."""
 NOISE = 100.0
@@ -89,7 +92,7 @@ def unfold(solver: BranchSolver, special: SpecialPoint) -> Unfolded | None:
         if not np.isfinite(size) or moved > FARTHEST:
             return None
         x.axpy(1.0, step)
-        if size < TOLERANCE or (size < 1e-7 and size > 0.5 * before):
+        if size < TOLERANCE or (size < STALLED and size > 0.5 * before):
             matrix = inertia.at(x).matrix
             noise = NOISE * max(_rounding(matrix, w, x) for w in v)
             return Unfolded(x, system.scalar(x), beta, noise + LEAST * inertia.scale, directions)
@@ -120,7 +123,7 @@ def _step(
         table[i] = [bend.dot(v[i]), *(u.dot(r[i]) for u in v)]
     known[k] = np.trace(G) - sum(s.dot(image) for image in y)
     table[k] = [sum(u.dot(image) for u, image in zip(v, r, strict=True)), *(sum(u.dot(z) for z in y) for u in v)]
-    size = np.maximum(abs(table).max(axis=1), 1e-300)
+    size = np.maximum(abs(table).max(axis=1), TINY)
     share = np.linalg.solve(table / size[:, None], known / size)
     step = combine([s, w, *v], np.array([1.0, *share]))
     return step, c + share[0] * b + G.T @ share[1:], v, _crossing_directions(system, w, v, table) if k == 1 else []

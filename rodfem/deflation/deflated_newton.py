@@ -29,9 +29,11 @@ from petsc4py import PETSc
 
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.deflation.group_orbit import Orbits
+from rodfem.fem.newton import LARGEST
+from rodfem.tolerances import TINY
 
-LARGEST = 0.4
-"""Bound of a step, in the metric."""
+POLE = 1e-12
+"""Least distance from a known equilibrium, in the metric, and least divisor of a deflated step."""
 MOST = 60
 """Deflated Newton steps of one try."""
 NEAR = 1e-4
@@ -63,7 +65,7 @@ class DeflatedNewton:
             matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
             system.lu(matrix)
             size = system.norm(step) if system.solve(equations, step) else float("nan")
-            if not isfinite(size) or not self._advance(x, step, -min(1.0, LARGEST / max(size, 1e-300))):
+            if not isfinite(size) or not self._advance(x, step, -min(1.0, LARGEST / max(size, TINY))):
                 return
 
     def approach(self, x: PETSc.Vec) -> int:
@@ -88,7 +90,7 @@ class DeflatedNewton:
             if max(size, step.norm() / (1.0 + x.norm())) < NEAR:
                 return number
             factor = self.rescaling(x, step)
-            factor *= min(1.0, LARGEST / max(abs(factor) * size, 1e-300))
+            factor *= min(1.0, LARGEST / max(abs(factor) * size, TINY))
             if not self._advance(x, step, factor):
                 return MOST
         return MOST
@@ -99,9 +101,9 @@ class DeflatedNewton:
         image = self.system.metric * step
         slope = 0.0
         for d, apart in self.known.nearest(x):
-            d = max(d, 1e-12)
+            d = max(d, POLE)
             slope -= 2 * apart.dot(image) / (d * d * (1 + d * d))
-        return 1.0 / (1.0 - slope) if abs(1.0 - slope) > 1e-12 else 1e12
+        return 1.0 / (1.0 - slope) if abs(1.0 - slope) > POLE else 1.0 / POLE
 
     def _advance(self, x: PETSc.Vec, step: PETSc.Vec, factor: float) -> bool:
         """Add ``factor`` times a step, halved while the stored energy has no value there; False if it never has."""

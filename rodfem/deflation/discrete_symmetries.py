@@ -21,6 +21,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.system import System
+from rodfem.tolerances import SAME_PLACE, same_place
 
 ACCURACY = 1e-12
 """Relative difference of ``F(T x) . T y`` and ``F(x) . y`` below which a map is a symmetry."""
@@ -76,7 +77,7 @@ def _reversed(system: System, values: np.ndarray, degree: int) -> np.ndarray:
     gathered = system.comm.allgather((here[: f.owned_cells], values[: f.owned_cells][:, order]))
     starts = np.concatenate([start for start, _ in gathered])
     table = np.concatenate([part for _, part in gathered])[np.argsort(starts)]
-    tolerance = 1e-9 * system.scene.length
+    tolerance = SAME_PLACE * system.scene.length
     cell = np.searchsorted(np.sort(starts), here - tolerance)
     out = np.empty_like(values)
     out[:, order] = table[len(starts) - 1 - cell][:, ::-1]
@@ -90,7 +91,7 @@ def _misfit(system: System, values: np.ndarray) -> np.ndarray:
     found = np.zeros((2, 3))
     here = np.zeros((2, 3), dtype=bool)
     for side, s in enumerate(system.scene.interval):
-        at_end = np.isclose(x, s, rtol=0, atol=1e-9 * system.scene.length)
+        at_end = same_place(x, s, system.scene.length)
         for number, value in zip(f.number[f.dofs["r"][at_end]], values[at_end], strict=True):
             here[side], found[side] = number < 0, np.where(number < 0, value, 0.0)
     both = system.comm.allgather((here, found))

@@ -19,6 +19,7 @@ from petsc4py import PETSc
 
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
+from rodfem.tolerances import NEGLIGIBLE
 
 FREQUENCIES = (0.5, 1.0)
 AMOUNTS = np.linspace(-2 * np.pi, 2 * np.pi, 96, endpoint=False)
@@ -105,7 +106,7 @@ class Orbits:
             if not symmetry.along:
                 constant, change = zero.generator(i), ones.generator(i)
                 change.axpy(-1.0, constant)
-                if constant.norm() > 0 and change.norm() < 1e-12 * constant.norm():
+                if constant.norm() > 0 and change.norm() < NEGLIGIBLE * constant.norm():
                     self.translations.append(constant)
                 else:
                     self.rotations.append(i)

@@ -6,6 +6,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.system import System
+from rodfem.tolerances import same_place
 
 
 def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[int]) -> PETSc.Vec:
@@ -35,7 +36,7 @@ def _clamped(system: System) -> list[bool]:
     x = f.coordinates(f.discretization.degree)
     here = []
     for s in system.scene.interval:
-        at_end = np.isclose(x, s, rtol=0, atol=1e-9 * system.scene.length)
+        at_end = same_place(x, s, system.scene.length)
         here.append(bool((f.number[f.dofs[f.turning.name][at_end]] < 0).any()))
     return [any(side) for side in zip(*system.comm.allgather(here), strict=True)]
 

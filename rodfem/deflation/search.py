@@ -5,8 +5,7 @@ equations from which the known equilibria are divided out (:mod:`rodfem.deflatio
 makes of a known equilibrium is known too: a continuous symmetry makes it a circle
 (:mod:`rodfem.deflation.group_orbit`), discrete ones a few isolated images
 (:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain Newton method, and kept if it is
-new and admissible.  It is the start of branches (:func:`starts`), and states of known branches are found by
-:func:`equilibria_at`.
+new and admissible.  States of known branches are found by :func:`equilibria_at`.
 
 A search can show that there are more equilibria, and never that there are no more.
 """
@@ -15,7 +14,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -30,6 +29,7 @@ from rodfem.deflation.guesses import turned_state
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import combine
+from rodfem.tolerances import DRIFT, SAME_LOAD
 
 IMAGE = 1e-12
 """Relative difference of stored energies above which a state is no mirror image of another."""
@@ -37,8 +37,8 @@ SAME = 1e-5
 """Equilibria nearer to each other than this, in the metric, are one."""
 LEAST, GREATEST = 0.3, 3.0
 """Root mean square rotation, in radian, of the first and of the last guess from the state that it starts from."""
-DRIFT = 1e-6
-"""Largest drift scalar of an equilibrium, over the rod's lowest bending eigenvalue."""
+SAME_ENERGY, LEAST_ENERGY = 1e-6, 1e-12
+"""Equilibria that slide are one if their energies differ by less than this part of them, or of the latter: absolute."""
 
 NEW, KNOWN, FAILED, INADMISSIBLE = "new", "known", "without convergence", "not admissible"
 
@@ -104,7 +104,7 @@ class Deflation(DeflatedNewton):
         scene = self.system.scene
         scene.parameters[scene.load].check(scene.load, load)
         for point in known:
-            if abs(point.load - load) > 1e-9 * abs(scene.span[1] - scene.span[0]):
+            if abs(point.load - load) > SAME_LOAD * abs(scene.span[1] - scene.span[0]):
                 raise InputError(
                     f"A known equilibrium is at {scene.load} = {point.load:.8g}, not {load:.8g}: "
                     "give equilibria at the load of the search (diagram.at(load) computes them)."
@@ -188,7 +188,7 @@ class Deflation(DeflatedNewton):
             point = solver.point(x, 0.0, solver.load_tangent(x, True), outcome)
         except ConvergenceError:  # an index that cannot be counted
             return None, FAILED
-        if self.slides and any(abs(point.energy - e) <= 1e-6 * max(abs(e), 1e-12) for e in self.energies):
+        if self.slides and any(abs(point.energy - e) <= SAME_ENERGY * max(abs(e), LEAST_ENERGY) for e in self.energies):
             return None, KNOWN
         if point.drift > DRIFT * solver.inertia.scale or not point.stretch > 0:
             return None, INADMISSIBLE
@@ -240,20 +240,3 @@ def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float)
                 raise ConvergenceError(f"No equilibrium at load {load:g} between two points of {branch.name}.")
             found.append(solver.point(x, s, solver.load_tangent(x, True), outcome))
     return found
-
-
-def starts(point: Point, name: str) -> list[Branch]:
-    """Branches of one point each that set out from a found one to higher and to lower loads.
-
-    :meth:`rodfem.diagram.tracer.Tracer.trace` follows them, and :func:`rodfem.continuation.solvers.follow` their
-    ``points``.  ``name`` is that of the branches.  Raises :class:`ValueError` for a point without a tangent.
-    """
-    if point.tangent is None:
-        raise ValueError("A point without a tangent is no start of a branch.")
-    out = []
-    for sign, words in ((1.0, "up"), (-1.0, "down")):
-        tangent = point.tangent.copy()
-        tangent.scale(sign if point.slope >= 0 else -sign)
-        first = replace(point, tangent=tangent, arclength=0.0, slope=sign * abs(point.slope))
-        out.append(Branch(f"{name} {words}", None, 0, [first]))
-    return out

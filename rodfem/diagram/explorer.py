@@ -141,9 +141,7 @@ class Explorer(Tracer):
         load does no work on the free motion, and the branch goes on with the tangent ``(w, 1)``, across the family.
         """
         solver, system = self.solver, self.solver.system
-        found = solver.inertia.at(point.x)
-        found.count()
-        vectors = found.nearest(freedoms, accuracy=1e-8)[1]
+        vectors = solver.inertia.modes_near_zero(point.x, freedoms)
         if max(coupling_of(solver, point.x, v) for v in vectors) > COUPLED:
             raise SceneError(
                 f"The first state, at {self.scene.load} = {point.load:g}, may move freely at this load, and is not the "

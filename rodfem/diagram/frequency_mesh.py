@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.solvers import StaticSolver
-from rodfem.diagram.sweep import at_load
+from rodfem.diagram.sweep import SHIFT, at_load
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
@@ -69,7 +69,7 @@ def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndar
     found = []
     for load in loads:
         x = at_load(solver, x, float(load))
-        values = eigensolver.at(x).near(number + 2, -1e-3).values
+        values = eigensolver.at(x).near(number + 2, SHIFT).values
         found.append(values[np.argsort(abs(values))][: number + 2])
     if min(map(len, found)) < number:
         remedy = Remedy("ask for fewer ({})", Argument("Plan", "spectrum"))

@@ -23,6 +23,8 @@ COUNTS = {
 }
 """Arguments that are not negative, in words."""
 GIVE_LOADS = Remedy("give them in {}", Argument("Plan", "at"))
+ACCURACY = 1e-8
+"""One that an error suggests."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class Plan:
         if self.method not in ("", methods.AUTO):
             methods.find(self.method)
         if self.accuracy is not None:
-            real("accuracy", self.accuracy, 1e-8)
+            real("accuracy", self.accuracy, ACCURACY)
         if not all(isinstance(event, Event) for event in self.events):
             raise InputError(f"events is {self.events!r}: give Events, as in events=(Event('ends meet', of=f),).")
         if self.locus is not None:

@@ -21,7 +21,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM
 from rodfem.output.files import COLUMNS, load_json, load_state
 from rodfem.problem.scene import Scene
-from rodfem.tolerances import unit
+from rodfem.tolerances import NEGLIGIBLE, unit
 
 NEEDED = ("range", "accuracy", "constants", "discretization", "meshes")
 """Entries of a diagram, beside those that all of its readers need."""
@@ -30,8 +30,6 @@ OF_SPECIAL = (
     *("kind", "row", "negative_before", "negative_after", "located_to", "coupling", "multiplicity", "error_estimate"),
     *("ordinate_error_estimate", "followed", "unfolding", "note", "omega2", "meets", "law"),
 )
-SAME = 1e-12
-"""Relative difference of two values of a constant that are the same."""
 
 
 def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Diagram:
@@ -85,7 +83,7 @@ def _check(data: dict[str, Any], scene: Scene, folder: Path) -> None:
         )
     for constant, value in data["constants"].items():
         known = scene.parameters.get(constant)
-        if known is None or abs(known.value - value) > SAME * unit(value):
+        if known is None or abs(known.value - value) > NEGLIGIBLE * unit(value):
             there = "has no such parameter" if known is None else f"has {known.value:.12g}"
             raise InputError(
                 f"{folder} was computed with {constant} = {value:.12g}, and the scene {there}: give the scene that was "
@@ -149,9 +147,7 @@ def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[S
         known = {f.name for f in fields(NormalForm)}
         special.law = NormalForm(**{name: _number(v) for name, v in entry["law"].items() if name in known})
     if isinstance(solver, BranchSolver) and special.kind.singular and entry["multiplicity"]:
-        found = solver.inertia.at(point.x)
-        found.count()
-        special.null_vectors = found.nearest(entry["multiplicity"], accuracy=1e-8)[1]
+        special.null_vectors = solver.inertia.modes_near_zero(point.x, entry["multiplicity"])
     return special
 
 

@@ -23,7 +23,7 @@ from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER, Kind
-from rodfem.continuation.locate import real_root, zero_uncertainty
+from rodfem.continuation.locate import SHARP, real_root, zero_uncertainty
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.plan import Plan
@@ -55,6 +55,10 @@ MEAN = 10.0
 """Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
 SHIFT = -1e-3
 """Eigenvalues are sought next to this one: beside zero, where the tangent matrix is singular."""
+BESIDE = 1e-4
+"""Relative distance of a shift from the pair that is sought there, and of the first two loads of a secant method."""
+AGAIN = 1e-7
+"""Eigenvalues of two shifts that differ by less than this, relative to them or to one, were found twice."""
 MANY = 100.0
 """Round-off of the inverse eigenvalues, in units of the largest and of eps.
 
@@ -187,13 +191,13 @@ class Sweep:
         reach = SEEN * abs(near.values).max()
         found = list(zip(_without_round_off(near.values), near.errors, near.kinds, near.vectors.T, strict=True))
         for pair in (v for v in self.last.values if v.imag > 0 and abs(v) > reach):
-            beside = pencil.near(2, pair * (1 + 1e-4))
+            beside = pencil.near(2, pair * (1 + BESIDE))
             for value, error, kind, vector in zip(
                 beside.values, beside.errors, beside.kinds, beside.vectors.T, strict=True
             ):
                 both = [(value, vector), (value.conjugate(), vector.conj())]
                 for v, x_v in both if abs(value.imag) > REAL * abs(value) else both[:1]:
-                    if all(abs(v - other) > 1e-7 * unit(v) for other, *_ in found):
+                    if all(abs(v - other) > AGAIN * unit(v) for other, *_ in found):
                         found.append((v, error, kind, x_v))
         real = [(complex(v.real) if abs(v.imag) < REAL * abs(v) else complex(v), *rest) for v, *rest in found]
         order = sorted(real, key=lambda f: (round(f[0].real, 6), f[0].imag))
@@ -302,7 +306,7 @@ class Sweep:
                 return self._real(a.x, load)[number]
 
             try:
-                found.append(float(brentq(mu, *loads, xtol=1e-12 * max(map(abs, loads)))))
+                found.append(float(brentq(mu, *loads, xtol=ROUND_OFF * max(map(abs, loads)))))
             except (ConvergenceError, IndexError, ValueError):
                 self.observer.warn(
                     f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
@@ -322,7 +326,7 @@ class Sweep:
         found = pencil.near(number + 2, SHIFT)
         cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
         load, uncertainty = _zero_between(self._measured(self.solver, self.eigensolver, guess), cluster, loads[0])
-        uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), 1e-11 * unit(load))
+        uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load))
         return _Event(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
@@ -432,4 +436,4 @@ def _zero(measured: AtLoad, cluster: Cluster, load: float) -> float:
     def mean(load: float) -> float:
         return measured(load, cluster).cluster.mean
 
-    return float(newton(mean, load, x1=load + 1e-4 * unit(load), tol=round_off(load)))
+    return float(newton(mean, load, x1=load + BESIDE * unit(load), tol=round_off(load)))

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from rodfem.adaptivity.accuracy_control import Watch
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
-from rodfem.adaptivity.zero_stretch import zero_stretch
+from rodfem.adaptivity.zero_stretch import LOCATED, zero_stretch
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.kinds import END, USER
@@ -26,10 +26,14 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
 from rodfem.errors import ConvergenceError
 from rodfem.stability.round_off import resolve
-from rodfem.tolerances import INSIDE, SAME_SPECIAL, SAME_STATE, unit
+from rodfem.tolerances import DRIFT, INSIDE, SAME_SPECIAL, SAME_STATE, unit
 
 BEYOND = 0.02
 """How far past a singular end of the range, relative to half the range, an equilibrium is sought to locate it."""
+EXACT, ALONG = 1e-15, 1e-11
+"""Arclength, in the metric, to which a load is located before it is set, and to which a stretch vanishes."""
+SAME_END = 1e-6
+"""A special point nearer to the end of the range than this, in spans, is the last state."""
 
 NEAR_START = 8
 """Steps of a branch that begins near another special point are as short as its first for so many times their length."""
@@ -266,7 +270,7 @@ class Tracer:
                 return system.scalar(solve_at(self.solver, lambda t: hermite(a, b, t), s)) - load
 
             margin = INSIDE * (q.arclength - p.arclength)
-            s = brentq(beyond, p.arclength + margin, q.arclength - margin, xtol=1e-15)
+            s = brentq(beyond, p.arclength + margin, q.arclength - margin, xtol=EXACT)
             x = solve_at(self.solver, lambda t: hermite(a, b, t), s)
             system.set_load(x, load)
         return self.solver.point(x, s, self.solver.load_tangent(x, q.load > p.load), outcome)
@@ -312,13 +316,13 @@ class Tracer:
             return shape.stretch(solve_at(self.solver, lambda t: hermite(a, b, t), s))
 
         h = b.arclength - a.arclength
-        s = brentq(stretch, a.arclength + INSIDE * h, b.arclength, xtol=1e-11)
+        s = brentq(stretch, a.arclength + INSIDE * h, b.arclength, xtol=ALONG)
         x = solve_at(self.solver, lambda t: hermite(a, b, t), s)
         row = self.solver.row(hermite(a, b, s)[1])
         last = self.solver.point(x, s, self.solver.tangent(row))
         if self._between(branch, a, last):
             return
-        special = SpecialPoint(END, last, last.negative, last.negative, 1e-10, test_function="stretch")
+        special = SpecialPoint(END, last, last.negative, last.negative, LOCATED, test_function="stretch")
         if self.plan.error_bars:
             try:
                 with self.solver.system.clock.purpose("error bars"):
@@ -358,7 +362,7 @@ class Tracer:
             )
             return
         for special in found:
-            if abs(special.point.load - load) < 1e-6 * abs(self.high - self.low):
+            if abs(special.point.load - load) < SAME_END * abs(self.high - self.low):
                 branch.points[-1] = special.point
                 branch.special.append(special)
                 branch.renumber()
@@ -389,7 +393,7 @@ class Tracer:
     def _check_symmetry(self, point: Point) -> None:
         for notice in self.solver.system.verification.read():
             self.observer.warn(notice)
-        if point.drift > 1e-6 * self.solver.inertia.scale:
+        if point.drift > DRIFT * self.solver.inertia.scale:
             self.watch.drifting(point)
             raise ConvergenceError(
                 f"The mesh does not resolve a symmetry of the scene any more: the drift is {point.drift:.2g} at "

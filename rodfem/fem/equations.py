@@ -22,6 +22,7 @@ from rodfem.fem.parameters import load_line
 from rodfem.problem.contribution import Site
 from rodfem.problem.local_state import Constants, Place, place
 from rodfem.problem.scene import Part
+from rodfem.tolerances import same_place
 
 if TYPE_CHECKING:
     from rodfem.fem.state import Evaluation
@@ -195,14 +196,11 @@ def point_measures(mesh: Any, points: list[float]) -> Any:
 
     The first two points are the ends.
     """
-    tolerance = 1e-9 * abs(points[1] - points[0])
+    length = abs(points[1] - points[0])
     mesh.topology.create_connectivity(0, 1)
 
     def tagged(chosen: list[tuple[int, float]]) -> Any:
-        found = [
-            dolfinx.mesh.locate_entities(mesh, 0, lambda x, s=s: np.isclose(x[0], s, rtol=0, atol=tolerance))
-            for _, s in chosen
-        ]
+        found = [dolfinx.mesh.locate_entities(mesh, 0, lambda x, s=s: same_place(x[0], s, length)) for _, s in chosen]
         values = np.repeat(np.array([tag for tag, _ in chosen], dtype=np.int32), [len(v) for v in found])
         vertices = np.concatenate(found).astype(np.int32)
         order = np.argsort(vertices)

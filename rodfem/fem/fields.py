@@ -27,6 +27,7 @@ from rodfem.problem.contribution import Block, Group, Unknown
 from rodfem.problem.kinds import reals, whole
 from rodfem.problem.local_state import Constants
 from rodfem.problem.scene import Scene
+from rodfem.tolerances import same_place
 
 LOAD = "load"
 HIGHEST = 12
@@ -162,7 +163,7 @@ class Fields:
         uniform = np.linspace(*scene.interval, elements + 1)
         if given is not None:
             ends = (given[0], given[-1]) == tuple(scene.interval)
-            if not ends or any(abs(np.subtract(given, s)).min() > 1e-9 * scene.length for s in scene.joints):
+            if not ends or any(not same_place(given, s, scene.length).any() for s in scene.joints):
                 raise InputError(
                     f"The vertices of the mesh must begin and end at {scene.interval[0]:g} and {scene.interval[1]:g} "
                     "and hold every joint of the scene: add what is missing."
@@ -200,7 +201,7 @@ class Fields:
         for end, s in zip(self.scene.sides, self.scene.interval, strict=True):
             for block in (b for b in self.blocks if b.continuous):
                 x = self.coordinates(block.degree)
-                at_end = self.dofs[block.name][np.isclose(x, s, rtol=0, atol=1e-9 * self.scene.length)]
+                at_end = self.dofs[block.name][same_place(x, s, self.scene.length)]
                 found.append(at_end[:, np.broadcast_to(end.clamps(block, c), block.size)].ravel())
         return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
 
@@ -250,7 +251,7 @@ class Fields:
         x = self.coordinates(self.discretization.degree)
         for end, s in zip(scene.sides, scene.interval, strict=True):
             if end.fixed_rotation is not None:
-                here = self.dofs[self.turning.name][np.isclose(x, s, rtol=0, atol=1e-9 * scene.length)]
+                here = self.dofs[self.turning.name][same_place(x, s, scene.length)]
                 out[here] = self.turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)
         return out
 

@@ -26,11 +26,14 @@ from rodfem.fem.fields import LOAD, Fields
 from rodfem.fem.state import Evaluation
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
 from rodfem.problem.contribution import Block
+from rodfem.tolerances import TINY
 
 EXACT = 1e-10
 """Round-off of the change of the functional, relative to the sum of magnitudes of its terms."""
 SLIDING = 1e-8
 """The same for the motion of a closed rod along itself: the error of a fine mesh."""
+SIMPLE = 1e-9
+"""Weights of a symmetry below this, relative to its greatest, are round-off of the elimination."""
 STATES = 3
 """Number of states at which equations are asked: each gives as many conditions as there are unknowns."""
 SLIDES = 8
@@ -71,7 +74,7 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
         return []
     # combinations that change no free unknown are no symmetries
     null = np.linalg.qr(null)[0]
-    scale = np.diag(moved).max(initial=1e-300)
+    scale = np.diag(moved).max(initial=TINY)
     squares, combinations = np.linalg.eigh(null.T @ (moved / scale) @ null)
     basis = simplest(null @ combinations[:, squares > EXACT])
     return [Symmetry(w, parts) for w in basis.T]
@@ -164,7 +167,7 @@ def simplest(basis: np.ndarray) -> np.ndarray:
         rows[i] /= rows[i, column]
         others = np.arange(len(rows)) != i
         rows[others] -= np.outer(rows[others, column], rows[i])
-    return np.where(abs(rows) > 1e-9, rows, 0.0).T
+    return np.where(abs(rows) > SIMPLE, rows, 0.0).T
 
 
 def _held(fields: Fields) -> np.ndarray:

@@ -15,6 +15,12 @@ TOLERANCE = 1e-10
 """Size of the last correction of a converged state: rotations in radian, load over its span, all else relative."""
 STALLED = 1e-6
 """Below this a correction that no longer shrinks is round-off, not divergence; it is reported as the error."""
+KEPT, SHRUNK = 0.02, 0.1
+"""The Jacobian serves once more where a correction is below the former, and below the latter part of the one before."""
+LARGEST = 0.4
+"""Bound of a damped step, in the metric."""
+CLOSE = 1e-3
+"""Step of a damped motion, in the metric, below which Newton's method takes over."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +105,7 @@ def iterate(
             origin.aypx(-1.0, x)
             return NewtonResult(True, iteration, left, system.norm(origin))
         # far from a solution, or where the old factors gain less than a digit, new ones are worth their cost
-        refactor = size > 0.02 or size > 0.1 * previous
+        refactor = size > KEPT or size > SHRUNK * previous
         previous = size
     origin.aypx(-1.0, x)
     return NewtonResult(False, iteration, size, float("inf"))
@@ -128,10 +134,10 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Newt
         size = system.norm(step)
         if not isfinite(size):
             break
-        x.axpy(-(1.0 if size < 0.4 else 0.4 / size), step)  # constraints are mended in one step, however long
+        x.axpy(-(1.0 if size < LARGEST else LARGEST / size), step)  # constraints are mended in one step, however long
         # switched evolution: longer time steps while the motion is slow, shorter where it is fast
-        tau *= 2.0 if size < 0.2 else 0.5 if size > 0.4 else 1.0
-        if (iteration % 5 == 4 and size < 0.1) or size < 1e-3:  # not earlier: it might jump to a state uphill
+        tau *= 2.0 if size < 0.2 else 0.5 if size > LARGEST else 1.0
+        if (iteration % 5 == 4 and size < 0.1) or size < CLOSE:  # not earlier: it might jump to a state uphill
             x.copy(trial)
             outcome = correct(system, trial, row, reach=0.3)
             if outcome.converged:

@@ -16,6 +16,9 @@ from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
 from rodfem.problem.quaternions import directors
 
+INWARDS = 1e-9
+"""Part of the way to the middle of its cell by which a node is moved: the end of a cell belongs to that cell."""
+
 
 def minimum(powers: list[float], t: float, spacing: float) -> float:
     """Value of a polynomial, given by rising powers, at its minimum within ``spacing`` of ``t`` in [-1, 1].
@@ -139,7 +142,7 @@ class Shape:
         named = {name: sample[name] for name in self.system.scalars if not name.startswith("drift")}
         for block in f.blocks:
             x = f.coordinates(block.degree)
-            inwards = x + 1e-9 * (x.mean(axis=1, keepdims=True) - x)  # the end of a cell belongs to that cell
+            inwards = x + INWARDS * (x.mean(axis=1, keepdims=True) - x)
             named[block.name] = self._evaluate(sample, block, ends, x, inwards)
         return self.system.vector(f.filled(named))
 

@@ -23,6 +23,9 @@ from rodfem.fem.values import NodalValues
 from rodfem.problem.contribution import Block, Motion
 from rodfem.problem.scene import Scene
 
+NAMED = 1e-3
+"""Weight of a part, relative to the greatest, above which it is named."""
+
 
 @dataclass(frozen=True)
 class Elementary:
@@ -77,7 +80,7 @@ class Symmetry:
 
     def __str__(self) -> str:
         """In words what moves: the names of the parts, the rotations and translations of other fields left out."""
-        parts = [p for p, w in zip(self.parts, self.weights, strict=True) if abs(w) > 1e-3 * abs(self.weights).max()]
+        parts = [p for p, w in zip(self.parts, self.weights, strict=True) if abs(w) > NAMED * abs(self.weights).max()]
         names = list(dict.fromkeys(p.name for p in parts if p.name))
         if self.along:
             names.insert(0, "motion along itself")

@@ -7,8 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from petsc4py import PETSc
 
-TINY = 1e-300
-"""A vector smaller than this is scaled as if it were of this size."""
+from rodfem.tolerances import TINY
+
+
+def generic(numbers: np.ndarray, which: int = 0) -> np.ndarray:
+    """Entries of a vector with these ``numbers``: it has a part along every mode; others for another ``which``."""
+    return np.asarray(np.sin((1.0 + which) * (1.0 + 0.731 * numbers)) + 0.3)
 
 
 def project_out(vector: PETSc.Vec, basis: Sequence[PETSc.Vec], metric: PETSc.Mat, times: int = 1) -> None:

@@ -5,6 +5,10 @@ from __future__ import annotations
 from math import ceil, floor, isfinite, log10
 
 from rodfem.continuation.branch import SpecialPoint
+from rodfem.tolerances import NEGLIGIBLE
+
+WHOLE = 1e-9
+"""Round-off of the logarithm of a power of ten."""
 
 
 def rounded_up(error: float) -> float:
@@ -12,7 +16,7 @@ def rounded_up(error: float) -> float:
     if not (isfinite(error) and error > 0):
         return error
     power = floor(log10(error))
-    return float(f"{ceil(error / 10.0**power * (1 - 1e-12))}e{power}")
+    return float(f"{ceil(error / 10.0**power * (1 - NEGLIGIBLE))}e{power}")
 
 
 def number(value: float, error: float, resolved: bool | None = True) -> str:
@@ -23,7 +27,7 @@ def number(value: float, error: float, resolved: bool | None = True) -> str:
     """
     if not isfinite(error):
         return f"{value:.8g} (no estimate)"
-    digits = min(max(-floor(log10(rounded_up(error)) + 1e-9), 0), 13) if error > 0 else 13
+    digits = min(max(-floor(log10(rounded_up(error)) + WHOLE), 0), 13) if error > 0 else 13
     shown = round(value, digits) + 0.0
     least = "at least " if resolved is False else ""
     return f"{shown:.{digits}f} ({least}{rounded_up(error + abs(value - shown)):.0e})"

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from rodfem.output.solids import Solid, ball, box, coil, profile_of, round_arrow, straight_arrow, sweep
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import AXIS, HELD, Setting, Support, Tie
+from rodfem.tolerances import TINY
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +30,8 @@ BLOCK, WIRE, ARROW, RAIL = 2.4, 0.22, 13.0, 3.4
 """Half the size of a block, radius of a wire, length of an arrow, in radii of the rod; half rails in half blocks."""
 LEAST = 1e-9
 """Load relative to the greatest one, or stiffness, below which none is drawn."""
+PUSHES = 1e-6
+"""Cosine of a force and the way into the rod above which it pushes."""
 
 
 def glyphs_of(
@@ -222,7 +225,7 @@ def _force(at: Floats, force: Floats, clear: float, outward: Floats, radius: flo
     """Arrow of a force: it ends at the rod where it pushes against it, and begins there where it pulls."""
     size = ARROW * radius * max(float(np.linalg.norm(force)), 0.4)
     way = force / np.linalg.norm(force)
-    pushes = way @ outward < -1e-6
+    pushes = way @ outward < -PUSHES
     start = at - (clear + size) * way if pushes else at + (0.5 * clear if abs(way @ outward) < 0.5 else clear) * way
     return straight_arrow(start, start + size * way, 0.48 * radius, LOAD)
 
@@ -240,7 +243,7 @@ def _distributed(
     along = abs(np.sum(forces * frames[nodes, :, 2], axis=1)).sum() > 0.5 * strength.sum()
     out = []
     for node, force, size in zip(
-        nodes, forces, 0.6 * ARROW * radius * strength / max(strength.max(), 1e-300), strict=True
+        nodes, forces, 0.6 * ARROW * radius * strength / max(strength.max(), TINY), strict=True
     ):
         if size < radius:
             continue

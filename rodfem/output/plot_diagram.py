@@ -23,6 +23,7 @@ from rodfem.file_format import DIAGRAM, read_json
 from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
 from rodfem.output.program import status_of
 from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, save, tex
+from rodfem.output.view import POINT
 
 __all__ = ["draw_diagram", "main"]
 
@@ -89,7 +90,7 @@ def figure_of(diagram: Mapping[str, Any]) -> Figure:
         footer = figure.text(0.012, 0.013, _footer(diagram), color="0.4", fontsize=FONT - 3)
         for text in (title, footer):  # one line each: shrink what is too long
             width = text.get_window_extent().width / figure.bbox.width
-            text.set_fontsize(text.get_fontsize() * min(1.0, 0.97 / max(width, 1e-9)))
+            text.set_fontsize(text.get_fontsize() * min(1.0, 0.97 / max(width, POINT)))
         legend, obstacles = _place_legend(axes, handles, pieces, points, len(branches) <= 8)
         _uncover(axes, pieces)
         _place_labels(axes, pieces, legend, obstacles)
@@ -225,7 +226,7 @@ def _place_labels(axes: Axes, pieces: list[Piece], legend: Bbox, obstacles: Floa
         for share, gap, side in product(np.linspace(0.1, 0.9, 13), (2.0, 8.0, 16.0), (1.0, -1.0)):
             middle = round(share * (len(curve) - 1))
             tangent = curve[min(middle + 4, len(curve) - 1)] - curve[max(middle - 4, 0)]
-            normal = side * np.array([-tangent[1], tangent[0]]) / max(math.hypot(*tangent), 1e-9)
+            normal = side * np.array([-tangent[1], tangent[0]]) / max(math.hypot(*tangent), POINT)
             centre = curve[middle] + normal * (np.abs(normal) @ half + gap)
             box = Bbox([centre - half, centre + half])
             cost = 40.0 * abs(share - 0.5) + 0.3 * gap + 2.0 * (normal[1] < 0.0)

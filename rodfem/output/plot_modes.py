@@ -26,9 +26,10 @@ from rodfem.output.glyphs import glyphs_of
 from rodfem.output.program import status_of
 from rodfem.output.sheet import DPI, STYLE
 from rodfem.output.solids import Solid, profile_of
-from rodfem.output.view import view_of
+from rodfem.output.view import POINT, view_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
+from rodfem.tolerances import TINY
 
 __all__ = ["draw_modes", "main"]
 
@@ -43,6 +44,8 @@ FRAMES, RATE, PERIODS, FAINTEST, GROWS = 60, 20, 2.0, 0.06, 0.8
 and the share of the time in which it grows; in the rest it goes back, pale, so that the loop joins."""
 TEETH, BENT = 15, 0.05
 """Lines along d1 where a mode hardly displaces the rod; deflection of a rod, over its size, that is one."""
+GROWTH = 1e-9
+"""Real part of the root of -mu, relative to it, above which a mode grows."""
 REST, UNSTABLE, STABLE, FREE = "#B4B4B4", "#D55E00", "#0072B2", "#009E73"
 
 
@@ -133,13 +136,13 @@ class _Panel:
         u, w = (CubicSpline(s, part[number].astype(complex))(fine) for part in (modes.displacement, modes.rotation))
         span = float(np.linalg.norm(np.ptp(self.r, axis=0)))
         moved, turned = (float(np.linalg.norm(abs(part), axis=1).max()) for part in (u, w))
-        size = min(LARGEST[0] * span / max(moved, 1e-9 * span), LARGEST[1] / max(turned, 1e-9))
+        size = min(LARGEST[0] * span / max(moved, POINT * span), LARGEST[1] / max(turned, POINT))
         self.u, self.w, self.radius = size * u, size * w, min(span, s[-1] - s[0]) / SLENDER
         self.combed = size * moved < 0.5 * LARGEST[0] * span
         self.root = np.sqrt(-mu)
         zero = abs(mu) <= (modes.error[number] if np.isfinite(modes.error[number]) else 0.0)
         self.free = modes.motion[number] == SYMMETRY or zero
-        self.color = FREE if self.free else UNSTABLE if self.root.real > 1e-9 * abs(self.root) else STABLE
+        self.color = FREE if self.free else UNSTABLE if self.root.real > GROWTH * abs(self.root) else STABLE
         self._title(modes, number, mu)
         angles = np.linspace(0, 2 * np.pi, self.sides + 1) - np.pi / self.sides
         self.profile = self.radius * profile_of(fine, setting.section, angles)
@@ -168,7 +171,7 @@ class _Panel:
             moved = self.u.imag
         off = self.r - self.r[0]
         axis = (self.r[-1] - self.r[0]) if held.axis is None else held.axis
-        off = off - np.outer(off @ axis, axis) / max(axis @ axis, 1e-300)
+        off = off - np.outer(off @ axis, axis) / max(axis @ axis, TINY)
         most = off[np.argmax(np.linalg.norm(off, axis=1))]
         across = most if held.force is None and np.linalg.norm(most) > BENT * span else held.force
         chosen = {"axis": held.axis, "down": held.down, "load": across, "side": held.widest(self.frames[0])}
@@ -242,7 +245,7 @@ class _Panel:
 
     def _facets(self, corners: Floats, across: Floats, colors: Floats, order: float) -> PolyCollection:
         """Facets (n, k, 3) that face the viewer, far ones first, lit from above; ``across`` is their normal (n, 3)."""
-        across = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-300)
+        across = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), TINY)
         light = 0.55 + 0.45 * np.clip(across @ np.array([-0.25, 0.75, 0.6]), 0, 1)
         near = np.argsort(corners[:, :, 2].mean(axis=1))
         near = near[across[near, 2] > 0]

@@ -20,7 +20,7 @@ from rodfem.file_format import STATES
 from rodfem.output.glyphs import DARK, LOAD, glyphs_of
 from rodfem.output.program import status_of
 from rodfem.output.solids import Solid, profile_of, rod, straight_arrow
-from rodfem.output.view import view_of
+from rodfem.output.view import POINT, view_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
@@ -234,7 +234,7 @@ def triad(view: Floats, corner: Floats, size: float) -> tuple[list[Solid], list[
     arrows = [straight_arrow(corner, corner + size * e, 0.03 * size, DARK) for e in np.eye(3)]
     seen = view[:2].T
     length = np.linalg.norm(seen, axis=1)
-    places = seen * (1.0 + 0.35 / np.maximum(length, 1e-9))[:, None]
+    places = seen * (1.0 + 0.35 / np.maximum(length, POINT))[:, None]
     last = int(np.argmin(length))
     if length[last] < 0.5:
         opposite = -np.delete(seen, last, axis=0).sum(axis=0)

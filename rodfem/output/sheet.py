@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
 from matplotlib.patheffects import withStroke
 
+from rodfem.tolerances import NEGLIGIBLE
+
 DPI, SIZE, FONT = 200, (7.5, 5.0), 11.0  # 1500 x 1000 pixels
 STYLE = {"font.size": FONT, "font.family": "DejaVu Sans", "axes.grid": True, "grid.color": "0.92"}
 PALETTE = (  # after Okabe and Ito: hues safe for the colour-blind, then the same once more and darker
@@ -48,4 +50,4 @@ def mesh_in_words(d: Mapping[str, Any]) -> str:
 def at_most(error: float) -> str:
     """Return a bound with two digits, never smaller than it is."""
     step = 10.0 ** (math.floor(math.log10(error)) - 1) if error > 0 else 1.0
-    return f"{math.ceil(error / step * (1 - 1e-12)) * step:.1e}".replace("e-0", "e-")
+    return f"{math.ceil(error / step * (1 - NEGLIGIBLE)) * step:.1e}".replace("e-0", "e-")

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rodfem.tolerances import NEGLIGIBLE, TINY
+
 Floats = NDArray[np.float64]
 
 FLATTEST = 7.0
@@ -42,7 +44,7 @@ def loft(rings: Floats, color: str) -> Solid:
     triangles = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1), *lids])
     corners = points[triangles]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return Solid(points, triangles[area > 1e-12 * max(area.max(), 1e-300)], color)
+    return Solid(points, triangles[area > NEGLIGIBLE * max(area.max(), TINY)], color)
 
 
 def sweep(path: ArrayLike, radii: ArrayLike, color: str, sides: int = SIDES) -> Solid:
@@ -158,7 +160,7 @@ def profile_of(s: Floats, section: tuple[Floats, Floats] | None, angles: Floats)
     if section is None:
         return np.tile(circle, (len(s), 1, 1))
     at, moments = section
-    moments = np.maximum(np.linalg.eigvalsh(moments).max(), 1e-300) * 1e-12 * np.eye(2) + moments
+    moments = np.maximum(np.linalg.eigvalsh(moments).max(), TINY) * NEGLIGIBLE * np.eye(2) + moments
     J = np.stack([[np.interp(s, at, moments[:, i, j]) for j in range(2)] for i in range(2)]).transpose(2, 0, 1)
     values, axes = np.linalg.eigh(J)  # ascending
     ratio = np.minimum(np.sqrt(values[:, 1] / values[:, 0]), FLATTEST)

@@ -19,6 +19,10 @@ NEAR = 0.9
 """Cosine from which on a direction is taken for that of the nearest axis of space."""
 STRAIGHT = 1e-3
 """Displacement relative to the rod's size below which the rod has not moved."""
+CLOSED = 1e-6
+"""Distance of the ends, relative to the rod's size, below which they meet."""
+POINT = 1e-9
+"""A length, or a part of one, below this has no direction in a picture: also the floor of a divisor."""
 
 
 def view_of(
@@ -56,7 +60,7 @@ def view_of(
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
     chord = reference[-1] - reference[0] if axis is None else axis
     shape, tilt = moved.T @ moved / len(moved), TILT
-    if np.linalg.norm(chord) < 1e-6 * size and down is None:
+    if np.linalg.norm(chord) < CLOSED * size and down is None:
         (right, up), tilt = _plane(reference + moved), STEEP
     elif down is not None:
         up = -down / np.linalg.norm(down)
@@ -74,7 +78,7 @@ def view_of(
                 up = up - (up @ right) * right
                 up /= np.linalg.norm(up)
                 right = np.cos(ASIDE) * right + np.sin(ASIDE) * np.cross(right, up)  # the rod goes away, so upwards
-            elif (up @ aside) * (np.cross(right, up) @ aside) > 1e-9 * (aside @ aside):  # towards the load
+            elif (up @ aside) * (np.cross(right, up) @ aside) > POINT * (aside @ aside):  # towards the load
                 tilt = -tilt
     back = np.cross(right, up)
     return np.array([right, np.cos(tilt) * up - np.sin(tilt) * back, np.cos(tilt) * back + np.sin(tilt) * up])

@@ -25,6 +25,12 @@ from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
 from rodfem.problem.local_state import Constants, watched
 from rodfem.problem.roles import Role, changes, functions_of, guarded
 from rodfem.problem.validation import check_kinds, check_scene
+from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
+
+ASIDE = 1e-6
+"""Distance beside an end or a break at which the material is asked, relative to the rod's length."""
+QUADRATIC = 1e-9
+"""Third differences of the stored energy, relative to its values, below which it is quadratic in the strains."""
 
 if TYPE_CHECKING:
     from rodfem.problem.attachment import Attachment
@@ -251,13 +257,13 @@ class Scene(Contribution):
     def joints(self) -> tuple[float, ...]:
         """Arclengths inside the rod that must be element boundaries, in ascending order."""
         places = {*self.breaks, *(part.s for part in self.parts if part.s is not None)}
-        close = 1e-9 * self.length
+        close = SAME_PLACE * self.length
         return tuple(sorted(s for s in places if self.interval[0] + close < s < self.interval[1] - close))
 
     def samples(self) -> list[float]:
         """Arclengths at which the material is checked: nine from end to end, and both sides of all breaks."""
         a, b = self.interval
-        eps = 1e-6 * self.length
+        eps = ASIDE * self.length
         return sorted({*np.linspace(a + eps, b - eps, 9).tolist(), *(s + d for s in self.joints for d in (-eps, eps))})
 
     def varying(self, load: str, span: tuple[float, float], **values: float) -> Scene:
@@ -310,7 +316,7 @@ class Scene(Contribution):
                 [self._energy_at(free + d * v[i] * np.eye(3)[i], k, self.constants(s=s)) for d in (0.0, -1.0, 1.0)]
                 for s in places
             ]
-            if any(abs(b - a) > 1e-12 * max(abs(a), abs(b)) for a, *others in pairs for b in others):
+            if any(abs(b - a) > NEGLIGIBLE * max(abs(a), abs(b)) for a, *others in pairs for b in others):
                 found.append(i)
         return tuple(found)
 
@@ -337,8 +343,8 @@ class Scene(Contribution):
 
     def plain(self, side: int) -> bool:
         """Whether dead forces are all that loads an end (0: left, 1: right): they are the contact force there."""
-        close = 1e-9 * self.length
-        here = [x.of for x in self.parts if x.s is not None and abs(x.s - self.interval[side]) < close]
+        end = self.interval[side]
+        here = [x.of for x in self.parts if x.s is not None and same_place(x.s, end, self.length)]
         return self.sides[side].dead and len(here) == 1
 
     def known_force(self, component: int, c: Constants) -> Any | None:
@@ -370,7 +376,7 @@ class Scene(Contribution):
         for _ in range(2):
             v, k = 0.05 * rng.uniform(-1, 1, size=(2, 3))
             values = [self._energy_at(t * v * free, t * k, self.constants()) for t in (0.0, 1.0, 2.0, 3.0)]
-            if abs(np.diff(values, 3)[0]) > 1e-9 * max(map(abs, values)):
+            if abs(np.diff(values, 3)[0]) > QUADRATIC * max(map(abs, values)):
                 return False
         return True
 

@@ -18,6 +18,7 @@ from rodfem.problem.end import SIDES, End
 from rodfem.problem.kinds import check_scalar, check_vector
 from rodfem.problem.local_state import asked_for, asks_where, functions_of_places, some_places
 from rodfem.problem.roles import functions_of
+from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
@@ -125,7 +126,7 @@ def check_start(scene: Scene) -> None:
         raise SceneError(f"The start has the shape {q.shape} at 5 arclengths: return a quaternion for each, (5, 4).")
     if not (np.linalg.norm(q, axis=1) > 0).all():
         raise SceneError("The start is no rotation everywhere: return quaternions of unit norm.")
-    if scene.normal is not None and abs(np.delete(q[:, 1:], scene.normal, axis=1)).max() > 1e-12:
+    if scene.normal is not None and abs(np.delete(q[:, 1:], scene.normal, axis=1)).max() > NEGLIGIBLE:
         raise SceneError(f"The start leaves the plane across {scene.planar}: turn about that axis only.")
 
 
@@ -170,7 +171,7 @@ def check_convexity(scene: Scene) -> None:
     for s in scene.samples() if scene.depends_on_s() else [None]:
         stiffness = scene.stiffness(s)
         lowest = np.linalg.eigvalsh(stiffness)[0] if stiffness.size else 1.0
-        if lowest <= 1e-12 * abs(stiffness).max(initial=0.0):
+        if lowest <= NEGLIGIBLE * abs(stiffness).max(initial=0.0):
             where = "" if s is None else f" at s = {s:g}"
             raise SceneError(
                 f"The stored energy is not convex{where}: its second derivative at the undeformed state has the "
@@ -208,7 +209,7 @@ def check_reach(scene: Scene) -> None:
         left, right = (end.held(scene.constants(load)) for end in scene.sides)
         if None not in left and None not in right:
             distance = sum((float(b) - float(a)) ** 2 for a, b in zip(left, right, strict=True)) ** 0.5
-            if distance > scene.length * (1 + 1e-12):
+            if distance > scene.length * (1 + NEGLIGIBLE):
                 raise SceneError(
                     f"At {scene.load} = {load:g} the ends are {distance:.6g} apart, but the rod is inextensible "
                     f"and only {scene.length:.6g} long: let it stretch, or move the ends together."

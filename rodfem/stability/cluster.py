@@ -20,6 +20,7 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.stability.nonsymmetric import REAL, Frequencies, NonsymmetricPencil
+from rodfem.tolerances import TINY
 
 BESIDE = 1e-3
 """Distance from zero at which eigenvalues near zero are looked for: the matrix is singular there."""
@@ -51,7 +52,7 @@ class Measured:
     @property
     def spread(self) -> float:
         """Distance of the eigenvalues from their mean, relative: how well they and their vectors are told apart."""
-        return float(np.sqrt(abs(self.discriminant)) / max(abs(self.values).max(), 1e-300))
+        return float(np.sqrt(abs(self.discriminant)) / max(abs(self.values).max(), TINY))
 
 
 def cluster_of(pencil: NonsymmetricPencil, found: Frequencies, chosen: list[int]) -> Cluster:
@@ -93,4 +94,4 @@ def _real_span(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
     parts = np.concatenate([vectors.real, vectors.imag], axis=1) if np.iscomplexobj(vectors) else vectors
     squares, turn = np.linalg.eigh(pencil.product(parts, pencil.weighed(parts)))
     last = slice(len(squares) - vectors.shape[1], None)
-    return np.asarray(parts @ (turn[:, last] / np.sqrt(np.maximum(squares[last], 1e-300))))
+    return np.asarray(parts @ (turn[:, last] / np.sqrt(np.maximum(squares[last], TINY))))

@@ -21,9 +21,12 @@ import scipy.linalg
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.blocks import Pencil
+from rodfem.tolerances import TINY
 
 RANK = 1e-11
 """Singular values below this, relative to the norm of the pencil's matrices, are zero."""
+FINITE = 1e-13
+"""Inverses of shifted eigenvalues below this, relative to the greatest, are those of infinite ones."""
 
 
 def split(matrix: np.ndarray, norm: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -42,7 +45,7 @@ def finite_eigenpairs(S: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndar
     Multipliers that drop out of the reduction are zero in the vectors.  Empty for a pencil without inertia.  Raises
     :class:`numpy.linalg.LinAlgError` for a pencil that is singular at every shift.
     """
-    stiffness, inertia = (max(float(np.linalg.norm(A, ord=2)), 1e-300) for A in (S, M))
+    stiffness, inertia = (max(float(np.linalg.norm(A, ord=2)), TINY) for A in (S, M))
     back = np.eye(len(S))
     while len(M):
         u1, _, v1, u0, v0 = split(M, inertia)
@@ -74,7 +77,7 @@ def symmetric_eigenpairs(pencil: Pencil, below: float, number: int) -> tuple[np.
     Z = scipy.linalg.null_space(C.T) if C.shape[1] else np.eye(len(K))
     mass, shifted = Z.T @ M @ Z, Z.T @ (K - below * M) @ Z
     nu, z = scipy.linalg.eigh((mass + mass.T) / 2, (shifted + shifted.T) / 2)
-    finite = int((nu > 1e-13 * nu[-1]).sum())
+    finite = int((nu > FINITE * nu[-1]).sum())
     if number > finite:
         raise ConvergenceError(f"The pencil has {finite} finite eigenvalues, not {number}: ask for fewer.")
     best = np.argsort(nu)[::-1][:number]
@@ -90,5 +93,5 @@ def eigenvalues_near(pencil: Pencil, target: float) -> np.ndarray:
     K, C, M = (gathered(A).toarray() for A in (pencil.K, pencil.C, pencil.M))
     Z = scipy.linalg.null_space(C.T) if C.shape[1] else np.eye(len(K))
     above, under = scipy.linalg.eig(Z.T @ M @ Z, Z.T @ (K - target * M) @ Z, right=False, homogeneous_eigvals=True)
-    finite = abs(above) > 1e-13 * abs(above / under).max() * abs(under)
+    finite = abs(above) > FINITE * abs(above / under).max() * abs(under)
     return np.asarray(target + under[finite] / above[finite])

@@ -22,12 +22,21 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors
-from rodfem.linalg.orthogonal import combine, orthonormalize
+from rodfem.linalg.orthogonal import combine, generic, orthonormalize
 from rodfem.linalg.selection import factors_of
+from rodfem.tolerances import TINY
 
 EPS = float(np.finfo(float).eps)
 NOISE = 8.0
 """Largest observed ratio of the round-off in an eigenvalue to the effect of random errors of the matrix's entries."""
+ZERO_BAND = 1e-7
+"""Half width of the band of eigenvalues that count as zero, over the lowest bending one, where round-off is below."""
+NULL, ROUGH = 1e-8, 1e-2
+"""Relative change of eigenvalues nearest zero at which their vectors are null vectors, and first guesses of a mode."""
+FRESH = 1e-3
+"""Weight of a generic vector that is added to each vector of a block before it is iterated."""
+PIVOT = 1e-3
+"""Threshold of MUMPS's pivots, relative to the largest entry of a column."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +56,11 @@ def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
 
     ICNTL(24) = 1 is what makes MUMPS report it; CNTL(3) is so small that no pivot is taken for zero: the matrices are
     shifted off their eigenvalues.  ICNTL(8) = 0: with MUMPS's own scaling of saddle matrices solutions were seen to
-    lose ten digits, and factorisations take up to ten times as long.  CNTL(1) = 1e-3 is ten times below MUMPS's own
-    threshold of pivots: the stiffness is 1/h and the constraints are h, and at 1e5 elements pivots were delayed by the
-    hundred thousand, to the few rows of the scalars, which cost several times the factorisation itself.
+    lose ten digits, and factorisations take up to ten times as long.  CNTL(1) is ten times below MUMPS's own threshold:
+    the stiffness is 1/h and the constraints are h, and at 1e5 elements pivots were delayed by the hundred thousand, to
+    the few rows of the scalars, which cost several times the factorisation itself.
     """
-    return factors_of("cholesky", comm, unknowns, scalars, {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3})
+    return factors_of("cholesky", comm, unknowns, scalars, {24: 1, 8: 0}, {3: -TINY, 1: PIVOT})
 
 
 class Inertia:
@@ -78,7 +87,7 @@ class Inertia:
         self.factors = inertia_factors(system.comm, system.fields.unknowns, system.fields.dense_rows)
         self.constraints = system.fields.constraints()
         self.scale = system.stiffness_scale
-        self.tolerance = 1e-7 * self.scale
+        self.tolerance = ZERO_BAND * self.scale
         self.resolution = 0.0
         self.vectors: list[PETSc.Vec] = []
         self.shift, self.filled, self.factored = 0.0, 0, 0
@@ -126,12 +135,18 @@ class Inertia:
             self.resolution = 10 * EPS * self.matrix.norm(PETSc.NormType.INFINITY) / smallest
             self.tolerance = max(self.tolerance, self.resolution)
 
+    def modes_near_zero(self, x: PETSc.Vec, number: int, accuracy: float = NULL) -> list[PETSc.Vec]:
+        """Vectors of the ``number`` eigenvalues nearest zero at ``x``: see :meth:`Factored.nearest`."""
+        found = self.at(x)
+        found.count()
+        return found.nearest(number, accuracy)[1]
+
     def seed(self, i: int) -> PETSc.Vec:
         """Generic vector: components along all unknowns of fields, none along scalars."""
         vector = self.system.new_vector()
         begin, end = vector.getOwnershipRange()
         numbers = np.arange(begin, min(end, self.system.fields.field_unknowns))
-        vector.array[: len(numbers)] = np.sin((1.0 + i) * (1.0 + 0.731 * numbers)) + 0.3
+        vector.array[: len(numbers)] = generic(numbers, i)
         return vector
 
 
@@ -219,7 +234,7 @@ class Factored:
         vectors = own.vectors[:block] + [own.seed(i) for i in range(len(own.vectors), block)]
         values = np.full(block, np.inf)
         for i, v in enumerate(vectors):
-            v.axpy(1e-3, own.seed(i))  # the old vectors may span an invariant space that misses the nearest one
+            v.axpy(FRESH, own.seed(i))  # the old vectors may span an invariant space that misses the nearest one
         with own.system.clock("stability"):
             for _ in range(most):
                 solved = [v.duplicate() for v in vectors]

@@ -6,6 +6,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.system import System
+from rodfem.tolerances import TINY
 
 PURE = 0.99
 """Share of the mean square rotation above which a mode is named after one kind of motion."""
@@ -18,7 +19,7 @@ def shares(system: System, turned: np.ndarray, parts: list[np.ndarray]) -> np.nd
     ``turned`` and ``parts``, the real and the imaginary part of the mode, as in :func:`squares`.
     """
     square = squares(system, turned, np.stack(parts, axis=1)).sum(axis=0)
-    return np.asarray(square / max(square.sum(), 1e-300))
+    return np.asarray(square / max(square.sum(), TINY))
 
 
 def squares(system: System, turned: np.ndarray, columns: np.ndarray) -> np.ndarray:

@@ -49,6 +49,7 @@ from rodfem.stability.pencil import (
     weighed_modes,
     with_factors,
 )
+from rodfem.tolerances import NEGLIGIBLE, TINY
 
 FAR = 1e5
 """How many times farther from the shift than the third nearest an eigenvalue may be.
@@ -156,7 +157,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             (i, j, v)
             for i, columns, values in rows
             for j, v in zip(columns, values, strict=True)
-            if abs(v) > 1e-12 * size
+            if abs(v) > NEGLIGIBLE * size
         ]
         entries = [e for part in self.system.comm.allgather(mine) for e in part]
         used = sorted({i for i, _, _ in entries})
@@ -234,7 +235,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             square = squares[begin : begin + part.shape[1]].sum(axis=0)
             begin += part.shape[1]
             for j in group:
-                kinds[j] = character.name(square / max(square.sum(), 1e-300))
+                kinds[j] = character.name(square / max(square.sum(), TINY))
         return kinds
 
     def motion(self, basis: np.ndarray) -> str:

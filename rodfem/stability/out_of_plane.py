@@ -12,6 +12,7 @@ from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.problem.ring import CLOSING_MOMENT
 from rodfem.stability.inertia import Index, Inertia
+from rodfem.tolerances import same_place
 
 PUSHED = 1e-8
 """Force or moment out of the plane, over bending stiffness by length, below which it is round-off."""
@@ -66,9 +67,7 @@ class InSpace:
             if x.direction is not None:
                 vectors[x.group.name] = vectors.get(x.group.name, np.zeros(3)) + out.pop(x.name) * np.array(x.direction)
         if scene.closed:
-            at_end = np.isclose(
-                old.coordinates(old.discretization.degree), scene.interval[1], rtol=0, atol=1e-9 * scene.length
-            )
+            at_end = same_place(old.coordinates(old.discretization.degree), scene.interval[1], scene.length)
             mine = state.turned[at_end].max(initial=-np.inf)
             last = np.array([new.comm.allreduce(float(mine), op=MPI.MAX)])
             moment = [out.pop(x.name) for x in old.groups[CLOSING_MOMENT]]

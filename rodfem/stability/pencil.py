@@ -22,6 +22,10 @@ from rodfem.linalg.orthogonal import combine
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
+SYMMETRIC, UNSYMMETRIC, SLICED = 1e-12, 1e-13, 1e-10
+"""Relative tolerances of SLEPc for a pencil with LU factors, for one without symmetry, and for all of an interval."""
+OF_VECTORS = 1e-9
+"""The same for vectors of a symmetric pencil: the error of its eigenvalues is the square."""
 FACTORS = "rodfem_st_"
 """Prefix of the options for the factors of a pencil without symmetry."""
 ROOM = {"mat_mumps_icntl_14": 100}
@@ -163,7 +167,7 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP if symmetric else SLEPc.EPS.ProblemType.GNHEP)
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTarget(target)
-    solver.setTolerances(tol=1e-12 if symmetric else 1e-13, max_it=300)
+    solver.setTolerances(tol=SYMMETRIC if symmetric else UNSYMMETRIC, max_it=300)
     solver.setDimensions(number, 2 * number + 20)
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)
@@ -226,11 +230,11 @@ def with_factors(
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTarget(target)
     if symmetric:
-        solver.setTolerances(tol=1e-9, max_it=300)  # of vectors: the error of eigenvalues is the square
+        solver.setTolerances(tol=OF_VECTORS, max_it=300)
         solver.setDimensions(number, number + max(number, LEAST))
         solver.setPurify(False)
     else:
-        solver.setTolerances(tol=1e-13, max_it=300)
+        solver.setTolerances(tol=UNSYMMETRIC, max_it=300)
         solver.setDimensions(number, 2 * number + 20)
     if start is not None:
         solver.setInitialSpace([start])
@@ -259,7 +263,7 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> 
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
     solver.setInterval(low, high)
-    solver.setTolerances(tol=1e-10)
+    solver.setTolerances(tol=SLICED)
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)
     transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)

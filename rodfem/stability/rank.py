@@ -22,11 +22,14 @@ import scipy.sparse.linalg as spl
 
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.linalg.matrices import gathered
+from rodfem.linalg.orthogonal import generic
 from rodfem.stability.blocks import Pencil
 from rodfem.stability.projection import factored
 
 DEPENDENT = 1e-12
 """A singular value below this, relative to the greatest column of ``C``, is zero."""
+DIRECTION = 1e-6
+"""Relative tolerance of ARPACK for the vector of the least singular value."""
 SMALL = 300
 """Number of columns up to which the singular values are computed by LAPACK."""
 NAMES = {"eta": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
@@ -48,13 +51,13 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     def product(b: np.ndarray) -> np.ndarray:
         return solve(np.append(np.zeros(m), -b.ravel()))[m:] / size
 
-    start = np.sin(1.0 + 0.731 * np.arange(p)) + 0.3
+    start = generic(np.arange(p))
     start = product(product(start))
     if not np.isfinite(start).all():
         return 0.0, np.full(p, p**-0.5)
     start /= np.linalg.norm(start)
     operator = spl.LinearOperator((p, p), matvec=product, dtype=float)
-    _, vectors = spl.eigsh(operator, k=1, which="LM", v0=start, tol=1e-6, ncv=min(20, p - 1))
+    _, vectors = spl.eigsh(operator, k=1, which="LM", v0=start, tol=DIRECTION, ncv=min(20, p - 1))
     vector = vectors[:, 0] / np.linalg.norm(vectors[:, 0])
     return float(np.linalg.norm(C @ vector)), vector
 

@@ -24,6 +24,7 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.linalg.orthogonal import generic
 from rodfem.stability.blocks import Pencil
 from rodfem.stability.projection import INVERSES, Projection, ShiftedInverse
 
@@ -31,6 +32,9 @@ TRANSFORMS = ("shift-invert", "cayley")
 FACTORISATIONS = 3
 """Of the eigenvalues of a symmetric pencil near a shift: there, and to count on both sides of it."""
 TOLERANCE = 1e-13
+"""Relative tolerance of SLEPc."""
+BEYOND = 1e-6
+"""Part of the farthest distance from the target by which a count reaches farther."""
 SPURIOUS = 1e-8
 """A vector of an infinite eigenvalue (no mass) comes with an arbitrary value, and a residual greater than this."""
 
@@ -98,7 +102,7 @@ class Reduction:
         """Keep the ``number`` nearest to ``target``, of equally near ones the left; count whether any is missing."""
         distance = abs(found.values - target)
         nearest = np.lexsort((found.values, np.round(distance / distance.max(), 9)))[:number]
-        radius = distance[nearest[-1]] * (1 + 1e-6)
+        radius = distance[nearest[-1]] * (1 + BEYOND)
         count = self.projection.below(target + radius) - self.projection.below(target - radius)
         keep = np.sort(nearest)
         return Reduced(
@@ -138,8 +142,7 @@ class Reduction:
         ksp.getPC().setType("python")
         ksp.getPC().setPythonContext(shifted)
         start = self._operator(self.projection.K).createVecRight()
-        anything = np.sin(1.0 + 0.731 * np.arange(n)) + 0.3
-        start.array[:] = shifted(self.projection.times(self.projection.M, anything))  # no massless part
+        start.array[:] = shifted(self.projection.times(self.projection.M, generic(np.arange(n))))  # no massless part
         solver.setInitialSpace([start])
         solver.setFromOptions()
         try:

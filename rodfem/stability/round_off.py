@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.stability.inertia import EPS, Factored, Index
+from rodfem.stability.inertia import EPS, NULL, ZERO_BAND, Factored, Index
 
 SPARE = 2
 """Vectors more than there are eigenvalues in the band."""
@@ -52,7 +52,7 @@ def decide(found: Factored) -> Decision:
     index, inertia = found.count(), found.inertia
     known = found.drifts
     inside = index.zero - known
-    least = 1e-7 * inertia.scale
+    least = ZERO_BAND * inertia.scale
     if inside == 0 or inertia.resolution <= least:
         return Decision(index, inertia.tolerance, np.zeros(0), np.zeros(0))
     theta, vectors = found.nearest(inside + SPARE)
@@ -75,7 +75,7 @@ def resolve(found: Factored) -> tuple[int, int]:
     near = index.zero - found.drifts
     if near <= 0:
         return index.negative, index.negative
-    theta, vectors = found.nearest(near + SPARE, accuracy=1e-8)
+    theta, vectors = found.nearest(near + SPARE, NULL)
     chosen = np.argsort(abs(theta))[:near]
     doubt = np.array([quotient_error(found.matrix, vectors[i]) for i in chosen])
     theta = np.array([vectors[i].dot(found.matrix * vectors[i]) for i in chosen]) + found.shift

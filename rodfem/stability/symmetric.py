@@ -47,6 +47,8 @@ DISTINCT = 1e-6
 """Eigenvalues closer than this, relative to the greatest, are one where the values found are counted."""
 CONVERGED = 1e-7
 """Residual, relative to the stiffness, above which a pair is rejected: the Krylov space broke down."""
+LEAST_SPREAD = 1e-3
+"""Part of the greatest eigenvalue that is added to the distance of the others: equal ones have none."""
 NOISE = 1e-6
 """Weight of a generic vector added to the previous modes, which may span an invariant space without the lowest."""
 
@@ -160,7 +162,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
                 f"SLEPc found {len(modes.values)} of the {number} eigenvalues asked for: ask for fewer, or use a "
                 "richer discretisation."
             )
-        spread = modes.values[-1] - modes.values[0] + 1e-3 * abs(modes.values).max()
+        spread = modes.values[-1] - modes.values[0] + LEAST_SPREAD * abs(modes.values).max()
         held.shift = modes.values[0] - 0.1 * spread
         return modes
 
@@ -223,7 +225,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         if len(values) < number:
             return Modes(values, vectors, errors, False)
         held.last = sum(vector.array_r for vector in vectors)
-        cut = values[number - 1] + 1e-6 * max(abs(values[number - 1]), self.inertia.scale)
+        cut = values[number - 1] + DISTINCT * max(abs(values[number - 1]), self.inertia.scale)
         known = int((values < cut).sum())
         return Modes(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import StringIO
 from math import pi
 
@@ -13,13 +14,13 @@ from demo_cases import Found, explored, scene
 from shooting_solver import Problem, Rod
 
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import Point
+from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import BranchSolver, distance
 from rodfem.deflation.discrete_symmetries import mirrors
 from rodfem.deflation.group_orbit import Orbit
 from rodfem.deflation.guesses import turned_state
-from rodfem.deflation.search import NEW, SAME, Deflation, equilibria_at, find_equilibria, starts
+from rodfem.deflation.search import NEW, SAME, Deflation, equilibria_at, find_equilibria
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
@@ -113,6 +114,18 @@ def test_ring_in_its_plane() -> None:
     assert (circle.zero, pressed.zero) == (3, 4)  # two translations, a rotation; and the shift, which a circle turns by
 
 
+def both_ways(point: Point) -> list[Branch]:
+    """Branches of one point each that set out from it to higher and to lower loads."""
+    assert point.tangent is not None
+    out = []
+    for sign in (1.0, -1.0):
+        tangent = point.tangent.copy()
+        tangent.scale(sign if point.slope >= 0 else -sign)
+        first = replace(point, tangent=tangent, arclength=0.0, slope=sign * abs(point.slope))
+        out.append(Branch("found", None, 0, [first]))
+    return out
+
+
 @pytest.mark.alone
 def test_ruler() -> None:
     """Both ways of falling to the side count as one; it is the start of the branch that leaves the plane."""
@@ -130,7 +143,7 @@ def test_ruler() -> None:
     assert search.nearest_known(image) < SAME
 
     explorer = Explorer(found.follower, Plan((0.0, 12.0), error_bars=False), Observer(), lambda: None)
-    up, down = starts(buckled, "found")
+    up, down = both_ways(buckled)
     for branch in (up, down):
         explorer.trace(branch)
     assert up.ended == "end of range"

@@ -31,7 +31,7 @@ MATRICES = {
     "rodfem.linalg.orthogonal",
 }
 """Linear algebra, which knows nothing of rods."""
-BELOW_MATRICES = {"rodfem.errors", "rodfem.compat"}
+BELOW_MATRICES = {"rodfem.errors", "rodfem.compat", "rodfem.tolerances"}
 """Other modules that they may import."""
 MATHEMATICS = {"ufl", "forms", "__future__", "collections", "dataclasses", "typing"}
 """All that ``forms`` may import."""
