@@ -9,7 +9,6 @@ import inspect
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -46,22 +45,6 @@ def require_real_petsc() -> None:
             "This PETSc was built for complex numbers, where MUMPS counts no inertia: under a load with a potential "
             "rodfem needs the real one; unset PETSC_DIR and SLEPC_DIR, or point both at the real build."
         )
-
-
-@cache
-def factors_by(package: str) -> bool:
-    """Whether this PETSc's package of that name makes LU factors: what PETSc says that it has differs by release."""
-    matrix = PETSc.Mat().createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=PETSc.COMM_SELF)
-    solver = PETSc.KSP().create(PETSc.COMM_SELF)
-    solver.setType("preonly")
-    solver.getPC().setType("lu")
-    solver.getPC().setFactorSolverType(package)
-    solver.setOperators(matrix)
-    try:
-        solver.setUp()
-    except PETSc.Error:
-        return False
-    return True
 
 
 def interval_mesh(comm: Any, elements: int, a: float, b: float) -> Any:

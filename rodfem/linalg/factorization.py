@@ -1,15 +1,14 @@
-"""Factors of matrices with a fixed pattern: LDL^t by MUMPS, LU by KLU; on several ranks replicated or substructured.
+"""Factors of matrices with a fixed pattern: what all of them have in common, and those of MUMPS.
 
-Only LDL^t factors count the inertia, and only MUMPS reports it.  For solutions alone KLU is faster on a chain of linear
-elements: it has no dense fronts to manage, each of the size of one element.  For 1e4 of them it
-solves in a tenth (reduced formulation) to a quarter (pointwise) of MUMPS's time.
+MUMPS is the reference and the last resort: what is factored along the rod (:mod:`rodfem.linalg.chain`) may be factored
+by it as well (``-rodfem_lu_pc_factor_mat_solver_type mumps``, ``-rodfem_cholesky_...``), with the same numbers.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from math import inf, log
 from typing import Any, Protocol
 
@@ -17,7 +16,6 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem import compat
 from rodfem.errors import ConvergenceError
 
 PETSC_ERR_LIB = 76
@@ -30,13 +28,6 @@ and at 1e5 elements MUMPS's parallel analysis overflows its stack on it.
 """
 DENSE_ROWS = {"mat_mumps_icntl_7": 6}
 """MUMPS's ordering for matrices with dense rows (QAMD).  PETSc takes it from its options only."""
-PIVOT = "mat_klu_pivot_tol"
-"""PETSc's option for KLU's threshold of pivots."""
-SMALL = 2.0**-14
-"""Scaling of dense rows and columns, so that none is chosen as the pivot of a sparse row and fills in all others.
-
-Without it 3000 pointwise elements of the hemitropic rod take 40 s to factor instead of 40 ms.
-"""
 BALANCED = {"mat_mumps_icntl_7": 4}
 """MUMPS's ordering that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
 
@@ -65,15 +56,6 @@ def preferred(prefix: str, values: dict[str, Any]) -> Iterator[None]:
             options.delValue(name)
 
 
-def pivots(prefix: str) -> AbstractContextManager[None]:
-    """Threshold of pivots while KLU's factors are made: the largest of a column, or the option with the prefix.
-
-    With KLU's own, 1e-3, eigenvalues lose a digit or two.  PETSc 3.18 and 3.22 read the option without a prefix: new
-    factors have none.
-    """
-    return preferred("", {PIVOT: PETSc.Options(prefix).getReal(PIVOT, 1.0)})
-
-
 class Factors(Protocol):
     """Factors ``lu``, or ``cholesky`` (LDL^t, which also counts the inertia), of matrices given one after the other.
 
@@ -98,16 +80,19 @@ class Factors(Protocol):
         """Logarithm of the size of the determinant of the symmetric matrix last factored."""
 
 
-def lu_package(comm: MPI.Comm, prefix: str) -> str:
-    """PETSc's name of the package for LU factors of matrices on a communicator; the option overrules what is best."""
-    best = "klu" if comm.size == 1 and compat.factors_by("klu") else "mumps"
-    return str(PETSc.Options(prefix).getString("pc_factor_mat_solver_type", best))
+class LocalFactors(Factors, Protocol):
+    """Factors on this rank alone, of which single columns of the inverse are asked for, too."""
+
+    kind: str
+
+    def columns(self, rows: np.ndarray, right: PETSc.Mat, out: PETSc.Mat) -> None:
+        """Columns ``rows`` of the inverse; ``right`` is room for their right-hand sides."""
 
 
 class Block:
     """Solves with factors on this rank for the columns of arrays, all at once."""
 
-    def __init__(self, factors: Klu | Mumps, rows: int) -> None:
+    def __init__(self, factors: LocalFactors, rows: int) -> None:
         """Make no room yet."""
         self.factors, self.rows = factors, rows
         self._room: dict[int, tuple[PETSc.Mat, PETSc.Mat]] = {}
@@ -149,80 +134,6 @@ class Spread(ABC):
     def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
         """Solve for all columns of a dense matrix at once."""
         out.getDenseArray()[:] = self.spread(right.getDenseArray())
-
-
-class Klu:
-    """LU factors by SuiteSparse's KLU, on one rank; PETSc's options with the prefix may choose another package.
-
-    The last ``dense`` rows and columns are eliminated last.
-    """
-
-    def __init__(self, prefix: str, dense: int = 0) -> None:
-        """Make the solver."""
-        self.kind, self.dense = "lu", dense
-        self.ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-        self.ksp.setOptionsPrefix(prefix)
-        self.ksp.setType("preonly")
-        self.ksp.getPC().setType("lu")
-        self.ksp.getPC().setFactorSolverType("klu")
-        self.prefix = prefix
-        self.ksp.setFromOptions()
-        self.regular = False
-        self._given: PETSc.Mat | None = None
-
-    def __call__(self, matrix: PETSc.Mat) -> None:
-        """Factor ``matrix``; ``regular`` is false where it is exactly singular."""
-        if self._given is None or matrix.handle != self._given.handle:
-            self._given, self._scaled, self._scale = matrix, matrix.duplicate(), matrix.createVecRight()
-            self._scale.set(1.0)
-            self._scale.array[self._last] = SMALL
-            self._right = self._scale.duplicate()
-        matrix.copy(self._scaled, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        self._scaled.diagonalScale(self._scale, self._scale)
-        self.ksp.setOperators(self._scaled)
-        try:
-            with pivots(self.prefix):
-                self.ksp.setUp()
-        except PETSc.Error as trouble:
-            if trouble.ierr != PETSC_ERR_LIB:
-                raise
-            self.regular = False
-            self.ksp.getPC().reset()
-        else:
-            self.regular = True
-
-    @property
-    def _last(self) -> slice:
-        """The dense rows."""
-        rows = self._scale.getSize()
-        return slice(rows - self.dense, rows)
-
-    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Solve with the last factors."""
-        self._right.pointwiseMult(right, self._scale)
-        self.ksp.solve(self._right, out)
-        out.array[self._last] *= SMALL
-
-    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Solve for all columns of a dense matrix."""
-        right.getDenseArray()[self._last] *= SMALL
-        self.ksp.getPC().getFactorMatrix().matSolve(right, out)
-        right.getDenseArray()[self._last] /= SMALL  # a power of two: exactly what it was
-        out.getDenseArray()[self._last] *= SMALL
-
-    def columns(self, rows: np.ndarray, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Columns ``rows`` of the inverse; ``right`` is room for their right-hand sides."""
-        right.zeroEntries()
-        right.getDenseArray()[rows, np.arange(len(rows))] = 1.0
-        self.solve_all(right, out)
-
-    def inertia(self) -> tuple[int, int]:
-        """LU factors count none: raises :class:`TypeError`."""
-        raise TypeError("LU factors have no inertia: LDL^t factors have")
-
-    def determinant(self) -> float:
-        """None is kept of LU factors: raises :class:`TypeError`."""
-        raise TypeError("LU factors keep no determinant: LDL^t factors do")
 
 
 class Mumps:

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.linalg.factorization import Block, Klu, Mumps, Spread
+from rodfem.linalg.factorization import Block, LocalFactors, Spread
 
 
 class Copy:
@@ -68,7 +68,7 @@ class Copied(Spread):
     same on all ranks, also where their processors are not: the count is rank 0's.
     """
 
-    def __init__(self, factors: Mumps | Klu) -> None:
+    def __init__(self, factors: LocalFactors) -> None:
         """Keep what factors on this rank."""
         self.factors, self.symmetric = factors, factors.kind == "cholesky"
         self.regular = False

@@ -1,12 +1,31 @@
-"""Choice of the factors for a matrix: KLU's or MUMPS's, and on several ranks whole on each or piece by piece."""
+"""Choice of the factors for a matrix: along the rod or MUMPS's; on several ranks whole on each, or piece by piece."""
 
 from __future__ import annotations
 
+import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 
-from rodfem.linalg.factorization import Factors, Klu, Mumps, is_cut, lu_package
+from rodfem.errors import InputError
+from rodfem.linalg.chain import Chain
+from rodfem.linalg.factorization import Factors, LocalFactors, Mumps, is_cut
 from rodfem.linalg.replicated import Copied
 from rodfem.linalg.substructured import SubstructuredFactors
+
+CHAIN, MUMPS = "chain", "mumps"
+"""Names of what factors on one rank."""
+
+
+def package(prefix: str) -> str:
+    """Name of what factors on one rank: PETSc's option with the prefix, or what is best.
+
+    Raises :class:`InputError` for another name.
+    """
+    best = MUMPS if np.issubdtype(PETSc.ScalarType, np.complexfloating) else CHAIN
+    name = str(PETSc.Options(prefix).getString("pc_factor_mat_solver_type", best))
+    if name not in (CHAIN, MUMPS):
+        raise InputError(f"Nothing factors matrices by the name {name!r}: choose {CHAIN} or {MUMPS}.")
+    return name
 
 
 def factors_of(
@@ -18,24 +37,15 @@ def factors_of(
     thresholds: dict[int, float] | None = None,
     prefix: str = "",
 ) -> Factors:
-    """Factors for matrices of ``unknowns`` rows on a communicator, the last ``scalars`` of which may be dense.
+    """Factors for matrices of ``unknowns`` rows along a rod on a communicator, the last ``scalars`` of which are dense.
 
-    ``controls`` are MUMPS's ICNTL, ``thresholds`` its CNTL; PETSc's options begin with ``rodfem_lu_`` or
-    ``rodfem_cholesky_``, or with another ``prefix``.  ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the
-    matrices.
+    Those of another matrix, of 0 unknowns, are MUMPS's.  ``controls`` are MUMPS's ICNTL, ``thresholds`` its CNTL;
+    PETSc's options begin with ``rodfem_lu_`` or ``rodfem_cholesky_``, or with another ``prefix``.  ``kind`` is ``lu``
+    or ``cholesky`` (LDL^t), ``comm`` that of the matrices.
     """
     prefix = prefix or f"rodfem_{kind}_"
-    lu = kind == "lu" and lu_package(MPI.COMM_SELF, prefix) != "mumps"
-    factors = Klu(prefix, scalars) if lu else Mumps(kind, controls, thresholds, prefix)
+    along = unknowns > 0 and package(prefix) == CHAIN
+    factors: LocalFactors = Chain(kind, scalars) if along else Mumps(kind, controls, thresholds, prefix)
     if comm.size == 1:
         return factors
     return SubstructuredFactors(scalars, factors) if is_cut(comm, unknowns) else Copied(factors)
-
-
-def solving(counting: Factors, comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
-    """The fastest factors for solutions with a symmetric matrix: its LDL^t factors ``counting``, or LU factors.
-
-    The matrix has ``unknowns`` rows on ``comm``, the last ``scalars`` of which may be dense.
-    """
-    same = lu_package(MPI.COMM_SELF, "rodfem_lu_") == "mumps"
-    return counting if same else factors_of("lu", comm, unknowns, scalars, {})

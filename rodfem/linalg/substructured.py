@@ -43,7 +43,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.linalg.factorization import Block, Klu, Mumps, Spread
+from rodfem.linalg.chain import Chain
+from rodfem.linalg.factorization import Block, LocalFactors, Spread
 from rodfem.linalg.subdomain import Subdomain
 
 GROWTH = 100.0
@@ -61,12 +62,12 @@ an unknown couples to this piece alone.
 
 
 class SubstructuredFactors(Spread):
-    """Factors on several ranks: of each rank's piece by KLU or MUMPS, and of the interface matrix on all ranks.
+    """Factors on several ranks: of each rank's piece, along the rod or by MUMPS, and of the interface matrix on all.
 
     :class:`~rodfem.linalg.factorization.Factors` of matrices whose pattern is symmetric and stays.
     """
 
-    def __init__(self, scalars: int, factors: Mumps | Klu) -> None:
+    def __init__(self, scalars: int, factors: LocalFactors) -> None:
         """Keep the factors for this rank's piece; the last ``scalars`` unknowns are shared."""
         self.factors, self.scalars = factors, scalars
         self.symmetric = factors.kind == "cholesky"
@@ -80,8 +81,8 @@ class SubstructuredFactors(Spread):
             self.piece = Subdomain(matrix, self.scalars, symmetric=self.symmetric)
             self.touched = self.piece.comm.allgather(self.piece.touched)
             self._block = Block(self.factors, self.piece.matrix.size[0])
-            if isinstance(self.factors, Klu):
-                self.factors.dense = len(self.piece.touched)
+            if isinstance(self.factors, Chain):
+                self.factors.border = len(self.piece.touched)
         piece = self.piece
         corner = piece.update(matrix)
         trouble = ""

@@ -38,7 +38,6 @@ from rodfem.stability import mode_type as character
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.pencil import (
     FACTORS,
-    LARGE,
     Inverse,
     PencilMatrices,
     StatePencil,
@@ -358,14 +357,14 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         raise ConvergenceError(f"SLEPc found no eigenvalue near {target:.6g}: use a richer discretisation.")
 
     def _inverse(self, matrix: PETSc.Mat, mass: PETSc.Mat, target: complex) -> Inverse | None:
-        """Inverse of ``matrix - target mass`` for a large pencil, piece by piece on several ranks; None: SLEPc's own.
+        """Inverse of ``matrix - target mass`` along the rod, piece by piece on several ranks; None: SLEPc's own.
 
-        MUMPS, SLEPc's choice on several ranks, gives up on a long rod: the zero block of the multipliers delays more
-        pivots than its analysis has made room for.  KLU's factors fill in where the pencil is of twice the size.
+        A complex shift makes a pencil of twice the size, which is SLEPc's and MUMPS's.  On several ranks MUMPS gives up
+        on a long rod: the zero block of the multipliers delays more pivots than its analysis has made room for.
         """
         rows, comm = matrix.size[0], matrix.comm.tompi4py()
         doubled = rows > self.matrix.size[0]
-        if rows < LARGE or (doubled and comm.size == 1):
+        if doubled and not is_cut(comm, rows):
             return None
         shifted = matrix.copy()
         shifted.axpy(-target, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)

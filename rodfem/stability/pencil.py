@@ -17,7 +17,7 @@ from slepc4py import SLEPc
 from rodfem.errors import SceneError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
-from rodfem.linalg.factorization import Factors, lu_package, ordering, pivots, preferred
+from rodfem.linalg.factorization import Factors, ordering, preferred
 from rodfem.linalg.orthogonal import combine
 
 MASSLESS = 1e-12
@@ -30,8 +30,6 @@ FACTORS = "rodfem_st_"
 """Prefix of the options for the factors of a pencil without symmetry."""
 ROOM = {"mat_mumps_icntl_14": 100}
 """Percentage of room beyond MUMPS's estimate: delayed pivots of a saddle point take more than its own 20."""
-LARGE = 5000
-"""Rows of a pencil from which MUMPS factors it: a dense row may fill in KLU's factors."""
 LEAST = 6
 """How many vectors more than eigenvalues a Krylov space has, at least; far below, restarts cost more than vectors."""
 
@@ -175,10 +173,9 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
     ksp = transform.getKSP()
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
-    package = lu_package(matrix.comm.tompi4py(), FACTORS) if matrix.size[0] < LARGE else "mumps"
-    ksp.getPC().setFactorSolverType(package)
+    ksp.getPC().setFactorSolverType("mumps")
     solver.setFromOptions()
-    with preferred(FACTORS, ordering(matrix) | ROOM), pivots(FACTORS):
+    with preferred(FACTORS, ordering(matrix) | ROOM):
         solver.setUp()
     return solver
 

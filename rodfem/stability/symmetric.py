@@ -24,7 +24,6 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import dense_columns
 from rodfem.linalg.factorization import Factors
-from rodfem.linalg.selection import solving
 from rodfem.stability.inertia import Inertia, inertia_factors
 from rodfem.stability.pencil import (
     Inverse,
@@ -100,11 +99,7 @@ class SymmetricSolver(PencilMatrices):
         super().__init__(inertia.system)
         self.inertia = inertia
         system, sizes = self.system, (self.system.fields.unknowns, self.system.fields.dense_rows)
-        counting = inertia_factors(system.comm, *sizes)
-        self.counting = self.solving = _Shifted(counting, system.state_matrix())
-        solver = solving(counting, system.comm, *sizes)
-        if solver is not counting:
-            self.solving = _Shifted(solver, system.state_matrix())
+        self.shifted = _Shifted(inertia_factors(system.comm, *sizes), system.state_matrix())
         self.shift = -inertia.scale
         self.factorisations = 0
         self.last = np.zeros(0)
@@ -118,11 +113,12 @@ class SymmetricSolver(PencilMatrices):
             modes = symmetry_modes(system, x)
             assemble_pencil(system, x, self.matrix, self.mass)
             self.deflated = exclude_modes(system, modes, self.matrix, self.mass)
-        self.counting.at = self.solving.at = np.nan
+        self.shifted.at = np.nan
         return SymmetricPencil(self)
 
-    def factor(self, sigma: float, shifted: _Shifted) -> None:
+    def factor(self, sigma: float) -> None:
         """Factor ``S - sigma M``, unless that is what was factored last."""
+        shifted = self.shifted
         if sigma == shifted.at:
             return
         self.matrix.copy(shifted.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
@@ -186,8 +182,8 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         Raises :class:`ConvergenceError` where the count breaks down: constraints depend on each other.
         """
         held = self._held()
-        held.factor(sigma, held.counting)
-        negative, zero = held.counting.factors.inertia()
+        held.factor(sigma)
+        negative, zero = held.shifted.factors.inertia()
         below = negative - self.inertia.constraints - self._drifts
         if zero or below < 0:
             raise ConvergenceError(
@@ -213,8 +209,8 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         asked for.
         """
         held = self._held()
-        held.factor(held.shift, held.solving)
-        if not held.solving.factors.regular:
+        held.factor(held.shift)
+        if not held.shifted.factors.regular:
             held.shift -= self.inertia.scale
             return self._solve(number, extra)
         values, vectors, errors = self._krylov_schur(number, number + extra)
@@ -238,7 +234,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         if len(held.last):  # a space that is invariant already would miss all else
             start.scale(NOISE / self.system.norm(start))
             start.array[:] += held.last
-        inverse = Inverse(held.solving.factors)
+        inverse = Inverse(held.shifted.factors)
         solver = with_factors(held.matrix, held.mass, number, held.shift, inverse, start, held.deflated)
         solver.solve()
         found = solver.getConverged()
@@ -272,7 +268,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         for i, vector in enumerate(vectors):
             right.getDenseArray()[:, i] = (self.mass * vector).array_r
         held = self._held()
-        held.solving.factors.solve_all(right, solved)
+        held.shifted.factors.solve_all(right, solved)
         for i, (value, vector) in enumerate(zip(values, vectors, strict=True)):
             vector.array[:] = (value - held.shift) * solved.getDenseArray()[:, i]
 

@@ -20,6 +20,8 @@ ROOMS = 11
 CIRCLES = [{"rodfem.diagram.diagram", "rodfem.diagram.trace"}]
 """Modules that import each other inside functions (a diagram can be traced again): add none."""
 MATRICES = {
+    "rodfem.linalg.chain",
+    "rodfem.linalg.compiled",
     "rodfem.linalg.factorization",
     "rodfem.linalg.selection",
     "rodfem.linalg.replicated",

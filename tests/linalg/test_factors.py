@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from time import process_time
-
 import numpy as np
 import pytest
 import small_states
@@ -13,7 +11,8 @@ from petsc4py import PETSc
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
-from rodfem.linalg.factorization import Klu, Mumps, lu_package
+from rodfem.linalg.chain import Chain
+from rodfem.linalg.factorization import Mumps
 from rodfem.linalg.matrices import gathered
 from rodfem.linalg.replicated import Copied
 from rodfem.linalg.substructured import SubstructuredFactors
@@ -28,7 +27,6 @@ STATES = pytest.mark.parametrize(
     [("cord", "plain", 30.0), ("cord", "buckled", 40.0), ("hemitropic", "plain", 0.25), ("hemitropic", "buckled", 0.2)],
 )
 SHARED = pytest.mark.parametrize("shared", ["pieces", "copies"])
-LU = "rodfem_lu_"
 SIGMAS = (-30.0, -3.0, -0.1, 0.0, 0.1, 2.0, 40.0)
 
 
@@ -104,16 +102,14 @@ def test_many_right_hand_sides(shared: str) -> None:
 
 
 @SHARED
-@pytest.mark.parametrize("package", ["klu", "mumps"])
+@pytest.mark.parametrize("package", ["chain", "mumps"])
 @FORMULATIONS
 @pytest.mark.parametrize(("name", "load"), [("follower", 10.0), ("hemitropic", 0.3)])
 def test_matrix_without_symmetry(formulation: str, name: str, load: float, package: str, shared: str) -> None:
-    if package == "klu" != lu_package(MPI.COMM_SELF, LU):
-        pytest.skip("PETSc has no KLU")
     if name == "follower":
         formulation = "pointwise"
     system, x = at(name, "plain", formulation, load)
-    alone = Klu(LU, system.fields.dense_rows) if package == "klu" else Mumps("lu", {8: 0})
+    alone = Chain("lu", system.fields.dense_rows) if package == "chain" else Mumps("lu", {8: 0})
     factors = Copied(alone) if shared == "copies" else SubstructuredFactors(system.fields.dense_rows, alone)
     row = system.metric * x
     system.set_load(row, 1.0)
@@ -179,31 +175,3 @@ def test_long_rods_are_cut(formulation: str, elements: int) -> None:
         nearest, _ = factored.nearest(1, accuracy=1e-9)
         found.append([verdict.negative, verdict.zero, *nearest, *verdict.values])
     np.testing.assert_allclose(*found, rtol=1e-7)
-
-
-@pytest.mark.skipif(lu_package(MPI.COMM_SELF, LU) != "klu", reason="PETSc has no KLU")
-@pytest.mark.parametrize(("formulation", "elements", "degree"), [("pointwise", 1000, 1), ("reduced", 300, 6)])
-def test_dense_rows_do_not_fill_in(formulation: str, elements: int, degree: int) -> None:
-    """Newton's matrix has an arclength equation, and integral constraints.
-
-    Where one of them is the pivot of a sparse row KLU takes tens to hundreds of times as long as MUMPS.
-    """
-    solver = Solver(
-        small_states.scene("hemitropic"), Discretization(formulation, elements, degree), MPI.COMM_SELF
-    ).equilibria
-    solver.system.set_phase(None)
-    x = solver.start(0.3, 0.4)
-    matrix, times = solver.system.at(x).jacobian(solver.axis), []
-    for factors in (Klu(LU, solver.system.fields.dense_rows), Mumps("lu", {8: 0})):
-        factors(matrix)
-        least = np.inf
-        for _ in range(3):
-            matrix.stateIncrease()
-            started = process_time()
-            factors(matrix)
-            least = min(least, process_time() - started)
-        times.append(least)
-        right, out = solver.inertia.seed(1), solver.system.new_vector()
-        factors.solve(right, out)
-        assert (matrix * out - right).norm() < 1e-14 * matrix.norm(PETSc.NormType.INFINITY) * out.norm()
-    assert times[0] < 8 * times[1]

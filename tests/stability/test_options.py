@@ -11,7 +11,6 @@ from small_states import plain
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.linalg.factorization import Klu
 from rodfem.stability.assessment import Assessor
 from rodfem.stability.blocks import Blocks
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
@@ -21,7 +20,6 @@ from rodfem.stability.reduction import Reduction
 
 pytestmark = pytest.mark.alone
 
-LU = "rodfem_lu_"
 ORDERING = 2
 """MUMPS's approximate minimum fill: not what rodfem asks for."""
 
@@ -37,7 +35,6 @@ def options() -> Iterator[PETSc.Options]:
 
 
 def test_nothing_is_left_in_the_database(options: PETSc.Options) -> None:
-    options["mat_klu_pivot_tol"] = 0.5  # of the user, without a prefix
     before = options.getAll()
     system, x = cord()
     system.at(x).factor(system.load_axis())
@@ -49,25 +46,6 @@ def test_nothing_is_left_in_the_database(options: PETSc.Options) -> None:
     vibration.near(2, 0.0)
     shift_invert(vibration.matrix, vibration.mass, 2, 1.0, symmetric=False).solve()
     assert options.getAll() == before
-    del options["mat_klu_pivot_tol"]
-
-
-def test_threshold_of_pivots_is_read(options: PETSc.Options) -> None:
-    """Factors of KLU with the threshold that was asked for, whatever the prefix that it was asked for with."""
-    system, x = cord()
-    matrix, solutions = system.at(x).jacobian(system.load_axis()), []
-    for name in ("", f"{LU}mat_klu_pivot_tol", "mat_klu_pivot_tol"):
-        if name:
-            options[name] = 1e-12
-        factors, out = Klu(LU, system.fields.dense_rows), system.new_vector()
-        factors(matrix)
-        factors.solve(matrix * x, out)
-        solutions.append(out)
-        if name:
-            del options[name]
-    default, prefixed, plainly = solutions
-    assert (prefixed - plainly).norm() == 0.0
-    assert (default - plainly).norm() > 0.0
 
 
 def cord() -> tuple[System, PETSc.Vec]:
@@ -77,7 +55,7 @@ def cord() -> tuple[System, PETSc.Vec]:
 
 def test_factors(options: PETSc.Options) -> None:
     options["rodfem_lu_mat_mumps_icntl_7"] = options["rodfem_cholesky_mat_mumps_icntl_7"] = ORDERING
-    options["rodfem_lu_pc_factor_mat_solver_type"] = "mumps"
+    options["rodfem_lu_pc_factor_mat_solver_type"] = options["rodfem_cholesky_pc_factor_mat_solver_type"] = "mumps"
     system, x = cord()
     system.at(x).factor(system.load_axis())
     assessor = Assessor(system)
@@ -93,7 +71,7 @@ def test_symmetric_pencil(options: PETSc.Options) -> None:
     assessor = Assessor(system)
     expected = assessor(x, "shift-invert", 3).values
     spectrum = assessor.symmetric
-    solver = with_factors(spectrum.matrix, spectrum.mass, 3, -9.0, spectrum.solving.factors, spectrum.inertia.seed(1))
+    solver = with_factors(spectrum.matrix, spectrum.mass, 3, -9.0, spectrum.shifted.factors, spectrum.inertia.seed(1))
     assert (solver.getDimensions()[1], solver.getTolerances()[0]) == (17, 1e-7)
     options["rodfem_slicing_eps_tol"], options["rodfem_slicing_st_mat_mumps_icntl_7"] = 1e-8, ORDERING
     solver = in_interval(spectrum.matrix, spectrum.mass, -20.0, 30.0)

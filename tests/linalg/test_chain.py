@@ -1,0 +1,197 @@
+"""The elimination along a chain against dense linear algebra, and against MUMPS on matrices of every scene."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from golden_cases import cases
+from mpi4py import MPI
+from petsc4py import PETSc
+from small_states import scene as small_scene
+
+import rodfem.linalg
+from rodfem import Discretization, Plan, trace
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD
+from rodfem.diagram.solver import Solver
+from rodfem.errors import ConvergenceError, InputError
+from rodfem.linalg.chain import Chain
+from rodfem.linalg.factorization import Mumps
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="factors on one rank")
+SHIFTS = (-3.0, -0.3, -1e-3, 1e-3, 0.3, 3.0)
+"""Of the second variation, in units of the lowest bending eigenvalue."""
+BACKWARD = 1e-14
+"""Backward error of a solution."""
+
+
+def petsc(dense: np.ndarray, coupled: np.ndarray) -> PETSc.Mat:
+    """Matrix with a given pattern."""
+    pattern = sp.csr_matrix(coupled)
+    pattern.sort_indices()
+    values = dense[pattern.nonzero()]
+    return PETSc.Mat().createAIJ(dense.shape, csr=(pattern.indptr, pattern.indices, values), comm=PETSc.COMM_SELF)
+
+
+def random_chain(rng: np.random.Generator, *, symmetric: bool) -> tuple[np.ndarray, np.ndarray, int]:
+    """Matrix of cells that share vertices, with zero blocks as of multipliers, in random order; pattern, border."""
+    cells, vertex, inner, border = rng.integers((1, 1, 0, 0), (9, 6, 9, 5))
+    fields = cells * (vertex + inner) + vertex
+    n = fields + border
+    dense, coupled = np.zeros((n, n)), np.zeros((n, n), dtype=bool)
+    for first in np.arange(cells) * (vertex + inner):
+        cell = np.arange(first, first + 2 * vertex + inner)
+        block = rng.normal(size=(len(cell), len(cell)))
+        zero = rng.random(len(cell)) < 0.4
+        block[np.ix_(zero, zero)] = 0.0
+        dense[np.ix_(cell, cell)] += block + block.T if symmetric else block
+        coupled[np.ix_(cell, cell)] = True
+    across = rng.normal(size=(2, border, fields))
+    dense[fields:, :fields], dense[:fields, fields:] = across[0], across[0 if symmetric else 1].T
+    coupled[fields:], coupled[:, fields:] = True, True
+    order = np.append(rng.permutation(fields), np.arange(fields, n))
+    return dense[np.ix_(order, order)], coupled[np.ix_(order, order)], int(border)
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_random_chains(symmetric: bool) -> None:
+    rng, tried, delayed = np.random.default_rng(3), 0, 0
+    while tried < 300:
+        dense, coupled, border = random_chain(rng, symmetric=symmetric)
+        if np.linalg.cond(dense) > 1e10:
+            continue
+        tried += 1
+        factors = Chain("cholesky" if symmetric else "lu", border)
+        factors(petsc(dense, coupled))
+        right = rng.normal(size=(len(dense), 3))
+        found = factors.solve_columns(right)
+        size = abs(dense).sum(axis=1).max() * abs(found).max()
+        assert factors.regular and abs(dense @ found - right).max() < 100 * BACKWARD * size
+        assert factors.determinant() == pytest.approx(np.linalg.slogdet(dense)[1], abs=1e-5)
+        assert factors.growth <= 100.0 or factors.fronts == 1
+        delayed += factors.delayed
+        if symmetric:
+            assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
+    assert delayed > 100
+
+
+def test_what_cannot_be_factored() -> None:
+    """Exactly singular, no number; and a pattern is learnt anew for another matrix."""
+    dense = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    factors = Chain("cholesky", 0)
+    factors(petsc(dense, dense != 0))
+    assert not factors.regular and factors.inertia()[1] == 1 and factors.determinant() == -np.inf
+    with pytest.raises(ConvergenceError, match="no numbers"):
+        factors(petsc(np.diag([1.0, np.nan]), np.eye(2, dtype=bool)))
+    factors(petsc(np.diag([1.0, -2.0]), np.eye(2, dtype=bool)))
+    assert factors.regular and factors.inertia() == (1, 0)
+
+
+def test_an_unknown_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    options = PETSc.Options()
+    options["rodfem_lu_pc_factor_mat_solver_type"] = "superglue"
+    try:
+        with pytest.raises(InputError, match="'superglue': choose chain or mumps"):
+            Solver(small_scene("cord"), Discretization("reduced", 4, 3))
+    finally:
+        del options["rodfem_lu_pc_factor_mat_solver_type"]
+
+
+class Both:
+    """Factors along the rod and MUMPS's, of matrices with one pattern."""
+
+    def __init__(self, kind: str, border: int) -> None:
+        self.along, self.symmetric = Chain(kind, border), kind == "cholesky"
+        self.other = Mumps(kind, {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3} if self.symmetric else {})
+
+    def agree(self, matrix: PETSc.Mat) -> None:
+        """Assert that both count the same, and that the chain's factors solve."""
+        matrix.stateIncrease()
+        self.along(matrix)
+        self.other(matrix)
+        if self.symmetric:
+            assert self.along.inertia() == self.other.inertia()
+            assert self.along.determinant() == pytest.approx(
+                self.other.determinant(), abs=1e-2
+            )  # nearly singular ones, too
+        right, out = matrix.createVecs()
+        right.array[:] = np.random.default_rng(0).normal(size=right.size)
+        self.along.solve(right, out)
+        assert (matrix * out - right).norm() < BACKWARD * matrix.norm(PETSc.NormType.INFINITY) * out.norm()
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("name", list(cases()))
+def test_matrices_of_every_scene(name: str) -> None:
+    """Second variations at bent states, with shifts on both sides of zero, and bordered Jacobians."""
+    scene = cases()[name]()
+    found = Solver(scene, Discretization("auto", 8, 6), MPI.COMM_SELF).equilibria
+    system, border = found.system, found.system.fields.dense_rows
+    symmetric, general = Both("cholesky", border), Both("lu", border)
+    for place, bent in ((0.1, 0.0), (0.37, 0.3), (0.8, 0.7)):
+        x = found.start(scene.span[0] + place * (scene.span[1] - scene.span[0]), bent)
+        system.set_phase(x)
+        row = system.metric * x
+        row.axpy(1.0, system.load_axis())
+        general.agree(system.at(x).jacobian(row))
+        if not scene.conservative:
+            continue
+        matrix, shift = found.inertia.at(x).matrix, 0.0
+        for wanted in SHIFTS:
+            sigma = wanted * system.stiffness_scale
+            matrix.axpy(shift - sigma, found.inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            shift = sigma
+            symmetric.agree(matrix)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+@pytest.mark.parametrize("name", ["cord", "hemitropic", "ruler"])
+def test_beside_special_points(name: str, formulation: str) -> None:
+    """The count is MUMPS's from 1e-8 to 1e-2 of the lowest bending eigenvalue beside an eigenvalue that is zero."""
+    diagram = trace(small_scene(name), Discretization(formulation, 6, 6), Plan(depth=1, error_bars=False))
+    solver, seen = diagram.solvers[0], 0
+    both = Both("cholesky", solver.system.fields.dense_rows)
+    for special in (s for branch in diagram for s in branch.special if s.kind in (FOLD, BRANCH_POINT)):
+        matrix, shift = solver.inertia.at(special.point.x).matrix, 0.0
+        for size in 10.0 ** np.arange(-8, -1):
+            for sigma in (-size * solver.inertia.scale, size * solver.inertia.scale):
+                matrix.axpy(shift - sigma, solver.inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+                shift = sigma
+                both.agree(matrix)
+                seen += 1
+    assert seen >= 14
+
+
+@pytest.mark.parametrize(("formulation", "elements", "degree"), [("reduced", 3000, 1), ("reduced", 400, 6)])
+def test_few_pivots_are_delayed(formulation: str, elements: int, degree: int) -> None:
+    """Couplings to the contact force add up along the rod: a scale by their largest entry would delay them all."""
+    solver = Solver(small_scene("cord"), Discretization(formulation, elements, degree), MPI.COMM_SELF).equilibria
+    found = solver.inertia.at(solver.start(20.0, 0.3))
+    found.count()
+    factors = found.factors
+    assert isinstance(factors, Chain)
+    assert factors.fronts >= elements - 1
+    assert factors.delayed < elements / 4
+
+
+@pytest.mark.alone
+def test_clean_under_the_sanitizers(tmp_path: Path) -> None:
+    compiler = shutil.which("gcc")
+    assert compiler is not None
+    here, program = Path(__file__).parent, tmp_path / "driver"
+    flags = ["-g", "-O1", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined", "-fno-sanitize-recover"]
+    source = Path(rodfem.linalg.__file__).parent
+    build = [compiler, *flags, f"-I{source}", str(here / "chain_driver.c"), "-o", str(program), "-lm"]
+    run: Callable[[list[str]], subprocess.CompletedProcess[str]] = lambda command: subprocess.run(  # noqa: E731
+        command, capture_output=True, text=True, check=False
+    )
+    built = run(build)
+    assert built.returncode == 0, built.stderr
+    done = run([str(program)])
+    assert (done.returncode, done.stdout) == (0, "0 wrong\n"), done.stdout + done.stderr
