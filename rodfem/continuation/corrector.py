@@ -14,13 +14,8 @@ the block is rich in its vector: 1e-3 of a generic vector is added every time, a
 whose eigenvalue is within the tolerance, 1e-7 of the usual, grows by 1e7.  If that is too near zero, the
 state is computed by LU factors of ``J``, and counted by two shifts.
 
-The factors belong to the prediction, the index to the equilibrium.  From one to the other ``S`` changes by ``dS``.  Its
-effect on the eigenvalues near zero is measured, not bounded beforehand: a rod that carries a force or a moment, or
-whose energy is far from quadratic, may be a thousand times as sensitive as another.  The second variation at the
-equilibrium is projected on the block ``Y``, by a difference of the equations along its first vector ``y``: ``y.dS y``
-is the first-order change of that eigenvalue, the rest of ``Y^t dS y`` its coupling to the others.  The count at the
-prediction is that of the equilibrium only where the distance of all eigenvalues from zero is many times as large; else
-``S`` is factored, and counted, at the equilibrium itself.
+Tangent and index of a row are from factors at the row's own state, those of Newton's method from factors at the
+prediction: an eigenvalue may cross zero, and the branch may bend, on the way from one to the other.
 """
 
 from __future__ import annotations
@@ -28,7 +23,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isfinite
 
-import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
@@ -42,14 +36,6 @@ BLOCK = 2
 """Number of vectors that are iterated along a branch."""
 NEAR = 1e-3
 """Distance of an eigenvalue from zero, over the lowest bending eigenvalue, below which the two shifts count."""
-SENSITIVE = 100.0
-"""Least change of an eigenvalue assumed when the state moves by one radian, in the same units."""
-DIFFERENCE = 0.05
-"""Step of the differences, relative to how far the equilibrium is from the prediction."""
-SHORTEST = 1e-7
-"""Least of these steps, in the metric: shorter ones differ by round-off."""
-SAFE = 10.0
-"""Least distance of all eigenvalues from zero, over the measured change of those carried along."""
 
 
 @dataclass(frozen=True)
@@ -60,27 +46,19 @@ class Regular:
     ----------
     found
         The factors.
-    below
-        Its index.
+    index
+        Its index and zeros by the count of the factors; None where an eigenvalue is too near zero for one count.
     nearest
         Estimated distance of the eigenvalue nearest zero from zero.
     tangent
         Unit tangent, on the side of increasing load.
-    projected
-        Products of the block with ``S y`` for its first vector ``y``, (BLOCK,).
     """
 
     x: PETSc.Vec
     found: Factored
-    below: int
+    index: Index | None
     nearest: float
     tangent: PETSc.Vec
-    projected: np.ndarray
-
-    @property
-    def index(self) -> Index:
-        """Index and zeros by the count of the factors."""
-        return Index(self.below, self.found.drifts, self.found.factors.determinant())
 
     def along(self, row: PETSc.Vec) -> PETSc.Vec:
         """Unit tangent on the side to which ``row`` points."""
@@ -99,7 +77,6 @@ class Corrector:
         system = self.system
         self._right, self._solved = dense_columns(system, BLOCK + 2), dense_columns(system, BLOCK + 2)
         self._step, self._image = system.new_vector(), system.new_vector()
-        self._beside = system.new_vector()
         self._fresh = [inertia.seed(i) for i in range(BLOCK)]
         self._fresh_images = [inertia.metric * v for v in self._fresh]
         self.restart()
@@ -133,17 +110,9 @@ class Corrector:
         if not self._started:
             self.restart()
             return None
-        # y.S v for the first vector y of the block: the eigenvalue itself, and its couplings to the rest of the block
-        found.matrix.mult(self._block[0], self._image)
-        projected = np.array([self._image.dot(v) for v in self._block])
-        return Regular(x.copy(), found, below, nearest, tangent, projected)
-
-    def _project_at(self, x: PETSc.Vec, step: float) -> np.ndarray:
-        """The same of ``S`` at the equilibrium ``x``, by a difference of the equations over ``step``."""
-        # F(x) = 0, so that F(x + step y) / step is S y up to first order in the step: no matrix is assembled
-        self._beside.waxpy(step, self._block[0], x)
-        self.system.at(self._beside).residual(self._image)
-        return np.array([self._image.dot(v) for v in self._block]) / step
+        certain = nearest >= NEAR * inertia.scale + 10 * inertia.tolerance
+        index = Index(below, found.drifts, found.factors.determinant()) if certain else None
+        return Regular(x.copy(), found, index, nearest, tangent)
 
     def _solve(self, found: Factored, right: PETSc.Vec | None) -> tuple[PETSc.Vec, float]:
         """Solve for all right-hand sides at once: the cost is that of the call, hardly of a column.
@@ -211,24 +180,3 @@ class Corrector:
             origin.copy(x)
             return None
         return outcome, at
-
-    def settled(self, x: PETSc.Vec, at: Regular) -> Regular | None:
-        """State whose index and tangent serve for ``x``: ``at``, factored near by, or else ``x`` itself.
-
-        Those of ``at`` hold where no eigenvalue can have come near zero, let alone crossed it, on the way to ``x``.
-        None where one of them may be zero.
-        """
-        inertia = self.inertia
-        self._image.waxpy(-1.0, at.x, x)
-        moved = self.system.norm(self._image)
-        least = NEAR * inertia.scale + 10 * inertia.tolerance
-        if moved:
-            projected = self._project_at(x, max(DIFFERENCE * moved, SHORTEST))
-            change = float(np.linalg.norm(projected - at.projected))
-            # the count at the prediction holds only if no eigenvalue can have crossed zero on the way from there
-            if at.nearest < least + SENSITIVE * moved * inertia.scale + SAFE * change:
-                there = self.factor(x)
-                if there is None:
-                    return None
-                at = there
-        return at if at.nearest >= least else None

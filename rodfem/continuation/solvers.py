@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.continuation.branch import Point
-from rodfem.continuation.corrector import SENSITIVE, Corrector
+from rodfem.continuation.corrector import Corrector
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
@@ -33,9 +33,6 @@ from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.round_off import decide
 from rodfem.stability.symmetric import SymmetricSolver
 
-LEVEL = 0.05
-"""Slope of the load (in spans per unit of arclength) below which it is computed anew at the corrected state, unless the
-correction was too small to change its sign."""
 VERTICAL = 1e-8
 """Slope of the load (in spans per unit of arclength) below which it counts as constant along a branch."""
 STILL = 1e-6
@@ -218,28 +215,20 @@ class BranchSolver(StaticSolver):
         return [float(value) for value in modes.values]
 
     def correct(
-        self, x: PETSc.Vec, row: PETSc.Vec, reach: float, slope: float
+        self, x: PETSc.Vec, row: PETSc.Vec, reach: float
     ) -> tuple[NewtonResult, PETSc.Vec | None, Index | None]:
-        """Correct a prediction in place; also its unit tangent on the side of ``row``, and its index.
+        """Correct a prediction in place; also its unit tangent on the side of ``row``, and its index, both at ``x``.
 
-        The tangent is None without convergence, the index where the factors that served the correction do not determine
-        it.  ``slope`` is that of the last point: where the load turns back, or hardly changes, the tangent is that at
-        ``x`` itself and not at the prediction.  ``row`` is the normal of the plane on which the equilibrium lies, and
-        ``reach`` bounds how far ``x`` may move, in the metric.
+        The tangent is None without convergence, the index where one factorisation does not determine it.  ``row`` is
+        the normal of the plane on which the equilibrium lies, and ``reach`` bounds how far ``x`` may move, in the
+        metric.
         """
         corrected = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)
-        outcome, at = corrected or (correct(self.system, x, row, most=8, reach=reach), None)
+        outcome = corrected[0] if corrected else correct(self.system, x, row, most=8, reach=reach)
         if not outcome.converged:
             return outcome, None, None
-        tangent = at.along(row) if at else self._tangent(row)
-        new, span = self.system.scalar(tangent), abs(self.system.scene.span[1] - self.system.scene.span[0])
-        if new * slope <= 0 or abs(new) < min(LEVEL, SENSITIVE * outcome.moved) * span:
-            at = self.corrector.factor(x)
-            tangent = at.along(row) if at else self._tangent(row, x)
-        settled = self.corrector.settled(x, at) if at else None
-        if at and settled is not at:  # near a special point the tangent differs from that at the prediction
-            tangent = settled.along(row) if settled else self._tangent(row, x)
-        return outcome, tangent, settled.index if settled else None
+        at = self.corrector.factor(x)
+        return outcome, at.along(row) if at else self._tangent(row, x), at.index if at else None
 
     def damp(self, freedoms: int) -> None:
         """Keep Newton's method from moving along families of equilibria at one load, where there are any."""
@@ -372,7 +361,7 @@ def follow(
         if low <= load <= high:
             row = solver.row(direction)
             if last.tangent is None or row.dot(last.tangent) > 0:  # else an extrapolation that turns back
-                outcome, tangent, index = solver.correct(x, row, 0.5 * step, last.slope)
+                outcome, tangent, index = solver.correct(x, row, 0.5 * step)
                 if outcome.converged:
                     load = system.scalar(x)
         if not low <= load <= high or _on_bound(load, last, bounds, span):

@@ -319,7 +319,7 @@ class Tracer:
         s = brentq(stretch, a.arclength + INSIDE * h, b.arclength, xtol=ALONG)
         x = solve_at(self.solver, lambda t: hermite(a, b, t), s)
         row = self.solver.row(hermite(a, b, s)[1])
-        last = self.solver.point(x, s, self.solver.tangent(row))
+        last = self.solver.point(x, s, self.solver.tangent(row, at=x))
         if self._between(branch, a, last):
             return
         special = SpecialPoint(END, last, last.negative, last.negative, LOCATED, test_function="stretch")
