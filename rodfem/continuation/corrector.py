@@ -152,11 +152,11 @@ class Corrector:
 
     def correct(
         self, x: PETSc.Vec, row: PETSc.Vec, most: int = 12, reach: float = 1e3, tolerance: float = 0.0
-    ) -> tuple[NewtonResult, Regular | None] | None:
+    ) -> NewtonResult | None:
         """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place.
 
-        As :func:`rodfem.fem.newton.iterate`; also the state whose factors served last, on the way.  None, with ``x`` as
-        it was, where ``S`` is too near singular.  ``most``, ``reach`` and ``tolerance`` are those of that function.
+        As :func:`rodfem.fem.newton.iterate`.  None, with ``x`` as it was, where ``S`` is too near singular.  ``most``,
+        ``reach`` and ``tolerance`` are those of that function.
         """
         self.system.set_phase(x)
         origin, singular, at = x.copy(), False, None
@@ -179,4 +179,4 @@ class Corrector:
         if singular:
             origin.copy(x)
             return None
-        return outcome, at
+        return outcome

@@ -161,8 +161,8 @@ class BranchSolver(StaticSolver):
         """As for any equilibrium, with the symmetric factors unless they are too near singular."""
         x = guess.copy()
         self.system.set_load(x, load)
-        corrected = self.corrector.correct(x, self.axis, reach=reach)
-        return (x, corrected[0]) if corrected is not None else super().at_load(guess, load, reach)
+        outcome = self.corrector.correct(x, self.axis, reach=reach)
+        return (x, outcome) if outcome is not None else super().at_load(guess, load, reach)
 
     def point(
         self,
@@ -223,8 +223,9 @@ class BranchSolver(StaticSolver):
         the normal of the plane on which the equilibrium lies, and ``reach`` bounds how far ``x`` may move, in the
         metric.
         """
-        corrected = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)
-        outcome = corrected[0] if corrected else correct(self.system, x, row, most=8, reach=reach)
+        outcome = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)
+        if outcome is None:
+            outcome = correct(self.system, x, row, most=8, reach=reach)
         if not outcome.converged:
             return outcome, None, None
         at = self.corrector.factor(x)

@@ -123,7 +123,7 @@ def find_special(
 def renew(solver: BranchSolver, point: Point, *, turning: bool) -> None:
     """Compute the index of a point anew, at its own state; also the tangent, where the load is ``turning`` beside it.
 
-    The recorded ones may have been told from a prediction near by.
+    The recorded index may be that of one factorisation; this one is from two shifts.
     """
     index = decide(solver.inertia.at(point.x)).index
     point.negative, point.zero = index.negative, index.zero

@@ -49,7 +49,7 @@ def test_state_and_tangent_are_those_of_lu_factors(name: str) -> None:
     system.set_phase(guess)
     ours, theirs = guess.copy(), guess.copy()
     corrected = follower.corrector.correct(ours, row)
-    assert corrected is not None and corrected[0].converged and correct(system, theirs, row).converged
+    assert corrected is not None and corrected.converged and correct(system, theirs, row).converged
     ours.axpy(-1.0, theirs)
     assert system.norm(ours) < TOLERANCE
     tangent = follower.tangent(row, at=theirs)
