@@ -9,7 +9,7 @@ import inspect
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -36,6 +36,8 @@ REAL: Any = np.float64
 """Numbers of states and forms, whatever those of PETSc."""
 COMPLEX = bool(np.issubdtype(PETSc.ScalarType, np.complexfloating))
 """Whether this PETSc was built for complex numbers: forms and states are real all the same."""
+KINDS = CELL, BOUNDARY, INTERIOR = 1, 2, 4
+"""Numbers that an entity of an integral has: cell; cell and facet; cell and facet on either side."""
 
 
 def require_real_petsc() -> None:
@@ -132,6 +134,11 @@ def cell_vertices(mesh: Any, cells: int) -> np.ndarray:
     return x[_table(mesh.geometry.dofmap, cells)]
 
 
+def cell_coordinates(mesh: Any, cells: int) -> np.ndarray:
+    """Coordinates of the vertices of each local cell, in reference order: (cells, 2, 3)."""
+    return np.asarray(mesh.geometry.x)[_table(mesh.geometry.dofmap, cells)]
+
+
 def compile_forms(forms: Sequence[Any]) -> list[Any]:
     """Compile UFL forms; raises :class:`SetupError` where the form cache is locked by a killed run."""
     try:
@@ -193,6 +200,40 @@ def local_table(form: Any) -> sp.csr_matrix:
     local = fem.assemble_matrix(form)  # PETSc brings the parts of other ranks' rows there
     size = int(np.asarray(local.indptr)[-1])
     return sp.csr_matrix((local.data[:size], local.indices[:size], local.indptr), shape=(len(local.indptr) - 1,) * 2)
+
+
+class Integral(NamedTuple):
+    """An integral of a compiled form.
+
+    ``kernel`` is the C function that computes the tensor of one entity, a function pointer of cffi; ``entities``
+    (count, ``kind``) are a cell each, with a facet on the boundary, of both sides inside.
+    """
+
+    kernel: Any
+    kind: int
+    entities: np.ndarray
+
+
+def integrals(form: Any) -> list[Integral]:
+    """Integrals of a compiled form, over the cells and facets of this rank."""
+    found, compiled, cpp = [], form.ufcx_form, getattr(form, "_cpp_object", form)
+    for place, kind in enumerate(KINDS):
+        if hasattr(compiled, "form_integral_offsets"):
+            kernels = [compiled.form_integrals[i] for i in range(*compiled.form_integral_offsets[place : place + 2])]
+        else:
+            kernels = [compiled.integrals(place)[i] for i in range(compiled.num_integrals(place))]
+        if not kernels:
+            continue
+        of_kind = next(t for t in cpp.integral_types if int(t) == place)
+        for kernel, name in zip(kernels, cpp.integral_ids(of_kind), strict=True):
+            entities = np.ascontiguousarray(cpp.domains(of_kind, name), dtype=np.int32).reshape(-1, kind)
+            found.append(Integral(kernel.tabulate_tensor_float64, kind, entities))
+    return found
+
+
+def pack_constants(form: Any) -> np.ndarray:
+    """Values of the constants of a compiled form, one after the other."""
+    return np.asarray(dolfinx.fem.assemble.pack_constants(form))
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""The equations of a scene on its fields: Lagrangian, weak form, Jacobian and metrics as compiled dolfinx forms."""
+"""The equations of a scene on its fields: Lagrangian, weak form, Jacobian and metrics as compiled forms."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ from forms import inertia, lagrangian
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
 from rodfem import compat
+from rodfem.fem.assembly import Assembler, Cells, vector_places
 from rodfem.fem.fields import Fields
-from rodfem.fem.parameters import load_line
+from rodfem.fem.parameters import Line, load_line
 from rodfem.problem.contribution import Site
 from rodfem.problem.local_state import Constants, Place, place
 from rodfem.problem.scene import Part
@@ -51,7 +52,9 @@ class Equations:
     line
         Parameters that the scalar unknown ``load`` stands for unless an evaluation says otherwise: the scene's load.
     held
-        Evaluation whose values are where the forms read them: see :mod:`rodfem.fem.state`.
+        Evaluation whose values are where dolfinx reads them: see :mod:`rodfem.fem.state`.
+    cells, local_places
+        Cells of this rank, and the places of a vector of all their degrees of freedom.
     uniform
         Whether the equations do not have the arclength in them, and nothing acts at points inside the rod.
     """
@@ -101,8 +104,21 @@ class Equations:
         forms = [first, second, W * dx, metric * dx, kinetic]
         if not scene.ordinate.places:
             forms.append((0.0 * c.s + scene.ordinate.of(along, c)) * dx)
-        self.residual, self.jacobian, self.energy, self.metric, self.kinetic, *more = compat.compile_forms(forms)
-        self.ordinate: Any = more[0] if more else None
+        self._taken: Line | None = None
+        self.cells = Cells.of(fields)
+        self._assemblers = [Assembler(form, self.cells) for form in compat.compile_forms(forms)]
+        self.residual, self.jacobian, self.energy, self.metric, self.kinetic, *more = self._assemblers
+        self.ordinate = more[0] if more else None
+        self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
+
+    def take(self, line: Line) -> None:
+        """Let the constants of the forms be the parameters of a ``line``."""
+        if line is self._taken:
+            return
+        self.base.value[:], self.direction.value[:] = line.origin, line.direction
+        for form in self._assemblers:
+            form.pack_constants()
+        self._taken = line
 
     # --- the functional --------------------------------------------------------------------------------------------
 

@@ -17,9 +17,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from rodfem import compat
+from rodfem.fem.assembly import Places, matrix_places, vector_places
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Discretization, Fields
 from rodfem.fem.invariance import find_motion_along, find_symmetries
@@ -94,6 +97,9 @@ class System:
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
         self.equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self.equation_numbers = number[self.equation_targets].astype(PETSc.IntType)
+        direct = comm.size == 1 and not compat.COMPLEX
+        self.equation_places = vector_places(self.equations.cells.dofs, without_load) if direct else None
+        self._places: dict[tuple[int, bool], Places] = {}
         self._pattern, self._metric_pattern = bordered_pattern(self.fields), metric_pattern(self.fields)
         self.matrix = self.state_matrix(load=True)
         self._numbered = np.flatnonzero(number >= 0)
@@ -192,6 +198,13 @@ class System:
     def maps(self, load: bool) -> tuple[np.ndarray, np.ndarray]:
         """Global numbers of the rows and columns of a matrix at each local degree of freedom, -1 for none."""
         return self._columns[False], self._columns[load]
+
+    def matrix_places(self, pattern: sp.csr_matrix, load: bool) -> Places:
+        """Places of bilinear forms in a matrix of a ``pattern`` of this system, with the column of the ``load``."""
+        key = (id(pattern), load)
+        if key not in self._places:
+            self._places[key] = matrix_places(self.equations.cells.dofs, *self.maps(load), pattern)
+        return self._places[key]
 
     def add_drifts(self, matrix: PETSc.Mat) -> None:
         """Add rows and columns of the drift scalars: the generators, or a one where a drift is switched off."""

@@ -31,12 +31,12 @@ def _processor() -> str:
 
 
 @cache
-def module(name: str, declarations: str) -> Any:
-    """The compiled module of ``name.c`` beside this file, with ``lib`` and ``ffi`` of cffi.
+def module(name: str, declarations: str, beside: Path = Path(__file__).parent) -> Any:
+    """The compiled module of ``name.c`` in the folder ``beside``, with ``lib`` and ``ffi`` of cffi.
 
     ``declarations`` are its functions in C.  Raises what the compiler raises.
     """
-    code = (Path(__file__).parent / f"{name}.c").read_text()
+    code = (beside / f"{name}.c").read_text()
     key = hashlib.sha1("\n".join([code, declarations, *FLAGS, sys.version, _processor()]).encode()).hexdigest()[:16]
     full, folder = f"rodfem_{name}_{key}", _cache()
     found = next(folder.glob(f"{full}*.so"), None)
