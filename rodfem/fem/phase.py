@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.fem.symmetries import Symmetry, mismatch
@@ -83,11 +84,12 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
     if count == len(dropped):
         return no_phase(count, reference)
     state: State = system.at(reference)
-    generators = [state.generator(i) for i in range(count)]
-    images = [system.metric * g for g in generators]
+    generators = system.generators.at(state)
+    images = [system.metric * system.generators.vector(g) for g in generators]
+    own = np.array([image.array_r[: generators.shape[1]].real for image in images])
+    gram = system.comm.allreduce(generators @ own.T, op=MPI.SUM)
     exact = [i for i, s in enumerate(symmetries) if not s.along and i not in dropped]
-    gram = np.array([[np.real(generators[i].dot(images[j])) for j in exact] for i in exact])
-    squares, turn = np.linalg.eigh(gram.reshape(len(exact), len(exact)))
+    squares, turn = np.linalg.eigh(gram[np.ix_(exact, exact)])
     combinations, sizes = list((np.eye(count)[:, exact] @ turn).T), list(np.sqrt(np.maximum(squares, 0.0)))
     least = [SYMMETRIC_STATE] * len(exact)
     if symmetries[-1].along and count - 1 not in dropped:
@@ -95,9 +97,10 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
         rest = np.eye(count)[-1]
         for weights, size in zip(combinations, sizes, strict=True):
             if size >= SYMMETRIC_STATE:
-                rest = rest - weights / size**2 * np.real(combine(images, weights).dot(generators[-1]))
+                rest = rest - weights / size**2 * (weights @ gram[:, -1])
         combinations.append(rest / np.linalg.norm(rest))
-        sizes.append(system.norm(combine(generators, combinations[-1])))
+        # by the difference of the vectors: in the Gram matrix half of the digits cancel
+        sizes.append(system.norm(system.generators.vector(combinations[-1] @ generators)))
         least.append(max(MESH * mismatch(state), 10 * SYMMETRIC_STATE))
     active = np.array(sizes) >= least
     conditions, offsets, broken = [None] * count, [0.0] * count, {}

@@ -157,4 +157,5 @@ class State(Evaluation):
 
     def generator(self, symmetry: int) -> PETSc.Vec:
         """Change under the infinitesimal symmetry, in all fields and scalars that it moves."""
-        return self.system.vector(self.system.symmetries[symmetry].change(self))
+        generators = self.system.generators
+        return generators.vector(generators.at(self)[symmetry])

@@ -25,6 +25,7 @@ from rodfem import compat
 from rodfem.fem.assembly import Places, matrix_places, vector_places
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Discretization, Fields
+from rodfem.fem.generators import Generators
 from rodfem.fem.invariance import find_motion_along, find_symmetries
 from rodfem.fem.parameters import Line
 from rodfem.fem.phase import no_phase, phase_at
@@ -33,7 +34,6 @@ from rodfem.fem.state import State
 from rodfem.fem.symmetries import Symmetry, may_slide
 from rodfem.fem.values import NodalValues
 from rodfem.fem.verification import Verification
-from rodfem.linalg.orthogonal import combine
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.scene import Scene
 from rodfem.timing import Clock
@@ -58,6 +58,8 @@ class System:
     line
         Parameters that the load of a state stands for where nothing else is said: the scene's load, unless a locus in
         two parameters is followed.
+    generators
+        Changes of a state by the symmetries.
     verification
         What verifies the symmetries at the states where the second variation is assembled.
     damping
@@ -109,7 +111,7 @@ class System:
         source = PETSc.IS().createGeneral(sources, comm=PETSc.COMM_SELF)
         self._gather = PETSc.Scatter().create(self.workspace, source, self._gathered, None)
         self.metric = self._assemble_metric()
-        self.phase = no_phase(len(self.drifts))
+        self.phase, self.generators = no_phase(len(self.drifts)), Generators(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
         self.lu = factors_of("lu", comm, self.fields.unknowns, self.fields.dense_rows, {8: 0})
@@ -269,12 +271,8 @@ class System:
         self.set_phase(x)
         moved = x.copy()
         moved.axpy(1.0, direction)
-        before, after, changes = self.at(x), self.at(moved), []
-        for i in range(len(self.drifts)):
-            change = after.generator(i)
-            change.axpy(-1.0, before.generator(i))
-            changes.append(change)
-        return [combine(changes, weights) for weights in self.phase.kept]
+        changes = self.generators.at(self.at(moved)) - self.generators.at(self.at(x))
+        return [self.generators.vector(weights @ changes) for weights in self.phase.kept]
 
     def active_drifts(self, x: PETSc.Vec) -> int:
         """Number of symmetries that the state ``x`` breaks: as many of its zero eigenvalues belong to them."""
