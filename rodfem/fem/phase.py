@@ -18,7 +18,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.fem.symmetries import Symmetry, mismatch
-from rodfem.linalg.orthogonal import combine
 
 if TYPE_CHECKING:
     from rodfem.fem.state import State
@@ -85,11 +84,12 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
         return no_phase(count, reference)
     state: State = system.at(reference)
     generators = system.generators.at(state)
-    images = [system.metric * system.generators.vector(g) for g in generators]
-    own = np.array([image.array_r[: generators.shape[1]].real for image in images])
-    gram = system.comm.allreduce(generators @ own.T, op=MPI.SUM)
+    images = system.weighed(generators)
+    gram = generators @ images.T
+    if system.comm.size > 1:
+        gram = system.comm.allreduce(gram, op=MPI.SUM)
     exact = [i for i, s in enumerate(symmetries) if not s.along and i not in dropped]
-    squares, turn = np.linalg.eigh(gram[np.ix_(exact, exact)])
+    squares, turn = np.linalg.eigh(gram[exact][:, exact])
     combinations, sizes = list((np.eye(count)[:, exact] @ turn).T), list(np.sqrt(np.maximum(squares, 0.0)))
     least = [SYMMETRIC_STATE] * len(exact)
     if symmetries[-1].along and count - 1 not in dropped:
@@ -105,7 +105,7 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
     active = np.array(sizes) >= least
     conditions, offsets, broken = [None] * count, [0.0] * count, {}
     for i in np.flatnonzero(active):
-        condition = combine(images, combinations[i] / sizes[i])
+        condition = system.generators.vector(combinations[i] / sizes[i] @ images)
         conditions[i], offsets[i] = condition, state.along(condition)
         broken[int(i)] = combinations[i] / sizes[i]
     return Phase(tuple(conditions), tuple(offsets), broken, np.array(combinations)[~active], reference.copy())

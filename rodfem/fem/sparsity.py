@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.fem.fields import Fields
+from rodfem.linalg.matrices import shared_matrix
 
 
 def bordered_pattern(fields: Fields) -> sp.csr_matrix:
@@ -74,28 +73,19 @@ def _own_rows(fields: Fields, names: list[str]) -> sp.csr_matrix:
     return rows
 
 
-@dataclass(frozen=True)
-class Shared:
-    """Values of a PETSc matrix on one rank that are an array of numpy as well, and its pattern."""
-
-    values: np.ndarray
-    pattern: sp.csr_matrix
-
-
 def new_matrix(fields: Fields, pattern: sp.csr_matrix, rows: PETSc.LGMap, columns: PETSc.LGMap) -> PETSc.Mat:
     """Zero PETSc AIJ matrix with ``pattern``, on the ranks of ``fields``.
 
     ``rows`` and ``columns`` are the maps from local degrees of freedom to its rows and columns.  On one rank its values
-    are :class:`Shared`.
+    are shared with numpy.
     """
-    size = (fields.local_unknowns, fields.unknowns)
-    index, values = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType)), np.zeros(pattern.nnz)
     if fields.comm.size == 1 and not compat.COMPLEX:
-        matrix = PETSc.Mat().createAIJWithArrays(size, (*index, values), comm=fields.comm)
-        matrix.setAttr("shared", Shared(values, pattern))
+        matrix = shared_matrix(fields.comm, pattern)
     else:
+        size = (fields.local_unknowns, fields.unknowns)
         matrix = PETSc.Mat().createAIJ((size, size), comm=fields.comm)
-        matrix.setPreallocationCSR((*index, values))
+        index = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
+        matrix.setPreallocationCSR((*index, np.zeros(pattern.nnz)))
     matrix.setLGMap(rows, columns)
     matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
     matrix.setOption(PETSc.Mat.Option.IGNORE_ZERO_ENTRIES, True)  # a point between two cells couples all of both, by 0

@@ -18,6 +18,7 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.fem.assembly import Assembler, Places
 from rodfem.fem.values import NodalValues
+from rodfem.linalg.matrices import shared
 
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations
@@ -137,12 +138,11 @@ class State(Evaluation):
 
         The caller assembles the matrix (``matrix.assemble()``) when all is added.
         """
-        shared = matrix.getAttr("shared")
-        if shared is None:
+        if (own := shared(matrix)) is None:
             self._register()
             compat.assemble_matrix(matrix, form.form, *self.system.maps(load))
             return
-        self._add(form, self.system.matrix_places(shared.pattern, load), shared.values)
+        self._add(form, self.system.matrix_places(own.pattern, load), own.values)
         matrix.stateIncrease()
 
     def factor(self, row: PETSc.Vec, damping: float = 0.0) -> None:

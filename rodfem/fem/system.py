@@ -34,6 +34,7 @@ from rodfem.fem.state import State
 from rodfem.fem.symmetries import Symmetry, may_slide
 from rodfem.fem.values import NodalValues
 from rodfem.fem.verification import Verification
+from rodfem.linalg.matrices import shared
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.scene import Scene
 from rodfem.timing import Clock
@@ -105,12 +106,14 @@ class System:
         self._pattern, self._metric_pattern = bordered_pattern(self.fields), metric_pattern(self.fields)
         self.matrix = self.state_matrix(load=True)
         self._numbered = np.flatnonzero(number >= 0)
-        sources = np.append(number[self._numbered], self.drifts).astype(PETSc.IntType)
-        self._gathered = PETSc.Vec().createSeq(len(sources), comm=PETSc.COMM_SELF)
+        self._sources = np.append(number[self._numbered], self.drifts).astype(PETSc.IntType)
+        self._gathered = PETSc.Vec().createSeq(len(self._sources), comm=PETSc.COMM_SELF)
         self.workspace = self.matrix.createVecRight()
-        source = PETSc.IS().createGeneral(sources, comm=PETSc.COMM_SELF)
+        source = PETSc.IS().createGeneral(self._sources, comm=PETSc.COMM_SELF)
         self._gather = PETSc.Scatter().create(self.workspace, source, self._gathered, None)
         self.metric = self._assemble_metric()
+        own, fixed = shared(self.metric), self.fields.unknowns - len(self.drifts)
+        self._weights = None if own is None else own.matrix[:fixed, :fixed]
         self.phase, self.generators = no_phase(len(self.drifts)), Generators(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
@@ -164,6 +167,13 @@ class System:
         self.set_load(row, 1.0)
         return row
 
+    def weighed(self, own: np.ndarray) -> np.ndarray:
+        """Metric times vectors of which this rank has these rows each, (count, own rows)."""
+        if self._weights is not None:
+            return np.asarray((self._weights @ own.T).T)
+        images = [self.metric * self.generators.vector(row) for row in own]
+        return np.array([image.array_r[: own.shape[1]].real for image in images]).reshape(own.shape)
+
     def norm(self, d: PETSc.Vec) -> float:
         """Size of a change of state in the metric."""
         self.metric.mult(d, self.workspace)
@@ -183,6 +193,8 @@ class System:
 
     def gathered(self, x: PETSc.Vec) -> np.ndarray:
         """Values of a vector at this rank's free local degrees of freedom, in ascending order, then the drifts'."""
+        if self.comm.size == 1:
+            return np.asarray(x.array_r[self._sources].real)
         self._gather.scatter(x, self._gathered, addv=PETSc.InsertMode.INSERT_VALUES)
         return np.array(self._gathered.array_r.real)
 
