@@ -9,6 +9,7 @@ import inspect
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,22 +100,22 @@ def mixed_space(mesh: Any, parts: Sequence[tuple[bool, int, int]]) -> Any:
 
 def nodes(degree: int) -> np.ndarray:
     """Reference coordinates in [0, 1] of the nodes of a Lagrange element, in the order of its degrees of freedom."""
-    if degree == 0:
-        return np.array([0.5])
-    element = basix.create_element(
-        basix.ElementFamily.P, basix.CellType.interval, degree, basix.LagrangeVariant.gll_warped
-    )
-    return np.asarray(element.points)[:, 0]
+    return np.array([0.5]) if degree == 0 else np.array(_lagrange(degree).points)[:, 0]
 
 
 def lagrange_basis(degree: int, x: np.ndarray) -> np.ndarray:
     """Values of the Lagrange basis on :func:`nodes` at reference points ``x`` of shape (m,): (m, degree + 1)."""
     if degree == 0 or len(x) == 0:
         return np.ones((len(x), degree + 1))
-    element = basix.create_element(
+    values = _lagrange(degree).tabulate(0, np.asarray(x, dtype=float).reshape(-1, 1))
+    return np.asarray(values)[0].reshape(len(x), degree + 1)
+
+
+@cache
+def _lagrange(degree: int) -> Any:
+    return basix.create_element(
         basix.ElementFamily.P, basix.CellType.interval, degree, basix.LagrangeVariant.gll_warped
     )
-    return np.asarray(element.tabulate(0, np.asarray(x, dtype=float).reshape(-1, 1)))[0].reshape(len(x), degree + 1)
 
 
 def _table(adjacency: Any, cells: int) -> np.ndarray:

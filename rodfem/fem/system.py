@@ -191,6 +191,18 @@ class System:
         local[self._numbered] = self.gathered(d)[: len(self._numbered)]
         return NodalValues(self.fields, local, self.line)
 
+    def changes(self, columns: np.ndarray) -> np.ndarray:
+        """Local values of changes of state whose own rows are ``columns`` (own rows, k): (k, local size)."""
+        out = np.zeros((columns.shape[1], len(self.fields.number)))
+        if self.comm.size == 1:
+            out[:, self._numbered] = columns[self._sources[: len(self._numbered)]].T
+            return out
+        vector = self.new_vector()
+        for local, column in zip(out, columns.T, strict=True):
+            vector.array[:] = column
+            local[:] = self.change(vector).local
+        return out
+
     def gathered(self, x: PETSc.Vec) -> np.ndarray:
         """Values of a vector at this rank's free local degrees of freedom, in ascending order, then the drifts'."""
         if self.comm.size == 1:
