@@ -50,6 +50,8 @@ LEAST_SPREAD = 1e-3
 """Part of the greatest eigenvalue that is added to the distance of the others: equal ones have none."""
 NOISE = 1e-6
 """Weight of a generic vector added to the previous modes, which may span an invariant space without the lowest."""
+COINCIDENT = 1e-8
+"""Distance of an eigenvalue from the shift, relative to that, below which the count beside it is round-off."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         held = self._held()
         step = max(abs(held.shift), self.inertia.scale)
         for _ in range(40):
-            if self.below(held.shift) == 0:
+            if self.below(held.shift) == 0 and not self._shift_is_an_eigenvalue():
                 return
             held.shift -= step
             step *= 3
@@ -175,6 +177,14 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             "The spectrum has no lower end: the kinetic metric is too small for the rod's stiffness; give the rod a "
             "larger mass or rotary inertia."
         )
+
+    def _shift_is_an_eigenvalue(self) -> bool:
+        """Whether that is so but for round-off, which a count does not tell: a step of inverse iteration does."""
+        held, mode = self._held(), self.inertia.seed(0)
+        mode.scale(1.0 / self.system.norm(mode))
+        grown = mode.duplicate()
+        held.shifted.factors.solve(self.mass * mode, grown)
+        return not self.system.norm(grown) * COINCIDENT * abs(held.shift) < 1.0
 
     def below(self, sigma: float) -> int:
         """Number of eigenvalues below ``sigma``, symmetry modes not included.
