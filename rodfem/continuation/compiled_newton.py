@@ -174,7 +174,7 @@ class CompiledNewton:
     def correct(self, x: PETSc.Vec, row: PETSc.Vec, most: int, reach: float, tolerance: float) -> NewtonResult | None:
         """As :func:`rodfem.fem.newton.iterate`; None, with ``x`` as it was, where ``S`` is too near singular.
 
-        ``most``, ``reach`` and ``tolerance`` are those of that function.
+        ``row`` is the normal of the plane; ``most``, ``reach`` and ``tolerance`` are those of that function.
         """
         self._take()
         n, still = self.newton, newton.STALLED

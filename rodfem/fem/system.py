@@ -21,7 +21,6 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem import compat
 from rodfem.fem.assembly import Places, matrix_places, vector_places
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Discretization, Fields
@@ -100,8 +99,8 @@ class System:
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
         self.equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self.equation_numbers = number[self.equation_targets].astype(PETSc.IntType)
-        direct = comm.size == 1 and not compat.COMPLEX
-        self.equation_places = vector_places(self.equations.cells.dofs, without_load) if direct else None
+        dofs = self.equations.cells.dofs
+        self.equation_places = vector_places(dofs, without_load) if self.fields.compiled else None
         self._places: dict[tuple[int, bool], Places] = {}
         self._pattern, self._metric_pattern = bordered_pattern(self.fields), metric_pattern(self.fields)
         self.matrix = self.state_matrix(load=True)
@@ -117,7 +116,7 @@ class System:
         self.phase, self.generators = no_phase(len(self.drifts)), Generators(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
-        self.lu = factors_of("lu", comm, self.fields.unknowns, self.fields.dense_rows, {8: 0})
+        self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, {8: 0})
 
     def _symmetries(self) -> list[Symmetry]:
         """Symmetries of the scene; found with few elements, which have the same ones, where there are many.

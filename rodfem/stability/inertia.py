@@ -86,7 +86,7 @@ class Inertia:
             self.metric.setValue(system.load_index, system.load_index, 0.0)
         self.metric.assemble()
         self._weights = local_rows(self.metric) if system.comm.size == 1 else None
-        self.factors = inertia_factors(system.comm, system.fields.unknowns, system.fields.dense_rows)
+        self.factors = inertia_factors(system.comm, system.fields.along, system.fields.dense_rows)
         self.constraints = system.fields.constraints()
         self.scale = system.stiffness_scale
         self.tolerance = ZERO_BAND * self.scale

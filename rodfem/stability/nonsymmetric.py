@@ -374,7 +374,8 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         if doubled:
             shifted, factors = matrix.copy(), SubstructuredFactors(dense_rows, Mumps("lu", {8: 0}, prefix=FACTORS))
         elif kept is None:
-            shifted, factors = matrix.copy(), factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=FACTORS)
+            along = rows if self.system.fields.along else 0
+            shifted, factors = matrix.copy(), factors_of("lu", comm, along, dense_rows, {8: 0}, prefix=FACTORS)
             self._shared.inverted = shifted, factors
         else:
             shifted, factors = kept

@@ -100,7 +100,7 @@ class SymmetricSolver(PencilMatrices):
         """Allocate the matrices of the pencil once."""
         super().__init__(inertia.system)
         self.inertia = inertia
-        system, sizes = self.system, (self.system.fields.unknowns, self.system.fields.dense_rows)
+        system, sizes = self.system, (self.system.fields.along, self.system.fields.dense_rows)
         self.shifted = _Shifted(inertia_factors(system.comm, *sizes), system.state_matrix())
         self.shift = -inertia.scale
         self.factorisations = 0
