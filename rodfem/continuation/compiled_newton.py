@@ -148,11 +148,9 @@ class CompiledNewton:
         factors.prepare(self.inertia.matrix)
         rod.factors = factors.pointer
         rod.factor, rod.solve, rod.negative, rod.zero = factors.functions
-        phase = system.phase
-        for i, (condition, offset) in enumerate(zip(phase.conditions, phase.offsets, strict=True)):
-            self.active[i], self.offsets[i] = condition is not None, offset
-            if condition is not None:
-                self.conditions[i] = condition.array_r
+        self.active[:], self.offsets[:] = 0, system.phase.offsets
+        for i, row in system.phase.rows.items():
+            self.active[i], self.conditions[i, : len(row)] = 1, row
 
     def factor(self, x: PETSc.Vec) -> Factored | None:
         """Factor ``S`` at ``x``, with the phase conditions as they are; the tangent is in :attr:`tangent`.

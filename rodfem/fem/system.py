@@ -113,7 +113,8 @@ class System:
         self.metric = self._assemble_metric()
         own, fixed = shared(self.metric), self.fields.unknowns - len(self.drifts)
         self._weights = None if own is None else own.matrix[:fixed, :fixed]
-        self.phase, self.generators = no_phase(len(self.drifts)), Generators(self)
+        self.generators = Generators(self)
+        self.phase = no_phase(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
         self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, {8: 0})
@@ -268,7 +269,7 @@ class System:
     def set_phase(self, reference: PETSc.Vec | None) -> None:
         """Set the phase conditions at ``reference`` (:mod:`rodfem.fem.phase`); None: none active."""
         if reference is None:
-            self.phase = no_phase(len(self.drifts))
+            self.phase = no_phase(self)
         elif not self.phase.belongs_to(reference):
             self.phase = phase_at(self, reference, self.verification.dropped)
 
@@ -281,7 +282,7 @@ class System:
         if not self.symmetries or self.verification(matrix, state, equations):
             return True
         reference = self.phase.reference
-        self.phase = no_phase(len(self.drifts))
+        self.phase = no_phase(self)
         self.set_phase(reference)
         return False
 
