@@ -27,7 +27,7 @@ from petsc4py import PETSc
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.kinds import FOLD
-from rodfem.continuation.locate import WINDOW, locate_event, refine
+from rodfem.continuation.locate import WINDOW, Curve, locate_event, refine
 from rodfem.continuation.normal_form import Origin, normal_form_of, ordinate_along
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
@@ -177,18 +177,10 @@ class Enriched:
         assert point.tangent is not None
         x, tangent = self.transfer(point.x, state=True), self.transfer(point.tangent, state=False)
 
-        def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-            y = x.copy()
-            y.axpy(s, tangent)
-            return y, tangent
-
-        _, found, along = locate_event(self.solver, event, curve, -WINDOW, WINDOW)
+        _, found, along = locate_event(self.solver, event, _straight(x, tangent), -WINDOW, WINDOW)
         load, ordinate = self.system.scalar(found), self.solver.shape.ordinate(found)
         slope = abs(ordinate_along(self.solver, found, tangent))
-        left = (
-            abs(point.slope) * along + round_off(load),
-            slope * along + round_off(ordinate),
-        )
+        left = abs(point.slope) * along + round_off(load), slope * along + round_off(ordinate)
         changed = self._gauges[1].changed(x, found, state=True)
         return Again(found, load, ordinate, *left, self.rho([point.x], [found]), changed)
 
@@ -201,12 +193,7 @@ class Enriched:
         tangent = self.transfer(point.tangent, state=False)
         mode = self.transfer(special.null_vectors[0], state=False)
         mode.scale(1.0 / self.system.norm(mode))
-
-        def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-            y = x.copy()
-            y.axpy(s, tangent)
-            return y, tangent
-
+        curve = _straight(x, tangent)
         # few nodes tell where an eigenvalue crosses zero better than where the load has its extremum
         test_function = "mu" if special.kind == FOLD else special.test_function
         try:
@@ -221,3 +208,8 @@ class Enriched:
         changed = max(gauge.changed(x, found.x, state=True), gauge.changed(mode, sharp, state=False))
         self._origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
         return Again(found.x, found.load, ordinate, found.uncertainty, left, rho, changed)
+
+
+def _straight(x: PETSc.Vec, tangent: PETSc.Vec) -> Curve:
+    """Straight line through a state."""
+    return lambda s: (x + tangent * s, tangent)

@@ -151,11 +151,7 @@ class Meshes:
 
         ``d`` is the change, ``source`` the number of its mesh, ``target`` the solver of the other one.
         """
-        moved = x.copy()
-        moved.axpy(1.0, d)
-        out = self.state(moved, source, target)
-        out.axpy(-1.0, self.state(x, source, target))
-        return out
+        return self.state(x + d, source, target) - self.state(x, source, target)
 
     def here(self, point: Point, target: BranchSolver) -> Point:
         """Point with its state and tangent interpolated, not solved, on another mesh; itself if it is on that."""

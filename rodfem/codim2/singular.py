@@ -155,9 +155,7 @@ class Singular:
         before, total = np.inf, 0.0
         for _ in range(12):
             now = self._linear(p, x, origin[1], old)
-            gone = x.copy()
-            gone.axpy(-1.0, origin[1])
-            along = row_p @ (p - origin[0]) + (row_x.dot(gone) if row_x else 0.0)
+            along = row_p @ (p - origin[0]) + (row_x.dot(x - origin[1]) if row_x else 0.0)
             dp, dx = self._step(now, row_p, row_x, along, scale)
             size = self.length(dp, dx)
             p, total = p + dp, total + size
@@ -218,19 +216,17 @@ class Singular:
         columns = self._columns(p, x, None)[0] if old is None else []
         system.set_load(x, float(p[0]))
         system.line = self.plane.along(p, 0)
-        right = system.new_vector()
-        system.at(x).residual(right)
-        right.scale(-1.0)
-        if not np.isfinite(right.norm()):
+        equations = system.new_vector()
+        system.at(x).residual(equations)
+        if not np.isfinite(equations.norm()):
             raise ConvergenceError("the stored energy is not defined there")
         saddle = self.saddle.at(x)
         rest = bordered.factor(saddle.matrix, self.psi, self.phi)
         gauge = np.zeros(k)
         if not self.fold:  # psi.(x - x0) = 0 keeps the state symmetric: beta, in b0, then is the imperfection
-            gone = x.copy()
-            gone.axpy(-1.0, reference)
+            gone = x - reference
             gauge = np.array([-w.dot(gone) for w in self.phi])
-        s0, b0 = bordered.solve(right, gauge)
+        s0, b0 = bordered.solve(-equations, gauge)
         solved = [bordered.solve(None, e) for e in np.eye(k)]
         v, G = [w for w, _ in solved], np.array([row for _, row in solved])
         # where a symmetry relates the null vectors G is a multiple of the identity: one equation, its trace
@@ -238,10 +234,7 @@ class Singular:
         spread = float(abs(G - g * np.eye(k)).max())
         if old is not None:
             return _Linear(s0, b0, old.response, old.b, v, old.w, g, spread, old.grad_x, old.grad_p, rest)
-        responses = []
-        for column in columns:
-            column.scale(-1.0)
-            responses.append(bordered.solve(column, np.zeros(k)))
+        responses = [bordered.solve(-column, np.zeros(k)) for column in columns]
         w = self._left(saddle, v)
         grad_x, grad_p = self._gradient(p, x, v, w)
         b = np.array([row for _, row in responses])
@@ -262,9 +255,7 @@ class Singular:
         grad_x, grad_p = self.system.new_vector(), np.zeros(2)
         for right, left in zip(v, w, strict=True):
             for sign in (1.0, -1.0):
-                y = x.copy()
-                y.axpy(sign * DIFFERENCE, right)
-                columns, image = self._columns(p, y, left)
+                columns, image = self._columns(p, x + right * (sign * DIFFERENCE), left)
                 factor = -sign / (2 * DIFFERENCE * len(v))
                 grad_x.axpy(factor, image)
                 grad_p += factor * np.array([column.dot(left) for column in columns])

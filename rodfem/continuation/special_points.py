@@ -57,8 +57,7 @@ def special_at(
     """
     system, inertia = solver.system, solver.inertia
     x = located.x
-    tangent = located.tangent
-    tangent.scale(1.0 / system.norm(tangent))
+    tangent = located.tangent / system.norm(located.tangent)
     found = inertia.at(x)
     point = solver.point(x, arclength, tangent, index=decide(found).index)
     null_count = point.zero - found.drifts
@@ -212,9 +211,8 @@ def directions(solver: BranchSolver, special: SpecialPoint) -> list[PETSc.Vec]:
         out.append(d)
         known.append(d)
         for image in system.equivalent_directions(special.point.x, d):
-            if system.norm(image) > FIXED:
-                image.scale(1.0 / system.norm(image))
-                known.append(image)
+            if (size := system.norm(image)) > FIXED:
+                known.append(image / size)
     return out
 
 
@@ -247,8 +245,7 @@ def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, fir
     for damping in dict.fromkeys((before, before or solver.inertia.tolerance)):
         system.damping, amplitude = damping, first
         while amplitude > SHORTEST:
-            x = special.point.x.copy()
-            x.axpy(amplitude, direction)
+            x = special.point.x + direction * amplitude
             outcome = correct(system, x, row, reach=2.0 * amplitude)
             if outcome.converged:
                 apart = distance(system, special.point.x, x)

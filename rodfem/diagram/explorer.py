@@ -151,9 +151,7 @@ class Explorer(Tracer):
         found = solver.inertia.at(point.x)
         bordered = Bordered(system, found.matrix, freedoms, solver.inertia.constraints)
         bordered.factor(found.matrix, [solver.inertia.metric * v for v in vectors])
-        right = found.border.copy()
-        right.scale(-1.0)
-        tangent, _ = bordered.solve(right, np.zeros(freedoms))
+        tangent, _ = bordered.solve(-found.border, np.zeros(freedoms))
         system.set_load(tangent, 1.0)
         tangent.scale((1.0 if increasing else -1.0) / system.norm(tangent))
         point.tangent, point.slope = tangent, system.scalar(tangent)
@@ -180,12 +178,10 @@ class Explorer(Tracer):
             first: Point | None = None
             for sign in (1.0, -1.0):
                 self.use(special.point.mesh)
-                way = direction.copy()
-                way.scale(sign)
                 name = self._name(parent)
                 origin = parent.name, i
                 branch = start_branch(
-                    special, way, name, origin, parent.depth + 1, self.solver, len(ways), self._bounds()
+                    special, direction * sign, name, origin, parent.depth + 1, self.solver, len(ways), self._bounds()
                 )
                 if branch is None:
                     self.observer.warn(

@@ -476,10 +476,7 @@ def equivalent(a: Point, b: Point, tolerance: float = 1e-8, of_strain: float = 0
 
 def reversed_point(point: Point, total: float) -> Point:
     """The same equilibrium on the branch of length ``total`` followed the other way."""
-    tangent = None
-    if point.tangent is not None:
-        tangent = point.tangent.copy()
-        tangent.scale(-1.0)
+    tangent = None if point.tangent is None else -point.tangent
     return replace(point, arclength=total - point.arclength, tangent=tangent, slope=-point.slope)
 
 

@@ -277,7 +277,6 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         stiffness, mass = self._norms()
         errors = []
         for value, vector in zip(values, vectors, strict=True):
-            residual = self.matrix * vector
-            residual.axpy(-value, self.mass * vector)
+            residual = self.matrix * vector - self.mass * vector * value
             errors.append(residual.norm() / ((stiffness + abs(value) * mass) * vector.norm()))
         return np.array(errors)
