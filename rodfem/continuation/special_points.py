@@ -119,18 +119,6 @@ def find_special(
     return found
 
 
-def renew(solver: BranchSolver, point: Point, *, turning: bool) -> None:
-    """Compute the index of a point anew, at its own state; also the tangent, where the load is ``turning`` beside it.
-
-    The recorded index may be that of one factorisation; this one is from two shifts.
-    """
-    index = decide(solver.inertia.at(point.x)).index
-    point.negative, point.zero = index.negative, index.zero
-    if turning and point.tangent is not None:
-        point.tangent = solver.tangent(solver.row(point.tangent), at=point.x)
-        point.slope = solver.system.scalar(point.tangent)
-
-
 def _count_between(solver: BranchSolver, a: Point, b: Point, found: list[SpecialPoint]) -> None:
     """Set the indices between neighbouring special points of one piece of a branch by counts half-way.
 
