@@ -338,7 +338,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         while number:
             try:
                 if inverse is None:
-                    solver = shift_invert(matrix, mass, number, target, symmetric=False)
+                    solver = shift_invert(matrix, mass, number, target)
                 else:
                     solver = with_factors(matrix, mass, number, target, inverse, symmetric=False)
                 solver.setUp()
