@@ -10,7 +10,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from rodfem.codim2.parameter_plane import LocusPoint, Plane, between, predict
+from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent, between, predict
 from rodfem.codim2.singular import Destroyed
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
@@ -34,12 +34,7 @@ class Criterion(Protocol):
         """Size of a step."""
 
     def correct(
-        self,
-        p: np.ndarray,
-        x: PETSc.Vec,
-        tangent: tuple[np.ndarray, PETSc.Vec | None],
-        near: LocusPoint,
-        reach: float = 1.0,
+        self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0
     ) -> LocusPoint:
         """Point of the locus on the plane through ``(p, x)`` across ``tangent``.
 

@@ -16,6 +16,8 @@ from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
 
 Interval = tuple[float, float]
+Tangent = tuple[np.ndarray, PETSc.Vec | None]
+"""Direction of parameters (2,) and state; None: of the parameters alone."""
 
 
 @dataclass

@@ -42,7 +42,7 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.parameter_plane import LocusPoint, Plane
+from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import KEPT, SHRUNK, STALLED, TOLERANCE
@@ -125,18 +125,10 @@ class Singular:
 
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Size of a step: parameters over the widths of their bounds, the state in the metric."""
-        return float(np.hypot(np.linalg.norm(dp / self.plane.width), self._norm(dx)))
-
-    def _norm(self, d: PETSc.Vec) -> float:
-        return float(max((self.metric * d).dot(d), 0.0)) ** 0.5
+        return float(np.hypot(np.linalg.norm(dp / self.plane.width), np.sqrt(max((self.metric * dx).dot(dx), 0.0))))
 
     def correct(
-        self,
-        p: np.ndarray,
-        x: PETSc.Vec,
-        tangent: tuple[np.ndarray, PETSc.Vec | None],
-        near: LocusPoint,
-        reach: float = 1.0,
+        self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0
     ) -> LocusPoint:
         """Point of the locus on the plane through ``(p, x)`` across ``tangent``; raises :class:`ConvergenceError`.
 
@@ -261,9 +253,7 @@ class Singular:
                 grad_p += factor * np.array([column.dot(left) for column in columns])
         return grad_x, grad_p
 
-    def _node(
-        self, p: np.ndarray, x: PETSc.Vec, along: tuple[np.ndarray, PETSc.Vec | None], last: np.ndarray
-    ) -> LocusPoint:
+    def _node(self, p: np.ndarray, x: PETSc.Vec, along: Tangent, last: np.ndarray) -> LocusPoint:
         """Evaluate tangent, count and records at a point of the locus, and border with its null vectors."""
         at = self._linear(p, x, x, None)
         scale = self.saddle.scale

@@ -13,7 +13,7 @@ A search can show that there are more equilibria, and never that there are no mo
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -217,19 +217,19 @@ def find_equilibria(
     return found
 
 
-def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float) -> list[Point]:
+def equilibria_at(
+    solver: BranchSolver, branches: Sequence[Branch], load: float, here: Callable[[Point], Point] = lambda p: p
+) -> list[Point]:
     """Equilibria of traced branches at exactly ``load``, which a search for further ones deflates.
 
-    Raises :class:`ConvergenceError` where there is none between two points on either side of the load.
+    Raises :class:`ConvergenceError` where there is none between two points on either side of the load.  ``here`` brings
+    points of ``branches`` to the mesh of ``solver``, where they are on others.
     """
     found = []
     for branch in branches:
-        for a, b in pairwise(branch.points):
-            if (
-                (a.load - load) * (b.load - load) > 0
-                or a.load == b.load
-                or (b.load == load and b is not branch.points[-1])
-            ):
+        points = [here(p) for p in branch.points]
+        for a, b in pairwise(points):
+            if (a.load - load) * (b.load - load) > 0 or a.load == b.load or (b.load == load and b is not points[-1]):
                 continue
             t = (load - a.load) / (b.load - a.load)
             s = a.arclength + t * (b.arclength - a.arclength)

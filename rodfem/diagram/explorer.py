@@ -54,8 +54,7 @@ class Explorer(Tracer):
         self.observer.note("")
         with self.solver.system.clock.purpose("search"):
             self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
-            here = [replace(b, points=[self.here(p) for p in b.points]) for b in self.branches]
-            known = equilibria_at(self.solver, here, load)
+            known = equilibria_at(self.solver, self.branches, load, self.here)
             found = find_equilibria(self.solver, load, known, self.plan.tries, observer=self.observer)
         before = len(self.branches)
         for i, point in enumerate(found):
@@ -66,9 +65,8 @@ class Explorer(Tracer):
     def _on_branch(self, point: Point, first: int = 0) -> bool:
         """Whether a point is on one of the branches traced, from number ``first`` on."""
         self.use(point.mesh)
-        here = [replace(b, points=[self.here(p) for p in b.points]) for b in self.branches[first:]]
         known = Orbits(self.solver.system)
-        for other in equilibria_at(self.solver, here, point.load):
+        for other in equilibria_at(self.solver, self.branches[first:], point.load, self.here):
             known.add(other.x)
         return any(apart < SAME for apart, _ in known.nearest(point.x))
 
@@ -241,9 +239,9 @@ class Explorer(Tracer):
         if equivalent(a, b):
             return True
         inner, outer = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
-        piece = Branch("", None, 0, [self.here(replace(special.point, arclength=0.0)), self.here(outer)])
+        piece = Branch("", None, 0, [replace(special.point, arclength=0.0), outer])
         try:
-            there = equilibria_at(self.solver, [piece], inner.load)
+            there = equilibria_at(self.solver, [piece], inner.load, self.here)
         except ConvergenceError:  # nothing of the one branch is at the other's load
             return False
         return any(self.alike(self.here(inner), p, SAME_STATE) for p in there)
@@ -252,8 +250,9 @@ class Explorer(Tracer):
         """Whether what leaves the end of a side branch is that branch again, or its mirror image."""
         if special.test_function != "slope":
             return False
-        tail = replace(parent, points=[self.here(p) for p in parent.points[-TAIL:]])
-        return any(equivalent(point, other, SAME_STATE) for other in equilibria_at(self.solver, [tail], point.load))
+        tail = replace(parent, points=parent.points[-TAIL:])
+        known = equilibria_at(self.solver, [tail], point.load, self.here)
+        return any(equivalent(point, other, SAME_STATE) for other in known)
 
     def _traced_already(self, branch: Branch, special: SpecialPoint) -> bool:
         """Whether another branch ended at this branch point coming along the same way."""
