@@ -18,7 +18,7 @@ from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.modes import Modes
-from rodfem.output.digits import index_in_words, number, rounded_up
+from rodfem.output.digits import in_words, index_in_words, number, rounded_up
 from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Verdict
 from rodfem.timing import Clock
@@ -185,11 +185,9 @@ class Report(Observer):
         self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
         for branch in branches:
             for s in branch.special:
-                exact = s.kind.given and s.test_function != "stretch"
-                load = f"{s.point.load:.10g}" if exact else number(s.point.load, s.error_estimate, s.resolved)
+                load, ordinate, index = in_words(s)
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
-                ordinate = number(s.point.ordinate, s.ordinate_error, s.resolved)
-                self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {index_in_words(s)}{zero}")
+                self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {index}{zero}")
                 if s.kind == FLUTTER:
                     self.say(f"    double eigenvalue omega^2 = {number(s.omega2, s.omega2_error)}")
                 if s.note:
