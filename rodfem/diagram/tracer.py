@@ -7,7 +7,6 @@ from dataclasses import replace
 from itertools import pairwise
 from math import isnan
 
-from petsc4py import PETSc
 from scipy.optimize import brentq
 
 from rodfem.adaptivity.accuracy_control import Watch
@@ -195,14 +194,11 @@ class Tracer:
     def _between(self, branch: Branch, a: Point, b: Point) -> str:
         """Insert folds, branch points and user points between two points; a reason if the branch ends there."""
         with self.solver.system.clock.purpose("location"):
-            return self._between_points(branch, a, b)
-
-    def _between_points(self, branch: Branch, a: Point, b: Point) -> str:
-        specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b)
-        pieces = [a, *(s.point for s in specials if s.point.arclength > a.arclength), b]
-        users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
-        users += self.events.between(self.solver, a, b)
-        return self._insert(branch, specials + users)
+            specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b)
+            pieces = [a, *(s.point for s in specials if s.point.arclength > a.arclength), b]
+            users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
+            users += self.events.between(self.solver, a, b)
+            return self._insert(branch, specials + users)
 
     def _rest(self, branch: Branch) -> str:
         """Insert the special points that only the end of a branch shows; a reason if the branch ends at one."""
@@ -278,17 +274,6 @@ class Tracer:
     def _no_equilibrium(self, load: float) -> str:
         return f"No equilibrium at {self.scene.load} = {load:g} between two points of the branch: use another load."
 
-    def user(self, guess: PETSc.Vec, load: float, s: float, increasing: bool) -> Point:
-        """Point at exactly ``load`` from a guess; raises :class:`ConvergenceError`.
-
-        Its arclength is about ``s``; its tangent is on the side on which the load is ``increasing``, or decreases.  The
-        ``guess`` is a state.
-        """
-        x, outcome = self.solver.at_load(guess, load, reach=1.0)
-        if not outcome.converged:
-            raise ConvergenceError(self._no_equilibrium(load))
-        return self.solver.point(x, s, self.solver.load_tangent(x, increasing), outcome)
-
     def _meeting(self, branch: Branch, special: SpecialPoint) -> str:
         """Recognise a branch point that is known already; a reason if the branch ends there."""
         for other in self.branches:
@@ -352,9 +337,11 @@ class Tracer:
             return
         try:
             with self.solver.system.clock.purpose("location"):
-                guess = hermite(previous, last, last.arclength)[0]
-                point = self.user(guess, beyond, 2 * last.arclength - previous.arclength, beyond > load)
-                point.arclength = last.arclength + distance(self.solver.system, last.x, point.x)
+                x, outcome = self.solver.at_load(last.x, beyond, reach=1.0)
+                if not outcome.converged:
+                    raise ConvergenceError(self._no_equilibrium(beyond))
+                s = last.arclength + distance(self.solver.system, last.x, x)
+                point = self.solver.point(x, s, self.solver.load_tangent(x, beyond > load), outcome)
                 found = [s for s in self.specials.beyond(previous, point) if s.kind.branches]
         except ConvergenceError as trouble:
             self.observer.warn(

@@ -382,12 +382,14 @@ class Scene(Contribution):
 
     def stiffness(self, s: float | None = None) -> np.ndarray:
         """Second derivative of ``W`` in the m free strains and ``k`` at the undeformed state, (m + 3, m + 3)."""
-        return self._stiffness if s is None else self._stiffness_at(s)
+        if s not in self._stiffnesses:
+            self._stiffnesses[s] = self._stiffness_at(s)
+        return self._stiffnesses[s]
 
     @cached_property
-    def _stiffness(self) -> np.ndarray:
-        """Stiffness at the middle, differentiated once: systems and their companions ask for it."""
-        return self._stiffness_at(None)
+    def _stiffnesses(self) -> dict[float | None, np.ndarray]:
+        """Stiffness by the arclength, differentiated once: systems, their companions and pictures ask for it."""
+        return {}
 
     def _stiffness_at(self, s: float | None) -> np.ndarray:
         free_v = self.free_strains
