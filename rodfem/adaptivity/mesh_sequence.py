@@ -89,15 +89,15 @@ class Meshes:
         self.solvers = [solver]
         self.accuracy = None if accuracy is None else internal_accuracy(solver.system.scene, accuracy)
         self._richer: dict[int, Enriched] = {}
-        self._gauges: dict[int, SmoothnessIndicator] = {}
+        self._indicators: dict[int, SmoothnessIndicator] = {}
         if accuracy is not None:
             self._weights = weights_of(solver.system.scene)
 
-    def gauge(self, number: int) -> SmoothnessIndicator:
-        """Gauge of the smoothness of states on a mesh."""
-        if number not in self._gauges:
-            self._gauges[number] = SmoothnessIndicator(self.solvers[number], self._weights)
-        return self._gauges[number]
+    def indicator(self, number: int) -> SmoothnessIndicator:
+        """Smoothness indicator of a mesh."""
+        if number not in self._indicators:
+            self._indicators[number] = SmoothnessIndicator(self.solvers[number], self._weights)
+        return self._indicators[number]
 
     def richer(self, number: int) -> Enriched:
         """Companion of a mesh, on halves of its elements one degree richer, made when it is first asked for."""
@@ -117,7 +117,7 @@ class Meshes:
         assert self.accuracy is not None
         old = self.solvers[trouble.point.mesh]
         error = trouble.error if isfinite(trouble.error) else 1e3 * self.accuracy
-        found = self.gauge(old.mesh)(trouble.point.x, trouble.directions)
+        found = self.indicator(old.mesh)(trouble.point.x, trouble.directions)
         gain = self.accuracy / (error * MARGIN * FURTHER**tries)
         indicator = max(found.indicator, TINY) * gain**trouble.order
         mesh = cheapest(old, found, indicator)

@@ -25,7 +25,7 @@ def check_method(system: System, plan: Plan) -> None:
     Assessor(system).choose(plan.method or "auto", plan.modes)
 
 
-def judge_users(
+def assess_all(
     branches: list[Branch], solvers: Sequence[StaticSolver], plan: Plan, output: Path, report: Report, figures: bool
 ) -> None:
     """Assessor the states at the loads of the plan; save and draw their modes, if they are wanted.

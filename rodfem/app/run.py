@@ -103,9 +103,9 @@ def run(
     terminal.timing(clock, sum(len(b.points) for b in branches))
     terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
     if plan.method or plan.modes:
-        from rodfem.app.assess_all import judge_users
+        from rodfem.app.assess_all import assess_all
 
-        judge_users(branches, diagram.solvers, plan, output, terminal, figures)
+        assess_all(branches, diagram.solvers, plan, output, terminal, figures)
     if plan.locus is not None:
         _loci(branches, diagram.solvers, plan, output, terminal, figures)
     if figures and comm.rank == 0:

@@ -181,7 +181,7 @@ class Report(Observer):
     def table(self, branches: Sequence[Branch], system: System) -> None:
         """Print the final table: every special point with its error bar."""
         scene = system.scene
-        self.say(f"\nSpecial points (in brackets a bound of the error; ordinate: {scene.ordinate.name})")
+        self.say(f"\nSpecial points (in parentheses a bound of the error; ordinate: {scene.ordinate.name})")
         self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
         for branch in branches:
             for s in branch.special:
@@ -197,7 +197,7 @@ class Report(Observer):
 
         if coarse := sum(s.resolved is False for b in branches for s in b.special):
             self.warn(
-                f"The mesh does not resolve {coarse} special point{'s'[: coarse > 1]}: what stands in brackets is "
+                f"The mesh does not resolve {coarse} special point{'s'[: coarse > 1]}: the value in parentheses is "
                 "no bound there, and the rod need not have such a point; use more elements or a higher degree."
             )
         missed = not_followed(branches)

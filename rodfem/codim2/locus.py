@@ -205,7 +205,7 @@ def locus(
         raise InputError(
             f"The special point at {scene.load} = {p[0]:g}, {parameter} = {p[1]:g} is outside the bounds: widen them."
         )
-    with system.clock.purpose("locus"), plane.kept():
+    with system.clock.scope("locus"), plane.kept():
         system.line = plane.along(p, 0)
         guess = _guess(solver, special, p)
         criterion = _criterion(solver, plane, special.kind, guess)

@@ -46,7 +46,7 @@ class Diagram:
     warnings, notes
         Sentences on what went wrong without stopping the computation, and on what is worth knowing.
     clock
-        Seconds by purpose.
+        Seconds by scope.
     """
 
     def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[StaticSolver]) -> None:
@@ -60,7 +60,7 @@ class Diagram:
 
     @property
     def clock(self) -> Clock:
-        """Seconds by purpose, of the computation and of later requests."""
+        """Seconds by scope, of the computation and of later requests."""
         return self.solvers[0].system.clock
 
     @property

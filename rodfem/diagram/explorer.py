@@ -52,7 +52,7 @@ class Explorer(Tracer):
     def _search(self, load: float) -> None:
         """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
         self.observer.note("")
-        with self.solver.system.clock.purpose("search"):
+        with self.solver.system.clock.scope("search"):
             self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
             known = equilibria_at(self.solver, self.branches, load, self.here)
             found = find_equilibria(self.solver, load, known, self.plan.tries, observer=self.observer)
@@ -197,7 +197,7 @@ class Explorer(Tracer):
                 if self._came_from(parent, special, first):
                     continue
                 self.trace(branch)
-        self._judge_from_the_side(special, self.branches[before:])
+        self._classify_from_the_side(special, self.branches[before:])
 
     def _bounds(self) -> tuple[float, float]:
         """Least and greatest load, with room for round-off."""
@@ -209,22 +209,22 @@ class Explorer(Tracer):
         if special.law is not None:
             return
         from_the_side = special.test_function == "slope"
-        with self.solver.system.clock.purpose("location"):
+        with self.solver.system.clock.scope("location"):
             way = special.null_vectors[0] if from_the_side else direction
             special.law = normal_form_of(self.solver, origin_of(self.solver, special), way)
         if special.law is not None and isfinite(special.error_estimate):
-            with self.solver.system.clock.purpose("error bars"):
+            with self.solver.system.clock.scope("error bars"):
                 self.meshes.richer(special.point.mesh).law(special, way, special.law)
         if special.law is not None and not from_the_side:
             indices = special.negative_before, special.negative_after
-            special.law.judge(*(indices if special.point.slope > 0 else reversed(indices)))
+            special.law.classify(*(indices if special.point.slope > 0 else reversed(indices)))
             self.observer.law(special)
 
-    def _judge_from_the_side(self, special: SpecialPoint, trunk: Sequence[Branch]) -> None:
+    def _classify_from_the_side(self, special: SpecialPoint, trunk: Sequence[Branch]) -> None:
         """Name a pitchfork that was reached along its side branch, from the branch that it ends on, now traced."""
         index = {branch.points[1].load > special.point.load: branch.points[1].negative for branch in trunk}
         if special.law is not None and special.test_function == "slope" and len(index) == 2:
-            special.law.judge(index[False], index[True])
+            special.law.classify(index[False], index[True])
             self.observer.law(special)
 
     def _name(self, parent: Branch) -> str:

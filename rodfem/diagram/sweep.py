@@ -203,7 +203,7 @@ class Sweep:
 
     def _between(self, branch: Branch, a: Point, b: Point, before: Frequencies, after: Frequencies) -> None:
         """Locate what happens between two loads: eigenvalues that collide, and real ones that pass through zero."""
-        with self.solver.system.clock.purpose("location"):
+        with self.solver.system.clock.scope("location"):
             events = self._collisions(a, b, before, after)
             real = [f.diverged() for f in (before, after)]
             for event in events:
@@ -336,7 +336,7 @@ class Sweep:
         self.observer.special(branch, special)
 
     def _error_bars(self, branch: Branch) -> None:
-        with self.solver.system.clock.purpose("error bars"):
+        with self.solver.system.clock.scope("error bars"):
             system = self.solver.system
             richer = StaticSolver(richer_system(system))
             eigensolver, transfer = NonsymmetricSolver(richer.system), Transfer(system, richer.system)

@@ -9,7 +9,7 @@ from math import isnan
 
 from scipy.optimize import brentq
 
-from rodfem.adaptivity.accuracy_control import Watch
+from rodfem.adaptivity.accuracy_control import AccuracyControl
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
 from rodfem.adaptivity.zero_stretch import LOCATED, zero_stretch
@@ -64,7 +64,7 @@ class Tracer:
 
     @property
     def solvers(self) -> Sequence[BranchSolver]:
-        """Followers by the number of their mesh."""
+        """Solvers by the number of their mesh."""
         return self.meshes.solvers
 
     def use(self, mesh: int) -> None:
@@ -81,7 +81,7 @@ class Tracer:
         if branch.ended == NOT_TRACED:
             self.observer.branch(branch)
         self.use(branch.points[-1].mesh)
-        self.watch = Watch(self.meshes, (self.low, self.high))
+        self.control = AccuracyControl(self.meshes, (self.low, self.high))
         self.solver.damp(self._extra(branch.points[-1]) if branch.parent else 0)
         self._attempt(branch)
         self._finish(branch)
@@ -103,7 +103,7 @@ class Tracer:
         back = Branch(name, None, depth, [reversed_point(point, 0.0)])
         self.use(point.mesh)
         self.observer.branch(back)
-        self.watch = Watch(self.meshes, (self.low, self.high))
+        self.control = AccuracyControl(self.meshes, (self.low, self.high))
         self.solver.damp(0)
         self._attempt(back)
         branch = reversed_branch(back)
@@ -129,7 +129,7 @@ class Tracer:
             self.specials.begin(history[-1])
         while True:
             try:
-                self.watch.row(history[-1], self.solver)
+                self.control.row(history[-1], self.solver)
                 if not begun:
                     self._first_users(branch)
                     begun = True
@@ -143,10 +143,10 @@ class Tracer:
 
         Rows before the trouble stay what they are on the mesh that was made for them.
         """
-        solver = self.watch.another(trouble, self.observer)
+        solver = self.control.another(trouble, self.observer)
         if solver is not None:
             solver.damp(self.solver.system.damping > 0)
-            with self.solver.system.clock.purpose("location"):
+            with self.solver.system.clock.scope("location"):
                 pairs = self.meshes.carry(history, solver, branch.parent is not None)
             moved = {id(old): new for old, new in pairs if old is trouble.point}
             branch.points = [moved.get(id(p), p) for p in branch.points]
@@ -167,7 +167,7 @@ class Tracer:
                 return
             previous = history[-1]
             self._check_symmetry(item)
-            self.watch.row(item, self.solver)
+            self.control.row(item, self.solver)
             self._check_zeros(history, item)
             if item.stretch <= 0:
                 self._end_at_zero_stretch(branch, previous, item)
@@ -193,7 +193,7 @@ class Tracer:
 
     def _between(self, branch: Branch, a: Point, b: Point) -> str:
         """Insert folds, branch points and user points between two points; a reason if the branch ends there."""
-        with self.solver.system.clock.purpose("location"):
+        with self.solver.system.clock.scope("location"):
             specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b)
             pieces = [a, *(s.point for s in specials if s.point.arclength > a.arclength), b]
             users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
@@ -202,13 +202,13 @@ class Tracer:
 
     def _rest(self, branch: Branch) -> str:
         """Insert the special points that only the end of a branch shows; a reason if the branch ends at one."""
-        with self.solver.system.clock.purpose("location"):
+        with self.solver.system.clock.scope("location"):
             return self._insert(branch, self.specials.rest())
 
     def _insert(self, branch: Branch, specials: list[SpecialPoint]) -> str:
         """Insert special points into a branch, up to one at which it ends: then the reason."""
         for special in specials:
-            self.watch.special(special)
+            self.control.special(special)
         for special in sorted(specials, key=lambda s: s.point.arclength):
             reason = self._meeting(branch, special) if special.kind.branches else ""
             branch.insert(special)
@@ -243,7 +243,7 @@ class Tracer:
             return
         a, b = map(self.here, branch.points)
         for special in self._users(branch, a, b, a, b):
-            self.watch.special(special)
+            self.control.special(special)
             branch.insert(special)
             self.observer.special(branch, special)
 
@@ -310,12 +310,12 @@ class Tracer:
         special = SpecialPoint(END, last, last.negative, last.negative, LOCATED, test_function="stretch")
         if self.plan.error_bars:
             try:
-                with self.solver.system.clock.purpose("error bars"):
+                with self.solver.system.clock.scope("error bars"):
                     special = zero_stretch(self.solver, last)
             except ConvergenceError as trouble:
                 special.note = f"no error estimate: {trouble}"
             else:
-                self.watch.judge(special)
+                self.control.check(special)
         branch.points.append(special.point)
         branch.special.append(special)
 
@@ -336,7 +336,7 @@ class Tracer:
         if not parameter.admissible[0] < beyond < parameter.admissible[1] or previous.x is last.x:
             return
         try:
-            with self.solver.system.clock.purpose("location"):
+            with self.solver.system.clock.scope("location"):
                 x, outcome = self.solver.at_load(last.x, beyond, reach=1.0)
                 if not outcome.converged:
                     raise ConvergenceError(self._no_equilibrium(beyond))
@@ -381,7 +381,7 @@ class Tracer:
         for notice in self.solver.system.verification.read():
             self.observer.warn(notice)
         if point.drift > DRIFT * self.solver.inertia.scale:
-            self.watch.drifting(point)
+            self.control.drifting(point)
             raise ConvergenceError(
                 f"The mesh does not resolve a symmetry of the scene any more: the drift is {point.drift:.2g} at "
                 f"{self.scene.load} = {point.load:.6g} where it should vanish; use more elements, or ask for an "
@@ -439,15 +439,15 @@ class Tracer:
         for unexplained in branch.unexplained:
             self.observer.warn(str(unexplained))
         self.observer.finished(branch)
-        self.watch.summary(branch, self.observer)
+        self.control.summary(branch, self.observer)
         self.finished()
 
     def _error_bars(self, branch: Branch) -> None:
-        with self.solver.system.clock.purpose("error bars"):
+        with self.solver.system.clock.scope("error bars"):
             for special in branch.special:
                 if isnan(special.error_estimate):
                     self.meshes.richer(special.point.mesh).estimate(special)
-                self.watch.label(special)
+                self.control.label(special)
 
 
 def equivalent(a: Point, b: Point, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:

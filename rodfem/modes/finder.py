@@ -14,7 +14,7 @@ from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
 from rodfem.modes.perturbation import Motion, Motions
-from rodfem.stability import mode_type as character
+from rodfem.stability import mode_type
 from rodfem.stability.assessment import Assessor, Verdict
 from rodfem.stability.left_right import two_sided
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
@@ -79,7 +79,7 @@ class ModeFinder:
 
     def _name(self, x: PETSc.Vec, v: PETSc.Vec) -> str:
         """Name of the motion."""
-        return character.name(character.shares(self.system, self.system.at(x).turned, [v.array_r]))
+        return mode_type.name(mode_type.shares(self.system, self.system.at(x).turned, [v.array_r]))
 
     def _turned(self, x: PETSc.Vec, values: np.ndarray, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
         """Sign each mode, and choose a basis of the modes of equal eigenvalues: the same from any orthonormal one.

@@ -237,8 +237,8 @@ def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
     Raises :class:`InputError` where the file has another or a newer format, or no such row, has it in the other
-    formulation, or lacks an unknown of the follower's scene.  ``path`` is that of ``states.h5``, ``row`` the number of
-    the row of ``branch``; the state is one of ``solver``.
+    formulation, or lacks an unknown of the scene.  ``path`` is that of ``states.h5``, ``row`` the number of the row of
+    ``branch``; the state is one of ``solver``.
     """
     import h5py
 
