@@ -21,7 +21,7 @@ import ufl
 from petsc4py import PETSc
 
 from forms import loads
-from forms.energy import bending, logarithmic_stretch
+from forms.energy import bending_and_twist, logarithmic_stretch
 from rodfem import (
     Attachment,
     Constraint,
@@ -76,7 +76,7 @@ def energy_of(rng: np.random.Generator, rod: str) -> tuple[Callable[..., Any], d
 
     def energy(v: Any, k: Any, c: Any) -> Any:
         turned = (k[0], k[1] - c.k0, k[2] - c.t0)
-        out = bending(turned, (c.B1, c.B2, c.C)) + c.m * turned[0] * turned[2] * 0.5
+        out = bending_and_twist(turned, (c.B1, c.B2, c.C)) + c.m * turned[0] * turned[2] * 0.5
         out += c.a * sum(ufl.cosh(0.7 * x) - 1 for x in turned)
         if rod in ("flexible", "inextensible"):
             out += 0.5 * c.GA * (v[0] ** 2 + v[1] ** 2)
