@@ -109,7 +109,7 @@ def find_special(
         if found[0].kind == FOLD:
             own = min(found[0].negative_before, found[0].negative_after)
             rest = [order for order in rest if order != own]
-    still = _persistent(solver, a, persistent) if rest else []
+    still = solver.inertia.modes_near_zero(a.x, persistent) if rest and persistent else []
     while rest:
         special = _special(solver, a, b, rest[0], "mu", still)
         found.append(special)
@@ -151,13 +151,6 @@ def point_between(solver: BranchSolver, a: Point, b: Point, s: float) -> Point |
     if max(distance(solver.system, a.x, x), distance(solver.system, x, b.x)) > whole:
         return None
     return solver.point(x, s, solver.tangent(solver.row(hermite(a, b, s)[1]), at=x))
-
-
-def _persistent(solver: BranchSolver, a: Point, count: int) -> list[PETSc.Vec]:
-    """Vectors of the eigenvalues that are zero all along a branch, at the point ``a``."""
-    if not count:
-        return []
-    return solver.inertia.modes_near_zero(a.x, count)
 
 
 def _special(
