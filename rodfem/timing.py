@@ -6,6 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
 
+WORK = ("assembly", "solve", "stability")
+"""What a point of a branch costs."""
+
 
 class Clock:
     """Accumulates wall time by name; nested measurements are charged to the innermost name.
@@ -53,6 +56,10 @@ class Clock:
                 yield
         finally:
             self._scope = outer
+
+    def each(self, points: int) -> float:
+        """Milliseconds of :data:`WORK` for one of so many points."""
+        return 1e3 * sum(self.seconds.get(name, 0.0) for name in WORK) / max(points, 1)
 
     def total(self) -> float:
         """Seconds since the clock was made."""

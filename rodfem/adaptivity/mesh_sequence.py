@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite, log10
 
-import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -125,9 +124,8 @@ class Meshes:
         affordable = 1.2 * cost(fields, mesh.elements, mesh.degree)
         for known in self.solvers:
             d = known.system.fields.discretization
-            vertices = self.vertices(known.mesh)
             if known is not old and cost(fields, d.elements, d.degree) <= affordable:
-                if found.fulfilled_by(d, vertices, indicator):
+                if found.fulfilled_by(d, known.system.fields.all_vertices(), indicator):
                     return known
         s = old.system
         with s.clock("setup"):
@@ -135,10 +133,6 @@ class Meshes:
         new.mesh = len(self.solvers)
         self.solvers.append(new)
         return new
-
-    def vertices(self, number: int) -> np.ndarray:
-        """Arclengths at which the elements of a mesh meet, (E + 1,)."""
-        return self.solvers[number].system.fields.all_vertices()
 
     # --- points on another mesh --------------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ from rodfem.modes.modes import Modes
 from rodfem.output.digits import in_words, index_in_words, number, rounded_up
 from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Verdict
-from rodfem.timing import Clock
+from rodfem.timing import WORK, Clock
 
 INDEX, UNSTABLE = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
@@ -276,13 +276,8 @@ class Report(Observer):
 
     def timing(self, clock: Clock, points: int) -> None:
         """Print where the time went."""
-        s = clock.seconds
-        work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
-        parts = [
-            f"{name} {s.get(name, 0.0):.2f} s"
-            for name in ("setup", "assembly", "solve", "stability", "location", "error bars", "files")
-        ]
+        names = ("setup", *WORK, "location", "error bars", "files")
+        parts = [f"{name} {clock.seconds.get(name, 0.0):.2f} s" for name in names]
         self.say(f"\nTime: {', '.join(parts)}; {clock.total():.2f} s in all")
         known = "index" if self.count == INDEX else "frequencies"
-        each = 1e3 * work / max(points, 1)
-        self.say(f"{points} points with their {known}, {each:.2f} ms each (assembly, solve, stability)")
+        self.say(f"{points} points with their {known}, {clock.each(points):.2f} ms each ({', '.join(WORK)})")

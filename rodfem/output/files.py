@@ -72,7 +72,6 @@ def as_data(
     scene = system.scene
     s = clock.seconds
     points = sum(len(b.points) for b in branches)
-    work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
     return {
         "format": DIAGRAM.mark(),
         "scene": scene.name,
@@ -99,7 +98,7 @@ def as_data(
             "setup_s": s.get("setup", 0.0),
             "total_s": clock.total(),
             "points": points,
-            "ms_per_point": 1e3 * work / max(points, 1),
+            "ms_per_point": clock.each(points),
             "ranks": system.comm.size,
         },
     }

@@ -31,7 +31,6 @@ from rodfem.problem import quaternions
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End
 from rodfem.problem.local_state import Constants, OfPlace, asks_where, place
-from rodfem.problem.quaternions import directors, of_vector
 from rodfem.problem.scene import Scene
 from rodfem.problem.setting import DISTRIBUTED, FOUNDATION, HELD, SECTION, SUPPORTS, TIES, Support, Tie, kind_of
 
@@ -126,8 +125,8 @@ def stiffness_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floa
             continue
 
         def value(change: Floats, which: int = which) -> float:
-            moved, turned = (r + change, q) if which == 0 else (r, quaternions.product(of_vector(change), q))
-            return _number(energy(_point(moved, turned, s, length), c))
+            turned = quaternions.product(quaternions.of_vector(change), q)
+            return _number(energy(_point(r, turned, s, length) if which else _point(r + change, q, s, length), c))
 
         out[which] = _spring(*_second(value, STEP * (length if which == 0 else 1.0)))
     return out
@@ -181,8 +180,8 @@ def derivative_of(function: OfPlace, c: Constants, s: float, length: float, r: F
     """
     x = ufl.variable(ufl.as_vector([*r.tolist(), 0.0, 0.0, 0.0]))
     spin = ufl.as_vector([x[3], x[4], x[5]])
-    frame = [ufl.as_vector(d) for d in directors(q).T.tolist()]
-    turned = [d + ufl.cross(spin, d) for d in frame]  # to first order, which is enough
+    directors = [ufl.as_vector(d) for d in quaternions.directors(q).T.tolist()]
+    turned = [d + ufl.cross(spin, d) for d in directors]  # to first order, which is enough
     R = ufl.as_matrix([[d[i] for d in turned] for i in range(3)])
     rotated = product(ufl.as_vector([1.0, x[3] / 2, x[4] / 2, x[5] / 2]), ufl.as_vector(q.tolist()))
     value = ufl.as_ufl(function(place(rotated, R, s, ufl.as_vector([x[0], x[1], x[2]]), length=length), c))
@@ -277,7 +276,7 @@ def _of_the_ends(scene: Scene, constraint: Constraint, load: float) -> Floats | 
         known = {"dr": ufl.dot(R, strains), "v": strains, "k": ufl.as_vector(rng.normal(size=3).tolist())}
         x = place(turned, R, s, r, length=scene.length, **known)
         values.append(_number(constraint.value(x, scene.constants(load, s))))
-        rows.append([*(directors(q) @ v), 1.0])
+        rows.append([*(quaternions.directors(q) @ v), 1.0])
     matrix, value = np.array(rows), np.array(values)
     a = np.linalg.lstsq(matrix, value, rcond=None)[0]
     fits = np.linalg.norm(matrix @ a - value) < SMALL * np.linalg.norm(value)
