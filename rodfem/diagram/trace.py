@@ -64,8 +64,6 @@ def trace(
     ``diagram``.
     """
     plan = plan or Plan()
-    if scene.conservative:
-        compat.require_real_petsc()
     plan.check(scene)
     recorder, clock = Recorder(observer or Observer()), Clock()
     with compat.announce_compilation(recorder.compiling):

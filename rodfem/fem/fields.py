@@ -203,7 +203,7 @@ class Fields:
 
         Of a planar rod also all that would leave the plane.
         """
-        found = [dofs.ravel() for dofs in self.out_of_plane().values()]
+        found = [dofs.ravel() for dofs in self.out_of_plane(self.scene.normal).values()]
         c = self.scene.constants()
         for end, s in zip(self.scene.sides, self.scene.interval, strict=True):
             for block in (b for b in self.blocks if b.continuous):
@@ -212,9 +212,8 @@ class Fields:
                 found.append(at_end[:, np.broadcast_to(end.clamps(block, c), block.size)].ravel())
         return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
 
-    def out_of_plane(self) -> dict[str, np.ndarray]:
-        """Degrees of freedom of each field that vanish for a planar rod; empty for a rod in space."""
-        normal = self.scene.normal
+    def out_of_plane(self, normal: int | None) -> dict[str, np.ndarray]:
+        """Degrees of freedom of each field that vanish for a rod in the plane across ``normal``; None: in space."""
         if normal is None:
             return {}
         components = {

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 import ufl
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 from ufl.utils.stacks import StackDict
@@ -28,6 +27,7 @@ from ufl.utils.stacks import StackDict
 from forms.kinematics import UNDEFORMED
 from forms.rotation import IDENTITY, product, rotation
 from rodfem.errors import SceneError
+from rodfem.problem import quaternions
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End
 from rodfem.problem.local_state import Constants, OfPlace, asks_where, place
@@ -40,8 +40,6 @@ STATIONS = 9
 """Places along the rod at which distributed forces are recorded."""
 STEP, SMALL = 1e-3, 1e-6
 """Of differences of potentials (relative to the rod's length; in radian), and what is zero beside the greatest."""
-BENT = 1e-2
-"""Angle by which the rod is bent in differences of its energy."""
 FLAT = 1e-3
 """Curvature times the rod's length, or difference of two curvatures relative to them, that is taken for zero."""
 Sample = dict[str, Any]
@@ -127,8 +125,8 @@ def stiffness_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floa
             continue
 
         def value(change: Floats, which: int = which) -> float:
-            moved, turned = (r + change, q) if which == 0 else (r, turn(q, change))
-            return _number(energy(_point(moved, turned, s, length), c))
+            turned = quaternions.product(quaternions.of_vector(change), q)
+            return _number(energy(_point(r, turned, s, length) if which else _point(r + change, q, s, length), c))
 
         out[which] = _spring(*_second(value, STEP * (length if which == 0 else 1.0)))
     return out
@@ -182,7 +180,7 @@ def derivative_of(function: OfPlace, c: Constants, s: float, length: float, r: F
     """
     x = ufl.variable(ufl.as_vector([*r.tolist(), 0.0, 0.0, 0.0]))
     spin = ufl.as_vector([x[3], x[4], x[5]])
-    directors = [ufl.as_vector(d) for d in Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix().T.tolist()]
+    directors = [ufl.as_vector(d) for d in quaternions.directors(q).T.tolist()]
     turned = [d + ufl.cross(spin, d) for d in directors]  # to first order, which is enough
     R = ufl.as_matrix([[d[i] for d in turned] for i in range(3)])
     rotated = product(ufl.as_vector([1.0, x[3] / 2, x[4] / 2, x[5] / 2]), ufl.as_vector(q.tolist()))
@@ -191,29 +189,11 @@ def derivative_of(function: OfPlace, c: Constants, s: float, length: float, r: F
     return np.array([float(slope.evaluate((), {}, (i,), StackDict())) for i in range(6)]).reshape(2, 3)
 
 
-def turn(q: Floats, change: Floats) -> Floats:
-    """Unit quaternion (4,) turned by a rotation vector (3,) in the frame of space."""
-    angle = float(np.linalg.norm(change))
-    a, v = np.cos(angle / 2), change * np.sinc(angle / (2 * np.pi)) / 2
-    return np.append(a * q[0] - v @ q[1:], a * q[1:] + q[0] * v + np.cross(v, q[1:]))
-
-
 def section_of(scene: Scene) -> tuple[Floats, Floats]:
     """Bending stiffness (n, 2, 2) in ``k1, k2`` of the undeformed rod at n arclengths (n,), one where it is uniform."""
-    places = scene.samples() if scene.depends_on_s() else [scene.interval[0]]
-    return np.array(places), np.array([_bending(scene, s) for s in places])
-
-
-def _bending(scene: Scene, s: float) -> Floats:
-    """Second derivative (2, 2) of the stored energy in ``k1, k2`` at zero, by differences: pictures need no more."""
-    c, h = scene.constants(s=s), BENT / scene.length
-
-    def W(k1: float, k2: float) -> float:
-        return _number(scene.energy(ufl.as_vector(UNDEFORMED), ufl.as_vector([h * k1, h * k2, 0.0]), c))
-
-    here, ahead, aside = W(0, 0), W(1, 0), W(0, 1)
-    mixed = W(1, 1) - ahead - aside + here
-    return np.array([[ahead - 2 * here + W(-1, 0), mixed], [mixed, aside - 2 * here + W(0, -1)]]) / h**2
+    varies = scene.depends_on_s()
+    places = scene.samples() if varies else [scene.interval[0]]
+    return np.array(places), np.array([scene.stiffness(s if varies else None)[-3:-1, -3:-1] for s in places])
 
 
 def distributed_on(scene: Scene, load: float) -> tuple[Floats, Floats, Floats]:
@@ -296,7 +276,7 @@ def _of_the_ends(scene: Scene, constraint: Constraint, load: float) -> Floats | 
         known = {"dr": ufl.dot(R, strains), "v": strains, "k": ufl.as_vector(rng.normal(size=3).tolist())}
         x = place(turned, R, s, r, length=scene.length, **known)
         values.append(_number(constraint.value(x, scene.constants(load, s))))
-        rows.append([*(Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix() @ v), 1.0])
+        rows.append([*(quaternions.directors(q) @ v), 1.0])
     matrix, value = np.array(rows), np.array(values)
     a = np.linalg.lstsq(matrix, value, rcond=None)[0]
     fits = np.linalg.norm(matrix @ a - value) < SMALL * np.linalg.norm(value)

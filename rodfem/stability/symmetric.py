@@ -270,7 +270,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         return self.matrix.norm(PETSc.NormType.INFINITY), self.mass.norm(PETSc.NormType.INFINITY)
 
     def _purify(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> None:
-        """Replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``: without what has no mass, and is arbitrary in them.
+        """Purification: replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``, without arbitrary massless parts.
 
         All at once: the cost is that of the call, hardly of a column.
         """
@@ -287,7 +287,6 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         stiffness, mass = self._norms()
         errors = []
         for value, vector in zip(values, vectors, strict=True):
-            residual = self.matrix * vector
-            residual.axpy(-value, self.mass * vector)
+            residual = self.matrix * vector - self.mass * vector * value
             errors.append(residual.norm() / ((stiffness + abs(value) * mass) * vector.norm()))
         return np.array(errors)
