@@ -26,9 +26,10 @@ from math import inf
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.compiled_newton import CompiledNewton
+from rodfem.continuation.compiled_corrector import CompiledCorrector
 from rodfem.errors import ConvergenceError
-from rodfem.fem.newton import NewtonResult, iterate
+from rodfem.fem.compiled_newton import SINGULAR
+from rodfem.fem.newton import NewtonResult, iterate, limits, result
 from rodfem.fem.state import State
 from rodfem.fem.system import dense_columns
 from rodfem.stability.inertia import FRESH, Factored, Index, Inertia
@@ -80,7 +81,8 @@ class Corrector:
         self._right, self._solved = dense_columns(system, BLOCK + 2), dense_columns(system, BLOCK + 2)
         self._step = system.new_vector()
         near_zero = NEAR * inertia.scale
-        self.compiled = CompiledNewton(inertia, BLOCK, near_zero) if CompiledNewton.serves(inertia) else None
+        serves = CompiledCorrector.serves(inertia.matrix, inertia.factors)
+        self.compiled = CompiledCorrector(inertia, BLOCK, near_zero) if serves else None
         self._fresh = np.stack([inertia.seed(i).array_r for i in range(BLOCK)], axis=1)
         self._fresh_images = inertia.weighed(self._fresh)
         self.restart()
@@ -117,7 +119,7 @@ class Corrector:
             return None
         return self._regular(x, found, below, nearest, tangent)
 
-    def _compiled_factor(self, compiled: CompiledNewton, x: PETSc.Vec) -> Regular | None:
+    def _compiled_factor(self, compiled: CompiledCorrector, x: PETSc.Vec) -> Regular | None:
         system, inertia = self.system, self.inertia
         system.set_phase(x)
         with system.clock("solve"):
@@ -205,12 +207,12 @@ class Corrector:
         return outcome
 
     def _compiled_correct(
-        self, compiled: CompiledNewton, x: PETSc.Vec, row: PETSc.Vec, most: int, reach: float, tolerance: float
+        self, compiled: CompiledCorrector, x: PETSc.Vec, row: PETSc.Vec, most: int, reach: float, tolerance: float
     ) -> NewtonResult | None:
         system, origin = self.system, x.copy()
         with system.clock("solve"):
-            outcome = compiled.correct(x, row, most, reach, tolerance)
+            ended = compiled.correct(x, row, limits(system, most, reach, tolerance))
         if not system.symmetries or system.verify(self.inertia.matrix, *compiled.last_factored()):
-            return outcome
+            return None if ended.status >= SINGULAR else result(ended)
         origin.copy(x)  # with a condition that belongs to no symmetry: once more without it
         return self._compiled_correct(compiled, x, row, most, reach, tolerance)

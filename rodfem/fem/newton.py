@@ -8,6 +8,7 @@ from math import isfinite
 
 from petsc4py import PETSc
 
+from rodfem.fem.compiled_newton import BROKEN, CONVERGED, Ended, Limits
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 
@@ -51,6 +52,11 @@ def correct(
     :func:`iterate`.
     """
     system.set_phase(x)
+    if system.compiled is not None and not system.damping:
+        with system.clock("solve"):
+            ended = system.compiled.correct(x, row, limits(system, most, reach))
+        if ended.status != BROKEN:
+            return result(ended)
     step = system.new_vector()
 
     def solve(state: State, equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
@@ -59,6 +65,21 @@ def correct(
         return step if system.solve(equations, step) else None
 
     return iterate(system, x, solve, most, reach)
+
+
+def limits(system: System, most: int, reach: float, tolerance: float = 0.0) -> Limits:
+    """Constants of the iteration for compiled code.
+
+    ``most``, ``reach`` and ``tolerance`` are those of :func:`iterate`; with damping the ``system`` may stand still
+    earlier.
+    """
+    still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
+    return Limits(most, reach, tolerance, still, TOLERANCE, KEPT, SHRUNK)
+
+
+def result(ended: Ended) -> NewtonResult:
+    """The same of an iteration in compiled code."""
+    return NewtonResult(ended.status == CONVERGED, ended.iterations, ended.error, ended.moved)
 
 
 def iterate(
@@ -82,7 +103,7 @@ def iterate(
     ``system`` has the equations; an error below ``tolerance``, of the size of a correction, is small enough.
     """
     equations, origin = system.new_vector(), x.copy()
-    still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
+    still = limits(system, most, reach).still
     previous, size, refactor = float("inf"), float("inf"), True
     iteration = 0
     for iteration in range(1, most + 1):

@@ -22,6 +22,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.fem.assembly import Places, matrix_places, vector_places
+from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Discretization, Fields
 from rodfem.fem.generators import Generators
@@ -33,6 +34,7 @@ from rodfem.fem.state import State
 from rodfem.fem.symmetries import Symmetry, may_slide
 from rodfem.fem.values import NodalValues
 from rodfem.fem.verification import Verification
+from rodfem.linalg.chain import Chain
 from rodfem.linalg.matrices import shared
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.scene import Scene
@@ -62,6 +64,8 @@ class System:
         Changes of a state by the symmetries.
     verification
         What verifies the symmetries at the states where the second variation is assembled.
+    compiled
+        Newton's method in compiled code with LU factors, None where PETSc makes them.
     damping
         Multiple of the metric added to every Jacobian.  Not zero where a state belongs to a family of equilibria at one
         and the same load that no symmetry explains: the Jacobian is singular there, and Newton's method must not move
@@ -118,6 +122,9 @@ class System:
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
         self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, {8: 0})
+        self.compiled = None
+        if isinstance(self.lu, Chain) and CompiledNewton.serves(self.matrix, self.lu):
+            self.compiled = CompiledNewton(self, self.matrix, self.lu)
 
     def _symmetries(self) -> list[Symmetry]:
         """Symmetries of the scene; found with few elements, which have the same ones, where there are many.

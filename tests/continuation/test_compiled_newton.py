@@ -8,8 +8,8 @@ from golden_cases import FAMILIES, cases
 
 import rodfem.fem.system
 from rodfem import Discretization, Plan, trace
-from rodfem.continuation.compiled_newton import CompiledNewton
 from rodfem.errors import InputError
+from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.fields import PETSC
 from rodfem.linalg.chain import Chain
 

@@ -1,8 +1,9 @@
-/* Newton's method on the plane across a row, with symmetric factors, in one call: rodfem/continuation/corrector.py and
-   rodfem/fem/newton.py have the same iteration in Python, step by step, for several ranks and for PETSc's factors.
+/* Newton's method on the plane across a row, in one call: rodfem/fem/newton.py and rodfem/continuation/corrector.py have
+   the same iteration in Python, step by step, for several ranks and for PETSc's factors.
 
    The second variation S is assembled with its border: drifts with their phase conditions, and the column F_lam of the
-   load, which is taken out.  Blocks of columns are stored one column after the other.  */
+   load.  For symmetric factors that column is taken out; the Jacobian, for LU factors, has it, and the row.  Blocks of
+   columns are stored one column after the other.  */
 
 #include <math.h>
 #include <stdint.h>
@@ -24,6 +25,7 @@ typedef struct {
     double *values;             /* of S, compressed sparse rows */
     int load, load_diagonal;    /* its number, and place of its diagonal entry */
     const int *load_column;     /* n: places of the entries of its column; -1: its diagonal */
+    const int *load_row;        /* n: places of those of its row */
     int drifts;
     const int *drift;           /* numbers of the drifts */
     const int *active;          /* whether each has a phase condition */
@@ -49,9 +51,11 @@ typedef struct {
     int most;
     double reach, tolerance;    /* bound of a correction; error that is small enough */
     double converged, still, kept, shrunk; /* constants of rodfem/fem/newton.py */
-    int iterations, status;     /* 0: converged, 1: not, 2: S too near singular, 3: factors failed */
+    int iterations, singular;   /* singular: the Jacobian was, exactly */
+    int status;                 /* 0: converged, 1: not, 2: S too near singular, 3: factors failed */
     double error, moved;
-    double *origin, *equations, *factored, *factored_equations; /* x; residual; state last factored and its residual */
+    double *step, *origin, *equations; /* correction; x at first; residual */
+    double *factored, *factored_equations; /* state last factored, and its residual */
 } Newton;
 
 static double dot(int n, const double *a, const double *b)
@@ -102,8 +106,8 @@ static int residual_at(const Rod *rod, const double *x, double *out)
     return 0;
 }
 
-/* S at x into the values of the matrix, and F_lam.  */
-int assemble_at(const Rod *rod, const double *x)
+/* S at x into the values of the matrix with its border; the column of the load stays where it is.  */
+static int assemble_bordered(const Rod *rod, const double *x)
 {
     memset(rod->values, 0, rod->entries * sizeof(double));
     gather(rod, x);
@@ -117,6 +121,21 @@ int assemble_at(const Rod *rod, const double *x)
             rod->values[column[i]] += condition[i];
         }
     }
+    return 0;
+}
+
+/* The Jacobian at x: S with its border, and the row of the arclength equation.  */
+static int jacobian_at(const Rod *rod, const double *x, const double *row)
+{
+    if (assemble_bordered(rod, x)) return 1;
+    for (int i = 0; i < rod->n; i++) rod->values[rod->load_row[i]] += row[i];
+    return 0;
+}
+
+/* S at x into the values of the matrix, a one for the load, and F_lam.  */
+int assemble_at(const Rod *rod, const double *x)
+{
+    if (assemble_bordered(rod, x)) return 1;
     for (int i = 0; i < rod->n; i++) {
         rod->border[i] = 0;
         if (rod->load_column[i] < 0) continue;
@@ -177,7 +196,8 @@ int solve_at(const Rod *rod, Block *b, const double *r)
     return 2;
 }
 
-/* Solve the equations on the plane through x across row, in place; see rodfem.fem.newton.iterate.  */
+/* Solve the equations on the plane through x across row, in place; see rodfem.fem.newton.iterate.  With a block the
+   factors are those of S, without (NULL) LU factors of the Jacobian; newton->step is the correction.  */
 int correct(const Rod *rod, Block *b, Newton *newton, double *x, const double *row)
 {
     int n = rod->n, fresh = 1;
@@ -189,22 +209,30 @@ int correct(const Rod *rod, Block *b, Newton *newton, double *x, const double *r
         double *r = newton->equations;
         if (residual_at(rod, x, r)) return newton->status = 3;
         if (!isfinite(dot(n, r, r))) break; /* outside of where the stored energy is defined */
-        if (fresh) {
+        if (!b) {
+            if (fresh && jacobian_at(rod, x, row)) return newton->status = 3;
+            int failed = fresh ? ((factor_matrix *)rod->factor)(rod->factors, rod->values) : 0;
+            if (failed > 1) return newton->status = 3;
+            newton->singular = failed;
+            if (failed) break;
+            if (((solve_columns *)rod->solve)(rod->factors, 1, r, newton->step)) return newton->status = 3;
+        } else if (fresh) {
             if (assemble_at(rod, x)) return newton->status = 3;
             memcpy(newton->factored, x, n * sizeof(double));
             memcpy(newton->factored_equations, r, n * sizeof(double));
             int failed = solve_at(rod, b, r);
             if (failed) return newton->status = failed;
         } else if (((solve_columns *)rod->solve)(rod->factors, 1, r, b->step)) return newton->status = 3;
+        double *step = b ? b->step : newton->step, length = 0, state = 0;
         /* J^-1 (r, 0) = y - z (row . y) / (row . z): the step stays on the plane across row */
-        double share = dot(n, row, b->step) / dot(n, row, b->tangent), length = 0, state = 0;
+        double share = b ? dot(n, row, step) / dot(n, row, b->tangent) : 0;
         for (int i = 0; i < n; i++) {
-            b->step[i] -= share * b->tangent[i];
-            x[i] -= b->step[i];
-            length += b->step[i] * b->step[i];
+            if (b) step[i] -= share * b->tangent[i];
+            x[i] -= step[i];
+            length += step[i] * step[i];
             state += x[i] * x[i];
         }
-        double distance = size_of(rod, b->step);
+        double distance = size_of(rod, step);
         size = fmax(distance, sqrt(length) / (1 + sqrt(state)));
         if (!isfinite(distance) || !isfinite(length) || distance > newton->reach) break;
         /* chord steps converge linearly: their rate, doubled for safety, says what the next correction would be */
