@@ -19,6 +19,8 @@ from rodfem.diagram.sweep import Sweep
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
+from rodfem.linalg.chain import DECLARATIONS
+from rodfem.linalg.compiled import compile_ahead
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
@@ -65,6 +67,8 @@ class Solver:
         """
         if scene.conservative:
             compat.require_real_petsc()
+        if compat.ALONE:
+            compile_ahead("chain", DECLARATIONS)
         system = System(scene, discretization or Discretization(), comm, clock)
         self.equilibria = BranchSolver(system, spectrum) if scene.conservative else StaticSolver(system)
 

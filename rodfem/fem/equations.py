@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -56,8 +57,8 @@ class Equations:
         Whether the equations do not have the arclength in them, and nothing acts at points inside the rod.
     """
 
-    def __init__(self, fields: Fields) -> None:
-        """Derive and compile the forms."""
+    def __init__(self, fields: Fields, compile_forms: Callable[[list[Any]], list[Any]] = compat.compile_forms) -> None:
+        """Derive the forms, and compile them unless another function is given that begins to."""
         self.fields, scene = fields, fields.scene
         mesh, k = fields.mesh, fields.discretization.degree
         self.names, self.line = list(scene.parameters), load_line(scene)
@@ -98,10 +99,10 @@ class Equations:
         kinetic += sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
         self.massless = apply_algebra_lowering(kinetic).empty()
         self.uniform = not extract_type(first, ufl.SpatialCoordinate) and not scene.joints
-        forms = [first, second, W * dx, metric * dx, kinetic]
+        forms = [second, first, W * dx, metric * dx, kinetic]
         if not scene.ordinate.places:
             forms.append((0.0 * c.s + scene.ordinate.of(along, c)) * dx)
-        self.residual, self.jacobian, self.energy, self.metric, self.kinetic, *more = compat.compile_forms(forms)
+        self.jacobian, self.residual, self.energy, self.metric, self.kinetic, *more = compile_forms(forms)
         self.ordinate: Any = more[0] if more else None
 
     # --- the functional --------------------------------------------------------------------------------------------

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 import ufl
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 from ufl.utils.stacks import StackDict
@@ -28,6 +27,7 @@ from ufl.utils.stacks import StackDict
 from forms.kinematics import UNDEFORMED
 from forms.rotation import IDENTITY, product, rotation
 from rodfem.errors import SceneError
+from rodfem.problem import quaternions
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End
 from rodfem.problem.local_state import Constants, OfPlace, asks_where, place
@@ -182,7 +182,7 @@ def derivative_of(function: OfPlace, c: Constants, s: float, length: float, r: F
     """
     x = ufl.variable(ufl.as_vector([*r.tolist(), 0.0, 0.0, 0.0]))
     spin = ufl.as_vector([x[3], x[4], x[5]])
-    directors = [ufl.as_vector(d) for d in Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix().T.tolist()]
+    directors = [ufl.as_vector(d) for d in quaternions.directors(q).T.tolist()]
     turned = [d + ufl.cross(spin, d) for d in directors]  # to first order, which is enough
     R = ufl.as_matrix([[d[i] for d in turned] for i in range(3)])
     rotated = product(ufl.as_vector([1.0, x[3] / 2, x[4] / 2, x[5] / 2]), ufl.as_vector(q.tolist()))
@@ -296,7 +296,7 @@ def _of_the_ends(scene: Scene, constraint: Constraint, load: float) -> Floats | 
         known = {"dr": ufl.dot(R, strains), "v": strains, "k": ufl.as_vector(rng.normal(size=3).tolist())}
         x = place(turned, R, s, r, length=scene.length, **known)
         values.append(_number(constraint.value(x, scene.constants(load, s))))
-        rows.append([*(Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix() @ v), 1.0])
+        rows.append([*(quaternions.directors(q) @ v), 1.0])
     matrix, value = np.array(rows), np.array(values)
     a = np.linalg.lstsq(matrix, value, rcond=None)[0]
     fits = np.linalg.norm(matrix @ a - value) < SMALL * np.linalg.norm(value)
