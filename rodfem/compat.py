@@ -9,8 +9,9 @@ import inspect
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -55,6 +56,8 @@ REAL: Any = np.float64
 """Numbers of states and forms, whatever those of PETSc."""
 COMPLEX = bool(np.issubdtype(PETSc.ScalarType, np.complexfloating))
 """Whether this PETSc was built for complex numbers: forms and states are real all the same."""
+KINDS = CELL, BOUNDARY, INTERIOR = 1, 2, 4
+"""Numbers that an entity of an integral has: cell; cell and facet; cell and facet on either side."""
 
 
 def require_real_petsc() -> None:
@@ -116,22 +119,22 @@ def mixed_space(mesh: Any, parts: Sequence[tuple[bool, int, int]]) -> Any:
 
 def nodes(degree: int) -> np.ndarray:
     """Reference coordinates in [0, 1] of the nodes of a Lagrange element, in the order of its degrees of freedom."""
-    if degree == 0:
-        return np.array([0.5])
-    element = basix.create_element(
-        basix.ElementFamily.P, basix.CellType.interval, degree, basix.LagrangeVariant.gll_warped
-    )
-    return np.asarray(element.points)[:, 0]
+    return np.array([0.5]) if degree == 0 else np.array(_lagrange(degree).points)[:, 0]
 
 
 def lagrange_basis(degree: int, x: np.ndarray) -> np.ndarray:
     """Values of the Lagrange basis on :func:`nodes` at reference points ``x`` of shape (m,): (m, degree + 1)."""
     if degree == 0 or len(x) == 0:
         return np.ones((len(x), degree + 1))
-    element = basix.create_element(
+    values = _lagrange(degree).tabulate(0, np.asarray(x, dtype=float).reshape(-1, 1))
+    return np.asarray(values)[0].reshape(len(x), degree + 1)
+
+
+@cache
+def _lagrange(degree: int) -> Any:
+    return basix.create_element(
         basix.ElementFamily.P, basix.CellType.interval, degree, basix.LagrangeVariant.gll_warped
     )
-    return np.asarray(element.tabulate(0, np.asarray(x, dtype=float).reshape(-1, 1)))[0].reshape(len(x), degree + 1)
 
 
 def _table(adjacency: Any, cells: int) -> np.ndarray:
@@ -149,6 +152,11 @@ def cell_vertices(mesh: Any, cells: int) -> np.ndarray:
     """Arclengths of the two vertices of each local cell, in reference order: (cells, 2)."""
     x = np.asarray(mesh.geometry.x)[:, 0]
     return x[_table(mesh.geometry.dofmap, cells)]
+
+
+def cell_coordinates(mesh: Any, cells: int) -> np.ndarray:
+    """Coordinates of the vertices of each local cell, in reference order: (cells, 2, 3)."""
+    return np.asarray(mesh.geometry.x)[_table(mesh.geometry.dofmap, cells)]
 
 
 def compile_forms(forms: Sequence[Any]) -> list[Any]:
@@ -289,6 +297,40 @@ def _instead(name: str, function: Callable[..., Any]) -> Iterator[None]:
         yield
     finally:
         setattr(jit, name, usual)
+
+
+class Integral(NamedTuple):
+    """An integral of a compiled form.
+
+    ``kernel`` is the C function that computes the tensor of one entity, a function pointer of cffi; ``entities``
+    (count, ``kind``) are a cell each, with a facet on the boundary, of both sides inside.
+    """
+
+    kernel: Any
+    kind: int
+    entities: np.ndarray
+
+
+def integrals(form: Any) -> list[Integral]:
+    """Integrals of a compiled form, over the cells and facets of this rank."""
+    found, compiled, cpp = [], form.ufcx_form, getattr(form, "_cpp_object", form)
+    for place, kind in enumerate(KINDS):
+        if hasattr(compiled, "form_integral_offsets"):
+            kernels = [compiled.form_integrals[i] for i in range(*compiled.form_integral_offsets[place : place + 2])]
+        else:
+            kernels = [compiled.integrals(place)[i] for i in range(compiled.num_integrals(place))]
+        if not kernels:
+            continue
+        of_kind = next(t for t in cpp.integral_types if int(t) == place)
+        for kernel, name in zip(kernels, cpp.integral_ids(of_kind), strict=True):
+            entities = np.ascontiguousarray(cpp.domains(of_kind, name), dtype=np.int32).reshape(-1, kind)
+            found.append(Integral(kernel.tabulate_tensor_float64, kind, entities))
+    return found
+
+
+def pack_constants(form: Any) -> np.ndarray:
+    """Values of the constants of a compiled form, one after the other."""
+    return np.asarray(dolfinx.fem.assemble.pack_constants(form))
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from literature import test_classics
 from problem import test_docs
 
 import rodfem
-from rodfem.continuation.branch import Branch, SpecialPoint
+from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import FLUTTER
 from rodfem.diagram.plan import Plan
 from rodfem.fem.fields import Discretization
@@ -49,14 +49,14 @@ def cases() -> dict[str, Callable[[], Scene]]:
     return found | {f"docs {name}": (lambda s=scene: s) for name, scene in test_docs.scenes().items()}
 
 
-def trace(scene: Scene) -> list[Branch]:
-    """Branches of a scene to the depth 1, with error bars.
+def trace(scene: Scene, *, error_bars: bool = True) -> rodfem.Diagram:
+    """Diagram of a scene to the depth 1.
 
     By the default discretisation, or twice as many elements where the rod is bent from the start: of a closed rod the
     numbers of a coarse mesh depend on where it is along itself.
     """
     mesh = Discretization("auto", 8 if scene.start is None else 16, 6)
-    return rodfem.trace(scene, mesh, Plan(depth=0 if scene.name in FAMILIES else 1)).branches
+    return rodfem.trace(scene, mesh, Plan(depth=0 if scene.name in FAMILIES else 1, error_bars=error_bars))
 
 
 def record(scene: Scene) -> list[dict[str, Any]]:
@@ -68,7 +68,7 @@ def record(scene: Scene) -> list[dict[str, Any]]:
             "indices": [index for index, _ in groupby(p.negative for p in branch.points)],
             "special": [_point(s) for s in branch.special],
         }
-        for branch in trace(scene)
+        for branch in trace(scene).branches
     ]
 
 

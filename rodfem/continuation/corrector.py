@@ -21,8 +21,9 @@ prediction: an eigenvalue may cross zero, and the branch may bend, on the way fr
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import inf
 
+import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
@@ -76,16 +77,14 @@ class Corrector:
         self.inertia, self.system = inertia, inertia.system
         system = self.system
         self._right, self._solved = dense_columns(system, BLOCK + 2), dense_columns(system, BLOCK + 2)
-        self._step, self._image = system.new_vector(), system.new_vector()
-        self._fresh = [inertia.seed(i) for i in range(BLOCK)]
-        self._fresh_images = [inertia.metric * v for v in self._fresh]
+        self._step = system.new_vector()
+        self._fresh = np.stack([inertia.seed(i).array_r for i in range(BLOCK)], axis=1)
+        self._fresh_images = inertia.weighed(self._fresh)
         self.restart()
 
     def restart(self) -> None:
         """Begin a branch: nothing is known about its eigenvectors."""
-        self._block = [v.copy() for v in self._fresh]
-        self._images = [v.copy() for v in self._fresh_images]
-        self._started = False
+        self._block, self._images, self._started = self._fresh, self._fresh_images, False
 
     def factor(self, x: PETSc.Vec, right: PETSc.Vec | None = None) -> Regular | None:
         """Factor ``S`` at ``x``; solve for the tangent, the block, and ``right`` (into ``_step``).
@@ -102,9 +101,8 @@ class Corrector:
             return None
         # inverse iteration: one step a point along a branch, three from generic vectors
         for _ in range(1 if self._started else 3):
-            for i in range(BLOCK):
-                self._block[i].axpy(FRESH, self._fresh[i])
-                self._images[i].axpy(FRESH, self._fresh_images[i])
+            self._block = self._block + FRESH * self._fresh
+            self._images = self._images + FRESH * self._fresh_images
             tangent, nearest = self._solve(found, right)
         self._started = nearest > NEAR * inertia.scale
         if not self._started:
@@ -123,11 +121,8 @@ class Corrector:
         with system.clock("solve"):
             columns = self._right.getDenseArray()
             columns[:, 0] = 0.0 if right is None else right.array_r
-            columns[:, 1] = found.border.array_r
-            sizes = []
-            for i, (v, image) in enumerate(zip(self._block, self._images, strict=True)):
-                columns[:, 2 + i] = image.array_r
-                sizes.append(image.dot(v) ** 0.5)
+            columns[:, 1], columns[:, 2:] = found.border.array_r, self._images
+            sizes = np.sqrt(inertia.sum((self._images * self._block).sum(axis=0)))
             found.factors.solve_all(self._right, self._solved)
             solved = self._solved.getDenseArray()
             self._step.array[:] = solved[:, 0]
@@ -135,19 +130,17 @@ class Corrector:
             tangent.array[:] = -solved[:, 1]
             system.set_load(tangent, 1.0)
             tangent.scale(1.0 / system.norm(tangent))
-            growth = 0.0
-            for i, (v, image, size) in enumerate(zip(self._block, self._images, sizes, strict=True)):
-                v.array[:] = solved[:, 2 + i]
-                inertia.metric.mult(v, image)
-                # |S^-1 M v| / |v| is at most one over the distance of the nearest eigenvalue from zero
-                grown = max(image.dot(v), TINY) ** 0.5
-                growth = max(growth, grown / size) if isfinite(grown) else float("inf")
-                v.scale(1.0 / grown)
-                image.scale(1.0 / grown)
-                for j in range(i):  # else all vectors of the block become the same one
-                    along = image.dot(self._block[j])
-                    v.axpy(-along, self._block[j])
-                    image.axpy(-along, self._images[j])
+            # |S^-1 M v| / |v| is at most one over the distance of the nearest eigenvalue from zero
+            block = np.array(solved[:, 2:].real)
+            images = inertia.weighed(block)
+            grown = np.sqrt(np.maximum(inertia.sum((images * block).sum(axis=0)), TINY))
+            growth = float((grown / sizes).max()) if np.isfinite(grown).all() else inf
+            block, images = block / grown, images / grown
+            for i in range(1, BLOCK):  # else all vectors of the block become the same one
+                along = inertia.sum(images[:, i] @ block[:, :i])
+                block[:, i] -= block[:, :i] @ along
+                images[:, i] -= images[:, :i] @ along
+            self._block, self._images = block, images
         return tangent, 1.0 / growth
 
     def correct(

@@ -1,8 +1,7 @@
-"""The equations of a scene on its fields: Lagrangian, weak form, Jacobian and metrics as compiled dolfinx forms."""
+"""The equations of a scene on its fields: Lagrangian, weak form, Jacobian and metrics as compiled forms."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -18,8 +17,9 @@ from forms import inertia, lagrangian
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
 from rodfem import compat
+from rodfem.fem.assembly import Assembler, Cells, vector_places
 from rodfem.fem.fields import Fields
-from rodfem.fem.parameters import load_line
+from rodfem.fem.parameters import Line, load_line
 from rodfem.problem.contribution import Site
 from rodfem.problem.local_state import Constants, Place, place
 from rodfem.problem.scene import Part
@@ -52,13 +52,25 @@ class Equations:
     line
         Parameters that the scalar unknown ``load`` stands for unless an evaluation says otherwise: the scene's load.
     held
-        Evaluation whose values are where the forms read them: see :mod:`rodfem.fem.state`.
+        Evaluation whose values are where dolfinx reads them: see :mod:`rodfem.fem.state`.
+    cells, local_places
+        Cells of this rank, and the places of a vector of all their degrees of freedom.
     uniform
         Whether the equations do not have the arclength in them, and nothing acts at points inside the rod.
     """
 
-    def __init__(self, fields: Fields, compile_forms: Callable[[list[Any]], list[Any]] = compat.compile_forms) -> None:
-        """Derive the forms, and compile them unless another function is given that begins to."""
+    def __init__(self, fields: Fields) -> None:
+        """Derive and compile the forms."""
+        forms = self._derive(fields)
+        self._taken: Line | None = None
+        self.cells = Cells.of(fields)
+        self._assemblers = [Assembler(form, self.cells) for form in compat.compile_forms(forms)]
+        self.jacobian, self.residual, self.energy, self.metric, self.kinetic, *more = self._assemblers
+        self.ordinate = more[0] if more else None
+        self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
+
+    def _derive(self, fields: Fields) -> list[Any]:
+        """Forms in UFL: second and first derivative of the Lagrangian, energy, metric, mass, ordinate along the rod."""
         self.fields, scene = fields, fields.scene
         mesh, k = fields.mesh, fields.discretization.degree
         self.names, self.line = list(scene.parameters), load_line(scene)
@@ -102,8 +114,21 @@ class Equations:
         forms = [second, first, W * dx, metric * dx, kinetic]
         if not scene.ordinate.places:
             forms.append((0.0 * c.s + scene.ordinate.of(along, c)) * dx)
-        self.jacobian, self.residual, self.energy, self.metric, self.kinetic, *more = compile_forms(forms)
-        self.ordinate: Any = more[0] if more else None
+        return forms
+
+    @classmethod
+    def compile_ahead(cls, fields: Fields) -> None:
+        """Begin to compile beside this process what another instance finds then in the cache."""
+        compat.compile_ahead(cls.__new__(cls)._derive(fields))
+
+    def take(self, line: Line) -> None:
+        """Let the constants of the forms be the parameters of a ``line``."""
+        if line is self._taken:
+            return
+        self.base.value[:], self.direction.value[:] = line.origin, line.direction
+        for form in self._assemblers:
+            form.pack_constants()
+        self._taken = line
 
     # --- the functional --------------------------------------------------------------------------------------------
 

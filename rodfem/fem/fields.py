@@ -20,6 +20,7 @@ from mpi4py import MPI
 from rodfem import compat
 from rodfem.errors import InputError
 from rodfem.fem import formulations
+from rodfem.fem.arclength import Arclength
 from rodfem.fem.formulation import CONTACT_FORCE, Formulation
 from rodfem.fem.rotation_field import AngleField, QuaternionField, Turning
 from rodfem.problem.contribution import Block, Group, Unknown
@@ -276,6 +277,11 @@ class Fields:
         """Arclengths at which elements meet, of all ranks in ascending order, (E + 1,)."""
         mine = self.vertices[: self.owned_cells, 0]
         return np.append(np.sort(np.concatenate(self.comm.allgather(mine))), self.scene.interval[1])
+
+    @cached_property
+    def arclength(self) -> Arclength:
+        """Matrices of the derivative in arclength."""
+        return Arclength(self)
 
     @property
     def dense_rows(self) -> int:

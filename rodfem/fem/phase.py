@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.fem.symmetries import Symmetry, mismatch
-from rodfem.linalg.orthogonal import combine
 
 if TYPE_CHECKING:
     from rodfem.fem.state import State
@@ -83,11 +83,13 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
     if count == len(dropped):
         return no_phase(count, reference)
     state: State = system.at(reference)
-    generators = [state.generator(i) for i in range(count)]
-    images = [system.metric * g for g in generators]
+    generators = system.generators.at(state)
+    images = system.weighed(generators)
+    gram = generators @ images.T
+    if system.comm.size > 1:
+        gram = system.comm.allreduce(gram, op=MPI.SUM)
     exact = [i for i, s in enumerate(symmetries) if not s.along and i not in dropped]
-    gram = np.array([[np.real(generators[i].dot(images[j])) for j in exact] for i in exact])
-    squares, turn = np.linalg.eigh(gram.reshape(len(exact), len(exact)))
+    squares, turn = np.linalg.eigh(gram[exact][:, exact])
     combinations, sizes = list((np.eye(count)[:, exact] @ turn).T), list(np.sqrt(np.maximum(squares, 0.0)))
     least = [SYMMETRIC_STATE] * len(exact)
     if symmetries[-1].along and count - 1 not in dropped:
@@ -95,14 +97,15 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
         rest = np.eye(count)[-1]
         for weights, size in zip(combinations, sizes, strict=True):
             if size >= SYMMETRIC_STATE:
-                rest = rest - weights / size**2 * np.real(combine(images, weights).dot(generators[-1]))
+                rest = rest - weights / size**2 * (weights @ gram[:, -1])
         combinations.append(rest / np.linalg.norm(rest))
-        sizes.append(system.norm(combine(generators, combinations[-1])))
+        # by the difference of the vectors: in the Gram matrix half of the digits cancel
+        sizes.append(system.norm(system.generators.vector(combinations[-1] @ generators)))
         least.append(max(MESH * mismatch(state), 10 * SYMMETRIC_STATE))
     active = np.array(sizes) >= least
     conditions, offsets, broken = [None] * count, [0.0] * count, {}
     for i in np.flatnonzero(active):
-        condition = combine(images, combinations[i] / sizes[i])
+        condition = system.generators.vector(combinations[i] / sizes[i] @ images)
         conditions[i], offsets[i] = condition, state.along(condition)
         broken[int(i)] = combinations[i] / sizes[i]
     return Phase(tuple(conditions), tuple(offsets), broken, np.array(combinations)[~active], reference.copy())

@@ -98,8 +98,8 @@ class Shape:
 
     def ordinate(self, x: PETSc.Vec) -> float:
         """Ordinate of the scene at the state ``x``."""
-        state, of = self.system.at(x), self.system.scene.ordinate
-        return state.integral(self.system.equations.ordinate) if of.s is None else float(of.of(*self._at(state, of.s)))
+        state, of, integral = self.system.at(x), self.system.scene.ordinate, self.system.equations.ordinate
+        return state.integral(integral) if integral is not None else float(of.of(*self._at(state, of.s or 0.0)))
 
     def stretch(self, x: PETSc.Vec) -> float:
         """Smallest stretch ``v3`` along the rod; 1 for an inextensible rod.

@@ -6,7 +6,9 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
+from rodfem import compat
 from rodfem.fem.fields import Fields
+from rodfem.linalg.matrices import shared_matrix
 
 
 def bordered_pattern(fields: Fields) -> sp.csr_matrix:
@@ -74,13 +76,16 @@ def _own_rows(fields: Fields, names: list[str]) -> sp.csr_matrix:
 def new_matrix(fields: Fields, pattern: sp.csr_matrix, rows: PETSc.LGMap, columns: PETSc.LGMap) -> PETSc.Mat:
     """Zero PETSc AIJ matrix with ``pattern``, on the ranks of ``fields``.
 
-    ``rows`` and ``columns`` are the maps from local degrees of freedom to its rows and columns.
+    ``rows`` and ``columns`` are the maps from local degrees of freedom to its rows and columns.  On one rank its values
+    are shared with numpy.
     """
-    size = (fields.local_unknowns, fields.unknowns)
-    matrix = PETSc.Mat().createAIJ((size, size), comm=fields.comm)
-    matrix.setPreallocationCSR(
-        (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType), np.zeros(pattern.nnz))
-    )
+    if fields.comm.size == 1 and not compat.COMPLEX:
+        matrix = shared_matrix(fields.comm, pattern)
+    else:
+        size = (fields.local_unknowns, fields.unknowns)
+        matrix = PETSc.Mat().createAIJ((size, size), comm=fields.comm)
+        index = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
+        matrix.setPreallocationCSR((*index, np.zeros(pattern.nnz)))
     matrix.setLGMap(rows, columns)
     matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
     matrix.setOption(PETSc.Mat.Option.IGNORE_ZERO_ENTRIES, True)  # a point between two cells couples all of both, by 0

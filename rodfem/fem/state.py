@@ -1,22 +1,24 @@
 """A state of a rod: its values, and the equations evaluated there.
 
-Forms are compiled for one dolfinx Function and a few Constants, the *register*.  Only this module writes there: an
-evaluation puts its own values there before a form is assembled, unless they are there already.
+A form is assembled for the values that are handed in (:mod:`rodfem.fem.assembly`).  What dolfinx evaluates itself,
+expressions and the matrices of several ranks, is compiled for one dolfinx Function, the *register*.  Only this module
+writes there: an evaluation puts its own values there first, unless they are there already.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
-from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
+from rodfem.fem.assembly import Assembler, Places
 from rodfem.fem.values import NodalValues
+from rodfem.linalg.matrices import shared
 
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations
@@ -39,26 +41,29 @@ class Evaluation(NodalValues):
         if held is self:
             return
         self.fields.u.x.array[:] = self.local
-        if held is None or held.line is not self.line:
-            equations.base.value[:], equations.direction.value[:] = self.line.origin, self.line.direction
+        equations.take(self.line)
         equations.held = self
+
+    def _add(self, form: Assembler, places: Places | None, out: np.ndarray) -> None:
+        self.equations.take(self.line)
+        form.add(self.local, places, out)
 
     def covector(self) -> np.ndarray:
         """The equations of this rank's cells, (local size,)."""
-        self._register()
         out = np.zeros(len(self.local))
-        fem.assemble_vector(out, self.equations.residual)
+        self._add(self.equations.residual, self.equations.local_places, out)
         return out
 
     def tangent(self) -> sp.csr_matrix:
         """Their derivative in all local degrees of freedom, clamped ones included."""
         self._register()
-        return compat.local_table(self.equations.jacobian)
+        return compat.local_table(self.equations.jacobian.form)
 
-    def integral(self, form: Any) -> float:
+    def integral(self, form: Assembler) -> float:
         """Integral over the rod; collective."""
-        self._register()
-        return float(self.fields.comm.allreduce(fem.assemble_scalar(form).real, op=MPI.SUM))
+        out, comm = np.zeros(1), self.fields.comm
+        self._add(form, None, out)
+        return float(out[0] if comm.size == 1 else comm.allreduce(out[0], op=MPI.SUM))
 
     def energy(self) -> float:
         """Stored energy; collective."""
@@ -93,9 +98,13 @@ class State(Evaluation):
         system = self.system
         with system.clock("assembly"):
             out.set(0.0)
-            values = self.covector()[system.equation_targets]
-            out.setValues(system.equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)
-            out.assemble()
+            if (places := system.equation_places) is not None:
+                with out as array:
+                    self._add(self.equations.residual, places, array)
+            else:
+                values = self.covector()[system.equation_targets]
+                out.setValues(system.equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)
+                out.assemble()
             for i, value in enumerate(self.drifts.tolist()):
                 phase = system.phase.conditions[i]
                 if phase is not None:
@@ -124,13 +133,17 @@ class State(Evaluation):
             matrix.assemble()
         return matrix
 
-    def assemble_into(self, matrix: PETSc.Mat, form: Any, *, load: bool = False) -> None:
+    def assemble_into(self, matrix: PETSc.Mat, form: Assembler, *, load: bool = False) -> None:
         """Add a bilinear form to a matrix of the system, with or without the load's column.
 
         The caller assembles the matrix (``matrix.assemble()``) when all is added.
         """
-        self._register()
-        compat.assemble_matrix(matrix, form, *self.system.maps(load))
+        if (own := shared(matrix)) is None:
+            self._register()
+            compat.assemble_matrix(matrix, form.form, *self.system.maps(load))
+            return
+        self._add(form, self.system.matrix_places(own.pattern, load), own.values)
+        matrix.stateIncrease()
 
     def factor(self, row: PETSc.Vec, damping: float = 0.0) -> None:
         """Factor the Jacobian, with ``damping`` times the metric added, for :meth:`System.solve`."""
@@ -144,4 +157,5 @@ class State(Evaluation):
 
     def generator(self, symmetry: int) -> PETSc.Vec:
         """Change under the infinitesimal symmetry, in all fields and scalars that it moves."""
-        return self.system.vector(self.system.symmetries[symmetry].change(self))
+        generators = self.system.generators
+        return generators.vector(generators.at(self)[symmetry])

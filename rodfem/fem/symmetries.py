@@ -10,17 +10,16 @@ state).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 
 from forms.symmetry import AXES, Matrix, cross, left, right
-from rodfem import compat
 from rodfem.fem.fields import Fields
 from rodfem.fem.values import NodalValues
-from rodfem.problem.contribution import Block, Motion
+from rodfem.problem.contribution import Motion
 from rodfem.problem.scene import Scene
 
 NAMED = 1e-3
@@ -60,7 +59,7 @@ class Symmetry:
         return out
 
     def linear(self, fields: Fields) -> sp.csr_matrix:
-        """``A`` of the change ``A x + c`` (without ``along``) between local degrees of freedom, scalars once."""
+        """``A`` of the change ``A x + c`` between local degrees of freedom, scalars once."""
         rows, columns, values = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
         for target, (matrix, _) in self._targets.items():
             if target in fields.dofs:
@@ -76,7 +75,8 @@ class Symmetry:
                         columns.append(column)
                         values.append(np.full(len(row), matrix[i, j]))
         where = (np.concatenate(rows), np.concatenate(columns))
-        return sp.csr_matrix((np.concatenate(values), where), shape=(len(fields.number),) * 2)
+        linear = sp.csr_matrix((np.concatenate(values), where), shape=(len(fields.number),) * 2)
+        return linear + self.along * fields.arclength.derivative if self.along else linear
 
     def __str__(self) -> str:
         """In words what moves: the names of the parts, the rotations and translations of other fields left out."""
@@ -105,13 +105,7 @@ class Symmetry:
 
 def derivative(state: NodalValues) -> np.ndarray:
     """Derivative in arclength of a state, local values, the mean of elements at nodes; zero for scalars."""
-    fields, size = state.fields, len(state.local)
-    out, count = np.zeros(size), np.ones(size)
-    for block in fields.blocks:
-        dofs, slopes = fields.dofs[block.name].ravel(), _slopes(state, block).ravel()
-        out += np.bincount(dofs, slopes, minlength=size)
-        count = np.maximum(count, np.bincount(dofs, minlength=size))
-    return np.where(fields.number < 0, 0.0, fields.scattered(out / count))
+    return np.asarray(state.fields.scattered(state.fields.arclength.derivative @ state.local))
 
 
 def mismatch(state: NodalValues) -> float:
@@ -119,31 +113,8 @@ def mismatch(state: NodalValues) -> float:
 
     It measures how far the mesh is from the invariance under the motion along itself.
     """
-    fields, worst = state.fields, 0.0
-    for block in (b for b in fields.blocks if b.name in (fields.turning.name, "r")):
-        dofs, slopes = fields.dofs[block.name].ravel(), _slopes(state, block).ravel()
-        low, high = np.full(len(fields.number), np.inf), np.full(len(fields.number), -np.inf)
-        np.minimum.at(low, dofs, slopes)
-        np.maximum.at(high, dofs, slopes)
-        worst = max(worst, float((high - low)[dofs].max()))
-    return float(fields.comm.allreduce(worst, op=MPI.MAX))
-
-
-def _slopes(state: NodalValues, block: Block) -> np.ndarray:
-    """Derivative in arclength of a field at the nodes of each cell, (cells, nodes, components)."""
-    vertices = state.fields.vertices
-    size = (vertices[:, 1] - vertices[:, 0])[:, None, None]
-    return np.asarray(np.matmul(differentiation(block.degree), state.values(block.name)) / size)
-
-
-@cache
-def differentiation(degree: int) -> np.ndarray:
-    """Matrix of the derivative of the polynomial through values at the nodes of an element, at the nodes: (m, m)."""
-    nodes = compat.nodes(degree)
-    powers = np.vander(2 * nodes - 1, increasing=True)
-    slopes = np.zeros_like(powers)
-    slopes[:, 1:] = 2 * powers[:, :-1] * np.arange(1, len(nodes))
-    return np.asarray(slopes @ np.linalg.inv(powers))
+    worst = float(abs(state.fields.arclength.jumps @ state.local).max(initial=0.0))
+    return float(state.fields.comm.allreduce(worst, op=MPI.MAX))
 
 
 def may_slide(scene: Scene) -> bool:

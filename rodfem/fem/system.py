@@ -17,11 +17,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from rodfem import compat
+from rodfem.fem.assembly import Places, matrix_places, vector_places
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Discretization, Fields
+from rodfem.fem.generators import Generators
 from rodfem.fem.invariance import find_motion_along, find_symmetries
 from rodfem.fem.parameters import Line
 from rodfem.fem.phase import no_phase, phase_at
@@ -30,7 +34,7 @@ from rodfem.fem.state import State
 from rodfem.fem.symmetries import Symmetry, may_slide
 from rodfem.fem.values import NodalValues
 from rodfem.fem.verification import Verification
-from rodfem.linalg.orthogonal import combine
+from rodfem.linalg.matrices import shared
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.scene import Scene
 from rodfem.timing import Clock
@@ -55,6 +59,8 @@ class System:
     line
         Parameters that the load of a state stands for where nothing else is said: the scene's load, unless a locus in
         two parameters is followed.
+    generators
+        Changes of a state by the symmetries.
     verification
         What verifies the symmetries at the states where the second variation is assembled.
     damping
@@ -94,16 +100,21 @@ class System:
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
         self.equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self.equation_numbers = number[self.equation_targets].astype(PETSc.IntType)
+        direct = comm.size == 1 and not compat.COMPLEX
+        self.equation_places = vector_places(self.equations.cells.dofs, without_load) if direct else None
+        self._places: dict[tuple[int, bool], Places] = {}
         self._pattern, self._metric_pattern = bordered_pattern(self.fields), metric_pattern(self.fields)
         self.matrix = self.state_matrix(load=True)
         self._numbered = np.flatnonzero(number >= 0)
-        sources = np.append(number[self._numbered], self.drifts).astype(PETSc.IntType)
-        self._gathered = PETSc.Vec().createSeq(len(sources), comm=PETSc.COMM_SELF)
+        self._sources = np.append(number[self._numbered], self.drifts).astype(PETSc.IntType)
+        self._gathered = PETSc.Vec().createSeq(len(self._sources), comm=PETSc.COMM_SELF)
         self.workspace = self.matrix.createVecRight()
-        source = PETSc.IS().createGeneral(sources, comm=PETSc.COMM_SELF)
+        source = PETSc.IS().createGeneral(self._sources, comm=PETSc.COMM_SELF)
         self._gather = PETSc.Scatter().create(self.workspace, source, self._gathered, None)
         self.metric = self._assemble_metric()
-        self.phase = no_phase(len(self.drifts))
+        own, fixed = shared(self.metric), self.fields.unknowns - len(self.drifts)
+        self._weights = None if own is None else own.matrix[:fixed, :fixed]
+        self.phase, self.generators = no_phase(len(self.drifts)), Generators(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
         self.lu = factors_of("lu", comm, self.fields.unknowns, self.fields.dense_rows, {8: 0})
@@ -156,6 +167,13 @@ class System:
         self.set_load(row, 1.0)
         return row
 
+    def weighed(self, own: np.ndarray) -> np.ndarray:
+        """Metric times vectors of which this rank has these rows each, (count, own rows)."""
+        if self._weights is not None:
+            return np.asarray((self._weights @ own.T).T)
+        images = [self.metric * self.generators.vector(row) for row in own]
+        return np.array([image.array_r[: own.shape[1]].real for image in images]).reshape(own.shape)
+
     def norm(self, d: PETSc.Vec) -> float:
         """Size of a change of state in the metric."""
         self.metric.mult(d, self.workspace)
@@ -173,8 +191,22 @@ class System:
         local[self._numbered] = self.gathered(d)[: len(self._numbered)]
         return NodalValues(self.fields, local, self.line)
 
+    def changes(self, columns: np.ndarray) -> np.ndarray:
+        """Local values of changes of state whose own rows are ``columns`` (own rows, k): (k, local size)."""
+        out = np.zeros((columns.shape[1], len(self.fields.number)))
+        if self.comm.size == 1:
+            out[:, self._numbered] = columns[self._sources[: len(self._numbered)]].T
+            return out
+        vector = self.new_vector()
+        for local, column in zip(out, columns.T, strict=True):
+            vector.array[:] = column
+            local[:] = self.change(vector).local
+        return out
+
     def gathered(self, x: PETSc.Vec) -> np.ndarray:
         """Values of a vector at this rank's free local degrees of freedom, in ascending order, then the drifts'."""
+        if self.comm.size == 1:
+            return np.asarray(x.array_r[self._sources].real)
         self._gather.scatter(x, self._gathered, addv=PETSc.InsertMode.INSERT_VALUES)
         return np.array(self._gathered.array_r.real)
 
@@ -192,6 +224,13 @@ class System:
     def maps(self, load: bool) -> tuple[np.ndarray, np.ndarray]:
         """Global numbers of the rows and columns of a matrix at each local degree of freedom, -1 for none."""
         return self._columns[False], self._columns[load]
+
+    def matrix_places(self, pattern: sp.csr_matrix, load: bool) -> Places:
+        """Places of bilinear forms in a matrix of a ``pattern`` of this system, with the column of the ``load``."""
+        key = (id(pattern), load)
+        if key not in self._places:
+            self._places[key] = matrix_places(self.equations.cells.dofs, *self.maps(load), pattern)
+        return self._places[key]
 
     def add_drifts(self, matrix: PETSc.Mat) -> None:
         """Add rows and columns of the drift scalars: the generators, or a one where a drift is switched off."""
@@ -256,12 +295,8 @@ class System:
         self.set_phase(x)
         moved = x.copy()
         moved.axpy(1.0, direction)
-        before, after, changes = self.at(x), self.at(moved), []
-        for i in range(len(self.drifts)):
-            change = after.generator(i)
-            change.axpy(-1.0, before.generator(i))
-            changes.append(change)
-        return [combine(changes, weights) for weights in self.phase.kept]
+        changes = self.generators.at(self.at(moved)) - self.generators.at(self.at(x))
+        return [self.generators.vector(weights @ changes) for weights in self.phase.kept]
 
     def active_drifts(self, x: PETSc.Vec) -> int:
         """Number of symmetries that the state ``x`` breaks: as many of its zero eigenvalues belong to them."""

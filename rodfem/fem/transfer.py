@@ -27,7 +27,7 @@ def richer_system(system: System) -> System:
 
 def compile_richer(system: System) -> None:
     """Begin to compile the forms of that beside this process."""
-    Equations(Fields(system.scene, richer(system), system.comm), compat.compile_ahead)
+    Equations.compile_ahead(Fields(system.scene, richer(system), system.comm))
 
 
 class Transfer:

@@ -15,15 +15,13 @@ A symmetry that fails is dropped, with a notice.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.fem.fields import LOAD
-from rodfem.fem.symmetries import Symmetry, mismatch
-from rodfem.fem.values import NodalValues
+from rodfem.fem.symmetries import mismatch
 from rodfem.problem.contribution import Motion
 
 if TYPE_CHECKING:
@@ -59,7 +57,6 @@ class Verification:
         self.system = system
         self.dropped: set[int] = set()
         self.notices: list[str] = []
-        self._generators: dict[tuple[int, ...], Generator] = {}
         self._norm = 0.0
         self._closing: list[PETSc.Vec] | None = None
         self._left, self._none = system.new_vector(), np.zeros(len(system.drifts))
@@ -84,11 +81,16 @@ class Verification:
         if not candidates:
             return []
         self._norm = self._norm or matrix.norm(PETSc.NormType.INFINITY)
+        generators = self.system.generators.at(state)
+
+        def holds(chosen: list[int]) -> bool:
+            return self._holds(matrix, generators, chosen, state, equations)
+
         exact = [i for i in candidates if not self.system.symmetries[i].along]
         suspects = [i for i in candidates if i not in exact]
-        if exact and not self._holds(matrix, self._mixture(tuple(exact)), state, equations):
+        if exact and not holds(exact):
             suspects += exact
-        return [i for i in suspects if not self._holds(matrix, self._mixture((i,)), state, equations)]
+        return [i for i in suspects if not holds([i])]
 
     def drop(self, i: int, at: float) -> None:
         """Drop a symmetry that failed at a load, in words."""
@@ -104,20 +106,17 @@ class Verification:
         out, self.notices = self.notices, []
         return out
 
-    def _mixture(self, chosen: tuple[int, ...]) -> Generator:
-        """Generic combination of symmetries."""
-        if chosen not in self._generators:
-            symmetries = [self.system.symmetries[i] for i in chosen]
-            weights = np.random.default_rng(0).uniform(0.5, 1.0, len(chosen)) * (-1.0) ** np.arange(len(chosen))
-            sums = sum((w * s.weights for w, s in zip(weights, symmetries, strict=True)), 0.0 * weights[:1])
-            mixed = symmetries[0] if len(chosen) == 1 else Symmetry(sums, symmetries[0].parts)
-            self._generators[chosen] = Generator(self.system, mixed)
-        return self._generators[chosen]
+    def _holds(
+        self, matrix: PETSc.Mat, generators: np.ndarray, chosen: list[int], state: State, equations: PETSc.Vec | None
+    ) -> bool:
+        """Whether a generic combination of the ``chosen`` generators is a null vector of ``S`` at the ``state``.
 
-    def _holds(self, matrix: PETSc.Mat, generator: Generator, state: State, equations: PETSc.Vec | None) -> bool:
-        """Whether a generator is a null vector of ``S`` at the state."""
+        ``matrix`` is ``S``, ``generators`` (count, own rows) are all of them there, ``equations`` as in
+        :meth:`__call__`.
+        """
         system, left = self.system, self._left
-        g = generator.change(state)
+        weights = _generic(len(chosen))
+        g = system.generators.vector(weights @ generators[chosen])
         matrix.mult(g, left)
         if system.has_scalars:
             left.setValues(system.drifts, self._none)  # phase conditions, no part of S
@@ -125,35 +124,31 @@ class Verification:
         size, length = system.norm(g) ** 2, g.norm()
         zero = ZERO * system.stiffness_scale * max(size, TINY) + EPS * self._norm * length**2
         quotient = float(np.real(left.dot(g)))
-        if generator.symmetry.along:
-            return abs(quotient) <= zero or self._of_the_mesh(generator.symmetry, g, quotient, zero, state, equations)
+        if system.symmetries[chosen[0]].along:
+            return abs(quotient) <= zero or self._of_the_mesh(chosen[0], g, quotient, zero, state, equations)
         small = RESIDUAL * self._norm * (length + TINY)
         if equations is not None:
-            left.axpy(1.0, generator.pulled_back(self._unloaded(state, equations)))
+            pulled = system.generators.pulled_back(self._unloaded(state, equations))
+            left.axpy(1.0, system.generators.vector(weights @ pulled[chosen]))
             quotient = float(np.real(left.dot(g)))
         if left.norm() > small:
             self._across_closing(matrix, left)
         return left.norm() <= small and abs(quotient) <= zero
 
     def _of_the_mesh(
-        self, symmetry: Symmetry, g: PETSc.Vec, quotient: float, zero: float, state: State, equations: PETSc.Vec | None
+        self, symmetry: int, g: PETSc.Vec, quotient: float, zero: float, state: State, equations: PETSc.Vec | None
     ) -> bool:
         """Whether a ``quotient`` that is not zero is the error of the mesh, or of a state that is no equilibrium.
 
-        ``zero`` is its round-off, ``g`` the change of the ``state`` by the ``symmetry``.
+        ``zero`` is its round-off, ``g`` the change of the ``state`` by the ``symmetry`` of that number.
         """
         system = self.system
         zero += OF_THE_MESH * system.stiffness_scale * mismatch(state) * system.norm(g)
         if equations is not None:
-            change = self._change_of(symmetry, g)
+            change = system.generators.vector(system.generators.linear(g)[symmetry])  # A g
             quotient += float(np.real(equations.dot(change)))
             zero += FAR * equations.norm() * change.norm()
         return abs(quotient) <= zero
-
-    def _change_of(self, symmetry: Symmetry, g: PETSc.Vec) -> PETSc.Vec:
-        """``A g`` for the generator ``A x + c``."""
-        constant = symmetry.change(self.system.change(self.system.new_vector()))
-        return self.system.vector(symmetry.change(self.system.change(g)) - constant)
 
     def _unloaded(self, state: State, equations: PETSc.Vec) -> PETSc.Vec:
         """The equations without the forces of the drift scalars."""
@@ -179,35 +174,7 @@ class Verification:
             left.axpy(-column.dot(left), column)
 
 
-class Generator:
-    """Change ``A x + c`` of a state by a symmetry, and ``A^t y``, by sparse matrices."""
-
-    def __init__(self, system: System, symmetry: Symmetry) -> None:
-        """Make the matrices."""
-        fields = system.fields
-        self.system, self.symmetry = system, symmetry
-        scalars = fields.copies[0] if system.has_scalars else np.zeros(0, int)
-        rows, self._columns = np.concatenate([fields.free_owned, scalars]), np.flatnonzero(fields.number >= 0)
-        A = symmetry.linear(fields)
-        self._forth, self._back = A[rows][:, self._columns], A.T.tocsr()[rows][:, self._columns]
-        self._change, self._pulled = system.new_vector(), system.new_vector()
-        self._size, (low, high) = len(rows), system.scene.span
-        constants = []
-        for load in (low, 0.62 * low + 0.38 * high, high):
-            at_load = NodalValues(fields, fields.filled({LOAD: load}), system.line)
-            constants.append(symmetry.change(at_load)[rows])
-        self._constant = constants[0]
-        varies = any(np.any(c != self._constant) for c in constants)  # with ends that are held, and known forces
-        self._varies = bool(symmetry.along) or bool(system.comm.allreduce(varies, op=MPI.LOR))
-
-    def change(self, state: State) -> PETSc.Vec:
-        """Change of a state."""
-        if self._varies:
-            return self.system.vector(self.symmetry.change(state))
-        self._change.array[: self._size] = self._forth @ state.local[self._columns] + self._constant
-        return self._change
-
-    def pulled_back(self, covector: PETSc.Vec) -> PETSc.Vec:
-        """``A^t`` times a covector."""
-        self._pulled.array[: self._size] = self._back @ self.system.gathered(covector)[: len(self._columns)]
-        return self._pulled
+@cache
+def _generic(count: int) -> np.ndarray:
+    """Weights of a generic combination."""
+    return np.random.default_rng(0).uniform(0.5, 1.0, count) * (-1.0) ** np.arange(count) if count > 1 else np.ones(1)

@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.compiled import module
+from rodfem.linalg.matrices import values_of
 
 DECLARATIONS = """
 typedef struct chain chain;
@@ -80,11 +81,11 @@ class Chain:
 
     def __call__(self, matrix: PETSc.Mat) -> None:
         """Factor ``matrix``; raises :class:`ConvergenceError` where it is no chain, or holds what is no number."""
-        starts, indices, values = matrix.getValuesCSR()
         if self._chain is None or matrix.handle != self._handle:
+            starts, indices, _ = matrix.getValuesCSR()
             self._set_up(matrix.size[0], starts, indices)
             self._handle = matrix.handle
-        values = np.ascontiguousarray(values.real)
+        values = values_of(matrix)
         status = self.lib.chain_factor(self._chain, self._pointer(values, "double"))
         self.regular = status == 0
         if status > SINGULAR:

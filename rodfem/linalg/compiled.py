@@ -32,24 +32,25 @@ def _processor() -> str:
         return platform.processor()
 
 
+_HERE = Path(__file__).parent
 _JOBS: dict[str, Job] = {}
 """What is compiled beside this process, by name."""
 
 
-def compile_ahead(name: str, declarations: str) -> None:
-    """Begin to compile beside this process what :func:`module` finds then in the cache, unless that has it."""
-    full, code = _named(name, declarations)
+def compile_ahead(name: str, declarations: str, beside: Path = _HERE) -> None:
+    """Begin to compile in another process what :func:`module` finds then in the cache, unless that has it."""
+    full, code = _named(name, declarations, beside)
     if full not in _JOBS and _found(full) is None:
         _JOBS[full] = Job(lambda: _compile(full, code, declarations))
 
 
 @cache
-def module(name: str, declarations: str) -> Any:
-    """The compiled module of ``name.c`` beside this file, with ``lib`` and ``ffi`` of cffi.
+def module(name: str, declarations: str, beside: Path = _HERE) -> Any:
+    """The compiled module of ``name.c`` in the folder ``beside``, with ``lib`` and ``ffi`` of cffi.
 
     ``declarations`` are its functions in C.  Raises what the compiler raises.
     """
-    full, code = _named(name, declarations)
+    full, code = _named(name, declarations, beside)
     if full in _JOBS:
         _JOBS.pop(full).wait()
     found = _found(full) or _compile(full, code, declarations)
@@ -60,9 +61,9 @@ def module(name: str, declarations: str) -> Any:
     return out
 
 
-def _named(name: str, declarations: str) -> tuple[str, str]:
+def _named(name: str, declarations: str, beside: Path) -> tuple[str, str]:
     """Name in the cache, which tells all that the compiled code depends on, and the code of ``name.c``."""
-    code = (Path(__file__).parent / f"{name}.c").read_text()
+    code = (beside / f"{name}.c").read_text()
     key = hashlib.sha1("\n".join([code, declarations, *FLAGS, sys.version, _processor()]).encode()).hexdigest()[:16]
     return f"rodfem_{name}_{key}", code
 

@@ -1,6 +1,8 @@
-"""Conversion of matrices of a rank's own unknowns to PETSc and back."""
+"""Conversion of matrices of a rank's own unknowns to PETSc and back, and PETSc matrices whose values numpy has, too."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,3 +40,37 @@ def local_rows(matrix: PETSc.Mat) -> sp.csr_matrix:
 def gathered(matrix: PETSc.Mat) -> sp.csr_matrix:
     """All of a matrix on every rank."""
     return sp.vstack(matrix.comm.tompi4py().allgather(local_rows(matrix))).tocsr()
+
+
+@dataclass(frozen=True)
+class Shared:
+    """Values of a PETSc matrix on one rank that are an array of numpy as well, and its pattern."""
+
+    values: np.ndarray
+    pattern: sp.csr_matrix
+
+    @property
+    def matrix(self) -> sp.csr_matrix:
+        """The matrix, with the values that it has now."""
+        return sp.csr_matrix((self.values, self.pattern.indices, self.pattern.indptr), shape=self.pattern.shape)
+
+
+def shared_matrix(comm: MPI.Comm, pattern: sp.csr_matrix) -> PETSc.Mat:
+    """Zero matrix on the one rank of ``comm`` with a ``pattern``, whose indices are sorted; see :func:`shared`."""
+    values = np.zeros(pattern.nnz)
+    index = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
+    matrix = PETSc.Mat().createAIJWithArrays(pattern.shape, (*index, values), comm=comm)
+    matrix.setAttr("shared", Shared(values, pattern))
+    return matrix
+
+
+def shared(matrix: PETSc.Mat) -> Shared | None:
+    """What a matrix shares with numpy; None for one that :func:`shared_matrix` did not make, copies among them."""
+    found: Shared | None = matrix.getAttr("shared")
+    return found
+
+
+def values_of(matrix: PETSc.Mat) -> np.ndarray:
+    """Real parts of the values of this rank's rows, not to be written to."""
+    found = shared(matrix)
+    return np.ascontiguousarray(matrix.getValuesCSR()[2].real) if found is None else found.values

@@ -22,6 +22,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors
+from rodfem.linalg.matrices import local_rows
 from rodfem.linalg.orthogonal import combine, generic, orthonormalize
 from rodfem.linalg.selection import factors_of
 from rodfem.tolerances import TINY
@@ -84,6 +85,7 @@ class Inertia:
         if system.has_scalars:  # the load is no part of a perturbation
             self.metric.setValue(system.load_index, system.load_index, 0.0)
         self.metric.assemble()
+        self._weights = local_rows(self.metric) if system.comm.size == 1 else None
         self.factors = inertia_factors(system.comm, system.fields.unknowns, system.fields.dense_rows)
         self.constraints = system.fields.constraints()
         self.scale = system.stiffness_scale
@@ -140,6 +142,20 @@ class Inertia:
         found = self.at(x)
         found.count()
         return found.nearest(number, accuracy)[1]
+
+    def weighed(self, own: np.ndarray) -> np.ndarray:
+        """Metric times vectors, the columns of ``own`` (own rows, count)."""
+        if self._weights is not None:
+            return np.asarray(self._weights @ own)
+        vector, out = self.system.new_vector(), np.empty_like(own)
+        for i in range(own.shape[1]):
+            vector.array[:] = own[:, i]
+            out[:, i] = (self.metric * vector).array_r.real
+        return out
+
+    def sum(self, own: np.ndarray) -> np.ndarray:
+        """Sum over the ranks."""
+        return own if self.system.comm.size == 1 else np.asarray(self.system.comm.allreduce(own, op=MPI.SUM))
 
     def seed(self, i: int) -> PETSc.Vec:
         """Generic vector: components along all unknowns of fields, none along scalars."""

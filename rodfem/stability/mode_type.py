@@ -31,11 +31,8 @@ def squares(system: System, turned: np.ndarray, columns: np.ndarray) -> np.ndarr
     f = system.fields
     cells = slice(0, f.owned_cells)
     size = (f.vertices[cells, 1] - f.vertices[cells, 0])[:, None, None]
-    vector, change = system.new_vector(), []
-    for column in columns.T:
-        vector.array[:] = column
-        change.append(system.change(vector).turned[cells])
-    q, dq = f.turning.quaternion(turned[cells]), f.turning.change(turned[cells], np.array(change))
+    change = system.changes(columns)[:, f.dofs[f.turning.name][cells]]
+    q, dq = f.turning.quaternion(turned[cells]), f.turning.change(turned[cells], change)
     scalar, v, dv = q[..., :1], q[..., 1:], dq[..., 1:]
     across = v[..., [1, 2, 0]] * dv[..., [2, 0, 1]] - v[..., [2, 0, 1]] * dv[..., [1, 2, 0]]  # v x dv
     w = scalar * dv - dq[..., :1] * v - across

@@ -67,6 +67,8 @@ ALIKE = 1e-6
 NEAR_ZERO = 1e-2
 """Share of the farthest eigenvalue below which differences of others are relative to this share."""
 EPS = float(np.finfo(float).eps)
+SPARE = 2
+"""Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,7 @@ class NonsymmetricSolver(PencilMatrices):
         """Allocate the matrices of the pencil once."""
         super().__init__(system)
         self.copies: list[Copy] = []
+        self.inverted: tuple[PETSc.Mat, Factors] | None = None
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
 
     def at(self, x: PETSc.Vec) -> NonsymmetricPencil:
@@ -202,7 +205,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
                 found = self._shifted(number, target, matrix, mass)
             else:
                 found = self._doubled(number, target, matrix, mass)
-            found = sorted(found, key=lambda p: abs(p.value - target))[: number + 2]
+            found = sorted(found, key=lambda p: abs(p.value - target))[: number + SPARE]
             third = abs(found[min(2, len(found) - 1)].value - target)
             found = [p for p in found if abs(p.value - target) <= FAR * third]
             for pair in found:
@@ -290,8 +293,8 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         """Solve with a shift that this PETSc's numbers can express."""
         solver = self._solve(matrix, mass, number, target if compat.COMPLEX else target.real)
         re, im = matrix.createVecRight(), matrix.createVecRight()
-        out = []
-        for i in range(solver.getConverged()):
+        values, out = [solver.getEigenvalue(i) for i in range(solver.getConverged())], []
+        for i in sorted(range(len(values)), key=lambda i: abs(values[i] - target))[: number + SPARE]:
             value = solver.getEigenpair(i, re, im)
             parts = character.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
             error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
@@ -366,13 +369,17 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         doubled = rows > self.matrix.size[0]
         if doubled and not is_cut(comm, rows):
             return None
-        shifted = matrix.copy()
-        shifted.axpy(-target, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        dense_rows = self.system.fields.dense_rows
+        dense_rows, kept = self.system.fields.dense_rows, self._shared.inverted
+        factors: Factors
         if doubled:
-            factors: Factors = SubstructuredFactors(dense_rows, Mumps("lu", {8: 0}, prefix=FACTORS))
+            shifted, factors = matrix.copy(), SubstructuredFactors(dense_rows, Mumps("lu", {8: 0}, prefix=FACTORS))
+        elif kept is None:
+            shifted, factors = matrix.copy(), factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=FACTORS)
+            self._shared.inverted = shifted, factors
         else:
-            factors = factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=FACTORS)
+            shifted, factors = kept
+            matrix.copy(shifted, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        shifted.axpy(-target, mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         factors(shifted)
         if not factors.regular:
             raise ConvergenceError(_singular(target))

@@ -101,9 +101,9 @@ def symmetry_modes(system: System, x: PETSc.Vec) -> dict[int, PETSc.Vec]:
     system.set_phase(x)
     if not system.phase.count:
         return {}
-    state = system.at(x)
-    generators = [state.generator(i) for i in range(len(system.drifts))]
-    return {system.drifts[i]: combine(generators, weights) for i, weights in system.phase.broken.items()}
+    generators = system.generators.at(system.at(x))
+    broken = system.phase.broken.items()
+    return {system.drifts[i]: system.generators.vector(weights @ generators) for i, weights in broken}
 
 
 def weighed_modes(

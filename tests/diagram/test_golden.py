@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from every_row import disagreements
 from golden_cases import cases, record
 
 pytestmark = [pytest.mark.alone, pytest.mark.versions]
@@ -32,3 +33,11 @@ def test_nothing_has_changed(name: str) -> None:
             allowed = max(t["bar"], 1e-10 * max(1.0, abs(t["load"])))
             assert s["load"] == pytest.approx(t["load"], abs=allowed, rel=0), branch["name"]
             assert s.get("omega2") == (pytest.approx(t["omega2"], rel=1e-8) if "omega2" in t else None)
+
+
+@pytest.mark.parametrize("name", ["demo hemitropic", "demo cord", "demo ruler", "demo ring"])
+def test_index_of_every_row(name: str) -> None:
+    """By three other methods; ``python -m tests.every_row`` does the same for all conservative scenes."""
+    rows, wrong = disagreements(name)
+    assert rows > 50
+    assert not wrong

@@ -280,7 +280,8 @@ def quadratic_forms(name: str, formulation: str, load: float, elements: int, deg
             for i, force in enumerate(f.forces):
                 z.setValue(f.scalars[f"n{force + 1}"], w.x.array[f.copies[0, i]])
         z.assemble()
-        found.append([float(z.dot(blocks.matrix * z)), state.integral(form)])
+        by_form = system.comm.allreduce(state.evaluate(lambda: fem.assemble_scalar(form)))
+        found.append([float(z.dot(blocks.matrix * z)), by_form])
     return np.array(found)
 
 

@@ -1,0 +1,66 @@
+"""Derivative in arclength of the nodal values of all fields on a mesh, as sparse matrices."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from rodfem import compat
+
+if TYPE_CHECKING:
+    from rodfem.fem.fields import Fields
+    from rodfem.problem.contribution import Block
+
+
+class Arclength:
+    """Derivatives of states on the cells of one :class:`~rodfem.fem.fields.Fields`.
+
+    Attributes
+    ----------
+    derivative
+        Matrix (local size, local size) of the derivative at nodes, the mean of the cells that share one; zero for
+        scalars and at clamped degrees of freedom.
+    jumps
+        Matrix (shared nodes, local size) of its jumps between cells, of rotation and centreline.
+    """
+
+    def __init__(self, fields: Fields) -> None:
+        """Make the matrices."""
+        size = len(fields.number)
+        mean, jumps = sp.csr_matrix((size, size)), [sp.csr_matrix((0, size))]
+        for block in fields.blocks:
+            slopes, dofs = _slopes(fields, block), fields.dofs[block.name].ravel()
+            sums = sp.csr_matrix((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(size, len(dofs)))
+            shared = np.maximum(np.asarray(sums.sum(axis=1)).ravel(), 1.0)
+            mean += sp.diags(np.where(fields.number < 0, 0.0, 1.0 / shared)) @ sums @ slopes
+            if block.name in (fields.turning.name, "r"):
+                order = np.argsort(dofs, kind="stable")
+                twins = np.flatnonzero(np.diff(dofs[order]) == 0)
+                jumps.append(slopes[order[twins + 1]] - slopes[order[twins]])
+        self.derivative, self.jumps = mean.tocsr(), sp.vstack(jumps).tocsr()
+
+
+def _slopes(fields: Fields, block: Block) -> sp.csr_matrix:
+    """Derivative of a field at the nodes of each cell, in the order of the flattened ``fields.dofs``."""
+    dofs, ends = fields.dofs[block.name], fields.vertices
+    cells, nodes, components = dofs.shape
+    weights = differentiation(block.degree) / (ends[:, 1] - ends[:, 0])[:, None, None]
+    shape = (cells, nodes, components, nodes)
+    rows = np.broadcast_to(np.arange(dofs.size).reshape(cells, nodes, components, 1), shape)
+    columns = np.broadcast_to(dofs.transpose(0, 2, 1)[:, None], shape)
+    values = np.broadcast_to(weights[:, :, None, :], shape)
+    where = (rows.ravel(), columns.ravel())
+    return sp.csr_matrix((values.ravel(), where), shape=(dofs.size, len(fields.number)))
+
+
+@cache
+def differentiation(degree: int) -> np.ndarray:
+    """Matrix of the derivative of the polynomial through values at the nodes of an element, at the nodes: (m, m)."""
+    nodes = compat.nodes(degree)
+    powers = np.vander(2 * nodes - 1, increasing=True)
+    slopes = np.zeros_like(powers)
+    slopes[:, 1:] = 2 * powers[:, :-1] * np.arange(1, len(nodes))
+    return np.asarray(slopes @ np.linalg.inv(powers))

@@ -1,0 +1,107 @@
+/* Assembly of the element tensors of a form, by the kernels that FFCx compiled for it.
+
+   A form is a sum of integrals over cells, exterior and interior facets (points, on an interval).  Its kernel computes
+   the tensor of one entity from the values of the coefficient in the cell (or, of an interior facet, in both cells), the
+   constants and the coordinates.  A scalar is summed; a vector is added where the degrees of freedom of the cell are; a
+   matrix is added to the values of a compressed sparse row matrix that couples all degrees of freedom within cells.  In
+   such a matrix rows with the same pattern have the same offsets: entry (i, j) of a cell is at row[i] + column[kind[i]][j].
+
+   The interface of the kernels is ufcx.h of FFCx.  */
+
+#include <stdint.h>
+#include <string.h>
+
+typedef void kernel(double *, const double *, const double *, const double *, const int *, const uint8_t *);
+typedef void custom_kernel(double *, const double *, const double *, const double *, const int *, const uint8_t *, void *);
+
+typedef struct {
+    uintptr_t kernel;
+    int custom;          /* whether it takes a seventh argument */
+    int kind;            /* numbers of an entity: cell; cell and facet; cell and facet on both sides */
+    int count;
+    const int *entities;
+} Integral;
+
+typedef struct {
+    int rank, size;      /* of its tensor; degrees of freedom of a cell */
+    int integrals;
+    const Integral *integral;
+    const double *x;     /* coordinates, cells x 2 x 3 */
+    const int *dofs;     /* cells x size */
+    double *tensor, *w;  /* room: (2 size)^rank, 2 size */
+} Form;
+
+typedef struct {
+    int kinds;
+    const int *row;      /* cells x size: where the row begins among the values, or the place in a vector; -1: left out */
+    const int *kind;     /* cells x size: which pattern the row has */
+    const int *column;   /* cells x kinds x size: offset of the column in rows of that pattern; -1: not there */
+} Places;
+
+/* Add the form for the values u to out.  Returns 1 where an interior facet couples more than the cell of its first side,
+   which no place is for.  */
+int assemble(const Form *form, const Places *places, const double *u, const double *constants, double *out)
+{
+    const uint8_t permutations[2] = {0, 0};
+    int n = form->size;
+    double coordinates[12];
+    for (int k = 0; k < form->integrals; k++) {
+        const Integral *integral = &form->integral[k];
+        int sides = integral->kind == 4 ? 2 : 1, m = sides * n;
+        size_t entries = form->rank == 0 ? 1 : form->rank == 1 ? (size_t)m : (size_t)m * m;
+        for (int e = 0; e < integral->count; e++) {
+            const int *entity = integral->entities + (size_t)e * integral->kind;
+            int facets[2] = {integral->kind > 1 ? entity[1] : 0, integral->kind == 4 ? entity[3] : 0};
+            for (int side = 0; side < sides; side++) {
+                int cell = entity[2 * side];
+                const int *dofs = form->dofs + (size_t)cell * n;
+                for (int i = 0; i < n; i++) form->w[side * n + i] = u[dofs[i]];
+                memcpy(coordinates + 6 * side, form->x + (size_t)cell * 6, 6 * sizeof(double));
+            }
+            double *a = form->tensor;
+            memset(a, 0, entries * sizeof(double));
+            if (integral->custom)
+                ((custom_kernel *)integral->kernel)(a, form->w, constants, coordinates, facets, permutations, NULL);
+            else
+                ((kernel *)integral->kernel)(a, form->w, constants, coordinates, facets, permutations);
+            if (form->rank == 0) { out[0] += a[0]; continue; }
+            size_t cell = entity[0];
+            const int *row = places->row + cell * n;
+            for (size_t i = n; sides == 2 && i < entries; i++)
+                if (a[i] != 0 && (form->rank == 1 || i / m >= (size_t)n || i % m >= (size_t)n)) return 1;
+            if (form->rank == 1) {
+                for (int i = 0; i < n; i++) if (row[i] >= 0) out[row[i]] += a[i];
+                continue;
+            }
+            const int *kind = places->kind + cell * n, *column = places->column + cell * places->kinds * n;
+            for (int i = 0; i < n; i++) {
+                if (row[i] < 0) continue;
+                const int *offset = column + (size_t)kind[i] * n;
+                const double *from = a + (size_t)i * m;
+                double *to = out + row[i];
+                for (int j = 0; j < n; j++) if (offset[j] >= 0) to[offset[j]] += from[j];
+            }
+        }
+    }
+    return 0;
+}
+
+/* Offsets of columns in the rows of a compressed sparse row matrix with sorted indices: for each of `cells` cells and
+   each of `kinds` rows, of which -1 is none, of `size` columns, of which -1 is none.  */
+void offsets(int cells, int kinds, int size, const int *rows, const int *columns, const int *starts, const int *indices,
+             int *out)
+{
+    for (int cell = 0; cell < cells; cell++)
+        for (int kind = 0; kind < kinds; kind++, rows++)
+            for (int j = 0; j < size; j++, out++) {
+                int wanted = columns[(size_t)cell * size + j];
+                *out = -1;
+                if (*rows < 0 || wanted < 0) continue;
+                int low = starts[*rows], high = starts[*rows + 1];
+                while (low < high) {
+                    int middle = low + (high - low) / 2;
+                    if (indices[middle] < wanted) low = middle + 1; else high = middle;
+                }
+                if (low < starts[*rows + 1] && indices[low] == wanted) *out = low - starts[*rows];
+            }
+}

@@ -1,0 +1,139 @@
+"""Assembly on one rank: element tensors by FFCx's kernels, added up by compiled code (``assembly.c``).
+
+dolfinx looks up the place of each entry in the matrix anew, and packs constants and coefficients, at every call.  A rod
+is assembled thousands of times with one mesh: here all places are known beforehand.  Several ranks assemble vectors in
+the same way, and matrices by dolfinx.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from rodfem import compat
+from rodfem.linalg.compiled import module
+
+if TYPE_CHECKING:
+    from rodfem.fem.fields import Fields
+
+DECLARATIONS = """
+typedef struct { uintptr_t kernel; int custom; int kind; int count; const int *entities; } Integral;
+typedef struct {
+    int rank, size; int integrals; const Integral *integral; const double *x; const int *dofs; double *tensor, *w;
+} Form;
+typedef struct { int kinds; const int *row; const int *kind; const int *column; } Places;
+int assemble(const Form *form, const Places *places, const double *u, const double *constants, double *out);
+void offsets(int cells, int kinds, int size, const int *rows, const int *columns, const int *starts, const int *indices,
+             int *out);
+"""
+
+KERNEL_ARGUMENTS = 6
+"""Number of arguments of a kernel of FFCx; since release 0.10 it takes custom data as well."""
+
+
+def _code() -> Any:
+    return module("assembly", DECLARATIONS, Path(__file__).parent)
+
+
+class Places:
+    """Where the entries of element tensors are in a vector, or among the values of a sparse matrix; -1 for none."""
+
+    def __init__(self, rows: np.ndarray, kinds: np.ndarray | None = None, columns: np.ndarray | None = None) -> None:
+        """Keep what :func:`vector_places` and :func:`matrix_places` found."""
+        ffi = _code().ffi
+        self._kept = [np.ascontiguousarray(x, dtype=np.int32) for x in (rows, kinds, columns) if x is not None]
+        given = [ffi.from_buffer("int[]", x) for x in self._kept] + [ffi.NULL] * (3 - len(self._kept))
+        self._kept.extend(given)
+        self.pointer = ffi.new("Places *", [0 if columns is None else columns.shape[1], *given])
+
+
+def vector_places(dofs: np.ndarray, targets: np.ndarray) -> Places:
+    """Places of a vector: ``targets`` (local size,) of the degrees of freedom ``dofs`` (cells, n) of each cell."""
+    return Places(targets[dofs])
+
+
+def matrix_places(dofs: np.ndarray, rows: np.ndarray, columns: np.ndarray, pattern: sp.csr_matrix) -> Places:
+    """Places of a matrix with a ``pattern``, whose indices are sorted.
+
+    ``rows`` and ``columns`` (local size,) are the numbers of its rows and columns at the degrees of freedom, -1 for
+    none; ``dofs`` (cells, n) are those of each cell.  Entries that the pattern does not have are left out: they are 0.
+    """
+    code = _code()
+    row, free = rows[dofs], rows[dofs] >= 0
+    # rows with the same pattern have the same sum of random numbers, which differ
+    sums = np.where(free, (pattern @ np.random.default_rng(1).random(pattern.shape[1]))[row], -1.0)
+    order = np.argsort(sums, axis=1)
+    changes = np.diff(np.take_along_axis(sums, order, axis=1), axis=1, prepend=-2.0) != 0
+    ranked = np.cumsum(changes, axis=1) - 1
+    kinds = np.empty_like(ranked)
+    np.put_along_axis(kinds, order, ranked, axis=1)
+    of_kind = np.full((len(dofs), int(ranked.max(initial=0)) + 1), -1, dtype=np.int32)
+    np.put_along_axis(of_kind, kinds, row, axis=1)
+    found = np.empty((*of_kind.shape, dofs.shape[1]), dtype=np.int32)
+    given = (np.ascontiguousarray(x, dtype=np.int32) for x in (of_kind, columns[dofs], pattern.indptr, pattern.indices))
+    arrays = [code.ffi.from_buffer("int[]", x) for x in (*given, found)]
+    code.lib.offsets(*found.shape, *arrays)
+    return Places(np.where(free, pattern.indptr[row], -1), kinds, found)
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cells of a mesh: coordinates of their vertices (cells, 2, 3), and local degrees of freedom (cells, n)."""
+
+    x: np.ndarray
+    dofs: np.ndarray
+
+    @classmethod
+    def of(cls, fields: Fields) -> Cells:
+        """Those of ``fields`` on this rank, ghosts last."""
+        count = len(fields.vertices)
+        return cls(
+            np.ascontiguousarray(compat.cell_coordinates(fields.mesh, count), dtype=float),
+            np.ascontiguousarray(compat.cell_dofs(fields.space, count), dtype=np.int32),
+        )
+
+
+class Assembler:
+    """A compiled ``form`` whose coefficient, where it has one, is the unknown; on the cells of this rank."""
+
+    def __init__(self, form: Any, cells: Cells) -> None:
+        """Take the kernels of a dolfinx form."""
+        self.form, self._code = form, _code()
+        ffi, size = self._code.ffi, cells.dofs.shape[1]
+        integrals = compat.integrals(form)
+        self._kept: list[Any] = [cells.x, cells.dofs, *(x.entities for x in integrals)]
+        self._integrals = ffi.new("Integral[]", len(integrals))
+        for c, x in zip(self._integrals, integrals, strict=True):
+            c.kernel, c.custom = int(ffi.cast("uintptr_t", x.kernel)), len(ffi.typeof(x.kernel).args) > KERNEL_ARGUMENTS
+            c.kind, c.count, c.entities = x.kind, len(x.entities), self._pointer(x.entities, "int")
+        sides = 1 + any(x.kind == compat.INTERIOR for x in integrals)
+        room = (np.zeros((sides * size) ** form.rank), np.zeros(sides * size))
+        given = [self._pointer(x, kind) for x, kind in ((cells.x, "double"), (cells.dofs, "int"))]
+        spare = [self._pointer(x, "double") for x in room]
+        self._form = ffi.new("Form *", [form.rank, size, len(integrals), self._integrals, *given, *spare])
+        self._constants: np.ndarray | None = None
+
+    def _pointer(self, array: np.ndarray, kind: str) -> Any:
+        found = self._code.ffi.from_buffer(f"{kind}[]", array)
+        self._kept.append(found)
+        return found
+
+    def pack_constants(self) -> None:
+        """Take the values that the constants of the form have now."""
+        self._constants = np.ascontiguousarray(compat.pack_constants(self.form), dtype=float)
+
+    def add(self, values: np.ndarray, places: Places | None, out: np.ndarray) -> None:
+        """Add the form at the local ``values`` of the unknown to ``out``, where ``places`` say (None: a scalar)."""
+        ffi = self._code.ffi
+        failed = self._code.lib.assemble(
+            self._form,
+            ffi.NULL if places is None else places.pointer,
+            ffi.from_buffer("double[]", values),
+            ffi.from_buffer("double[]", self._constants),
+            ffi.from_buffer("double[]", out),
+        )
+        assert not failed, "A term at a point inside the rod must be evaluated in one of the two cells there."

@@ -1,0 +1,73 @@
+"""Generators ``g(x) = A x + c`` of all symmetries of a scene at a state, by one sparse matrix."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rodfem.fem.fields import LOAD
+from rodfem.fem.values import NodalValues
+
+if TYPE_CHECKING:
+    from rodfem.fem.parameters import Line
+    from rodfem.fem.state import State
+    from rodfem.fem.system import System
+
+
+class Generators:
+    """Changes of states of one :class:`~rodfem.fem.system.System` by its symmetries, in the order of those."""
+
+    def __init__(self, system: System) -> None:
+        """Make the matrices."""
+        fields = system.fields
+        self.system, self.count = system, len(system.symmetries)
+        scalars = fields.copies[0] if system.has_scalars else np.zeros(0, int)
+        self._rows, self._columns = np.concatenate([fields.free_owned, scalars]), np.flatnonzero(fields.number >= 0)
+        every = [symmetry.linear(fields) for symmetry in system.symmetries]
+        none = sp.csr_matrix((0, len(self._columns)))
+        self._forth = sp.vstack([none, *(A[self._rows][:, self._columns] for A in every)]).tocsr()
+        self._back = sp.vstack([none, *(A.T.tocsr()[self._rows][:, self._columns] for A in every)]).tocsr()
+        self._line: Line | None = None
+
+    def _constant(self, state: State) -> np.ndarray:
+        """``c`` of all generators: with ends that are held, and forces that are known, they vary with the load."""
+        system, line = self.system, state.line
+        if line is not self._line:
+            low, high = system.scene.span
+            found = [self._constant_at(line, load) for load in (low, 0.62 * low + 0.38 * high, high)]
+            varies = any(np.any(c != found[0]) for c in found)
+            self._varies = bool(system.comm.allreduce(varies, op=MPI.LOR))
+            self._line, self._fixed = line, found[0]
+        return self._constant_at(line, state.load) if self._varies else self._fixed
+
+    def _constant_at(self, line: Line, load: float) -> np.ndarray:
+        fields = self.system.fields
+        at_load = NodalValues(fields, fields.filled({LOAD: load}), line)
+        return np.array([symmetry.change(at_load)[self._rows] for symmetry in self.system.symmetries])
+
+    def at(self, state: State) -> np.ndarray:
+        """All generators at a state, (count, own rows): see :meth:`vector`."""
+        if not self.count:
+            return np.zeros((0, len(self._rows)))
+        return (self._forth @ state.local[self._columns]).reshape(self.count, -1) + self._constant(state)
+
+    def linear(self, d: PETSc.Vec) -> np.ndarray:
+        """``A d`` of all generators for a change of state, (count, own rows)."""
+        return np.asarray(self._forth @ self._gathered(d)).reshape(self.count, -1)
+
+    def pulled_back(self, covector: PETSc.Vec) -> np.ndarray:
+        """``A^t y`` of all generators, (count, own rows)."""
+        return np.asarray(self._back @ self._gathered(covector)).reshape(self.count, -1)
+
+    def _gathered(self, vector: PETSc.Vec) -> np.ndarray:
+        return self.system.gathered(vector)[: len(self._columns)]
+
+    def vector(self, own: np.ndarray) -> PETSc.Vec:
+        """Vector of the system with these own rows, without component along drifts."""
+        out = self.system.new_vector()
+        out.array[: len(own)] = own
+        return out
