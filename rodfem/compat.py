@@ -321,7 +321,7 @@ def integrals(form: Any) -> list[Integral]:
             kernels = [compiled.integrals(place)[i] for i in range(compiled.num_integrals(place))]
         if not kernels:
             continue
-        of_kind = next(t for t in cpp.integral_types if int(t) == place)
+        of_kind = (fem.IntegralType.cell, fem.IntegralType.exterior_facet, fem.IntegralType.interior_facet)[place]
         for kernel, name in zip(kernels, cpp.integral_ids(of_kind), strict=True):
             entities = np.ascontiguousarray(cpp.domains(of_kind, name), dtype=np.int32).reshape(-1, kind)
             found.append(Integral(kernel.tabulate_tensor_float64, kind, entities))
@@ -330,7 +330,7 @@ def integrals(form: Any) -> list[Integral]:
 
 def pack_constants(form: Any) -> np.ndarray:
     """Values of the constants of a compiled form, one after the other."""
-    return np.asarray(dolfinx.fem.assemble.pack_constants(form))
+    return np.asarray(dolfinx.cpp.fem.pack_constants(getattr(form, "_cpp_object", form)))
 
 
 @contextmanager
