@@ -17,7 +17,7 @@ import rodfem
 HOME = Path(__file__).parents[2]
 HEAVY = ("dolfinx", "matplotlib", "mpi4py", "petsc4py", "slepc4py", "pyvista")
 UNUSED = (
-    *("pkg_resources", "setuptools", "ffcx.compiler", "matplotlib", "pyvista", "jinja2", "unittest"),
+    *("pkg_resources", "setuptools", "ffcx.compiler", "matplotlib", "pyvista", "jinja2"),
     *("scipy.optimize", "scipy.interpolate", "scipy.spatial", "scipy.integrate"),
 )
 """Modules that a run without pictures does not need, each a part of the time that a person waits for it."""
