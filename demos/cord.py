@@ -18,7 +18,7 @@ from argparse import Namespace
 from math import ceil, isfinite, pi
 
 import rodfem.app.cli as cli
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem.problem.ends import clamped, sliding
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 
@@ -27,7 +27,7 @@ def scene(options: Namespace) -> Scene:
     """State the problem: what the rod is made of, how its ends are held, and what to look at."""
 
     def energy(v, k, c):
-        return bending((k[0], k[1] - c.k0, k[2]), (1.0, 1.0, 1.0))
+        return bending_and_twist((k[0], k[1] - c.k0, k[2]), (1.0, 1.0, 1.0))
 
     return Scene(
         name="cord",

@@ -18,7 +18,7 @@ from argparse import Namespace
 from math import hypot, inf
 
 import rodfem.app.cli as cli
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem.errors import InputError
 from rodfem.problem.ends import clamped, free
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
@@ -32,7 +32,7 @@ def scene(options: Namespace) -> Scene:
         raise InputError(f"A rotary inertia of {min(j1, j2, j3):g} is negative: give zero or more.")
 
     def energy(v, k, c):
-        return bending(k, (c.B1, c.B2, c.B3))
+        return bending_and_twist(k, (c.B1, c.B2, c.B3))
 
     return Scene(
         name="follower",

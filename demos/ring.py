@@ -21,7 +21,7 @@ from math import inf, pi
 import numpy as np
 
 import rodfem.app.cli as cli
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem.problem.ends import Ring
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 
@@ -40,7 +40,7 @@ def scene(options: Namespace) -> Scene:
         title="Michell's ring",
         interval=(0.0, 2 * pi),
         rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending((k[0], k[1], k[2] - c.t0), (1.0, 1.0, c.C)),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t0), (1.0, 1.0, c.C)),
         parameters={"t0": Parameter(0.0, "t_0"), "C": Parameter(options.twisting, admissible=(0.0, inf))},
         load="t0",
         ends=Ring(),

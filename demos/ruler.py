@@ -18,7 +18,7 @@ Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section
 from argparse import Namespace
 
 import rodfem.app.cli as cli
-from forms.energy import bending, logarithmic_stretch
+from forms.energy import bending_and_twist, logarithmic_stretch
 from rodfem.errors import InputError
 from rodfem.problem.ends import clamped, free
 from rodfem.problem.scene import Ordinate, Parameter, Scene
@@ -33,7 +33,7 @@ def scene(options: Namespace) -> Scene:
     x, y = DIRECTIONS[options.direction]
 
     def energy(v, k, c):
-        return logarithmic_stretch(v, c.E) + bending(k, (c.B1, c.B2, c.B3))
+        return logarithmic_stretch(v, c.E) + bending_and_twist(k, (c.B1, c.B2, c.B3))
 
     return Scene(
         name="ruler",

@@ -12,12 +12,12 @@ import ufl
 from ufl.core.expr import Expr
 
 
-def bending(k: Expr, stiffness: tuple[Expr, Expr, Expr]) -> Expr:
+def bending_and_twist(k: Expr, stiffness: tuple[Expr, Expr, Expr]) -> Expr:
     """Quadratic energy of bending and twist, ``1/2 (B1 k1^2 + B2 k2^2 + C k3^2)``.
 
     ``k`` has shape (3,): bending about ``d1`` and ``d2``, then twist.  ``stiffness = (B1, B2, C)`` are the two bending
     stiffnesses and the torsional one, force times length squared.  A natural curvature or twist is subtracted first:
-    ``bending((k[0], k[1], k[2] - c.t0), stiffness)``.
+    ``bending_and_twist((k[0], k[1], k[2] - c.t0), stiffness)``.
     """
     return sum(0.5 * b * k[i] ** 2 for i, b in enumerate(stiffness))
 

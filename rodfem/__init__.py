@@ -4,14 +4,14 @@ A person states a :class:`Scene` and calls :func:`run`, which traces the equilib
 finds and classifies the points where it is lost, follows what branches off, and writes files and pictures::
 
     from math import hypot
-    from forms.energy import bending
+    from forms.energy import bending_and_twist
     from rodfem import Ordinate, Parameter, Scene, clamped, free, run
 
     column = Scene(
         name="column",
         interval=(0.0, 1.0),
         rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending(k, (c.EI, 2 * c.EI, 1.0)),
+        energy=lambda v, k, c: bending_and_twist(k, (c.EI, 2 * c.EI, 1.0)),
         parameters={"P": Parameter(0.0), "EI": Parameter(1.0)},
         load="P",
         ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),

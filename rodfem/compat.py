@@ -314,14 +314,15 @@ class Integral(NamedTuple):
 def integrals(form: Any) -> list[Integral]:
     """Integrals of a compiled form, over the cells and facets of this rank."""
     found, compiled, cpp = [], form.ufcx_form, getattr(form, "_cpp_object", form)
-    for place, kind in enumerate(KINDS):
+    kinds = dolfinx.cpp.fem.IntegralType
+    types = (kinds.cell, kinds.exterior_facet, kinds.interior_facet)  # in the order of ufcx.h
+    for place, (of_kind, kind) in enumerate(zip(types, KINDS, strict=True)):
         if hasattr(compiled, "form_integral_offsets"):
             kernels = [compiled.form_integrals[i] for i in range(*compiled.form_integral_offsets[place : place + 2])]
         else:
             kernels = [compiled.integrals(place)[i] for i in range(compiled.num_integrals(place))]
         if not kernels:
             continue
-        of_kind = (fem.IntegralType.cell, fem.IntegralType.exterior_facet, fem.IntegralType.interior_facet)[place]
         for kernel, name in zip(kernels, cpp.integral_ids(of_kind), strict=True):
             entities = np.ascontiguousarray(cpp.domains(of_kind, name), dtype=np.int32).reshape(-1, kind)
             found.append(Integral(kernel.tabulate_tensor_float64, kind, entities))

@@ -6,11 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
 
+WORK = ("assembly", "solve", "stability")
+"""What a point of a branch costs."""
+
 
 class Clock:
     """Accumulates wall time by name; nested measurements are charged to the innermost name.
 
-    Inside :meth:`purpose` everything is charged to that purpose instead: what locating special points costs, say,
+    Inside :meth:`scope` everything is charged to that name instead: what locating special points costs, say,
     is kept apart from what the points of a branch cost.
     """
 
@@ -19,7 +22,7 @@ class Clock:
         self.seconds: dict[str, float] = {}
         self.started = perf_counter()
         self._running: list[str] = []
-        self._purpose = self._next = ""
+        self._scope = self._next = ""
         self._mark = self.started
 
     def _charge(self) -> None:
@@ -37,7 +40,7 @@ class Clock:
     def __enter__(self) -> None:
         """Begin a block."""
         self._charge()
-        self._running.append(self._purpose or self._next)
+        self._running.append(self._scope or self._next)
 
     def __exit__(self, *trouble: object) -> None:
         """End a block, however it ends."""
@@ -45,14 +48,18 @@ class Clock:
         self._running.pop()
 
     @contextmanager
-    def purpose(self, name: str) -> Iterator[None]:
+    def scope(self, name: str) -> Iterator[None]:
         """Charge all of the block to ``name``."""
-        outer, self._purpose = self._purpose, self._purpose or name
+        outer, self._scope = self._scope, self._scope or name
         try:
             with self(name):
                 yield
         finally:
-            self._purpose = outer
+            self._scope = outer
+
+    def each(self, points: int) -> float:
+        """Milliseconds of :data:`WORK` for one of so many points."""
+        return 1e3 * sum(self.seconds.get(name, 0.0) for name in WORK) / max(points, 1)
 
     def total(self) -> float:
         """Seconds since the clock was made."""

@@ -7,7 +7,7 @@ of a pendulum), and shortens the rod by ``2 (1 - cos(ANGLE/2)) / sqrt(T)``; the 
 
 from math import cos, pi, sin
 
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem.problem.ends import clamped, sliding
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 
@@ -21,7 +21,7 @@ def scene(span: tuple[float, float] = (3.0, 6.0)) -> Scene:
         name="taut",
         interval=(0.0, 1.0),
         rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending(k, (1.0, 1.0, 1.0)),
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
         parameters={"lam": Parameter(span[0])},
         load="lam",
         ends=(

@@ -15,7 +15,7 @@ import ufl
 from rows import verify
 
 from forms import loads
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem import (
     Attachment,
     Constraint,
@@ -101,7 +101,7 @@ def column(name: str, ends: tuple[End, End], span: tuple[float, float], **more: 
     given: dict[str, Any] = {
         "interval": (0.0, 1.0),
         "rod": RIGID,
-        "energy": lambda v, k, c: bending(k, (c.B1, c.B2, c.C)),
+        "energy": lambda v, k, c: bending_and_twist(k, (c.B1, c.B2, c.C)),
         "load": "P",
         "ordinate": Ordinate("tip", s=1.0, of=lambda r, q: hypot(r[0], r[1])),
     }
@@ -138,7 +138,11 @@ def shearable(rod: str, GA: float, EA: float, constraints: tuple[Constraint, ...
     """Stiff sections that shear and stretch."""
 
     def energy(v: Any, k: Any, c: Any) -> Any:
-        return 0.5 * c.GA * (v[0] ** 2 + v[1] ** 2) + 0.5 * c.EA * (v[2] - 1) ** 2 + bending(k, (c.B1, c.B2, c.C))
+        return (
+            0.5 * c.GA * (v[0] ** 2 + v[1] ** 2)
+            + 0.5 * c.EA * (v[2] - 1) ** 2
+            + bending_and_twist(k, (c.B1, c.B2, c.C))
+        )
 
     return column(
         "shearable", SUPPORTS["clamped-free"], (0.0, 4.0), rod=rod, energy=energy, constraints=constraints,
@@ -185,7 +189,7 @@ def stepped(s: float) -> Scene:
 
     def energy(v: Any, k: Any, c: Any) -> Any:
         factor = ufl.conditional(ufl.lt(c.s, c.k), 2.0, 1.0)
-        return factor * bending(k, (c.B1, c.B2, c.C))
+        return factor * bending_and_twist(k, (c.B1, c.B2, c.C))
 
     return column(
         "stepped", SUPPORTS["clamped-free"], (0.0, 6.0), energy=energy, breaks=(s,), constants={"k": s}
@@ -251,7 +255,7 @@ def chain(planar: str | None) -> Scene:
     """A heavy cable of length 1 between supports 0.8 apart, that bends ever more easily."""
     return column(
         "chain", (pinned(), pinned(lambda c: (0.0, 0.0, 0.8))), (1e-2, 1e-5), load="k", planar=planar,
-        constants={"k": 1e-2}, energy=lambda v, k, c: bending(k, (c.k, c.k, c.k)),
+        constants={"k": 1e-2}, energy=lambda v, k, c: bending_and_twist(k, (c.k, c.k, c.k)),
         distributed=lambda c: (1.0, 0.0, 0.0), ordinate=Ordinate("sag", s=0.5, of=lambda r, q: r[0]),
     )  # fmt: skip
 
@@ -260,7 +264,7 @@ def softening() -> Scene:
     """A cantilever whose moment 1 k - k^3 has a largest value."""
     return column(
         "softening", (clamped(), free(lambda c: (0.0, c.P, 0.0))), (0.0, 3.0), planar="e1",
-        energy=lambda v, k, c: bending(k, (c.B1, c.B2, c.C)) - 0.25 * k[0] ** 4,
+        energy=lambda v, k, c: bending_and_twist(k, (c.B1, c.B2, c.C)) - 0.25 * k[0] ** 4,
     )  # fmt: skip
 
 
@@ -312,7 +316,7 @@ def ring() -> Scene:
     """A closed ring of intrinsic twist k."""
     return column(
         "ring", Ring(odd=True), (0.0, 2.2), load="k", constants={"B2": 1.0, "C": 1.5}, start=circle, **ROUND,
-        energy=lambda v, k, c: bending((k[0], k[1], k[2] - c.k), (c.B1, c.B2, c.C)),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.k), (c.B1, c.B2, c.C)),
     )  # fmt: skip
 
 
@@ -334,7 +338,7 @@ def arch(half: float, dead: bool) -> Scene:
     return column(
         "arch", (pinned(lambda c: (0.0, 0.0, -ufl.sin(c.k))), pinned(lambda c: (0.0, 0.0, ufl.sin(c.k)))),
         (0.0, 12.0), interval=(-half, half), start=circle, planar="e2", constants={"B2": 1.0, "k": half},
-        energy=lambda v, k, c: bending((k[0], k[1] - 1.0, k[2]), (c.B1, c.B2, c.C)), **load,
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (c.B1, c.B2, c.C)), **load,
         ordinate=Ordinate("crown", s=0.0, of=lambda r, q: float(r[0])),
     )  # fmt: skip
 
@@ -348,7 +352,7 @@ def deep_arch() -> Scene:
         (clamped(lambda c: (depth, 0.0, -foot), (cos(half / 2), 0.0, -sin(half / 2), 0.0)),
          pinned(lambda c: (depth, 0.0, foot))),
         (0.0, 12.0), interval=(-half, half), start=circle, planar="e2", constants={"B2": 1.0},
-        energy=lambda v, k, c: bending((k[0], k[1] - 1.0, k[2]), (c.B1, c.B2, c.C)),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (c.B1, c.B2, c.C)),
         attachments=(Attachment(0.0, force=lambda c: (c.P, 0.0, 0.0)),),
         ordinate=Ordinate("crown", s=0.0, of=lambda r, q: float(r[0])),
     )  # fmt: skip
@@ -361,7 +365,7 @@ def bathe() -> Scene:
 
     def energy(v: Any, k: Any, c: Any) -> Any:
         stretching = 0.5 * GA * (v[0] ** 2 + v[1] ** 2) + 0.5 * E * (v[2] - 1) ** 2
-        return stretching + bending((k[0], k[1] - 1 / radius, k[2]), (EI, EI, EI))
+        return stretching + bending_and_twist((k[0], k[1] - 1 / radius, k[2]), (EI, EI, EI))
 
     length = radius * pi / 4
     return column(
@@ -408,7 +412,7 @@ def spring(curvature: float, torsion: float) -> Scene:
         "helical spring", (hinged((1.0, 0.0, 0.0), lambda c: (None, 0.0, 0.0)), free(lambda c: (0.0, 0.0, c.F))),
         (0.0, 30.0), load="F", start=coil,
         constants={"F": 0.0, "B2": 1.0, "C": 0.8, "k": curvature, "t": torsion, "r": radius},
-        energy=lambda v, k, c: bending((k[0], k[1] - c.k, k[2] - c.t), (c.B1, c.B2, c.C)),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1] - c.k, k[2] - c.t), (c.B1, c.B2, c.C)),
         constraints=(at(1.0, lambda x, c: x.d1[2]), at(1.0, lambda x, c: x.r[0] * x.d1[1] - x.r[1] * x.d1[0])),
         ordinate=Ordinate("length", s=1.0, of=lambda r, q: float(r[2])),
     )  # fmt: skip

@@ -21,7 +21,7 @@ import ufl
 from petsc4py import PETSc
 
 from forms import loads
-from forms.energy import bending, logarithmic_stretch
+from forms.energy import bending_and_twist, logarithmic_stretch
 from rodfem import (
     Attachment,
     Constraint,
@@ -32,7 +32,6 @@ from rodfem import (
     Plan,
     Ring,
     Scene,
-    Solver,
     StepControl,
     at,
     clamped,
@@ -43,11 +42,12 @@ from rodfem import (
     integral,
     pinned,
     sliding,
+    trace,
 )  # fmt: skip
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.solvers import BranchSolver
-from rodfem.diagram.explorer import Explorer
+from rodfem.diagram.diagram import Diagram
 from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import gathered
@@ -76,7 +76,7 @@ def energy_of(rng: np.random.Generator, rod: str) -> tuple[Callable[..., Any], d
 
     def energy(v: Any, k: Any, c: Any) -> Any:
         turned = (k[0], k[1] - c.k0, k[2] - c.t0)
-        out = bending(turned, (c.B1, c.B2, c.C)) + c.m * turned[0] * turned[2] * 0.5
+        out = bending_and_twist(turned, (c.B1, c.B2, c.C)) + c.m * turned[0] * turned[2] * 0.5
         out += c.a * sum(ufl.cosh(0.7 * x) - 1 for x in turned)
         if rod in ("flexible", "inextensible"):
             out += 0.5 * c.GA * (v[0] ** 2 + v[1] ** 2)
@@ -283,18 +283,16 @@ def examine(scene: Scene, depth: int = 0, elements: int = 6, degree: int = 5) ->
     """Trace a scene coarsely and compare all of its rows."""
     finding, text = Finding(scene.name), StringIO()
     plan = Plan(scene.span, depth=depth, steps=StepControl(first=0.05, largest=0.2, most=40), error_bars=False)
-    branches: list[Branch] = []
+    diagram: Diagram | None = None
     try:
-        follower = Solver(scene, Discretization("auto", elements, degree)).equilibria
-        explorer = Explorer(follower, plan, Report(stream=text), lambda: None)
-        branches = explorer.branches
-        explorer.run()
+        diagram = trace(scene, Discretization("auto", elements, degree), plan, Report(stream=text))
     except (InputError, ConvergenceError) as trouble:
         finding.said.append(f"{type(trouble).__name__}: {trouble}")
+        diagram = getattr(trouble, "diagram", None)
     finding.said += [line.strip() for line in text.getvalue().splitlines() if line.startswith("  !")]
-    for branch in branches:
+    for branch in diagram or ():
         if branch.points:
-            compare(follower, branch, finding)
+            compare(diagram.solvers[0], branch, finding)
             chain(branch, finding)
     return finding
 

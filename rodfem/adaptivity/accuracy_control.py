@@ -48,7 +48,7 @@ class Checked:
     since: int = 0
 
 
-class Watch:
+class AccuracyControl:
     """Watches over the accuracy of the points of one branch."""
 
     def __init__(self, meshes: Meshes, bounds: tuple[float, float]) -> None:
@@ -69,14 +69,14 @@ class Watch:
             return
         if self.accuracy < SHARP:
             self._polish(point, solver)
-        indicator = self.meshes.gauge(solver.mesh)(point.x).indicator
+        indicator = self.meshes.indicator(solver.mesh)(point.x).indicator
         last = self.checked
         if last is not None and last.since < SELDOM and not self._at_bound(point):
             point.estimate = last.error * max(1.0, indicator / last.indicator)
             if indicator < GROWN * last.indicator or point.estimate * SURE < self.accuracy:
                 last.since += 1
                 return
-        with solver.system.clock.purpose("error bars"):
+        with solver.system.clock.scope("error bars"):
             point.estimate = self._computed(point)
         self.checked = Checked(max(indicator, LEAST), point.estimate)
         if point.estimate * GROWN > self.accuracy and point.arclength > self.excused:
@@ -86,11 +86,11 @@ class Watch:
         """Estimate the errors of a special point; raises :class:`TooCoarse` where another mesh may help."""
         if self.meshes.accuracy is None:
             return
-        with self.meshes.solvers[special.point.mesh].system.clock.purpose("error bars"):
+        with self.meshes.solvers[special.point.mesh].system.clock.scope("error bars"):
             self.meshes.richer(special.point.mesh).estimate(special)
-        self.judge(special)
+        self.check(special)
 
-    def judge(self, special: SpecialPoint) -> None:
+    def check(self, special: SpecialPoint) -> None:
         """Raise :class:`TooCoarse` for a special point with too large an error, where another mesh may help."""
         error = self._error_of(special)
         located = special.located_to / unit(special.point.load)

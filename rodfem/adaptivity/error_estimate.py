@@ -27,7 +27,7 @@ from petsc4py import PETSc
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.kinds import FOLD
-from rodfem.continuation.locate import WINDOW, locate_event, refine
+from rodfem.continuation.locate import WINDOW, Curve, locate_event, refine
 from rodfem.continuation.normal_form import Origin, normal_form_of, ordinate_along
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
@@ -100,12 +100,12 @@ class Enriched:
         self.transfer = Transfer(solver.system, self.system)
         self._origins: list[tuple[SpecialPoint, Origin, float]] = []
         weights = weights_of(self.system.scene)
-        self._gauges = SmoothnessIndicator(solver, weights), SmoothnessIndicator(self.solver, weights)
+        self._indicators = SmoothnessIndicator(solver, weights), SmoothnessIndicator(self.solver, weights)
 
     def rho(self, before: Sequence[PETSc.Vec], after: Sequence[PETSc.Vec]) -> float:
         """Ratio of the errors of a state (and its null vector) on the richer discretisation and on the first."""
         degree = self.coarse.system.fields.discretization.degree
-        first, last = (g.unresolved(x, more) for g, (x, *more) in zip(self._gauges, (before, after), strict=True))
+        first, last = (g.unresolved(x, more) for g, (x, *more) in zip(self._indicators, (before, after), strict=True))
         if degree < 3 or last < RESOLVED:  # the last coefficients are the strains themselves, or round-off
             return halved(degree)
         return max(halved(degree), min(AMPLE * last / max(first, RESOLVED), MOST))
@@ -157,7 +157,7 @@ class Enriched:
         last = system.scalar(x), self.solver.shape.ordinate(x)
         moved = np.abs(np.subtract(last, (load, ordinate)))
         left = STEADY * moved + ROUND_OFF * np.maximum(1.0, np.abs(last))
-        changed = self._gauges[1].changed(first, x, state=True)
+        changed = self._indicators[1].changed(first, x, state=True)
         return Again(x, *last, float(left[0]), float(left[1]), self.rho([point.x], [x]), changed)
 
     def law(self, special: SpecialPoint, direction: PETSc.Vec, law: NormalForm) -> None:
@@ -177,19 +177,11 @@ class Enriched:
         assert point.tangent is not None
         x, tangent = self.transfer(point.x, state=True), self.transfer(point.tangent, state=False)
 
-        def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-            y = x.copy()
-            y.axpy(s, tangent)
-            return y, tangent
-
-        _, found, along = locate_event(self.solver, event, curve, -WINDOW, WINDOW)
+        _, found, along = locate_event(self.solver, event, _straight(x, tangent), -WINDOW, WINDOW)
         load, ordinate = self.system.scalar(found), self.solver.shape.ordinate(found)
         slope = abs(ordinate_along(self.solver, found, tangent))
-        left = (
-            abs(point.slope) * along + round_off(load),
-            slope * along + round_off(ordinate),
-        )
-        changed = self._gauges[1].changed(x, found, state=True)
+        left = abs(point.slope) * along + round_off(load), slope * along + round_off(ordinate)
+        changed = self._indicators[1].changed(x, found, state=True)
         return Again(found, load, ordinate, *left, self.rho([point.x], [found]), changed)
 
     def _located(self, special: SpecialPoint) -> Again:
@@ -201,12 +193,7 @@ class Enriched:
         tangent = self.transfer(point.tangent, state=False)
         mode = self.transfer(special.null_vectors[0], state=False)
         mode.scale(1.0 / self.system.norm(mode))
-
-        def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-            y = x.copy()
-            y.axpy(s, tangent)
-            return y, tangent
-
+        curve = _straight(x, tangent)
         # few nodes tell where an eigenvalue crosses zero better than where the load has its extremum
         test_function = "mu" if special.kind == FOLD else special.test_function
         try:
@@ -216,8 +203,13 @@ class Enriched:
         ordinate = solver.shape.ordinate(found.x)
         slope = ordinate_along(solver, found.x, found.tangent)
         left = abs(slope) * found.along + round_off(ordinate)
-        sharp, gauge = solver.inertia.held.sharpened(mode), self._gauges[1]  # by the factors of a state nearby
+        sharp, indicator = solver.inertia.held.sharpened(mode), self._indicators[1]  # by the factors of a state nearby
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
-        changed = max(gauge.changed(x, found.x, state=True), gauge.changed(mode, sharp, state=False))
+        changed = max(indicator.changed(x, found.x, state=True), indicator.changed(mode, sharp, state=False))
         self._origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
         return Again(found.x, found.load, ordinate, found.uncertainty, left, rho, changed)
+
+
+def _straight(x: PETSc.Vec, tangent: PETSc.Vec) -> Curve:
+    """Straight line through a state."""
+    return lambda s: (x + tangent * s, tangent)

@@ -8,10 +8,11 @@ from there follow the bend of either branch, however sharp it is.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
-from rodfem.continuation.solvers import BranchSolver
+from rodfem.continuation.solvers import BranchSolver, distance
 from rodfem.continuation.unfolding import Unfolded, unfold
 from rodfem.fem.newton import correct
 
@@ -70,21 +71,15 @@ class Gaps:
     def open(self, gap: Gap, solver: BranchSolver) -> bool:
         """Add a gap; False where it is known already, so that smaller steps have not resolved it."""
         for known in self.known:
-            apart = self.meshes.here(known.point, solver).x.copy()
-            apart.axpy(-1.0, gap.point.x)
-            if solver.system.norm(apart) < LEAST:
+            if distance(solver.system, gap.point.x, self.meshes.here(known.point, solver).x) < LEAST:
                 return False
         self.known.append(gap)
         return True
 
     def reach(self, solver: BranchSolver, point: Point) -> float:
         """Largest step from a point: in proportion to the distance from the nearest gap."""
-        least = float("inf")
-        for gap in self.known:
-            apart = self.meshes.here(gap.point, solver).x.copy()
-            apart.axpy(-1.0, point.x)
-            least = min(least, solver.system.norm(apart))
-        return max(SHARE * least, LEAST)
+        apart = (distance(solver.system, point.x, self.meshes.here(gap.point, solver).x) for gap in self.known)
+        return max(SHARE * min(apart, default=inf), LEAST)
 
 
 def sharpen(solver: BranchSolver, special: SpecialPoint, found: Unfolded) -> None:
@@ -107,8 +102,7 @@ def arms(solver: BranchSolver, gap: Gap) -> list[Point]:
     for direction in gap.unfolded.directions:
         row = solver.row(direction)
         for sign in (1.0, -1.0):
-            x = gap.unfolded.x.copy()
-            x.axpy(sign * ARM, direction)
+            x = gap.unfolded.x + direction * (sign * ARM)
             outcome = correct(system, x, row, reach=ARM)
             if outcome.converged:
                 out.append(solver.point(x, 0.0, solver.tangent(row, at=x), outcome))

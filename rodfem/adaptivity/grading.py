@@ -108,9 +108,9 @@ class SmoothnessIndicator:
 
         Of two states, or (``state=False``) of two null vectors of metric norm 1, of either sign.
         """
-        system, apart = self.solver.system, before.copy()
+        system = self.solver.system
         same = state or (system.metric * before).dot(after) >= 0
-        apart.axpy(-1.0 if same else 1.0, after)
+        apart = before - after if same else before + after
         squares = self._squares(None, [apart]), self._squares(after, []) if state else self._squares(None, [after])
         change, size = (float(system.comm.allreduce(np.sum(self.solver.shape.size @ parts))) for parts in squares)
         return float(np.sqrt(change / max(size, system.scene.length)))

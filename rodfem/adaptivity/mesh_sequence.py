@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite, log10
 
-import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -89,15 +88,15 @@ class Meshes:
         self.solvers = [solver]
         self.accuracy = None if accuracy is None else internal_accuracy(solver.system.scene, accuracy)
         self._richer: dict[int, Enriched] = {}
-        self._gauges: dict[int, SmoothnessIndicator] = {}
+        self._indicators: dict[int, SmoothnessIndicator] = {}
         if accuracy is not None:
             self._weights = weights_of(solver.system.scene)
 
-    def gauge(self, number: int) -> SmoothnessIndicator:
-        """Gauge of the smoothness of states on a mesh."""
-        if number not in self._gauges:
-            self._gauges[number] = SmoothnessIndicator(self.solvers[number], self._weights)
-        return self._gauges[number]
+    def indicator(self, number: int) -> SmoothnessIndicator:
+        """Smoothness indicator of a mesh."""
+        if number not in self._indicators:
+            self._indicators[number] = SmoothnessIndicator(self.solvers[number], self._weights)
+        return self._indicators[number]
 
     def richer(self, number: int) -> Enriched:
         """Companion of a mesh, on halves of its elements one degree richer, made when it is first asked for."""
@@ -117,7 +116,7 @@ class Meshes:
         assert self.accuracy is not None
         old = self.solvers[trouble.point.mesh]
         error = trouble.error if isfinite(trouble.error) else 1e3 * self.accuracy
-        found = self.gauge(old.mesh)(trouble.point.x, trouble.directions)
+        found = self.indicator(old.mesh)(trouble.point.x, trouble.directions)
         gain = self.accuracy / (error * MARGIN * FURTHER**tries)
         indicator = max(found.indicator, TINY) * gain**trouble.order
         mesh = cheapest(old, found, indicator)
@@ -125,9 +124,8 @@ class Meshes:
         affordable = 1.2 * cost(fields, mesh.elements, mesh.degree)
         for known in self.solvers:
             d = known.system.fields.discretization
-            vertices = self.vertices(known.mesh)
             if known is not old and cost(fields, d.elements, d.degree) <= affordable:
-                if found.fulfilled_by(d, vertices, indicator):
+                if found.fulfilled_by(d, known.system.fields.all_vertices(), indicator):
                     return known
         s = old.system
         with s.clock("setup"):
@@ -135,10 +133,6 @@ class Meshes:
         new.mesh = len(self.solvers)
         self.solvers.append(new)
         return new
-
-    def vertices(self, number: int) -> np.ndarray:
-        """Arclengths at which the elements of a mesh meet, (E + 1,)."""
-        return self.solvers[number].system.fields.all_vertices()
 
     # --- points on another mesh --------------------------------------------------------------------------------
 
@@ -151,11 +145,7 @@ class Meshes:
 
         ``d`` is the change, ``source`` the number of its mesh, ``target`` the solver of the other one.
         """
-        moved = x.copy()
-        moved.axpy(1.0, d)
-        out = self.state(moved, source, target)
-        out.axpy(-1.0, self.state(x, source, target))
-        return out
+        return self.state(x + d, source, target) - self.state(x, source, target)
 
     def here(self, point: Point, target: BranchSolver) -> Point:
         """Point with its state and tangent interpolated, not solved, on another mesh; itself if it is on that."""

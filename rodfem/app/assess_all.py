@@ -25,10 +25,10 @@ def check_method(system: System, plan: Plan) -> None:
     Assessor(system).choose(plan.method or "auto", plan.modes)
 
 
-def judge_users(
+def assess_all(
     branches: list[Branch], solvers: Sequence[StaticSolver], plan: Plan, output: Path, report: Report, figures: bool
 ) -> None:
-    """Assessor the states at the loads of the plan; save and draw their modes, if they are wanted.
+    """Assess the states at the loads of the plan; save and draw their modes, if they are wanted.
 
     Each on the mesh on which it was computed.  ``branches`` are those of the diagram, ``solvers`` those of their meshes
     by number.  The ``plan`` names method, loads and number of modes.  Files go to the folder ``output``, pictures too

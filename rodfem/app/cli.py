@@ -108,6 +108,8 @@ def parser_for(
         "--degree": f"polynomial degree; the error falls as h^(2K) (default {degree})",
         "--formulation": "; ".join(f"{made.name}: {made.words}" for made in formulations.FORMULATIONS.values())
         + f"; {formulations.AUTO}: the first that the scene allows (default {formulation})",
+        "--factors": "chain: compiled assembly and elimination along the rod; petsc: the same numbers, slower, by "
+        "dolfinx, PETSc and MUMPS (default chain)",
         "--accuracy": "instead of elements and degree: choose meshes on the way such that loads and ordinates are in "
         "error by less than EPS (relative to values greater than one)",
         "--range": f"start at {load} = A, stay between A and B (default {span[0]:g} {span[1]:g})",
@@ -129,6 +131,7 @@ def parser_for(
             "--elements": {"type": int, "default": elements, "metavar": "N"},
             "--degree": {"type": int, "default": degree, "metavar": "K"},
             "--formulation": {"default": formulation, "metavar": f"{{{','.join(formulations.names())}}}"},
+            "--factors": {"default": "chain", "metavar": "{chain,petsc}"},
             "--accuracy": {"type": float, "metavar": "EPS"},
         },
         "what to compute": {
@@ -202,7 +205,7 @@ def main(
                     raise InputError(
                         f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy."
                     )
-        discretization = Discretization(options.formulation, options.elements, options.degree)
+        discretization = Discretization(options.formulation, options.elements, options.degree, factors=options.factors)
         scene = scene_of(options)
         span = tuple(options.span)
         steps = StepControl(largest=options.largest)

@@ -13,7 +13,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from rodfem.app.run import writable
+from rodfem.app.run import on_first, writable
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.file_format import RESULT
 from rodfem.output.files import save_json
@@ -42,9 +42,9 @@ def many(
     ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`InputError` where ``folder``
     cannot be written, or has a result in another or a newer format.  ``scenes`` are shared among the ranks of ``comm``.
     """
-    writable(folder, comm)
+    on_first(comm, lambda: writable(folder))
     files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]
-    _check(files, comm)
+    on_first(comm, lambda: _check(files))
     mine = range(comm.rank, len(scenes), comm.size)
     for done, i in enumerate(mine, start=1):
         if _saved(files[i], key_of(scenes[i])) is None:
@@ -60,18 +60,10 @@ def many(
     return comm.bcast([{} if result is None else result for result in found])
 
 
-def _check(files: Sequence[Path], comm: MPI.Comm) -> None:
-    """Raise :class:`InputError` on every rank where a file has a format that is not to be written over."""
-    trouble = ""
-    if comm.rank == 0:
-        try:
-            for file in files:
-                RESULT.check(_contents(file), file)
-        except InputError as error:
-            trouble = str(error)
-    trouble = comm.bcast(trouble)
-    if trouble:
-        raise InputError(trouble)
+def _check(files: Sequence[Path]) -> None:
+    """Raise :class:`InputError` where a file has a format that is not to be written over."""
+    for file in files:
+        RESULT.check(_contents(file), file)
 
 
 def _saved(file: Path, key: dict[str, Any]) -> dict[str, Any] | None:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from rodfem import compat
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.solvers import StaticSolver
@@ -32,20 +31,29 @@ GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
 ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
 
 
-def writable(folder: Path, comm: MPI.Comm) -> None:
-    """Make ``folder``; raises :class:`InputError` on every rank where it cannot be written."""
-    trouble = ""
+def on_first(comm: MPI.Comm, check: Callable[[], object]) -> None:
+    """Do a check on the first rank, and raise its :class:`InputError` on every rank."""
+    trouble: InputError | None = None
     if comm.rank == 0:
-        probe = folder / f".probe-{os.getpid()}"
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            probe.write_text("")
-            probe.unlink()
-        except OSError as error:
-            trouble = error.strerror or str(error)
+            check()
+        except InputError as error:
+            trouble = error
     trouble = comm.bcast(trouble)
-    if trouble:
-        raise InputError(f"The output folder {folder} cannot be written ({trouble})", ANOTHER_FOLDER)
+    if trouble is not None:
+        raise trouble
+
+
+def writable(folder: Path) -> None:
+    """Make ``folder``; raises :class:`InputError` where it cannot be written."""
+    probe = folder / f".probe-{os.getpid()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe.write_text("")
+        probe.unlink()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"The output folder {folder} cannot be written ({reason})", ANOTHER_FOLDER) from error
 
 
 def run(
@@ -86,10 +94,8 @@ def run(
     """
     plan = plan or Plan()
     output = output or Path("results") / scene.name
-    if scene.conservative:
-        compat.require_real_petsc()
     plan.check(scene)
-    writable(output, comm)
+    on_first(comm, lambda: writable(output))
     terminal = Terminal(plan, output, comm, quiet, words)
     diagram = trace(scene, discretization, plan, terminal, comm=comm)
     branches, clock = diagram.branches, diagram.clock
@@ -101,9 +107,9 @@ def run(
     terminal.timing(clock, sum(len(b.points) for b in branches))
     terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
     if plan.method or plan.modes:
-        from rodfem.app.assess_all import judge_users
+        from rodfem.app.assess_all import assess_all
 
-        judge_users(branches, diagram.solvers, plan, output, terminal, figures)
+        assess_all(branches, diagram.solvers, plan, output, terminal, figures)
     if plan.locus is not None:
         _loci(branches, diagram.solvers, plan, output, terminal, figures)
     if figures and comm.rank == 0:

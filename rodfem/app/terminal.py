@@ -18,10 +18,10 @@ from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.modes import Modes
-from rodfem.output.digits import index_in_words, number, rounded_up
+from rodfem.output.digits import in_words, index_in_words, number, rounded_up
 from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Verdict
-from rodfem.timing import Clock
+from rodfem.timing import WORK, Clock
 
 INDEX, UNSTABLE = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
@@ -181,15 +181,13 @@ class Report(Observer):
     def table(self, branches: Sequence[Branch], system: System) -> None:
         """Print the final table: every special point with its error bar."""
         scene = system.scene
-        self.say(f"\nSpecial points (in brackets a bound of the error; ordinate: {scene.ordinate.name})")
+        self.say(f"\nSpecial points (in parentheses a bound of the error; ordinate: {scene.ordinate.name})")
         self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
         for branch in branches:
             for s in branch.special:
-                exact = s.kind.given and s.test_function != "stretch"
-                load = f"{s.point.load:.10g}" if exact else number(s.point.load, s.error_estimate, s.resolved)
+                load, ordinate, index = in_words(s)
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
-                ordinate = number(s.point.ordinate, s.ordinate_error, s.resolved)
-                self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {index_in_words(s)}{zero}")
+                self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {index}{zero}")
                 if s.kind == FLUTTER:
                     self.say(f"    double eigenvalue omega^2 = {number(s.omega2, s.omega2_error)}")
                 if s.note:
@@ -199,7 +197,7 @@ class Report(Observer):
 
         if coarse := sum(s.resolved is False for b in branches for s in b.special):
             self.warn(
-                f"The mesh does not resolve {coarse} special point{'s'[: coarse > 1]}: what stands in brackets is "
+                f"The mesh does not resolve {coarse} special point{'s'[: coarse > 1]}: the value in parentheses is "
                 "no bound there, and the rod need not have such a point; use more elements or a higher degree."
             )
         missed = not_followed(branches)
@@ -278,13 +276,8 @@ class Report(Observer):
 
     def timing(self, clock: Clock, points: int) -> None:
         """Print where the time went."""
-        s = clock.seconds
-        work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
-        parts = [
-            f"{name} {s.get(name, 0.0):.2f} s"
-            for name in ("setup", "assembly", "solve", "stability", "location", "error bars", "files")
-        ]
+        names = ("setup", *WORK, "location", "error bars", "files")
+        parts = [f"{name} {clock.seconds.get(name, 0.0):.2f} s" for name in names]
         self.say(f"\nTime: {', '.join(parts)}; {clock.total():.2f} s in all")
         known = "index" if self.count == INDEX else "frequencies"
-        each = 1e3 * work / max(points, 1)
-        self.say(f"{points} points with their {known}, {each:.2f} ms each (assembly, solve, stability)")
+        self.say(f"{points} points with their {known}, {clock.each(points):.2f} ms each ({', '.join(WORK)})")

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.parameter_plane import LocusPoint, Plane
+from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure
@@ -41,12 +41,7 @@ class Collision:
         return float(np.linalg.norm(dp / self.plane.width))
 
     def correct(
-        self,
-        p: np.ndarray,
-        x: PETSc.Vec,
-        tangent: tuple[np.ndarray, PETSc.Vec | None],
-        near: LocusPoint,
-        reach: float = 1.0,
+        self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0
     ) -> LocusPoint:
         """Point of the curve on the line through ``p`` across ``tangent``; raises :class:`ConvergenceError`.
 

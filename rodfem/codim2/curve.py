@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.parameter_plane import LocusPoint, Plane, between, predict
+from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent, between, predict
 from rodfem.codim2.singular import Destroyed
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
@@ -34,12 +34,7 @@ class Criterion(Protocol):
         """Size of a step."""
 
     def correct(
-        self,
-        p: np.ndarray,
-        x: PETSc.Vec,
-        tangent: tuple[np.ndarray, PETSc.Vec | None],
-        near: LocusPoint,
-        reach: float = 1.0,
+        self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0
     ) -> LocusPoint:
         """Point of the locus on the plane through ``(p, x)`` across ``tangent``.
 
@@ -114,9 +109,7 @@ class Tracer:
             if over is None:
                 if turn < 0.9 or node.s - last.s > 2 * step:
                     raise ConvergenceError("the curve bends too sharply")
-                p = p - node.p
-                x.aypx(-1.0, node.x)
-                return node, self.criterion.length(p, x), ""
+                return node, self.criterion.length(p - node.p, x - node.x), ""
             p = node.p
         which, bound = over
         share = (bound - last.p[which]) / (p[which] - last.p[which])
@@ -135,18 +128,14 @@ class Tracer:
         return f"{self.plane.names[which]} = {bound:g}, its bound"
 
     def _after(self, last: LocusPoint, node: LocusPoint) -> LocusPoint:
-        change = node.x.copy()
-        change.axpy(-1.0, last.x)
-        node.s = last.s + self.criterion.length(node.p - last.p, change)
+        node.s = last.s + self.criterion.length(node.p - last.p, node.x - last.x)
         return node
 
     def _cosine(self, node: LocusPoint, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Cosine between a node's tangent and a direction."""
-        plus, minus = node.dx.copy(), node.dx.copy()
         size = self.criterion.length(dp, dx)
-        plus.axpy(1 / size, dx)
-        minus.axpy(-1 / size, dx)
-        a, b = (self.criterion.length(node.dp + s * dp / size, v) for s, v in ((1, plus), (-1, minus)))
+        dp, dx = dp / size, dx / size
+        a, b = self.criterion.length(node.dp + dp, node.dx + dx), self.criterion.length(node.dp - dp, node.dx - dx)
         return (a * a - b * b) / 4
 
     def _between(self, half: Half, a: LocusPoint, b: LocusPoint) -> str:

@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.codim2.collision import Collision
 from rodfem.codim2.curve import Criterion, Half, Tracer
 from rodfem.codim2.parameter_plane import Interval, LocusPoint, Plane
@@ -206,7 +205,7 @@ def locus(
         raise InputError(
             f"The special point at {scene.load} = {p[0]:g}, {parameter} = {p[1]:g} is outside the bounds: widen them."
         )
-    with system.clock.purpose("locus"), plane.kept():
+    with system.clock.scope("locus"), plane.kept():
         system.line = plane.along(p, 0)
         guess = _guess(solver, special, p)
         criterion = _criterion(solver, plane, special.kind, guess)
@@ -286,13 +285,8 @@ def _estimate(
     solver: StaticSolver, kind: str, plane: Plane, nodes: Sequence[LocusPoint], rows: list[int], error: np.ndarray
 ) -> None:
     """Fill ``rows`` of ``error`` with the distance, across the curve, to that of a richer discretisation."""
-    richer: StaticSolver
-    if isinstance(solver, BranchSolver):
-        found = Enriched(solver)
-        richer, transfer = found.solver, found.transfer
-    else:
-        richer = StaticSolver(richer_system(solver.system))
-        transfer = Transfer(solver.system, richer.system)
+    richer = type(solver)(richer_system(solver.system))
+    transfer = Transfer(solver.system, richer.system)
     other = Plane(richer.system, plane.names[1], (tuple(plane.bounds[0]), tuple(plane.bounds[1])))
     criterion: Criterion | None = None
     for row in rows:

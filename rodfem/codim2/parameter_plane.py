@@ -16,6 +16,8 @@ from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
 
 Interval = tuple[float, float]
+Tangent = tuple[np.ndarray, PETSc.Vec | None]
+"""Direction of parameters (2,) and state; None: of the parameters alone."""
 
 
 @dataclass
@@ -45,9 +47,7 @@ class LocusPoint:
 
     def reversed(self) -> LocusPoint:
         """The same point with the opposite tangent."""
-        dx = self.dx.copy()
-        dx.scale(-1.0)
-        return replace(self, dp=-self.dp, dx=dx)
+        return replace(self, dp=-self.dp, dx=-self.dx)
 
 
 class Plane:
@@ -109,9 +109,8 @@ def predict(nodes: list[LocusPoint], s: float) -> tuple[np.ndarray, PETSc.Vec, n
     """Extrapolate a locus to arclength ``s``: parameters, state, and their derivatives in ``s``."""
     last = nodes[-1]
     if len(nodes) < 3:
-        x = last.x.copy()
-        x.axpy(s - last.s, last.dx)
-        return last.p + (s - last.s) * last.dp, x, last.dp, last.dx
+        step = s - last.s
+        return last.p + step * last.dp, last.x + last.dx * step, last.dp, last.dx
     recent = nodes[-4:]
     value, slope = lagrange(np.array([n.s for n in recent]), s)
     p, x = np.array([n.p for n in recent]), [n.x for n in recent]

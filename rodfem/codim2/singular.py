@@ -42,7 +42,7 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.parameter_plane import LocusPoint, Plane
+from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import KEPT, SHRUNK, STALLED, TOLERANCE
@@ -125,18 +125,10 @@ class Singular:
 
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Size of a step: parameters over the widths of their bounds, the state in the metric."""
-        return float(np.hypot(np.linalg.norm(dp / self.plane.width), self._norm(dx)))
-
-    def _norm(self, d: PETSc.Vec) -> float:
-        return float(max((self.metric * d).dot(d), 0.0)) ** 0.5
+        return float(np.hypot(np.linalg.norm(dp / self.plane.width), np.sqrt(max((self.metric * dx).dot(dx), 0.0))))
 
     def correct(
-        self,
-        p: np.ndarray,
-        x: PETSc.Vec,
-        tangent: tuple[np.ndarray, PETSc.Vec | None],
-        near: LocusPoint,
-        reach: float = 1.0,
+        self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0
     ) -> LocusPoint:
         """Point of the locus on the plane through ``(p, x)`` across ``tangent``; raises :class:`ConvergenceError`.
 
@@ -155,9 +147,7 @@ class Singular:
         before, total = np.inf, 0.0
         for _ in range(12):
             now = self._linear(p, x, origin[1], old)
-            gone = x.copy()
-            gone.axpy(-1.0, origin[1])
-            along = row_p @ (p - origin[0]) + (row_x.dot(gone) if row_x else 0.0)
+            along = row_p @ (p - origin[0]) + (row_x.dot(x - origin[1]) if row_x else 0.0)
             dp, dx = self._step(now, row_p, row_x, along, scale)
             size = self.length(dp, dx)
             p, total = p + dp, total + size
@@ -218,19 +208,17 @@ class Singular:
         columns = self._columns(p, x, None)[0] if old is None else []
         system.set_load(x, float(p[0]))
         system.line = self.plane.along(p, 0)
-        right = system.new_vector()
-        system.at(x).residual(right)
-        right.scale(-1.0)
-        if not np.isfinite(right.norm()):
+        equations = system.new_vector()
+        system.at(x).residual(equations)
+        if not np.isfinite(equations.norm()):
             raise ConvergenceError("the stored energy is not defined there")
         saddle = self.saddle.at(x)
         rest = bordered.factor(saddle.matrix, self.psi, self.phi)
         gauge = np.zeros(k)
         if not self.fold:  # psi.(x - x0) = 0 keeps the state symmetric: beta, in b0, then is the imperfection
-            gone = x.copy()
-            gone.axpy(-1.0, reference)
+            gone = x - reference
             gauge = np.array([-w.dot(gone) for w in self.phi])
-        s0, b0 = bordered.solve(right, gauge)
+        s0, b0 = bordered.solve(-equations, gauge)
         solved = [bordered.solve(None, e) for e in np.eye(k)]
         v, G = [w for w, _ in solved], np.array([row for _, row in solved])
         # where a symmetry relates the null vectors G is a multiple of the identity: one equation, its trace
@@ -238,10 +226,7 @@ class Singular:
         spread = float(abs(G - g * np.eye(k)).max())
         if old is not None:
             return _Linear(s0, b0, old.response, old.b, v, old.w, g, spread, old.grad_x, old.grad_p, rest)
-        responses = []
-        for column in columns:
-            column.scale(-1.0)
-            responses.append(bordered.solve(column, np.zeros(k)))
+        responses = [bordered.solve(-column, np.zeros(k)) for column in columns]
         w = self._left(saddle, v)
         grad_x, grad_p = self._gradient(p, x, v, w)
         b = np.array([row for _, row in responses])
@@ -262,17 +247,13 @@ class Singular:
         grad_x, grad_p = self.system.new_vector(), np.zeros(2)
         for right, left in zip(v, w, strict=True):
             for sign in (1.0, -1.0):
-                y = x.copy()
-                y.axpy(sign * DIFFERENCE, right)
-                columns, image = self._columns(p, y, left)
+                columns, image = self._columns(p, x + right * (sign * DIFFERENCE), left)
                 factor = -sign / (2 * DIFFERENCE * len(v))
                 grad_x.axpy(factor, image)
                 grad_p += factor * np.array([column.dot(left) for column in columns])
         return grad_x, grad_p
 
-    def _node(
-        self, p: np.ndarray, x: PETSc.Vec, along: tuple[np.ndarray, PETSc.Vec | None], last: np.ndarray
-    ) -> LocusPoint:
+    def _node(self, p: np.ndarray, x: PETSc.Vec, along: Tangent, last: np.ndarray) -> LocusPoint:
         """Evaluate tangent, count and records at a point of the locus, and border with its null vectors."""
         at = self._linear(p, x, x, None)
         scale = self.saddle.scale

@@ -107,7 +107,7 @@ class NormalForm:
     uncertainty: float
     side: int
 
-    def judge(self, index_below: int, index_above: int) -> None:
+    def classify(self, index_below: int, index_above: int) -> None:
         """Name a pitchfork by the index of the branch that it leaves at loads just below and just above."""
         if self.kind == "pitchfork":
             there, here = (index_above, index_below) if self.side > 0 else (index_below, index_above)

@@ -26,6 +26,7 @@ from math import inf
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.continuation.compiled_newton import CompiledNewton
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import NewtonResult, iterate
 from rodfem.fem.state import State
@@ -78,6 +79,8 @@ class Corrector:
         system = self.system
         self._right, self._solved = dense_columns(system, BLOCK + 2), dense_columns(system, BLOCK + 2)
         self._step = system.new_vector()
+        near_zero = NEAR * inertia.scale
+        self.compiled = CompiledNewton(inertia, BLOCK, near_zero) if CompiledNewton.serves(inertia) else None
         self._fresh = np.stack([inertia.seed(i).array_r for i in range(BLOCK)], axis=1)
         self._fresh_images = inertia.weighed(self._fresh)
         self.restart()
@@ -85,6 +88,8 @@ class Corrector:
     def restart(self) -> None:
         """Begin a branch: nothing is known about its eigenvectors."""
         self._block, self._images, self._started = self._fresh, self._fresh_images, False
+        if self.compiled is not None:
+            self.compiled.restart()
 
     def factor(self, x: PETSc.Vec, right: PETSc.Vec | None = None) -> Regular | None:
         """Factor ``S`` at ``x``; solve for the tangent, the block, and ``right`` (into ``_step``).
@@ -94,6 +99,8 @@ class Corrector:
         inertia = self.inertia
         if not self.system.scene.conservative:  # S is not symmetric
             return None
+        if self.compiled is not None:
+            return self._compiled_factor(self.compiled, x)
         found = inertia.at(x, right)
         try:
             below = found.below(0.0)
@@ -108,6 +115,27 @@ class Corrector:
         if not self._started:
             self.restart()
             return None
+        return self._regular(x, found, below, nearest, tangent)
+
+    def _compiled_factor(self, compiled: CompiledNewton, x: PETSc.Vec) -> Regular | None:
+        system, inertia = self.system, self.inertia
+        system.set_phase(x)
+        with system.clock("solve"):
+            found = compiled.factor(x)
+        if not system.verify(inertia.matrix, system.at(x)):
+            found = compiled.factor(x)
+        if found is None:
+            return None
+        try:
+            below = found.counted()
+        except ConvergenceError:
+            return None
+        tangent = system.new_vector()
+        tangent.array[:] = compiled.tangent
+        return self._regular(x, found, below, compiled.nearest, tangent)
+
+    def _regular(self, x: PETSc.Vec, found: Factored, below: int, nearest: float, tangent: PETSc.Vec) -> Regular:
+        inertia = self.inertia
         certain = nearest >= NEAR * inertia.scale + 10 * inertia.tolerance
         index = Index(below, found.drifts, found.factors.determinant()) if certain else None
         return Regular(x.copy(), found, index, nearest, tangent)
@@ -152,6 +180,8 @@ class Corrector:
         ``reach`` and ``tolerance`` are those of that function.
         """
         self.system.set_phase(x)
+        if self.compiled is not None and self.system.scene.conservative:
+            return self._compiled_correct(self.compiled, x, row, most, reach, tolerance)
         origin, singular, at = x.copy(), False, None
 
         def solve(state: State, equations: PETSc.Vec, fresh: bool) -> PETSc.Vec | None:
@@ -173,3 +203,14 @@ class Corrector:
             origin.copy(x)
             return None
         return outcome
+
+    def _compiled_correct(
+        self, compiled: CompiledNewton, x: PETSc.Vec, row: PETSc.Vec, most: int, reach: float, tolerance: float
+    ) -> NewtonResult | None:
+        system, origin = self.system, x.copy()
+        with system.clock("solve"):
+            outcome = compiled.correct(x, row, most, reach, tolerance)
+        if not system.symmetries or system.verify(self.inertia.matrix, *compiled.last_factored()):
+            return outcome
+        origin.copy(x)  # with a condition that belongs to no symmetry: once more without it
+        return self._compiled_correct(compiled, x, row, most, reach, tolerance)

@@ -49,8 +49,7 @@ def origin_of(solver: BranchSolver, special: SpecialPoint) -> Origin:
 
 def ordinate_along(solver: BranchSolver, x: PETSc.Vec, direction: PETSc.Vec) -> float:
     """Change of the ordinate of ``x`` along a direction, of unit size in the metric."""
-    beside = x.copy()
-    beside.axpy(BESIDE / solver.system.norm(direction), direction)
+    beside = x + direction * (BESIDE / solver.system.norm(direction))
     return (solver.shape.ordinate(beside) - solver.shape.ordinate(x)) / BESIDE
 
 
@@ -94,8 +93,7 @@ def _near(
 ) -> tuple[float, float] | None:
     """Changes of load and ordinate at an amplitude of the bifurcating branch; None where Newton's method fails."""
     system = solver.system
-    x = origin.x.copy()
-    x.axpy(amplitude, direction)
+    x = origin.x + direction * amplitude
     if not correct(system, x, row, reach=2.0 * abs(amplitude)).converged:
         return None
     return system.scalar(x) - origin.load, solver.shape.ordinate(x) - origin.ordinate

@@ -57,8 +57,7 @@ def special_at(
     """
     system, inertia = solver.system, solver.inertia
     x = located.x
-    tangent = located.tangent
-    tangent.scale(1.0 / system.norm(tangent))
+    tangent = located.tangent / system.norm(located.tangent)
     found = inertia.at(x)
     point = solver.point(x, arclength, tangent, index=decide(found).index)
     null_count = point.zero - found.drifts
@@ -110,7 +109,7 @@ def find_special(
         if found[0].kind == FOLD:
             own = min(found[0].negative_before, found[0].negative_after)
             rest = [order for order in rest if order != own]
-    still = _persistent(solver, a, persistent) if rest else []
+    still = solver.inertia.modes_near_zero(a.x, persistent) if rest and persistent else []
     while rest:
         special = _special(solver, a, b, rest[0], "mu", still)
         found.append(special)
@@ -118,18 +117,6 @@ def find_special(
     found.sort(key=lambda s: s.point.arclength)
     _count_between(solver, a, b, found)
     return found
-
-
-def renew(solver: BranchSolver, point: Point, *, turning: bool) -> None:
-    """Compute the index of a point anew, at its own state; also the tangent, where the load is ``turning`` beside it.
-
-    The recorded index may be that of one factorisation; this one is from two shifts.
-    """
-    index = decide(solver.inertia.at(point.x)).index
-    point.negative, point.zero = index.negative, index.zero
-    if turning and point.tangent is not None:
-        point.tangent = solver.tangent(solver.row(point.tangent), at=point.x)
-        point.slope = solver.system.scalar(point.tangent)
 
 
 def _count_between(solver: BranchSolver, a: Point, b: Point, found: list[SpecialPoint]) -> None:
@@ -164,13 +151,6 @@ def point_between(solver: BranchSolver, a: Point, b: Point, s: float) -> Point |
     if max(distance(solver.system, a.x, x), distance(solver.system, x, b.x)) > whole:
         return None
     return solver.point(x, s, solver.tangent(solver.row(hermite(a, b, s)[1]), at=x))
-
-
-def _persistent(solver: BranchSolver, a: Point, count: int) -> list[PETSc.Vec]:
-    """Vectors of the eigenvalues that are zero all along a branch, at the point ``a``."""
-    if not count:
-        return []
-    return solver.inertia.modes_near_zero(a.x, count)
 
 
 def _special(
@@ -212,9 +192,8 @@ def directions(solver: BranchSolver, special: SpecialPoint) -> list[PETSc.Vec]:
         out.append(d)
         known.append(d)
         for image in system.equivalent_directions(special.point.x, d):
-            if system.norm(image) > FIXED:
-                image.scale(1.0 / system.norm(image))
-                known.append(image)
+            if (size := system.norm(image)) > FIXED:
+                known.append(image / size)
     return out
 
 
@@ -247,8 +226,7 @@ def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, fir
     for damping in dict.fromkeys((before, before or solver.inertia.tolerance)):
         system.damping, amplitude = damping, first
         while amplitude > SHORTEST:
-            x = special.point.x.copy()
-            x.axpy(amplitude, direction)
+            x = special.point.x + direction * amplitude
             outcome = correct(system, x, row, reach=2.0 * amplitude)
             if outcome.converged:
                 apart = distance(system, special.point.x, x)

@@ -35,7 +35,7 @@ from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
 from rodfem.stability.bordered import Bordered
-from rodfem.stability.inertia import EPS
+from rodfem.stability.round_off import rounding
 from rodfem.tolerances import TINY
 
 DIFFERENCE = 1e-4
@@ -47,7 +47,8 @@ STALLED = 1e-7
 FARTHEST = 0.5
 """A point farther than this from where it is expected, in the metric, is another one."""
 NOISE = 100.0
-"""Times the rounding errors of ``phi . F``, taken as independent, up to which ``beta`` is round-off."""
+"""Times the rounding errors of ``phi . F``, independent and as large as those of ``phi . S x``, up to which ``beta`` is
+round-off."""
 LEAST = 1e-15
 """Round-off of ``beta`` where all of these vanish, over the lowest bending eigenvalue."""
 
@@ -94,7 +95,7 @@ def unfold(solver: BranchSolver, special: SpecialPoint) -> Unfolded | None:
         x.axpy(1.0, step)
         if size < TOLERANCE or (size < STALLED and size > 0.5 * before):
             matrix = inertia.at(x).matrix
-            noise = NOISE * max(_rounding(matrix, w, x) for w in v)
+            noise = NOISE * max(rounding(matrix, w, x) for w in v)
             return Unfolded(x, system.scalar(x), beta, noise + LEAST * inertia.scale, directions)
         before = size
     return None
@@ -106,11 +107,8 @@ def _step(
     """Newton's step, the unfolding parameters after it, null vectors and directions."""
     system, found, k = solver.system, solver.inertia.at(x), len(psi)
     bordered.factor(found.matrix, psi)
-    right, slope = equations.copy(), found.border.copy()
-    right.scale(-1.0)
-    slope.scale(-1.0)
-    s, c = bordered.solve(right, np.zeros(k))
-    w, b = bordered.solve(slope, np.zeros(k))
+    s, c = bordered.solve(-equations, np.zeros(k))
+    w, b = bordered.solve(-found.border, np.zeros(k))
     solved = [bordered.solve(None, e) for e in np.eye(k)]
     v, G = [vector for vector, _ in solved], np.array([row for _, row in solved])
     system.set_load(w, 1.0)
@@ -138,8 +136,7 @@ def _crossing_directions(system: System, w: PETSc.Vec, v: list[PETSc.Vec], table
     for xi, dlam in ((pivot, a), (c, pivot)):  # no cancellation: the two roots xi/dlam have the product c/a
         if xi or dlam:
             d = combine([*v, w], np.array([xi, dlam]))
-            d.scale(1.0 / system.norm(d))
-            out.append(d)
+            out.append(d / system.norm(d))
     return out
 
 
@@ -154,9 +151,9 @@ def _differences(
     """Derivatives of ``S v`` along a direction at ``x``, and the second one of ``F`` (from ``F``, if given)."""
     system, inertia = solver.system, solver.inertia
     out, bend = [system.new_vector() for _ in vectors], system.new_vector()
-    beside, there = system.new_vector(), system.new_vector()
+    there = system.new_vector()
     for sign in (1.0, -1.0):
-        beside.waxpy(sign * h, direction, x)
+        beside = x + direction * (sign * h)
         matrix = inertia.at(beside).matrix
         for image, v in zip(out, vectors, strict=True):
             image.axpy(sign / (2 * h), matrix * v)
@@ -165,13 +162,3 @@ def _differences(
             bend.axpy(1.0 / h**2, there)
             bend.axpy(-1.0 / h**2, equations)
     return out, bend
-
-
-def _rounding(matrix: PETSc.Mat, v: PETSc.Vec, x: PETSc.Vec) -> float:
-    """Rounding error of ``v . F(x)``, those of its terms taken as independent and as large as those of ``v . S x``."""
-    starts, columns, values = matrix.getValuesCSR()
-    squares = PETSc.Mat().createAIJ(matrix.getSizes(), csr=(starts, columns, values**2), comm=matrix.comm)
-    a, b = v.copy(), x.copy()
-    a.pointwiseMult(v, v)
-    b.pointwiseMult(x, x)
-    return float(EPS * np.sqrt(a.dot(squares * b)))

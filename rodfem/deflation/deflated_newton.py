@@ -109,8 +109,7 @@ class DeflatedNewton:
         """Add ``factor`` times a step, halved while the stored energy has no value there; False if it never has."""
         system, equations = self.system, self.system.new_vector()
         for _ in range(10):
-            trial = x.copy()
-            trial.axpy(factor, step)
+            trial = x + step * factor
             self._normalise(trial)
             system.at(trial).residual(equations)
             if isfinite(equations.norm()):

@@ -140,7 +140,6 @@ def mirrors(system: System, x: PETSc.Vec) -> list[Mirror]:
 
 def _work(system: System, x: PETSc.Vec, y: PETSc.Vec) -> tuple[float, float]:
     """``F(x) . (y - x)`` and the product of the norms."""
-    equations, change = system.new_vector(), y.copy()
-    change.axpy(-1.0, x)
+    equations, change = system.new_vector(), y - x
     system.at(x).residual(equations)
     return float(equations.dot(change)), float(equations.norm() * change.norm())

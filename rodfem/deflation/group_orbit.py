@@ -40,8 +40,7 @@ class Orbit:
         zero = system.at(system.new_vector()).generator(symmetry)
         powers = [system.at(y).generator(symmetry)]
         for _ in range(5):
-            powers.append(system.at(powers[-1]).generator(symmetry))
-            powers[-1].axpy(-1.0, zero)
+            powers.append(system.at(powers[-1]).generator(symmetry) - zero)
         half, one = (w**2 for w in FREQUENCIES)
         # L^2 is -w^2 on the part of frequency w: polynomials in L^2 that are 1 on one part and 0 on the others
         of_half = np.array([one, 1.0]) / (-half * (one - half))
@@ -104,9 +103,8 @@ class Orbits:
         zero, ones = system.at(system.new_vector()), system.at(some)
         for i, symmetry in enumerate(system.symmetries):
             if not symmetry.along:
-                constant, change = zero.generator(i), ones.generator(i)
-                change.axpy(-1.0, constant)
-                if constant.norm() > 0 and change.norm() < NEGLIGIBLE * constant.norm():
+                constant = zero.generator(i)
+                if constant.norm() > 0 and (ones.generator(i) - constant).norm() < NEGLIGIBLE * constant.norm():
                     self.translations.append(constant)
                 else:
                     self.rotations.append(i)
@@ -131,9 +129,7 @@ class Orbits:
                 i = self.rotations[turn % len(self.rotations)]
                 orbit = orbits[i] if turn == 0 else self._orbit(y, i)
                 y = orbit.at(orbit.amount(image))
-            apart = x.copy()
-            apart.axpy(-1.0, y)
-            apart = self._still(apart)
+            apart = self._still(x - y)
             found.append((system.norm(apart), apart))
         return found
 

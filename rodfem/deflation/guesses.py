@@ -6,7 +6,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.system import System
-from rodfem.tolerances import same_place
 
 
 def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[int]) -> PETSc.Vec:
@@ -21,24 +20,13 @@ def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[i
     weights = rng.normal(size=(4, 3)) / np.arange(1, 5)[:, None]
     a, b = system.scene.interval
     x = (f.coordinates(f.discretization.degree) - a) / (b - a)
-    left, right = _clamped(system)
+    left, right = (end.fixed_rotation is not None for end in system.scene.sides)
     waves = _waves(x, left, right)
     dense = _waves(np.linspace(0.0, 1.0, 401), left, right)
     size = float(np.sqrt(np.mean(np.sum((dense @ weights) ** 2, axis=-1))))
     state = system.at(base)
     turned = f.turning.turned(state.turned, waves @ weights * (amplitude / size))
     return system.vector(f.filled(state.named | {f.turning.name: turned}))
-
-
-def _clamped(system: System) -> list[bool]:
-    """Whether the directors are held at the left and at the right end."""
-    f = system.fields
-    x = f.coordinates(f.discretization.degree)
-    here = []
-    for s in system.scene.interval:
-        at_end = same_place(x, s, system.scene.length)
-        here.append(bool((f.number[f.dofs[f.turning.name][at_end]] < 0).any()))
-    return [any(side) for side in zip(*system.comm.allgather(here), strict=True)]
 
 
 def _waves(x: np.ndarray, left: bool, right: bool) -> np.ndarray:

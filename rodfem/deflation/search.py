@@ -12,8 +12,7 @@ A search can show that there are more equilibria, and never that there are no mo
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -44,34 +43,21 @@ NEW, KNOWN, FAILED, INADMISSIBLE = "new", "known", "without convergence", "not a
 
 
 @dataclass
-class Try:
-    """How one try ended: the ``amplitude`` of its guess, its number of ``steps``, and one of the outcomes above."""
-
-    amplitude: float
-    steps: int
-    outcome: str
-
-
-@dataclass
 class SearchLog:
-    """What a search did: its ``load`` in words, all ``tries`` in order, and the ``mirrors`` (symmetries) of the scene.
+    """What a search did: its ``load`` in words, how its ``tries`` ended, and the ``mirrors`` (symmetries) of the scene.
 
-    ``nearly`` counts equilibria that are nearly mirror images of others, which an imperfection makes different ones.
+    ``tries`` are the outcomes above, in order.  ``nearly`` counts equilibria that are nearly mirror images of others,
+    which an imperfection makes different ones.
     """
 
     load: str
-    tries: list[Try] = field(default_factory=list)
+    tries: list[str] = field(default_factory=list)
     mirrors: list[str] = field(default_factory=list)
     nearly: int = 0
 
-    def count(self, outcome: str) -> int:
-        """Number of tries that ended so."""
-        return sum(t.outcome == outcome for t in self.tries)
-
     def __str__(self) -> str:
         """Return the counts, and what they do not prove, in a few lines."""
-        counts = Counter(t.outcome for t in self.tries)
-        words = ", ".join(f"{counts[outcome]} {outcome}" for outcome in (NEW, KNOWN, INADMISSIBLE, FAILED))
+        words = ", ".join(f"{self.tries.count(outcome)} {outcome}" for outcome in (NEW, KNOWN, INADMISSIBLE, FAILED))
         images = "; ".join(self.mirrors) or "none"
         nearly = f"  {self.nearly} new: nearly, but not exactly, mirror images of others\n" if self.nearly else ""
         return (
@@ -129,7 +115,7 @@ class Deflation(DeflatedNewton):
         """
         before = len(self.tally.tries)
         for number in range(before, before + tries):
-            x, amplitude = self.start.copy(), 0.0
+            x = self.start.copy()
             if number or self.known.states:
                 amplitude = LEAST * (GREATEST / LEAST) ** ((number - before) / max(tries - 1, 1))
                 base = self.bases[number % len(self.bases)] if self.bases else self.start
@@ -137,7 +123,7 @@ class Deflation(DeflatedNewton):
                 self.flow(x, FLOW * (1 + number // 2 % 2))
             steps = self.approach(x)
             point, outcome = self._judge(x) if steps < MOST else (None, FAILED)
-            self.tally.tries.append(Try(amplitude, steps, outcome))
+            self.tally.tries.append(outcome)
             if point is not None:
                 self.found.append(point)
                 self._deflate(point.x)
@@ -217,19 +203,19 @@ def find_equilibria(
     return found
 
 
-def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float) -> list[Point]:
+def equilibria_at(
+    solver: BranchSolver, branches: Sequence[Branch], load: float, here: Callable[[Point], Point] = lambda p: p
+) -> list[Point]:
     """Equilibria of traced branches at exactly ``load``, which a search for further ones deflates.
 
-    Raises :class:`ConvergenceError` where there is none between two points on either side of the load.
+    Raises :class:`ConvergenceError` where there is none between two points on either side of the load.  ``here`` brings
+    points of ``branches`` to the mesh of ``solver``, where they are on others.
     """
     found = []
     for branch in branches:
-        for a, b in pairwise(branch.points):
-            if (
-                (a.load - load) * (b.load - load) > 0
-                or a.load == b.load
-                or (b.load == load and b is not branch.points[-1])
-            ):
+        points = [here(p) for p in branch.points]
+        for a, b in pairwise(points):
+            if (a.load - load) * (b.load - load) > 0 or a.load == b.load or (b.load == load and b is not points[-1]):
                 continue
             t = (load - a.load) / (b.load - a.load)
             s = a.arclength + t * (b.arclength - a.arclength)

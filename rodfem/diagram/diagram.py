@@ -46,7 +46,7 @@ class Diagram:
     warnings, notes
         Sentences on what went wrong without stopping the computation, and on what is worth knowing.
     clock
-        Seconds by purpose.
+        Seconds by scope.
     """
 
     def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[StaticSolver]) -> None:
@@ -60,7 +60,7 @@ class Diagram:
 
     @property
     def clock(self) -> Clock:
-        """Seconds by purpose, of the computation and of later requests."""
+        """Seconds by scope, of the computation and of later requests."""
         return self.solvers[0].system.clock
 
     @property
@@ -110,7 +110,7 @@ class Diagram:
         if not isinstance(solver, BranchSolver):
             guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
             return [self.solver(guess).equilibrium(load, guess)]
-        return equilibria_at(solver, [replace(b, points=[self._on(p, finest) for p in b.points]) for b in self], load)
+        return equilibria_at(solver, self.branches, load, lambda p: self._on(p, finest))
 
     def solver(self, point: Point | SpecialPoint) -> Solver:
         """Return the solver of the mesh that a point belongs to."""
@@ -237,19 +237,10 @@ class Diagram:
 
     def _repr_html_(self) -> str:
         """Table of special points for notebooks."""
-        from rodfem.output.digits import index_in_words, number
+        from rodfem.output.digits import in_words
 
-        rows = []
-        for branch in self.branches:
-            for s in branch.special:
-                cells = (
-                    branch.name,
-                    s.kind,
-                    number(s.point.load, s.error_estimate, s.resolved),
-                    number(s.point.ordinate, s.ordinate_error, s.resolved),
-                    index_in_words(s),
-                )
-                rows.append("".join(f"<td>{escape(cell)}</td>" for cell in cells))
+        cells = [(branch.name, s.kind, *in_words(s)) for branch in self.branches for s in branch.special]
+        rows = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in cells]
         head = ("branch", "kind", self.scene.load, self.scene.ordinate.name, "index")
         title = "".join(f"<th>{escape(name)}</th>" for name in head)
         body = "".join(f"<tr>{row}</tr>" for row in rows)

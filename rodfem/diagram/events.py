@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-
-from petsc4py import PETSc
+from functools import partial
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import EVENT
@@ -29,22 +28,15 @@ class Events:
             return []
         before = self._values if self._row is a else [event_at(solver, event, a.x) for event in self.events]
         self._row, self._values = b, [event_at(solver, event, b.x) for event in self.events]
-        found = []
-        for event, p, q in zip(self.events, before, self._values, strict=True):
-            if p * q < 0:
-                found.append(_special(solver, event, a, b))
-        return found
+        changes = zip(self.events, before, self._values, strict=True)
+        return [_special(solver, event, a, b) for event, p, q in changes if p * q < 0]
 
 
 def _special(solver: BranchSolver, event: Event, a: Point, b: Point) -> SpecialPoint:
-    def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-        return hermite(a, b, s)
-
+    curve = partial(hermite, a, b)
     margin = INSIDE * (b.arclength - a.arclength)
     s, x, along = locate_event(solver, event, curve, a.arclength + margin, b.arclength - margin)
     tangent = solver.tangent(solver.row(curve(s)[1]), at=x)
     point = solver.point(x, s, tangent)
     left = abs(point.slope) * along + round_off(point.load)
-    special = SpecialPoint(EVENT, point, point.negative, point.negative, left, note=event.name)
-    special.event = event
-    return special
+    return SpecialPoint(EVENT, point, point.negative, point.negative, left, note=event.name, event=event)

@@ -52,10 +52,9 @@ class Explorer(Tracer):
     def _search(self, load: float) -> None:
         """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
         self.observer.note("")
-        with self.solver.system.clock.purpose("search"):
+        with self.solver.system.clock.scope("search"):
             self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
-            here = [replace(b, points=[self.here(p) for p in b.points]) for b in self.branches]
-            known = equilibria_at(self.solver, here, load)
+            known = equilibria_at(self.solver, self.branches, load, self.here)
             found = find_equilibria(self.solver, load, known, self.plan.tries, observer=self.observer)
         before = len(self.branches)
         for i, point in enumerate(found):
@@ -66,9 +65,8 @@ class Explorer(Tracer):
     def _on_branch(self, point: Point, first: int = 0) -> bool:
         """Whether a point is on one of the branches traced, from number ``first`` on."""
         self.use(point.mesh)
-        here = [replace(b, points=[self.here(p) for p in b.points]) for b in self.branches[first:]]
         known = Orbits(self.solver.system)
-        for other in equilibria_at(self.solver, here, point.load):
+        for other in equilibria_at(self.solver, self.branches[first:], point.load, self.here):
             known.add(other.x)
         return any(apart < SAME for apart, _ in known.nearest(point.x))
 
@@ -151,9 +149,7 @@ class Explorer(Tracer):
         found = solver.inertia.at(point.x)
         bordered = Bordered(system, found.matrix, freedoms, solver.inertia.constraints)
         bordered.factor(found.matrix, [solver.inertia.metric * v for v in vectors])
-        right = found.border.copy()
-        right.scale(-1.0)
-        tangent, _ = bordered.solve(right, np.zeros(freedoms))
+        tangent, _ = bordered.solve(-found.border, np.zeros(freedoms))
         system.set_load(tangent, 1.0)
         tangent.scale((1.0 if increasing else -1.0) / system.norm(tangent))
         point.tangent, point.slope = tangent, system.scalar(tangent)
@@ -180,12 +176,10 @@ class Explorer(Tracer):
             first: Point | None = None
             for sign in (1.0, -1.0):
                 self.use(special.point.mesh)
-                way = direction.copy()
-                way.scale(sign)
                 name = self._name(parent)
                 origin = parent.name, i
                 branch = start_branch(
-                    special, way, name, origin, parent.depth + 1, self.solver, len(ways), self._bounds()
+                    special, direction * sign, name, origin, parent.depth + 1, self.solver, len(ways), self._bounds()
                 )
                 if branch is None:
                     self.observer.warn(
@@ -203,7 +197,7 @@ class Explorer(Tracer):
                 if self._came_from(parent, special, first):
                     continue
                 self.trace(branch)
-        self._judge_from_the_side(special, self.branches[before:])
+        self._classify_from_the_side(special, self.branches[before:])
 
     def _bounds(self) -> tuple[float, float]:
         """Least and greatest load, with room for round-off."""
@@ -215,22 +209,22 @@ class Explorer(Tracer):
         if special.law is not None:
             return
         from_the_side = special.test_function == "slope"
-        with self.solver.system.clock.purpose("location"):
+        with self.solver.system.clock.scope("location"):
             way = special.null_vectors[0] if from_the_side else direction
             special.law = normal_form_of(self.solver, origin_of(self.solver, special), way)
         if special.law is not None and isfinite(special.error_estimate):
-            with self.solver.system.clock.purpose("error bars"):
+            with self.solver.system.clock.scope("error bars"):
                 self.meshes.richer(special.point.mesh).law(special, way, special.law)
         if special.law is not None and not from_the_side:
             indices = special.negative_before, special.negative_after
-            special.law.judge(*(indices if special.point.slope > 0 else reversed(indices)))
+            special.law.classify(*(indices if special.point.slope > 0 else reversed(indices)))
             self.observer.law(special)
 
-    def _judge_from_the_side(self, special: SpecialPoint, trunk: Sequence[Branch]) -> None:
+    def _classify_from_the_side(self, special: SpecialPoint, trunk: Sequence[Branch]) -> None:
         """Name a pitchfork that was reached along its side branch, from the branch that it ends on, now traced."""
         index = {branch.points[1].load > special.point.load: branch.points[1].negative for branch in trunk}
         if special.law is not None and special.test_function == "slope" and len(index) == 2:
-            special.law.judge(index[False], index[True])
+            special.law.classify(index[False], index[True])
             self.observer.law(special)
 
     def _name(self, parent: Branch) -> str:
@@ -245,9 +239,9 @@ class Explorer(Tracer):
         if equivalent(a, b):
             return True
         inner, outer = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
-        piece = Branch("", None, 0, [self.here(replace(special.point, arclength=0.0)), self.here(outer)])
+        piece = Branch("", None, 0, [replace(special.point, arclength=0.0), outer])
         try:
-            there = equilibria_at(self.solver, [piece], inner.load)
+            there = equilibria_at(self.solver, [piece], inner.load, self.here)
         except ConvergenceError:  # nothing of the one branch is at the other's load
             return False
         return any(self.alike(self.here(inner), p, SAME_STATE) for p in there)
@@ -256,8 +250,9 @@ class Explorer(Tracer):
         """Whether what leaves the end of a side branch is that branch again, or its mirror image."""
         if special.test_function != "slope":
             return False
-        tail = replace(parent, points=[self.here(p) for p in parent.points[-TAIL:]])
-        return any(equivalent(point, other, SAME_STATE) for other in equilibria_at(self.solver, [tail], point.load))
+        tail = replace(parent, points=parent.points[-TAIL:])
+        known = equilibria_at(self.solver, [tail], point.load, self.here)
+        return any(equivalent(point, other, SAME_STATE) for other in known)
 
     def _traced_already(self, branch: Branch, special: SpecialPoint) -> bool:
         """Whether another branch ended at this branch point coming along the same way."""

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.kinds import KINDS
@@ -19,17 +18,14 @@ from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM
-from rodfem.output.files import COLUMNS, load_json, load_state
+from rodfem.output.files import COLUMNS, OPTIONAL, SPECIAL, load_json, load_state
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, unit
 
 NEEDED = ("range", "accuracy", "constants", "discretization", "meshes")
 """Entries of a diagram, beside those that all of its readers need."""
 OF_BRANCH = ("name", "parent", "ended", "columns", "special")
-OF_SPECIAL = (
-    *("kind", "row", "negative_before", "negative_after", "located_to", "coupling", "multiplicity", "error_estimate"),
-    *("ordinate_error_estimate", "followed", "unfolding", "note", "omega2", "meets", "law"),
-)
+OF_SPECIAL = ("kind", "multiplicity", "meets", "law", *SPECIAL)
 
 
 def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Diagram:
@@ -103,7 +99,8 @@ def _branch(entry: dict[str, Any], solvers: Sequence[StaticSolver], states: Path
     for before, point, after in zip([*points[:1], *points[:-1]], points, [*points[1:], *points[-1:]], strict=True):
         solver = solvers[point.mesh]
         if isinstance(solver, BranchSolver) and before.mesh == point.mesh == after.mesh and len(points) > 1:
-            point.tangent = _chord(solver, before.x, after.x)
+            chord = after.x - before.x  # the tangent to second order of the step
+            point.tangent = chord / solver.system.norm(chord)
     branch = Branch(entry["name"], (parent[0], parent[1]) if parent else None, 0, points, ended=entry["ended"])
     branch.depth = len(entry["name"].split(".")) if parent else 0
     branch.special = [_special(s, points, solvers) for s in entry["special"]]
@@ -112,40 +109,23 @@ def _branch(entry: dict[str, Any], solvers: Sequence[StaticSolver], states: Path
 
 
 def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[StaticSolver], states: Path) -> Point:
-    values = {name: columns[name][row] for name in COLUMNS}
-    values = {name: float("nan") if value is None else value for name, value in values.items()}
-    solver = solvers[values["mesh"]]
-    more = ("spectrum", "omega2", "motion", "curve", "negative_in_space")
-    values |= {name: columns[name][row] for name in more if name in columns}
-    if "estimate" in columns and columns["estimate"][row] is not None:
-        values["estimate"] = columns["estimate"][row]
-    return Point(x=load_state(states, branch, row, solver), tangent=None, **values)
-
-
-def _chord(solver: BranchSolver, before: PETSc.Vec, after: PETSc.Vec) -> PETSc.Vec:
-    """Unit chord from the row before to the row after, which is the tangent to second order of the step."""
-    chord = after.copy()
-    chord.axpy(-1.0, before)
-    chord.scale(1.0 / solver.system.norm(chord))
-    return chord
+    values = {name: _number(columns[name][row]) for name in COLUMNS}
+    given = {name: columns[name][row] for name in OPTIONAL if name in columns}
+    values |= {name: value for name, value in given.items() if value is not None}
+    return Point(x=load_state(states, branch, row, solvers[values["mesh"]]), tangent=None, **values)
 
 
 def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[StaticSolver]) -> SpecialPoint:
     """Special point of a row; its null vectors are those of the eigenvalues nearest zero there."""
     point = points[entry["row"]]
     solver = solvers[point.mesh]
-    special = SpecialPoint(
-        KINDS[entry["kind"]], point, entry["negative_before"], entry["negative_after"], entry["located_to"],
-        coupling=entry["coupling"], error_estimate=_number(entry["error_estimate"]),
-        ordinate_error=_number(entry["ordinate_error_estimate"]), resolved=entry.get("resolved"), row=entry["row"],
-        switched=entry["followed"], unfolding=_number(entry["unfolding"]), note=entry["note"],
-        omega2=_number(entry["omega2"]),
-    )  # fmt: skip
+    known = {attribute: _number(entry[name]) for name, attribute in SPECIAL.items()}
+    special = SpecialPoint(KINDS[entry["kind"]], point, resolved=entry.get("resolved"), **known)
     if entry["meets"]:
         special.connects_to = (entry["meets"][0], entry["meets"][1])
     if entry["law"]:
-        known = {f.name for f in fields(NormalForm)}
-        special.law = NormalForm(**{name: _number(v) for name, v in entry["law"].items() if name in known})
+        parts = {f.name for f in fields(NormalForm)}
+        special.law = NormalForm(**{name: _number(v) for name, v in entry["law"].items() if name in parts})
     if isinstance(solver, BranchSolver) and special.kind.singular and entry["multiplicity"]:
         special.null_vectors = solver.inertia.modes_near_zero(point.x, entry["multiplicity"])
     return special

@@ -14,7 +14,7 @@ from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.index_chain import Row, chained
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.special_points import COUPLED, find_special, midpoint, renew
+from rodfem.continuation.special_points import COUPLED, find_special, midpoint
 from rodfem.continuation.touching import Touching
 from rodfem.errors import ConvergenceError
 from rodfem.stability.round_off import resolve
@@ -46,7 +46,6 @@ class SpecialSearch:
         self.solver = meshes.solvers[0]
         self.level = 0
         self._open: list[Point] = []
-        self._before: Point | None = None
         self._touching = Touching()
         self._short = (-inf, inf, 0)
 
@@ -57,7 +56,7 @@ class SpecialSearch:
 
     def resume(self, history: Sequence[Point]) -> None:
         """Go on from the last row of a branch, up to which everything has been found."""
-        self._open, self._before = [history[-1]], None
+        self._open = [history[-1]]
         self._touching.restart(history)
 
     def after(self, a: Point, b: Point) -> list[SpecialPoint]:
@@ -81,13 +80,7 @@ class SpecialSearch:
             if len(self._open) <= PATIENCE or self.row(b).decided:
                 return []
         changed = len(rows) > 1 or a.negative != b.negative or a.slope * b.slope < 0
-        if changed:
-            was = rows[0].negative, rows[0].slope > 0
-            for point in (*rows, b):
-                renew(self.solver, point, turning=len(rows) > 1 or a.slope * b.slope < 0)
-            if was != (rows[0].negative, rows[0].slope > 0) and self._before is not None:
-                rows.insert(0, self._here(self._before))  # what changes does so before that row
-        self._before, self._open = rows[-1], [b]
+        self._open = [b]
         between = [] if changed else self._touching.between(self.solver, a, b)
         self._touching.add(b, told=changed or any(row.arclength > a.arclength for row in between))
         return self._examined(self._among([*rows, *between, b]))

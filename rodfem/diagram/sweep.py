@@ -119,7 +119,7 @@ class Sweep:
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         for load in loads if a < b else loads[::-1]:
-            x = self._state(x, float(load))
+            x = at_load(self.solver, x, float(load))
             before = self.last
             point = self._point(x)
             for notice in self.solver.system.verification.read():
@@ -150,9 +150,6 @@ class Sweep:
     def at(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of an equilibrium that is not on the way of the sweep."""
         return self._point(x, on_the_way=False)
-
-    def _state(self, guess: PETSc.Vec, load: float) -> PETSc.Vec:
-        return at_load(self.solver, guess, load)
 
     def _point(self, x: PETSc.Vec, *, on_the_way: bool = True) -> Point:
         """Evaluate the records of the equilibrium ``x``; a special point is not ``on_the_way`` of the curves."""
@@ -206,7 +203,7 @@ class Sweep:
 
     def _between(self, branch: Branch, a: Point, b: Point, before: Frequencies, after: Frequencies) -> None:
         """Locate what happens between two loads: eigenvalues that collide, and real ones that pass through zero."""
-        with self.solver.system.clock.purpose("location"):
+        with self.solver.system.clock.scope("location"):
             events = self._collisions(a, b, before, after)
             real = [f.diverged() for f in (before, after)]
             for event in events:
@@ -218,7 +215,7 @@ class Sweep:
         negative = a.negative
         for i, event in enumerate(events):
             point = a if event.load == a.load else b if event.load == b.load else None
-            point = point or self._point(self._state(a.x, event.load), on_the_way=False)
+            point = point or self._point(at_load(self.solver, a.x, event.load), on_the_way=False)
             after_it = negative + event.change
             if i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
                 after_it = b.negative  # of all eigenvalues that are recorded
@@ -322,7 +319,7 @@ class Sweep:
 
     def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> _Event:
         """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
-        pencil, number = self.eigensolver.at(self._state(guess, loads[0])), len(loads)
+        pencil, number = self.eigensolver.at(at_load(self.solver, guess, loads[0])), len(loads)
         found = pencil.near(number + 2, SHIFT)
         cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
         load, uncertainty = _zero_between(self._measured(self.solver, self.eigensolver, guess), cluster, loads[0])
@@ -331,16 +328,15 @@ class Sweep:
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
         """Real eigenvalues at a load near the origin, in ascending order."""
-        return sorted(
-            v.real for v in self._leftmost(self.eigensolver.at(self._state(guess, load))).values if v.imag == 0
-        )
+        pencil = self.eigensolver.at(at_load(self.solver, guess, load))
+        return sorted(v.real for v in self._leftmost(pencil).values if v.imag == 0)
 
     def _special(self, branch: Branch, special: SpecialPoint) -> None:
         branch.special.append(special)
         self.observer.special(branch, special)
 
     def _error_bars(self, branch: Branch) -> None:
-        with self.solver.system.clock.purpose("error bars"):
+        with self.solver.system.clock.scope("error bars"):
             system = self.solver.system
             richer = StaticSolver(richer_system(system))
             eigensolver, transfer = NonsymmetricSolver(richer.system), Transfer(system, richer.system)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from mpi4py import MPI
 
 from rodfem import compat
@@ -63,8 +65,6 @@ def trace(
     ``diagram``.
     """
     plan = plan or Plan()
-    if scene.conservative:
-        compat.require_real_petsc()
     plan.check(scene)
     recorder, clock = Recorder(observer or Observer()), Clock()
     with compat.announce_compilation(recorder.compiling) as compiled:
@@ -103,8 +103,10 @@ def _mesh(
     if plan.accuracy is None or discretization.vertices is not None:
         return discretization
     if scene.conservative:
-        return start_mesh(scene, discretization.formulation, plan.accuracy, comm)
+        return replace(
+            start_mesh(scene, discretization.formulation, plan.accuracy, comm), factors=discretization.factors
+        )
     number = plan.spectrum or FREQUENCIES
     mesh, change = frequency_mesh(scene, discretization.formulation, plan.accuracy, plan.over(scene), number, comm)
     observer.frequency_mesh(mesh, number, change, plan.accuracy)
-    return mesh
+    return replace(mesh, factors=discretization.factors)

@@ -7,9 +7,7 @@ from dataclasses import replace
 from itertools import pairwise
 from math import isnan
 
-from petsc4py import PETSc
-
-from rodfem.adaptivity.accuracy_control import Watch
+from rodfem.adaptivity.accuracy_control import AccuracyControl
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
 from rodfem.adaptivity.zero_stretch import LOCATED, zero_stretch
@@ -65,7 +63,7 @@ class Tracer:
 
     @property
     def solvers(self) -> Sequence[BranchSolver]:
-        """Followers by the number of their mesh."""
+        """Solvers by the number of their mesh."""
         return self.meshes.solvers
 
     def use(self, mesh: int) -> None:
@@ -82,7 +80,7 @@ class Tracer:
         if branch.ended == NOT_TRACED:
             self.observer.branch(branch)
         self.use(branch.points[-1].mesh)
-        self.watch = Watch(self.meshes, (self.low, self.high))
+        self.control = AccuracyControl(self.meshes, (self.low, self.high))
         self.solver.damp(self._extra(branch.points[-1]) if branch.parent else 0)
         self._attempt(branch)
         self._finish(branch)
@@ -104,7 +102,7 @@ class Tracer:
         back = Branch(name, None, depth, [reversed_point(point, 0.0)])
         self.use(point.mesh)
         self.observer.branch(back)
-        self.watch = Watch(self.meshes, (self.low, self.high))
+        self.control = AccuracyControl(self.meshes, (self.low, self.high))
         self.solver.damp(0)
         self._attempt(back)
         branch = reversed_branch(back)
@@ -130,7 +128,7 @@ class Tracer:
             self.specials.begin(history[-1])
         while True:
             try:
-                self.watch.row(history[-1], self.solver)
+                self.control.row(history[-1], self.solver)
                 if not begun:
                     self._first_users(branch)
                     begun = True
@@ -144,10 +142,10 @@ class Tracer:
 
         Rows before the trouble stay what they are on the mesh that was made for them.
         """
-        solver = self.watch.another(trouble, self.observer)
+        solver = self.control.another(trouble, self.observer)
         if solver is not None:
             solver.damp(self.solver.system.damping > 0)
-            with self.solver.system.clock.purpose("location"):
+            with self.solver.system.clock.scope("location"):
                 pairs = self.meshes.carry(history, solver, branch.parent is not None)
             moved = {id(old): new for old, new in pairs if old is trouble.point}
             branch.points = [moved.get(id(p), p) for p in branch.points]
@@ -168,7 +166,7 @@ class Tracer:
                 return
             previous = history[-1]
             self._check_symmetry(item)
-            self.watch.row(item, self.solver)
+            self.control.row(item, self.solver)
             self._check_zeros(history, item)
             if item.stretch <= 0:
                 self._end_at_zero_stretch(branch, previous, item)
@@ -194,25 +192,22 @@ class Tracer:
 
     def _between(self, branch: Branch, a: Point, b: Point) -> str:
         """Insert folds, branch points and user points between two points; a reason if the branch ends there."""
-        with self.solver.system.clock.purpose("location"):
-            return self._between_points(branch, a, b)
-
-    def _between_points(self, branch: Branch, a: Point, b: Point) -> str:
-        specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b)
-        pieces = [a, *(s.point for s in specials if s.point.arclength > a.arclength), b]
-        users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
-        users += self.events.between(self.solver, a, b)
-        return self._insert(branch, specials + users)
+        with self.solver.system.clock.scope("location"):
+            specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b)
+            pieces = [a, *(s.point for s in specials if s.point.arclength > a.arclength), b]
+            users = [u for p, q in pairwise(pieces) for u in self._users(branch, p, q, a, b)]
+            users += self.events.between(self.solver, a, b)
+            return self._insert(branch, specials + users)
 
     def _rest(self, branch: Branch) -> str:
         """Insert the special points that only the end of a branch shows; a reason if the branch ends at one."""
-        with self.solver.system.clock.purpose("location"):
+        with self.solver.system.clock.scope("location"):
             return self._insert(branch, self.specials.rest())
 
     def _insert(self, branch: Branch, specials: list[SpecialPoint]) -> str:
         """Insert special points into a branch, up to one at which it ends: then the reason."""
         for special in specials:
-            self.watch.special(special)
+            self.control.special(special)
         for special in sorted(specials, key=lambda s: s.point.arclength):
             reason = self._meeting(branch, special) if special.kind.branches else ""
             branch.insert(special)
@@ -247,7 +242,7 @@ class Tracer:
             return
         a, b = map(self.here, branch.points)
         for special in self._users(branch, a, b, a, b):
-            self.watch.special(special)
+            self.control.special(special)
             branch.insert(special)
             self.observer.special(branch, special)
 
@@ -277,17 +272,6 @@ class Tracer:
 
     def _no_equilibrium(self, load: float) -> str:
         return f"No equilibrium at {self.scene.load} = {load:g} between two points of the branch: use another load."
-
-    def user(self, guess: PETSc.Vec, load: float, s: float, increasing: bool) -> Point:
-        """Point at exactly ``load`` from a guess; raises :class:`ConvergenceError`.
-
-        Its arclength is about ``s``; its tangent is on the side on which the load is ``increasing``, or decreases.  The
-        ``guess`` is a state.
-        """
-        x, outcome = self.solver.at_load(guess, load, reach=1.0)
-        if not outcome.converged:
-            raise ConvergenceError(self._no_equilibrium(load))
-        return self.solver.point(x, s, self.solver.load_tangent(x, increasing), outcome)
 
     def _meeting(self, branch: Branch, special: SpecialPoint) -> str:
         """Recognise a branch point that is known already; a reason if the branch ends there."""
@@ -325,12 +309,12 @@ class Tracer:
         special = SpecialPoint(END, last, last.negative, last.negative, LOCATED, test_function="stretch")
         if self.plan.error_bars:
             try:
-                with self.solver.system.clock.purpose("error bars"):
+                with self.solver.system.clock.scope("error bars"):
                     special = zero_stretch(self.solver, last)
             except ConvergenceError as trouble:
                 special.note = f"no error estimate: {trouble}"
             else:
-                self.watch.judge(special)
+                self.control.check(special)
         branch.points.append(special.point)
         branch.special.append(special)
 
@@ -351,10 +335,12 @@ class Tracer:
         if not parameter.admissible[0] < beyond < parameter.admissible[1] or previous.x is last.x:
             return
         try:
-            with self.solver.system.clock.purpose("location"):
-                guess = hermite(previous, last, last.arclength)[0]
-                point = self.user(guess, beyond, 2 * last.arclength - previous.arclength, beyond > load)
-                point.arclength = last.arclength + distance(self.solver.system, last.x, point.x)
+            with self.solver.system.clock.scope("location"):
+                x, outcome = self.solver.at_load(last.x, beyond, reach=1.0)
+                if not outcome.converged:
+                    raise ConvergenceError(self._no_equilibrium(beyond))
+                s = last.arclength + distance(self.solver.system, last.x, x)
+                point = self.solver.point(x, s, self.solver.load_tangent(x, beyond > load), outcome)
                 found = [s for s in self.specials.beyond(previous, point) if s.kind.branches]
         except ConvergenceError as trouble:
             self.observer.warn(
@@ -394,7 +380,7 @@ class Tracer:
         for notice in self.solver.system.verification.read():
             self.observer.warn(notice)
         if point.drift > DRIFT * self.solver.inertia.scale:
-            self.watch.drifting(point)
+            self.control.drifting(point)
             raise ConvergenceError(
                 f"The mesh does not resolve a symmetry of the scene any more: the drift is {point.drift:.2g} at "
                 f"{self.scene.load} = {point.load:.6g} where it should vanish; use more elements, or ask for an "
@@ -452,15 +438,15 @@ class Tracer:
         for unexplained in branch.unexplained:
             self.observer.warn(str(unexplained))
         self.observer.finished(branch)
-        self.watch.summary(branch, self.observer)
+        self.control.summary(branch, self.observer)
         self.finished()
 
     def _error_bars(self, branch: Branch) -> None:
-        with self.solver.system.clock.purpose("error bars"):
+        with self.solver.system.clock.scope("error bars"):
             for special in branch.special:
                 if isnan(special.error_estimate):
                     self.meshes.richer(special.point.mesh).estimate(special)
-                self.watch.label(special)
+                self.control.label(special)
 
 
 def equivalent(a: Point, b: Point, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:
@@ -476,10 +462,7 @@ def equivalent(a: Point, b: Point, tolerance: float = 1e-8, of_strain: float = 0
 
 def reversed_point(point: Point, total: float) -> Point:
     """The same equilibrium on the branch of length ``total`` followed the other way."""
-    tangent = None
-    if point.tangent is not None:
-        tangent = point.tangent.copy()
-        tangent.scale(-1.0)
+    tangent = None if point.tangent is None else -point.tangent
     return replace(point, arclength=total - point.arclength, tangent=tangent, slope=-point.slope)
 
 

@@ -98,7 +98,15 @@ class Cells:
 
 
 class Assembler:
-    """A compiled ``form`` whose coefficient, where it has one, is the unknown; on the cells of this rank."""
+    """A compiled ``form`` whose coefficient, where it has one, is the unknown; on the cells of this rank.
+
+    Attributes
+    ----------
+    constants
+        Values of the constants of the form, as :meth:`pack_constants` found them.
+    pointer, function
+        The form for other compiled code, and the address of what assembles it.
+    """
 
     def __init__(self, form: Any, cells: Cells) -> None:
         """Take the kernels of a dolfinx form."""
@@ -115,7 +123,8 @@ class Assembler:
         given = [self._pointer(x, kind) for x, kind in ((cells.x, "double"), (cells.dofs, "int"))]
         spare = [self._pointer(x, "double") for x in room]
         self._form = ffi.new("Form *", [form.rank, size, len(integrals), self._integrals, *given, *spare])
-        self._constants: np.ndarray | None = None
+        self.constants = np.zeros(0)
+        self.pointer, self.function = self._form, int(ffi.cast("uintptr_t", ffi.addressof(self._code.lib, "assemble")))
 
     def _pointer(self, array: np.ndarray, kind: str) -> Any:
         found = self._code.ffi.from_buffer(f"{kind}[]", array)
@@ -124,7 +133,7 @@ class Assembler:
 
     def pack_constants(self) -> None:
         """Take the values that the constants of the form have now."""
-        self._constants = np.ascontiguousarray(compat.pack_constants(self.form), dtype=float)
+        self.constants = np.ascontiguousarray(compat.pack_constants(self.form), dtype=float)
 
     def add(self, values: np.ndarray, places: Places | None, out: np.ndarray) -> None:
         """Add the form at the local ``values`` of the unknown to ``out``, where ``places`` say (None: a scalar)."""
@@ -133,7 +142,7 @@ class Assembler:
             self._form,
             ffi.NULL if places is None else places.pointer,
             ffi.from_buffer("double[]", values),
-            ffi.from_buffer("double[]", self._constants),
+            ffi.from_buffer("double[]", self.constants),
             ffi.from_buffer("double[]", out),
         )
         assert not failed, "A term at a point inside the rod must be evaluated in one of the two cells there."

@@ -30,6 +30,8 @@ from rodfem.problem.scene import Scene
 from rodfem.tolerances import same_place
 
 LOAD = "load"
+FACTORS = CHAIN, PETSC = "chain", "petsc"
+"""What assembles and factors the matrices of a discretisation."""
 HIGHEST = 12
 """Highest degree of elements."""
 
@@ -40,13 +42,15 @@ class Discretization:
 
     The formulation is one of :mod:`rodfem.fem.formulations`, or ``auto``: the first that the scene allows.
     ``vertices`` are the arclengths at which elements meet, both ends included; without them all elements are of nearly
-    equal size.
+    equal size.  ``factors`` are ``chain``, compiled assembly and elimination along the rod, or ``petsc``, the same
+    matrices assembled by dolfinx and factored by MUMPS: the reference, with the same numbers, and slower.
     """
 
     formulation: str = "auto"
     elements: int = 8
     degree: int = 6
     vertices: tuple[float, ...] | None = None
+    factors: str = CHAIN
 
     def __post_init__(self) -> None:
         """Check the values; raises :class:`InputError`."""
@@ -56,6 +60,8 @@ class Discretization:
             object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
         if self.formulation not in (known := formulations.names()):
             raise InputError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(known)}.")
+        if self.factors not in FACTORS:
+            raise InputError(f"Nothing factors matrices by the name {self.factors!r}: choose {' or '.join(FACTORS)}.")
         if self.elements < 1:
             raise InputError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
         if not 1 <= self.degree <= HIGHEST:
@@ -196,7 +202,7 @@ class Fields:
 
         Of a planar rod also all that would leave the plane.
         """
-        found = [dofs.ravel() for dofs in self.out_of_plane().values()]
+        found = [dofs.ravel() for dofs in self.out_of_plane(self.scene.normal).values()]
         c = self.scene.constants()
         for end, s in zip(self.scene.sides, self.scene.interval, strict=True):
             for block in (b for b in self.blocks if b.continuous):
@@ -205,9 +211,8 @@ class Fields:
                 found.append(at_end[:, np.broadcast_to(end.clamps(block, c), block.size)].ravel())
         return np.unique(np.concatenate(found)) if found else np.array([], dtype=int)
 
-    def out_of_plane(self) -> dict[str, np.ndarray]:
-        """Degrees of freedom of each field that vanish for a planar rod; empty for a rod in space."""
-        normal = self.scene.normal
+    def out_of_plane(self, normal: int | None) -> dict[str, np.ndarray]:
+        """Degrees of freedom of each field that vanish for a rod in the plane across ``normal``; None: in space."""
         if normal is None:
             return {}
         components = {
@@ -282,6 +287,16 @@ class Fields:
     def arclength(self) -> Arclength:
         """Matrices of the derivative in arclength."""
         return Arclength(self)
+
+    @property
+    def compiled(self) -> bool:
+        """Whether compiled code assembles matrices: on one rank, of real numbers, unless PETSc is asked for."""
+        return self.comm.size == 1 and not compat.COMPLEX and self.discretization.factors == CHAIN
+
+    @property
+    def along(self) -> int:
+        """Number of unknowns of the matrices that are factored along the rod; 0 where PETSc is to factor them."""
+        return self.unknowns if self.discretization.factors == CHAIN else 0
 
     @property
     def dense_rows(self) -> int:

@@ -16,17 +16,19 @@ derivative in it, is asked on a fine mesh, which has such a symmetry up to its s
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
 
-from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Fields
 from rodfem.fem.state import Evaluation
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
 from rodfem.problem.contribution import Block
 from rodfem.tolerances import TINY
+
+if TYPE_CHECKING:
+    from rodfem.fem.equations import Equations
 
 EXACT = 1e-10
 """Round-off of the change of the functional, relative to the sum of magnitudes of its terms."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rodfem.errors import InputError
+from rodfem.problem.quaternions import CONJUGATE, product
 
 
 def writhe(r: np.ndarray) -> float:
@@ -41,7 +42,7 @@ def twist(s: np.ndarray, q: np.ndarray) -> float:
     spline = CubicSpline(s, unit)
     fine = np.linspace(s[0], s[-1], 8 * len(s) + 1)
     p, d = spline(fine), spline(fine, 1)
-    k3 = 2 * (p[:, 0] * d[:, 3] - p[:, 3] * d[:, 0] + p[:, 2] * d[:, 1] - p[:, 1] * d[:, 2]) / np.sum(p * p, axis=1)
+    k3 = 2 * product(p * CONJUGATE, d)[:, 3] / np.sum(p * p, axis=1)
     return float(trapezoid(k3, fine)) / (2 * np.pi)
 
 

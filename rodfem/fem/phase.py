@@ -10,7 +10,9 @@ and a drift scalar as its multiplier (Doedel, in: Numerical Continuation Methods
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,23 +37,31 @@ class Phase:
 
     Attributes
     ----------
-    conditions
-        ``M g`` for each drift scalar, None where none is active.
+    rows
+        ``M g`` of each active condition by its drift scalar, this rank's rows.
     offsets
-        ``g . M x0``.
+        ``g . M x0`` for each drift scalar.
     broken
         Weights of the generators in each ``g``.
     kept
         Weights of those combinations that the reference has itself, a row each.
     reference
         ``x0``, None where no condition is active.
+    vector
+        Makes a vector of own rows.
     """
 
-    conditions: tuple[PETSc.Vec | None, ...]
-    offsets: tuple[float, ...]
+    rows: dict[int, np.ndarray]
+    offsets: np.ndarray
     broken: dict[int, np.ndarray]
     kept: np.ndarray
     reference: PETSc.Vec | None
+    vector: Callable[[np.ndarray], PETSc.Vec]
+
+    @cached_property
+    def conditions(self) -> tuple[PETSc.Vec | None, ...]:
+        """``M g`` for each drift scalar as vectors, None where none is active."""
+        return tuple(self.vector(self.rows[i]) if i in self.rows else None for i in range(len(self.offsets)))
 
     @property
     def count(self) -> int:
@@ -60,7 +70,7 @@ class Phase:
 
     def belongs_to(self, x: PETSc.Vec) -> bool:
         """Whether ``x`` is the reference state, or no state can have a phase condition."""
-        return not self.conditions or (self.reference is not None and bool(self.reference.equal(x)))
+        return not len(self.offsets) or (self.reference is not None and bool(self.reference.equal(x)))
 
     def motions(self, symmetries: list[Symmetry]) -> list[str]:
         """In words the motions that carry the reference state through equivalent ones, one for each condition."""
@@ -72,16 +82,17 @@ class Phase:
         return out
 
 
-def no_phase(count: int, reference: PETSc.Vec | None = None) -> Phase:
-    """No active condition for any of ``count`` drift scalars."""
-    return Phase((None,) * count, (0.0,) * count, {}, np.eye(count), None if reference is None else reference.copy())
+def no_phase(system: System, reference: PETSc.Vec | None = None) -> Phase:
+    """No active condition for any drift scalar of the ``system``."""
+    count, reference = len(system.drifts), None if reference is None else reference.copy()
+    return Phase({}, np.zeros(count), {}, np.eye(count), reference, system.generators.vector)
 
 
 def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
     """Phase conditions at ``reference`` for the symmetries of the ``system``, but for those ``dropped``."""
     symmetries, count = system.symmetries, len(system.symmetries)
     if count == len(dropped):
-        return no_phase(count, reference)
+        return no_phase(system, reference)
     state: State = system.at(reference)
     generators = system.generators.at(state)
     images = system.weighed(generators)
@@ -90,22 +101,33 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
         gram = system.comm.allreduce(gram, op=MPI.SUM)
     exact = [i for i, s in enumerate(symmetries) if not s.along and i not in dropped]
     squares, turn = np.linalg.eigh(gram[exact][:, exact])
-    combinations, sizes = list((np.eye(count)[:, exact] @ turn).T), list(np.sqrt(np.maximum(squares, 0.0)))
-    least = [SYMMETRIC_STATE] * len(exact)
+    combinations = np.zeros((len(exact), count))
+    combinations[:, exact] = turn.T
+    sizes, least = np.sqrt(np.maximum(squares, 0.0)), np.full(len(exact), SYMMETRIC_STATE)
     if symmetries[-1].along and count - 1 not in dropped:
         # of the motion along itself only what the exact symmetries do not do as well
         rest = np.eye(count)[-1]
         for weights, size in zip(combinations, sizes, strict=True):
             if size >= SYMMETRIC_STATE:
                 rest = rest - weights / size**2 * (weights @ gram[:, -1])
-        combinations.append(rest / np.linalg.norm(rest))
+        rest = rest / np.linalg.norm(rest)
         # by the difference of the vectors: in the Gram matrix half of the digits cancel
-        sizes.append(system.norm(system.generators.vector(combinations[-1] @ generators)))
-        least.append(max(MESH * mismatch(state), 10 * SYMMETRIC_STATE))
-    active = np.array(sizes) >= least
-    conditions, offsets, broken = [None] * count, [0.0] * count, {}
-    for i in np.flatnonzero(active):
-        condition = system.generators.vector(combinations[i] / sizes[i] @ images)
-        conditions[i], offsets[i] = condition, state.along(condition)
-        broken[int(i)] = combinations[i] / sizes[i]
-    return Phase(tuple(conditions), tuple(offsets), broken, np.array(combinations)[~active], reference.copy())
+        size = system.norm(system.generators.vector(rest @ generators))
+        combinations, sizes = np.vstack([combinations, rest]), np.append(sizes, size)
+        least = np.append(least, max(MESH * mismatch(state), 10 * SYMMETRIC_STATE))
+    active = np.flatnonzero(sizes >= least)
+    weights = combinations[active] / sizes[active, None]
+    rows, offsets = weights @ images, np.zeros(count)
+    own = system.fields.free_owned
+    offsets[active] = rows[:, : len(own)] @ state.local[own]
+    if system.comm.size > 1:
+        offsets = system.comm.allreduce(offsets, op=MPI.SUM)
+    numbers = active.tolist()
+    return Phase(
+        dict(zip(numbers, rows, strict=True)),
+        offsets,
+        dict(zip(numbers, weights, strict=True)),
+        np.delete(combinations, active, axis=0),
+        reference.copy(),
+        system.generators.vector,
+    )

@@ -6,7 +6,6 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from rodfem import compat
 from rodfem.fem.fields import Fields
 from rodfem.linalg.matrices import shared_matrix
 
@@ -76,10 +75,10 @@ def _own_rows(fields: Fields, names: list[str]) -> sp.csr_matrix:
 def new_matrix(fields: Fields, pattern: sp.csr_matrix, rows: PETSc.LGMap, columns: PETSc.LGMap) -> PETSc.Mat:
     """Zero PETSc AIJ matrix with ``pattern``, on the ranks of ``fields``.
 
-    ``rows`` and ``columns`` are the maps from local degrees of freedom to its rows and columns.  On one rank its values
-    are shared with numpy.
+    ``rows`` and ``columns`` are the maps from local degrees of freedom to its rows and columns.  Its values are
+    shared with numpy where compiled code assembles it.
     """
-    if fields.comm.size == 1 and not compat.COMPLEX:
+    if fields.compiled:
         matrix = shared_matrix(fields.comm, pattern)
     else:
         size = (fields.local_unknowns, fields.unknowns)

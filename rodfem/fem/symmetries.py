@@ -11,16 +11,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 
 from forms.symmetry import AXES, Matrix, cross, left, right
-from rodfem.fem.fields import Fields
 from rodfem.fem.values import NodalValues
 from rodfem.problem.contribution import Motion
 from rodfem.problem.scene import Scene
+
+if TYPE_CHECKING:
+    from rodfem.fem.fields import Fields
 
 NAMED = 1e-3
 """Weight of a part, relative to the greatest, above which it is named."""

@@ -21,7 +21,6 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem import compat
 from rodfem.fem.assembly import Places, matrix_places, vector_places
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Discretization, Fields
@@ -100,8 +99,8 @@ class System:
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
         self.equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self.equation_numbers = number[self.equation_targets].astype(PETSc.IntType)
-        direct = comm.size == 1 and not compat.COMPLEX
-        self.equation_places = vector_places(self.equations.cells.dofs, without_load) if direct else None
+        dofs = self.equations.cells.dofs
+        self.equation_places = vector_places(dofs, without_load) if self.fields.compiled else None
         self._places: dict[tuple[int, bool], Places] = {}
         self._pattern, self._metric_pattern = bordered_pattern(self.fields), metric_pattern(self.fields)
         self.matrix = self.state_matrix(load=True)
@@ -114,10 +113,11 @@ class System:
         self.metric = self._assemble_metric()
         own, fixed = shared(self.metric), self.fields.unknowns - len(self.drifts)
         self._weights = None if own is None else own.matrix[:fixed, :fixed]
-        self.phase, self.generators = no_phase(len(self.drifts)), Generators(self)
+        self.generators = Generators(self)
+        self.phase = no_phase(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
-        self.lu = factors_of("lu", comm, self.fields.unknowns, self.fields.dense_rows, {8: 0})
+        self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, {8: 0})
 
     def _symmetries(self) -> list[Symmetry]:
         """Symmetries of the scene; found with few elements, which have the same ones, where there are many.
@@ -269,7 +269,7 @@ class System:
     def set_phase(self, reference: PETSc.Vec | None) -> None:
         """Set the phase conditions at ``reference`` (:mod:`rodfem.fem.phase`); None: none active."""
         if reference is None:
-            self.phase = no_phase(len(self.drifts))
+            self.phase = no_phase(self)
         elif not self.phase.belongs_to(reference):
             self.phase = phase_at(self, reference, self.verification.dropped)
 
@@ -282,7 +282,7 @@ class System:
         if not self.symmetries or self.verification(matrix, state, equations):
             return True
         reference = self.phase.reference
-        self.phase = no_phase(len(self.drifts))
+        self.phase = no_phase(self)
         self.set_phase(reference)
         return False
 

@@ -81,16 +81,31 @@ class Chain:
 
     def __call__(self, matrix: PETSc.Mat) -> None:
         """Factor ``matrix``; raises :class:`ConvergenceError` where it is no chain, or holds what is no number."""
-        if self._chain is None or matrix.handle != self._handle:
-            starts, indices, _ = matrix.getValuesCSR()
-            self._set_up(matrix.size[0], starts, indices)
-            self._handle = matrix.handle
+        self.prepare(matrix)
         values = values_of(matrix)
         status = self.lib.chain_factor(self._chain, self._pointer(values, "double"))
         self.regular = status == 0
         if status > SINGULAR:
             why = "its fronts are too large" if status == TOO_LARGE else "it has entries that are no numbers"
             raise ConvergenceError(f"The matrix could not be factored along the rod: {why}.")
+
+    def prepare(self, matrix: PETSc.Mat) -> None:
+        """Find the fronts of a ``matrix``, unless they are known."""
+        if self._chain is None or matrix.handle != self._handle:
+            starts, indices, _ = matrix.getValuesCSR()
+            self._set_up(matrix.size[0], starts, indices)
+            self._handle = matrix.handle
+
+    @property
+    def pointer(self) -> Any:
+        """The chain, for other compiled code; it sets :attr:`regular`."""
+        return self._chain
+
+    @property
+    def functions(self) -> list[int]:
+        """Addresses of the functions that factor, solve, and count negative pivots and those that are zero."""
+        names = ("factor", "solve", "negative", "zero")
+        return [int(self.ffi.cast("uintptr_t", self.ffi.addressof(self.lib, f"chain_{name}"))) for name in names]
 
     def _pointer(self, array: np.ndarray, kind: str) -> Any:
         return self.ffi.from_buffer(f"{kind}[]", array)

@@ -14,8 +14,9 @@ from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
 from rodfem.modes.perturbation import Motion, Motions
-from rodfem.stability import mode_type as character
+from rodfem.stability import mode_type
 from rodfem.stability.assessment import Assessor, Verdict
+from rodfem.stability.cluster import as_vectors
 from rodfem.stability.left_right import two_sided
 from rodfem.stability.pencil import symmetry_modes, weighed_modes
 
@@ -37,7 +38,7 @@ class ModeFinder:
         self._richer: tuple[StaticSolver, Assessor, Transfer] | None = None
 
     def __call__(self, x: PETSc.Vec, number: int, method: str = "auto") -> tuple[Verdict, Modes]:
-        """Assessor the equilibrium ``x`` and find its ``number`` left-most modes (nearest zero without a potential)."""
+        """Assess the equilibrium ``x`` and find its ``number`` left-most modes (nearest zero without a potential)."""
         verdict = self.assessor(x, method, number)
         sample = self.motions.sample(x)
         found = self._conservative(x, verdict) if self.assessor.conservative else self._pairs(x, number)
@@ -79,7 +80,7 @@ class ModeFinder:
 
     def _name(self, x: PETSc.Vec, v: PETSc.Vec) -> str:
         """Name of the motion."""
-        return character.name(character.shares(self.system, self.system.at(x).turned, [v.array_r]))
+        return mode_type.name(mode_type.shares(self.system, self.system.at(x).turned, [v.array_r]))
 
     def _turned(self, x: PETSc.Vec, values: np.ndarray, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
         """Sign each mode, and choose a basis of the modes of equal eigenvalues: the same from any orthonormal one.
@@ -127,13 +128,8 @@ class ModeFinder:
     def _complex(self, x: PETSc.Vec, values: np.ndarray, *, dual: bool = False) -> Motion:
         """Motion of a complex perturbation, or weights of a complex functional, by its values on this rank (n,)."""
         evaluate = self.motions.dual if dual else self.motions.at
-        parts = []
-        for part in (values.real, values.imag):
-            vector = self.system.new_vector()
-            vector.array[:] = part
-            vector.assemble()
-            parts.append(evaluate(x, vector))
-        re, im = parts
+        parts = as_vectors(self.system, np.stack([values.real, values.imag], axis=1))
+        re, im = (evaluate(x, part) for part in parts)
         return Motion(re.r + 1j * im.r, re.w + 1j * im.w, re.q + 1j * im.q)
 
     # --- others ------------------------------------------------------------------------------------------------

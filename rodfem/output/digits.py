@@ -33,6 +33,14 @@ def number(value: float, error: float, resolved: bool | None = True) -> str:
     return f"{shown:.{digits}f} ({least}{rounded_up(error + abs(value - shown)):.0e})"
 
 
+def in_words(special: SpecialPoint) -> tuple[str, str, str]:
+    """Load, ordinate and index of a special point, as tables have them; a load that is given is exact."""
+    point = special.point
+    exact = special.kind.given and special.test_function != "stretch"
+    load = f"{point.load:.10g}" if exact else number(point.load, special.error_estimate, special.resolved)
+    return load, number(point.ordinate, special.ordinate_error, special.resolved), index_in_words(special)
+
+
 def index_in_words(special: SpecialPoint) -> str:
     """Index at a special point in words: before and after if it changes."""
     before, after = special.negative_before, special.negative_after

@@ -45,6 +45,12 @@ MEANING = {
     "mesh": "number of the discretisation in meshes",
 }
 """Columns in words, as they stand in the file."""
+OPTIONAL = ("estimate", "spectrum", "negative_in_space", "omega2", "motion", "curve")
+"""Columns that a branch has where one of its rows has an entry."""
+ALIKE = ("row", "negative_before", "negative_after", "located_to", "error_estimate", "coupling", "omega2", "unfolding")
+SPECIAL = {"ordinate_error_estimate": "ordinate_error", "followed": "switched", "note": "note"}
+SPECIAL |= {name: name for name in ALIKE}
+"""Entries of a special point, and the attributes that they hold, most of which have the same name."""
 UNSTABLE = "number of eigenvalues omega^2 that are negative or complex, of those found: 0 is stable"
 """Meaning of ``negative`` where loads have no potential."""
 
@@ -66,7 +72,6 @@ def as_data(
     scene = system.scene
     s = clock.seconds
     points = sum(len(b.points) for b in branches)
-    work = sum(s.get(name, 0.0) for name in ("assembly", "solve", "stability"))
     return {
         "format": DIAGRAM.mark(),
         "scene": scene.name,
@@ -93,7 +98,7 @@ def as_data(
             "setup_s": s.get("setup", 0.0),
             "total_s": clock.total(),
             "points": points,
-            "ms_per_point": 1e3 * work / max(points, 1),
+            "ms_per_point": clock.each(points),
             "ranks": system.comm.size,
         },
     }
@@ -112,17 +117,12 @@ def _mesh_data(fields: Fields) -> dict[str, Any]:
 def _branch_data(branch: Branch) -> dict[str, Any]:
     rows = {id(p): i for i, p in enumerate(branch.points)}
     columns: dict[str, list[Any]] = {name: [_plain(getattr(p, name)) for p in branch.points] for name in COLUMNS}
-    if any(np.isfinite(p.estimate) for p in branch.points):
-        columns["estimate"] = [_plain(p.estimate) for p in branch.points]
-    if any(p.spectrum for p in branch.points):
-        columns["spectrum"] = [p.spectrum for p in branch.points]
-    if any(p.negative_in_space is not None for p in branch.points):
-        columns["negative_in_space"] = [p.negative_in_space for p in branch.points]
-    if any(p.omega2 for p in branch.points):
-        columns["omega2"] = [p.omega2 for p in branch.points]
-        columns["motion"] = [p.motion for p in branch.points]
-        columns["curve"] = [p.curve for p in branch.points]
-        columns["unstable"] = [p.negative for p in branch.points]
+    for name in OPTIONAL:
+        column = [_plain(getattr(p, name)) for p in branch.points]
+        if any(value not in (None, []) for value in column):
+            columns[name] = column
+    if "omega2" in columns:
+        columns["unstable"] = columns["negative"]
     return {
         "name": branch.name,
         "parent": list(branch.parent) if branch.parent else None,
@@ -140,28 +140,18 @@ def _special_data(s: SpecialPoint) -> dict[str, Any]:
         "load": s.point.load,
         "ordinate": s.point.ordinate,
         "energy": s.point.energy,
-        "row": s.row,
-        "negative_before": s.negative_before,
-        "negative_after": s.negative_after,
         "zero": s.point.zero,
         "multiplicity": s.multiplicity,
-        "error_estimate": _plain(s.error_estimate),
-        "ordinate_error_estimate": _plain(s.ordinate_error),
         "resolved": s.resolved,
-        "located_to": s.located_to,
-        "coupling": s.coupling,
         "meets": list(s.connects_to) if s.connects_to else None,
-        "followed": s.switched,
-        "omega2": _plain(s.omega2),
         "law": None if s.law is None else asdict(s.law) | {"uncertainty": _plain(s.law.uncertainty)},
-        "unfolding": _plain(s.unfolding),
-        "note": s.note,
+        **{entry: _plain(getattr(s, attribute)) for entry, attribute in SPECIAL.items()},
     }
 
 
-def _plain(value: float) -> float | int | None:
-    """Number that JSON can hold; what is not finite becomes null."""
-    if isinstance(value, int):
+def _plain(value: Any) -> Any:
+    """What JSON can hold: numbers that are not finite become null."""
+    if value is None or isinstance(value, (int, str, list)):
         return value
     return float(value) if np.isfinite(value) else None
 
@@ -246,8 +236,8 @@ def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc
     """State vector of a saved row, to start from or to examine; the elements and the degree may differ.
 
     Raises :class:`InputError` where the file has another or a newer format, or no such row, has it in the other
-    formulation, or lacks an unknown of the follower's scene.  ``path`` is that of ``states.h5``, ``row`` the number of
-    the row of ``branch``; the state is one of ``solver``.
+    formulation, or lacks an unknown of the scene.  ``path`` is that of ``states.h5``, ``row`` the number of the row of
+    ``branch``; the state is one of ``solver``.
     """
     import h5py
 

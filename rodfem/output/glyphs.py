@@ -13,12 +13,12 @@ In a motion the rod has left a place: rails, what springs and strings are fixed 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodfem.output.solids import Solid, ball, box, coil, profile_of, round_arrow, straight_arrow, sweep
+from rodfem.output.solids import Solid, across, ball, box, coil, profile_of, round_arrow, straight_arrow, sweep
+from rodfem.output.view import sign_of
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import AXIS, HELD, Setting, Support, Tie
 from rodfem.tolerances import TINY
@@ -98,7 +98,7 @@ def _body(support: Support, at: Floats, home: Floats, R: Floats, away: Floats, s
         return []
     frame = directors(support.frame)
     if support.turning == HELD:
-        middle = at + 0.5 * size * frame[:, 2] * _sign(frame[:, 2] @ away)
+        middle = at + 0.5 * size * frame[:, 2] * sign_of(frame[:, 2] @ away)
         block = box(middle, frame, (size, size, 0.5 * size), GREY)
         return [block, *_rails(free, middle + home - at, frame[:, 0], 1.2 * size, size)]
     if support.turning == AXIS:
@@ -106,7 +106,7 @@ def _body(support: Support, at: Floats, home: Floats, R: Floats, away: Floats, s
         body = sweep([at - 1.25 * size * axis, at + 1.25 * size * axis], 0.5 * size, DARK)
     else:
         axis, body = np.zeros(3), ball(at, 0.68 * size, DARK)
-    along = frame[:, 2] * _sign(frame[:, 2] @ away) if axis.any() or not away.any() else away / np.linalg.norm(away)
+    along = frame[:, 2] * sign_of(frame[:, 2] @ away) if axis.any() or not away.any() else away / np.linalg.norm(away)
     below = _foot(along, [*free, axis] if axis.any() else free, up)
     side = axis if axis.any() else _other(below, free[0] if free else up)
     side = _other(below, side)
@@ -131,7 +131,7 @@ def _rails(free: list[Floats], middle: Floats, normal: Floats, apart: float, siz
 def _across(direction: Floats, other: Floats) -> Floats:
     """Unit vector across a direction, and across another where the two differ."""
     out = np.cross(direction, other)
-    return _other(direction, direction) if np.linalg.norm(out) < 0.1 else np.asarray(out / np.linalg.norm(out))
+    return across(direction) if np.linalg.norm(out) < 0.1 else np.asarray(out / np.linalg.norm(out))
 
 
 def _foot(along: Floats, free: list[Floats], up: Floats) -> Floats:
@@ -147,16 +147,14 @@ def _foot(along: Floats, free: list[Floats], up: Floats) -> Floats:
 def _other(direction: Floats, wanted: Floats) -> Floats:
     """Unit vector across a direction, as wanted where that is possible."""
     out = wanted - (wanted @ direction) * direction
-    if np.linalg.norm(out) < 0.3:
-        out = np.cross(direction, np.eye(3)[int(np.argmin(abs(direction)))])
-    return np.asarray(out / np.linalg.norm(out))
+    return across(direction) if np.linalg.norm(out) < 0.3 else np.asarray(out / np.linalg.norm(out))
 
 
 def _springs(support: Support, at: Floats, home: Floats, towards: Floats, radius: float, up: Floats) -> list[Solid]:
     """A coil along each principal direction of the stiffness of translation, a turn about each of that of rotation."""
     out: list[Solid] = []
     for direction in _stiff(support.translation_stiffness):
-        out += _spring(at, home, direction * _sign(direction @ towards), 11.0, radius, up)
+        out += _spring(at, home, direction * sign_of(direction @ towards), 11.0, radius, up)
     for direction in _stiff(support.rotation_stiffness):
         a = _other(direction, up)
         b = np.cross(direction, a)
@@ -253,7 +251,3 @@ def _distributed(
             tip = centres[node] + size / 2 * way + 5.5 * radius * _across(way, back)
         out.append(straight_arrow(tip - size * way, tip, 0.3 * radius, LOAD))
     return out
-
-
-def _sign(value: Any) -> float:
-    return -1.0 if value < 0 else 1.0

@@ -150,17 +150,14 @@ def _kind_label(kind: str, branches: Sequence[Mapping[str, Any]]) -> str:
     return f"{kind}, unfolding {' to '.join(words)}"
 
 
-def _uncover(axes: Axes, pieces: Sequence[Piece]) -> bool:
-    """Draw what is not stable once more, within stable lines that lie on it; return whether there is any such place."""
+def _uncover(axes: Axes, pieces: Sequence[Piece]) -> None:
+    """Draw what is not stable once more, within stable lines that lie on it."""
     stable = [_dense(axes, piece.curve)[0] for piece in pieces if piece.kind == STABLE]
-    found = False
     for piece in pieces:
         for part in hidden(_dense(axes, piece.curve)[0], stable) if piece.kind != STABLE else ():
             line = axes.transData.inverted().transform(part)
             axes.plot(*line.T, color="white", linewidth=2.0, solid_capstyle="butt", zorder=2.5)
             axes.plot(*line.T, color=piece.colour, **STYLES[piece.kind] | {"linewidth": 1.5}, zorder=2.6)
-            found = True
-    return found
 
 
 def _footer(diagram: Mapping[str, Any]) -> str:

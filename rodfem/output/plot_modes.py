@@ -25,9 +25,8 @@ from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_settin
 from rodfem.output.glyphs import glyphs_of
 from rodfem.output.program import status_of
 from rodfem.output.sheet import DPI, STYLE
-from rodfem.output.solids import Solid, profile_of
+from rodfem.output.solids import Solid, curve_of, profile_of
 from rodfem.output.view import POINT, view_of
-from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.tolerances import TINY
 
@@ -129,10 +128,7 @@ class _Panel:
         self.shown: list[Collection] = []
         s, mu = modes.s, complex(modes.value[number])
         self.s = fine = np.linspace(s[0], s[-1], POINTS[moving])
-        turns = np.where(np.sum(modes.q[1:] * modes.q[:-1], axis=1) < 0, -1.0, 1.0)  # q and -q are the same rotation
-        q = modes.q * np.append(1.0, np.cumprod(turns))[:, None]
-        self.r = CubicSpline(s, modes.r)(fine)
-        self.frames = directors(CubicSpline(s, q)(fine))
+        self.r, self.frames = curve_of(s, modes.r, modes.q, fine)
         u, w = (CubicSpline(s, part[number].astype(complex))(fine) for part in (modes.displacement, modes.rotation))
         span = float(np.linalg.norm(np.ptp(self.r, axis=0)))
         moved, turned = (float(np.linalg.norm(abs(part), axis=1).max()) for part in (u, w))

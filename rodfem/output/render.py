@@ -14,14 +14,12 @@ from typing import Any
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from rodfem.file_format import STATES
 from rodfem.output.glyphs import DARK, LOAD, glyphs_of
 from rodfem.output.program import status_of
-from rodfem.output.solids import Solid, profile_of, rod, straight_arrow
+from rodfem.output.solids import Solid, curve_of, profile_of, rod, straight_arrow
 from rodfem.output.view import POINT, view_of
-from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
 
@@ -184,10 +182,8 @@ def _curve(group: Any, row: int, count: int) -> tuple[Floats, Floats, Floats]:
     """Arclengths (count,), centres (count, 3) and directors (count, 3, 3) of a row of a branch."""
     s, r, q = (group[key][row] for key in ("s", "r", "q"))
     s, r, q = (values[np.isfinite(s)] for values in (s, r, q))
-    opposite = np.sum(q[1:] * q[:-1], axis=1, keepdims=True) < 0.0  # q and -q are the same rotation
-    q[1:] *= np.cumprod(np.where(opposite, -1.0, 1.0), axis=0)
     at = np.linspace(s[0], s[-1], count)
-    return at, CubicSpline(s, r)(at), directors(CubicSpline(s, q)(at))
+    return at, *curve_of(s, r, q, at)
 
 
 def _import_pyvista() -> Any:

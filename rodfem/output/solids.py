@@ -9,7 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
 
+from rodfem.problem.quaternions import directors
 from rodfem.tolerances import NEGLIGIBLE, TINY
 
 Floats = NDArray[np.float64]
@@ -65,6 +67,16 @@ def sweep(path: ArrayLike, radii: ArrayLike, color: str, sides: int = SIDES) -> 
         other = np.cross(tangent, normal)
         rings.append(point + radius * (np.outer(np.cos(angles), normal) + np.outer(np.sin(angles), other)))
     return loft(np.array(rings), color)
+
+
+def curve_of(s: Floats, r: Floats, q: Floats, at: Floats) -> tuple[Floats, Floats]:
+    """Centreline (n, 3) and directors (n, 3, 3) at arclengths ``at`` (n,) of a state, by splines through its nodes.
+
+    The nodes are at ``s`` (m,), with positions ``r`` (m, 3) and quaternions ``q`` (m, 4) of any length and sign.
+    """
+    opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
+    signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
+    return CubicSpline(s, r)(at), directors(CubicSpline(s, q * signs[:, None])(at))
 
 
 def across(direction: Floats) -> Floats:

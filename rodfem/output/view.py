@@ -66,11 +66,11 @@ def view_of(
         up = -down / np.linalg.norm(down)
         spread = (reference - reference.mean(axis=0)).T @ (reference - reference.mean(axis=0)) / len(reference)
         right = _principal(shape + spread, up, STRAIGHT * size, side)
-        right = right * _sign(right @ (moved[np.argmax(np.linalg.norm(moved, axis=1))] + 1e-3 * chord))
+        right = right * sign_of(right @ (moved[np.argmax(np.linalg.norm(moved, axis=1))] + 1e-3 * chord))
     else:
         right = _snapped(chord / np.linalg.norm(chord))
         up = _principal(shape, right, STRAIGHT * size, side)
-        up = up * _sign(up @ moved[np.argmax(np.linalg.norm(moved - np.outer(moved @ right, right), axis=1))])
+        up = up * sign_of(up @ moved[np.argmax(np.linalg.norm(moved - np.outer(moved @ right, right), axis=1))])
         if load is not None:
             aside = load - (load @ right) * right
             if abs(up @ aside) < BESIDE * np.linalg.norm(aside):
@@ -102,7 +102,7 @@ def _plane(points: Floats) -> tuple[Floats, Floats]:
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     vectors = np.linalg.eigh(np.cov(points.T) + np.diag(size * np.array([3e-3, 2e-3, 1e-3])) ** 2)[1]
     right, up = vectors[:, 2], vectors[:, 1]
-    return right * _sign(right @ np.array([3.0, 2.0, 1.0])), up * _sign(up @ np.array([1.0, 2.0, 3.0]))
+    return right * sign_of(right @ np.array([3.0, 2.0, 1.0])), up * sign_of(up @ np.array([1.0, 2.0, 3.0]))
 
 
 def _snapped(direction: Floats) -> Floats:
@@ -111,5 +111,6 @@ def _snapped(direction: Floats) -> Floats:
     return np.sign(direction[i]) * np.eye(3)[i] if abs(direction[i]) > NEAR else direction
 
 
-def _sign(value: Any) -> float:
+def sign_of(value: Any) -> float:
+    """Sign of a number, one for zero."""
     return -1.0 if value < 0 else 1.0

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from forms import inertia
 from rodfem.problem.contribution import Contribution, Site
 from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
-from rodfem.problem.roles import Role
+from rodfem.problem.roles import Role, role_field
 
 if TYPE_CHECKING:
     from rodfem.problem.local_state import Constants, OfConstants, OfPlace
@@ -24,22 +24,13 @@ class Attachment(Contribution):
     """
 
     s: float
-    force: OfConstants | None = field(
-        default=None, metadata={"role": Role("force of an attachment", "f(c)", 3, load=DEAD)}
+    force: OfConstants | None = role_field(Role("force of an attachment", "f(c)", 3, load=DEAD))
+    follower: OfConstants | None = role_field(
+        lambda x: Role(f"follower force at s = {x.s:g}", "f(c)", 3, load=FOLLOWER)
     )
-    follower: OfConstants | None = field(
-        default=None,
-        metadata={"role": lambda x: Role(f"follower force at s = {x.s:g}", "f(c)", 3, load=FOLLOWER)},
-    )
-    energy: OfPlace | None = field(
-        default=None, metadata={"role": Role("energy of an attachment", "f(x, c)", 0, load=POTENTIAL)}
-    )
-    mass: Callable[[Constants], Any] | None = field(
-        default=None, metadata={"role": Role("mass of an attachment", "f(c)", 0)}
-    )
-    rotary_inertia: OfConstants | None = field(
-        default=None, metadata={"role": Role("rotary inertia of an attachment", "f(c)", 3)}
-    )
+    energy: OfPlace | None = role_field(Role("energy of an attachment", "f(x, c)", 0, load=POTENTIAL))
+    mass: Callable[[Constants], Any] | None = role_field(Role("mass of an attachment", "f(c)", 0))
+    rotary_inertia: OfConstants | None = role_field(Role("rotary inertia of an attachment", "f(c)", 3))
 
     def kinetic(self, at: Site) -> Iterator[Any]:
         """Mass, where there is a centreline, and rotary inertia."""

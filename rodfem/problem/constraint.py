@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rodfem.problem.contribution import Block, Contribution, Group, Motion, Site, Unknown
-from rodfem.problem.roles import Role
+from rodfem.problem.roles import Role, role_field
 
 if TYPE_CHECKING:
     from rodfem.problem.local_state import Constants, OfPlace, Place
@@ -48,9 +48,7 @@ class Constraint(Contribution):
 class Integral(Constraint):
     """An integral over the rod that ``equals(c)``, which is spread over the rod."""
 
-    equals: Callable[[Constants], Any] = field(
-        default=lambda c: 0.0, metadata={"role": Role("value of an integral constraint", "f(c)", 0)}
-    )
+    equals: Callable[[Constants], Any] = role_field(Role("value of an integral constraint", "f(c)", 0), lambda c: 0.0)
     words = "integral constraint"
     whole = True
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from rodfem.errors import SceneError
 from rodfem.problem.contribution import UNIT, Block, Contribution, Direction, Group, Motion, Site, Unknown
 from rodfem.problem.kinds import check_vector
 from rodfem.problem.load import DEAD_AT_END, FOLLOWER, FOLLOWER_MOMENT, MOMENT, POTENTIAL
-from rodfem.problem.roles import Role
+from rodfem.problem.roles import Role, role_field
 from rodfem.problem.setting import AXIS, HELD, TURNS
 
 if TYPE_CHECKING:
@@ -55,26 +55,16 @@ class End(Contribution):
         Conservative.
     """
 
-    position: OfConstants | None = field(default=None, metadata={"role": Role("position of the {} end", "f(c)")})
-    rotation: Quaternion | OfConstants | None = field(
-        default=None, metadata={"role": Role("rotation of the {} end", "f(c)", or_value=True)}
-    )
-    force: OfConstants | None = field(
-        default=None, metadata={"role": Role("force on the {} end", "f(c)", 3, load=DEAD_AT_END)}
-    )
-    follower: OfConstants | None = field(
-        default=None, metadata={"role": Role("follower force on the {} end", "f(c)", 3, load=FOLLOWER)}
-    )
+    position: OfConstants | None = role_field(Role("position of the {} end", "f(c)"))
+    rotation: Quaternion | OfConstants | None = role_field(Role("rotation of the {} end", "f(c)", or_value=True))
+    force: OfConstants | None = role_field(Role("force on the {} end", "f(c)", 3, load=DEAD_AT_END))
+    follower: OfConstants | None = role_field(Role("follower force on the {} end", "f(c)", 3, load=FOLLOWER))
     hinge: tuple[float, float, float] | None = None
-    moment: OfConstants | None = field(
-        default=None, metadata={"role": Role("moment on the {} end", "f(c)", 3, load=MOMENT)}
+    moment: OfConstants | None = role_field(Role("moment on the {} end", "f(c)", 3, load=MOMENT))
+    follower_moment: OfConstants | None = role_field(
+        Role("follower moment on the {} end", "f(c)", 3, load=FOLLOWER_MOMENT)
     )
-    follower_moment: OfConstants | None = field(
-        default=None, metadata={"role": Role("follower moment on the {} end", "f(c)", 3, load=FOLLOWER_MOMENT)}
-    )
-    energy: OfPlace | None = field(
-        default=None, metadata={"role": Role("energy of the {} end", "f(x, c)", 0, load=POTENTIAL)}
-    )
+    energy: OfPlace | None = role_field(Role("energy of the {} end", "f(x, c)", 0, load=POTENTIAL))
 
     # --- what is held ----------------------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ guards them, makes terms of them or asks what they depend on cannot forget one.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +56,11 @@ class Role:
     def arguments(self) -> int:
         """Number of its arguments."""
         return self.call.count(",") + 1
+
+
+def role_field(role: Role | Callable[[Any], Role], default: Any = None) -> Any:
+    """Field of a dataclass for a function of this role, or of the role that it has for the object; optional."""
+    return field(default=default, metadata={"role": role})
 
 
 Visit = Callable[[str, Any, Role], Any]

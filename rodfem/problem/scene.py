@@ -23,7 +23,7 @@ from rodfem.errors import SceneError
 from rodfem.problem.contribution import Contribution
 from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
 from rodfem.problem.local_state import Constants, watched
-from rodfem.problem.roles import Role, changes, functions_of, guarded
+from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
 from rodfem.problem.validation import check_kinds, check_scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
 
@@ -70,11 +70,9 @@ class Inertia:
     Only frequencies need them, and the stability of states under loads without a potential.
     """
 
-    rho_A: Callable[[Constants], Any] = field(
-        default=lambda c: 0.0, metadata={"role": Role("mass per length", "f(c)", 0)}
-    )
-    rho_I: Callable[[Constants], Vector] = field(
-        default=lambda c: (1.0, 1.0, 1.0), metadata={"role": Role("rotary inertia per length", "f(c)", 3)}
+    rho_A: Callable[[Constants], Any] = role_field(Role("mass per length", "f(c)", 0), lambda c: 0.0)
+    rho_I: Callable[[Constants], Vector] = role_field(
+        Role("rotary inertia per length", "f(c)", 3), lambda c: (1.0, 1.0, 1.0)
     )
 
 
@@ -183,22 +181,14 @@ class Scene(Contribution):
     span: tuple[float, float]
     title: str = ""
     inertia: Inertia = Inertia()
-    distributed: OfConstants | None = field(
-        default=None, metadata={"role": Role("distributed force", "f(c)", 3, load=DEAD)}
-    )
-    follower: OfConstants | None = field(
-        default=None, metadata={"role": Role("distributed follower force", "f(c)", 3, load=FOLLOWER)}
-    )
-    potential: OfPlace | None = field(
-        default=None, metadata={"role": Role("potential along the rod", "f(x, c)", 0, along=True, load=POTENTIAL)}
-    )
+    distributed: OfConstants | None = role_field(Role("distributed force", "f(c)", 3, load=DEAD))
+    follower: OfConstants | None = role_field(Role("distributed follower force", "f(c)", 3, load=FOLLOWER))
+    potential: OfPlace | None = role_field(Role("potential along the rod", "f(x, c)", 0, along=True, load=POTENTIAL))
     attachments: tuple[Attachment, ...] = ()
     constraints: tuple[Constraint, ...] = ()
     breaks: tuple[float, ...] = ()
     planar: str | None = None
-    start: Callable[[np.ndarray], np.ndarray] | None = field(
-        default=None, metadata={"role": Role("start", "start(s)", hint=START)}
-    )
+    start: Callable[[np.ndarray], np.ndarray] | None = role_field(Role("start", "start(s)", hint=START))
     states: str = field(default="straight")
 
     def __post_init__(self) -> None:
@@ -382,12 +372,14 @@ class Scene(Contribution):
 
     def stiffness(self, s: float | None = None) -> np.ndarray:
         """Second derivative of ``W`` in the m free strains and ``k`` at the undeformed state, (m + 3, m + 3)."""
-        return self._stiffness if s is None else self._stiffness_at(s)
+        if s not in self._stiffnesses:
+            self._stiffnesses[s] = self._stiffness_at(s)
+        return self._stiffnesses[s]
 
     @cached_property
-    def _stiffness(self) -> np.ndarray:
-        """Stiffness at the middle, differentiated once: systems and their companions ask for it."""
-        return self._stiffness_at(None)
+    def _stiffnesses(self) -> dict[float | None, np.ndarray]:
+        """Stiffness by the arclength, differentiated once: systems, their companions and pictures ask for it."""
+        return {}
 
     def _stiffness_at(self, s: float | None) -> np.ndarray:
         free_v = self.free_strains

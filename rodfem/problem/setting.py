@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodfem.errors import SceneError
+from rodfem.problem.quaternions import directors
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
@@ -135,10 +136,7 @@ class Setting:
     @property
     def axis(self) -> Floats | None:
         """Direction d3 of the first support that holds it (3,); None without one."""
-        for q in (x.frame for x in self.supports if x.turning != TURNS):
-            a, b, c, d = q
-            return np.array([2 * (b * d + a * c), 2 * (c * d - a * b), a * a - b * b - c * c + d * d])
-        return None
+        return next((directors(x.frame)[:, 2] for x in self.supports if x.turning != TURNS), None)
 
     @property
     def force(self) -> Floats | None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rodfem.problem.local_state import Constants, OfConstants, Quaternion
     from rodfem.problem.scene import Scene
 
-ROUND_OFF = 1e-14
+SLIGHT = 1e-14
 """Component of a unit vector that is taken for zero."""
 
 
@@ -97,6 +97,6 @@ def sliding_hinge(
     if not direction.any():
         raise SceneError("The direction in which a hinge slides is zero: give one, as in along=(0.6, 0.0, 0.8).")
     direction = direction / np.linalg.norm(direction)
-    unit = tuple(np.where(abs(direction) > ROUND_OFF, direction, 0.0).tolist())
+    unit = tuple(np.where(abs(direction) > SLIGHT, direction, 0.0).tolist())
     push = None if force is None else lambda c: tuple(t * force(c) for t in unit)
     return SlidingHinge(position, rotation, push, hinge=axis, along=unit)

@@ -40,8 +40,6 @@ STATIONS = 9
 """Places along the rod at which distributed forces are recorded."""
 STEP, SMALL = 1e-3, 1e-6
 """Of differences of potentials (relative to the rod's length; in radian), and what is zero beside the greatest."""
-BENT = 1e-2
-"""Angle by which the rod is bent in differences of its energy."""
 FLAT = 1e-3
 """Curvature times the rod's length, or difference of two curvatures relative to them, that is taken for zero."""
 Sample = dict[str, Any]
@@ -127,8 +125,8 @@ def stiffness_of(energy: OfPlace, c: Constants, s: float, length: float, r: Floa
             continue
 
         def value(change: Floats, which: int = which) -> float:
-            moved, turned = (r + change, q) if which == 0 else (r, turn(q, change))
-            return _number(energy(_point(moved, turned, s, length), c))
+            turned = quaternions.product(quaternions.of_vector(change), q)
+            return _number(energy(_point(r, turned, s, length) if which else _point(r + change, q, s, length), c))
 
         out[which] = _spring(*_second(value, STEP * (length if which == 0 else 1.0)))
     return out
@@ -191,29 +189,11 @@ def derivative_of(function: OfPlace, c: Constants, s: float, length: float, r: F
     return np.array([float(slope.evaluate((), {}, (i,), StackDict())) for i in range(6)]).reshape(2, 3)
 
 
-def turn(q: Floats, change: Floats) -> Floats:
-    """Unit quaternion (4,) turned by a rotation vector (3,) in the frame of space."""
-    angle = float(np.linalg.norm(change))
-    a, v = np.cos(angle / 2), change * np.sinc(angle / (2 * np.pi)) / 2
-    return np.append(a * q[0] - v @ q[1:], a * q[1:] + q[0] * v + np.cross(v, q[1:]))
-
-
 def section_of(scene: Scene) -> tuple[Floats, Floats]:
     """Bending stiffness (n, 2, 2) in ``k1, k2`` of the undeformed rod at n arclengths (n,), one where it is uniform."""
-    places = scene.samples() if scene.depends_on_s() else [scene.interval[0]]
-    return np.array(places), np.array([_bending(scene, s) for s in places])
-
-
-def _bending(scene: Scene, s: float) -> Floats:
-    """Second derivative (2, 2) of the stored energy in ``k1, k2`` at zero, by differences: pictures need no more."""
-    c, h = scene.constants(s=s), BENT / scene.length
-
-    def W(k1: float, k2: float) -> float:
-        return _number(scene.energy(ufl.as_vector(UNDEFORMED), ufl.as_vector([h * k1, h * k2, 0.0]), c))
-
-    here, ahead, aside = W(0, 0), W(1, 0), W(0, 1)
-    mixed = W(1, 1) - ahead - aside + here
-    return np.array([[ahead - 2 * here + W(-1, 0), mixed], [mixed, aside - 2 * here + W(0, -1)]]) / h**2
+    varies = scene.depends_on_s()
+    places = scene.samples() if varies else [scene.interval[0]]
+    return np.array(places), np.array([scene.stiffness(s if varies else None)[-3:-1, -3:-1] for s in places])
 
 
 def distributed_on(scene: Scene, load: float) -> tuple[Floats, Floats, Floats]:

@@ -151,7 +151,7 @@ class Assessor(Workspace):
 
 
 def assess(source: Any, x: PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
-    """Assessor one state of a system or solver: see :class:`Assessor`, which is to be kept along a branch.
+    """Assess one state of a system or solver: see :class:`Assessor`, which is to be kept along a branch.
 
     ``source`` is the system or solver, ``x`` its equilibrium; ``method`` and ``number`` are those of
     :meth:`Assessor.__call__`.

@@ -39,7 +39,8 @@ class Bordered:
         size = (rows + self.extra, self.n + borders)
         self.matrix = PETSc.Mat().createAIJ((size, size), comm=self.comm)
         self.matrix.setPreallocationCSR((self.start, self.columns, self.values))
-        sizes = self.n + borders, system.fields.dense_rows + borders
+        along = self.n + borders if system.fields.along else 0
+        sizes = along, system.fields.dense_rows + borders
         if constraints is None:
             self.factors = factors_of("lu", self.comm, *sizes, {8: 0})
         else:

@@ -86,7 +86,7 @@ class Inertia:
             self.metric.setValue(system.load_index, system.load_index, 0.0)
         self.metric.assemble()
         self._weights = local_rows(self.metric) if system.comm.size == 1 else None
-        self.factors = inertia_factors(system.comm, system.fields.unknowns, system.fields.dense_rows)
+        self.factors = inertia_factors(system.comm, system.fields.along, system.fields.dense_rows)
         self.constraints = system.fields.constraints()
         self.scale = system.stiffness_scale
         self.tolerance = ZERO_BAND * self.scale
@@ -112,6 +112,14 @@ class Inertia:
         self.filled += 1
         return Factored(self)
 
+    def hold(self) -> Factored:
+        """The state that compiled code has just filled and factored the matrix for, with the border."""
+        self.filled += 1
+        self.factored, self.shift = self.filled, 0.0
+        self.matrix.stateIncrease()
+        self._settle_band()
+        return Factored(self)
+
     @property
     def held(self) -> Factored:
         """The state that the matrix holds now."""
@@ -131,6 +139,10 @@ class Inertia:
                 self.matrix.setValue(system.load_index, system.load_index, 1.0)
             self.matrix.assemble()
         self.shift = 0.0
+        self._settle_band()
+
+    def _settle_band(self) -> None:
+        system = self.system
         if not self.resolution:  # the band of round-off, eps |S| / m, for the smallest weight m of the metric
             mass = system.metric.getDiagonal().array_r[system.metric.getDiagonal().array_r > 0]
             smallest = system.comm.allreduce(float(mass.min()) if len(mass) else np.inf, op=MPI.MIN)
@@ -219,13 +231,20 @@ class Factored:
             own.shift = sigma
             own.factors(own.matrix)
             own.factored = self._filled
-            negative, zero = own.factors.inertia()
+        return self.counted()
+
+    def counted(self) -> int:
+        """Number of eigenvalues below the shift that was factored; symmetry modes not counted.
+
+        Raises :class:`ConvergenceError` where the count breaks down.
+        """
+        own, (negative, zero) = self._own(), self.factors.inertia()
         # Sylvester's law: each constraint, and each phase condition, has one negative eigenvalue of the saddle matrix
         below = negative - own.constraints - self.drifts
         if zero or below < 0:
             raise ConvergenceError(
-                f"The count of eigenvalues below {sigma:.2g} broke down ({zero} zero pivots, {negative} negative ones "
-                f"for {own.constraints} constraints): the constraints depend on each other."
+                f"The count of eigenvalues below {own.shift:.2g} broke down ({zero} zero pivots, {negative} negative "
+                f"ones for {own.constraints} constraints): the constraints depend on each other."
             )
         return int(below)
 

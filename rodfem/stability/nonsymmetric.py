@@ -34,7 +34,7 @@ from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, Mumps, is_cut
 from rodfem.linalg.replicated import Copy
 from rodfem.linalg.selection import factors_of
 from rodfem.linalg.substructured import SubstructuredFactors
-from rodfem.stability import mode_type as character
+from rodfem.stability import mode_type
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.pencil import (
     FACTORS,
@@ -231,18 +231,18 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             else:
                 basis = self.orthonormal(np.stack([found[j].vector for j in group], axis=1))
                 columns.append(np.concatenate([basis.real, basis.imag], axis=1))
-        squares = character.squares(self.system, self._turned, np.concatenate(columns, axis=1))
+        squares = mode_type.squares(self.system, self._turned, np.concatenate(columns, axis=1))
         kinds, begin = [""] * len(found), 0
         for group, part in zip(together, columns, strict=True):
             square = squares[begin : begin + part.shape[1]].sum(axis=0)
             begin += part.shape[1]
             for j in group:
-                kinds[j] = character.name(square / max(square.sum(), TINY))
+                kinds[j] = mode_type.name(square / max(square.sum(), TINY))
         return kinds
 
     def motion(self, basis: np.ndarray) -> str:
         """Type of the motion spanned by a ``basis`` (n, k)."""
-        return character.name(character.shares(self.system, self._turned, [*basis.real.T, *basis.imag.T]))
+        return mode_type.name(mode_type.shares(self.system, self._turned, [*basis.real.T, *basis.imag.T]))
 
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
         """``M X`` for real or complex vectors (n, k), with any PETSc."""
@@ -296,7 +296,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         values, out = [solver.getEigenvalue(i) for i in range(solver.getConverged())], []
         for i in sorted(range(len(values)), key=lambda i: abs(values[i] - target))[: number + SPARE]:
             value = solver.getEigenpair(i, re, im)
-            parts = character.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
+            parts = mode_type.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
             error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
             out.append(_Pair(complex(value), [part[self._own].copy() for part in parts], error))
         solver.destroy()
@@ -341,7 +341,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         while number:
             try:
                 if inverse is None:
-                    solver = shift_invert(matrix, mass, number, target, symmetric=False)
+                    solver = shift_invert(matrix, mass, number, target)
                 else:
                     solver = with_factors(matrix, mass, number, target, inverse, symmetric=False)
                 solver.setUp()
@@ -374,7 +374,8 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         if doubled:
             shifted, factors = matrix.copy(), SubstructuredFactors(dense_rows, Mumps("lu", {8: 0}, prefix=FACTORS))
         elif kept is None:
-            shifted, factors = matrix.copy(), factors_of("lu", comm, rows, dense_rows, {8: 0}, prefix=FACTORS)
+            along = rows if self.system.fields.along else 0
+            shifted, factors = matrix.copy(), factors_of("lu", comm, along, dense_rows, {8: 0}, prefix=FACTORS)
             self._shared.inverted = shifted, factors
         else:
             shifted, factors = kept

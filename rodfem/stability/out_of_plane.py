@@ -82,11 +82,6 @@ class InSpace:
         """Places in this rank's part of a vector of the equations that a planar rod does without."""
         f, normal = self.system.fields, self.planar.scene.normal
         assert normal is not None
-        numbers = [f.number[f.dofs["q"][..., [i + 1 for i in range(3) if i != normal]]].ravel()]
-        for name in ("r", "n"):
-            if name in f.dofs:
-                numbers.append(f.number[f.dofs[name][..., normal]].ravel())
-        if normal in f.scene.free_strains:
-            numbers.append(f.number[f.dofs["v"][..., f.scene.free_strains.index(normal)]].ravel())
-        places = np.unique(np.concatenate(numbers)) - f.offset
+        dofs = [f.dofs["q"][..., [i + 1 for i in range(3) if i != normal]], *f.out_of_plane(normal).values()]
+        places = np.unique(f.number[np.concatenate([d.ravel() for d in dofs])]) - f.offset
         return places[(places >= 0) & (places < len(f.free_owned))]

@@ -22,8 +22,8 @@ from rodfem.linalg.orthogonal import combine
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
-SYMMETRIC, UNSYMMETRIC, SLICED = 1e-12, 1e-13, 1e-10
-"""Relative tolerances of SLEPc for a pencil with LU factors, for one without symmetry, and for all of an interval."""
+UNSYMMETRIC, SLICED = 1e-13, 1e-10
+"""Relative tolerances of SLEPc for a pencil without symmetry, and for all eigenvalues of an interval."""
 OF_VECTORS = 1e-9
 """The same for vectors of a symmetric pencil: the error of its eigenvalues is the square."""
 FACTORS = "rodfem_st_"
@@ -153,22 +153,38 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
     return deflated
 
 
-def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex, *, symmetric: bool) -> SLEPc.EPS:
-    """Set up Krylov-Schur with shift-invert (LU) for the ``number`` eigenvalues nearest to ``target``.
+def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str, *, symmetric: bool) -> SLEPc.EPS:
+    """Krylov-Schur solver with shift-invert for the pencil ``matrix - mu mass``.
 
-    Raises :class:`PETSc.Error` where the shifted matrix is singular.  The pencil is ``matrix - mu mass``; ``symmetric``
-    says that both are.
+    Its options begin with ``prefix``; ``symmetric`` says that both matrices are, and the mass semidefinite.
     """
     solver = SLEPc.EPS().create(matrix.comm)
-    solver.setOptionsPrefix("rodfem_")
+    solver.setOptionsPrefix(prefix)
     solver.setOperators(matrix, mass)
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP if symmetric else SLEPc.EPS.ProblemType.GNHEP)
+    solver.getST().setType(SLEPc.ST.Type.SINVERT)
+    return solver
+
+
+def seek(solver: SLEPc.EPS, target: complex, number: int, size: int, tolerance: float) -> None:
+    """Ask for the ``number`` eigenvalues nearest to ``target`` from a space of ``size``, to a relative ``tolerance``.
+
+    They are those of the pencil of ``solver``.
+    """
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTarget(target)
-    solver.setTolerances(tol=SYMMETRIC if symmetric else UNSYMMETRIC, max_it=300)
-    solver.setDimensions(number, 2 * number + 20)
+    solver.setDimensions(number, size)
+    solver.setTolerances(tol=tolerance, max_it=300)
+
+
+def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: complex) -> SLEPc.EPS:
+    """Set up shift-invert (LU) for the ``number`` eigenvalues nearest to ``target`` of a pencil without symmetry.
+
+    Raises :class:`PETSc.Error` where the shifted matrix is singular.  The pencil is ``matrix - mu mass``.
+    """
+    solver = eigensolver(matrix, mass, "rodfem_", symmetric=False)
+    seek(solver, target, number, 2 * number + 20, UNSYMMETRIC)
     transform = solver.getST()
-    transform.setType(SLEPc.ST.Type.SINVERT)
     transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     ksp = transform.getKSP()
     ksp.setType("preonly")
@@ -203,6 +219,16 @@ class Inverse:
             z.axpy(1.0, self._correction)
 
 
+def use_inverse(solver: SLEPc.EPS, context: object) -> None:
+    """Have the shifted matrix of a solver never formed: ``context``, of a python preconditioner, is its inverse."""
+    transform = solver.getST()
+    transform.setMatMode(SLEPc.ST.MatMode.SHELL)
+    ksp = transform.getKSP()
+    ksp.setType("preonly")
+    ksp.getPC().setType("python")
+    ksp.getPC().setPythonContext(context)
+
+
 def with_factors(
     matrix: PETSc.Mat,
     mass: PETSc.Mat,
@@ -217,33 +243,20 @@ def with_factors(
     """Set up the same with the ``inverse`` of ``matrix - target mass`` from factors made elsewhere, and a first vector.
 
     Vectors of a symmetric pencil are right up to massless unknowns: purification corrects all of them at once.
-    Eigenvectors that are ``deflated`` are not found.  ``number`` and ``symmetric`` are those of :func:`shift_invert`;
-    ``start`` is the first vector.
+    Eigenvectors that are ``deflated`` are not found.  ``number`` is that of :func:`shift_invert`, ``symmetric`` that of
+    :func:`eigensolver`; ``start`` is the first vector.
     """
-    solver = SLEPc.EPS().create(matrix.comm)
-    solver.setOptionsPrefix("rodfem_")
-    solver.setOperators(matrix, mass)
-    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP if symmetric else SLEPc.EPS.ProblemType.GNHEP)
-    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-    solver.setTarget(target)
+    solver = eigensolver(matrix, mass, "rodfem_", symmetric=symmetric)
     if symmetric:
-        solver.setTolerances(tol=OF_VECTORS, max_it=300)
-        solver.setDimensions(number, number + max(number, LEAST))
+        seek(solver, target, number, number + max(number, LEAST), OF_VECTORS)
         solver.setPurify(False)
     else:
-        solver.setTolerances(tol=UNSYMMETRIC, max_it=300)
-        solver.setDimensions(number, 2 * number + 20)
+        seek(solver, target, number, 2 * number + 20, UNSYMMETRIC)
     if start is not None:
         solver.setInitialSpace([start])
     if deflated:
         solver.setDeflationSpace(list(deflated))
-    transform = solver.getST()
-    transform.setType(SLEPc.ST.Type.SINVERT)
-    transform.setMatMode(SLEPc.ST.MatMode.SHELL)
-    ksp = transform.getKSP()
-    ksp.setType("preonly")
-    ksp.getPC().setType("python")
-    ksp.getPC().setPythonContext(inverse)
+    use_inverse(solver, inverse)
     solver.setFromOptions()
     return solver
 
@@ -254,16 +267,11 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> 
     Options: ``-rodfem_slicing_eps_...``, ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is one.
     The pencil is ``matrix - mu mass``, the two numbers are ``low`` and ``high``.
     """
-    solver = SLEPc.EPS().create(matrix.comm)
-    solver.setOptionsPrefix("rodfem_slicing_")
-    solver.setOperators(matrix, mass)
-    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver = eigensolver(matrix, mass, "rodfem_slicing_", symmetric=True)
     solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
     solver.setInterval(low, high)
     solver.setTolerances(tol=SLICED)
-    transform = solver.getST()
-    transform.setType(SLEPc.ST.Type.SINVERT)
-    transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    solver.getST().setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     solver.setFromOptions()
     ksp = solver.getKrylovSchurKSP()  # that of the solver for one slice
     ksp.setType("preonly")

@@ -26,6 +26,7 @@ from slepc4py import SLEPc
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.linalg.orthogonal import generic
 from rodfem.stability.blocks import Pencil
+from rodfem.stability.pencil import eigensolver, seek, use_inverse
 from rodfem.stability.projection import INVERSES, Projection, ShiftedInverse
 
 TRANSFORMS = ("shift-invert", "cayley")
@@ -114,21 +115,14 @@ class Reduction:
     ) -> Reduced:
         """Return about ``number`` eigenvalues, ``least`` at least: a pencil may have fewer finite ones than rows."""
         n, target = self.projection.kernel.dimension, shifted.sigma
-        solver = SLEPc.EPS().create(PETSc.COMM_SELF)
-        solver.setOptionsPrefix("rodfem_reduced_")
-        solver.setOperators(self._operator(self.projection.K), self._operator(self.projection.M))
-        # Not GHEP: where strains have no mass M is semidefinite, and in the coordinates of the kernel only up to
+        # Not symmetric: where strains have no mass M is semidefinite, and in the coordinates of the kernel only up to
         # round-off.  At a breakdown, which double eigenvalues bring about early, SLEPc would find it indefinite.
-        solver.setProblemType(SLEPc.EPS.ProblemType.GNHEP)
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        solver.setTarget(target)
-        solver.setTolerances(tol=TOLERANCE, max_it=300)
-        solver.setDimensions(number, min(2 * number + 20, n))
+        stiffness, mass = (self._operator(matrix) for matrix in (self.projection.K, self.projection.M))
+        solver = eigensolver(stiffness, mass, "rodfem_reduced_", symmetric=False)
+        seek(solver, target, number, min(2 * number + 20, n), TOLERANCE)
         spectral = solver.getST()
-        spectral.setType(SLEPc.ST.Type.SINVERT if transform == "shift-invert" else SLEPc.ST.Type.CAYLEY)
-        spectral.setMatMode(SLEPc.ST.MatMode.SHELL)
-        spectral.setShift(target)
         if transform == "cayley":
+            spectral.setType(SLEPc.ST.Type.CAYLEY)
             if not self.symmetric:
                 raise InputError(
                     "SLEPc does not transform complex eigenvalues back from Cayley's transform: use shift-invert."
@@ -137,10 +131,8 @@ class Reduction:
             if a2 == target:
                 raise InputError(f"A Cayley transform with shift and antishift {target:g} is constant: change one.")
             spectral.setCayleyAntishift(-a2)
-        ksp = spectral.getKSP()
-        ksp.setType("preonly")
-        ksp.getPC().setType("python")
-        ksp.getPC().setPythonContext(shifted)
+        spectral.setShift(target)
+        use_inverse(solver, shifted)
         start = self._operator(self.projection.K).createVecRight()
         start.array[:] = shifted(self.projection.times(self.projection.M, generic(np.arange(n))))  # no massless part
         solver.setInitialSpace([start])

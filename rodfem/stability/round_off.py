@@ -84,8 +84,11 @@ def resolve(found: Factored) -> tuple[int, int]:
 
 def quotient_error(matrix: PETSc.Mat, y: PETSc.Vec) -> float:
     """Ten times the change of ``y.Sy`` by independent relative errors eps of all entries of S."""
+    return 10 * rounding(matrix, y, y)
+
+
+def rounding(matrix: PETSc.Mat, v: PETSc.Vec, x: PETSc.Vec) -> float:
+    """Change of ``v.Sx`` by independent relative errors eps of all entries of S."""
     starts, columns, values = matrix.getValuesCSR()
     squares = PETSc.Mat().createAIJ(matrix.getSizes(), csr=(starts, columns, values**2), comm=matrix.comm)
-    square = y.copy()
-    square.pointwiseMult(y, y)
-    return float(10 * EPS * np.sqrt(square.dot(squares * square)))
+    return float(EPS * np.sqrt((v * v).dot(squares * (x * x))))

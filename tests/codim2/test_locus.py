@@ -22,7 +22,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from shooting_solver import Problem, Rod
 
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem.codim2.locus import Locus, locus
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.solvers import StaticSolver
@@ -61,7 +61,7 @@ def cantilever(load: str, span: tuple[float, float]) -> Diagram:
         name="cantilever",
         interval=(0.0, 1.0),
         rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending(k, (10.0, 1.0, 10.0)),
+        energy=lambda v, k, c: bending_and_twist(k, (10.0, 1.0, 10.0)),
         parameters={"lam": Parameter(0.0 if load == "lam" else 2.8, r"\lambda"), "e": Parameter(0.0)},
         load=load,
         ends=(clamped(), free(lambda c: (c.e, 0.0, -c.lam))),

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from rows import verify
 from scipy.optimize import brentq
 
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem import (
     Discretization,
     Observer,
@@ -55,7 +55,7 @@ def localised(turns: int = 27) -> Scene:
     """A rod twisted by many turns and pulled by T between clamps: van der Heijden & Thompson (2000), in other units."""
     return Scene(
         name="localised", interval=(0.0, 1.0), rod=RIGID, load="T", span=(3200.0, 2450.0),
-        energy=lambda v, k, c: bending(k, (1.0, 1.0, c.C)),
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.0, c.C)),
         parameters={"T": Parameter(3200.0), "C": Parameter(0.789 / 1.345)},
         ends=(clamped(), sliding(ON_AXIS, (cos(turns * pi), 0.0, 0.0, sin(turns * pi)), lambda c: (0.0, 0.0, c.T))),
         start=lambda s: np.stack([np.cos(turns * pi * s), 0 * s, 0 * s, np.sin(turns * pi * s)], axis=1),
@@ -105,7 +105,7 @@ def test_a_double_point_that_the_mesh_splits() -> None:
     """Michell's ring of C = 1.5 at its fourth mode, C t0 = sqrt(15): one point, where two eigenvalues vanish."""
     scene = column(
         "ring", Ring(odd=True), (2.4, 2.7), load="k", constants={"k": 2.4, "B2": 1.0, "C": 1.5}, start=circle, **ROUND,
-        energy=lambda v, k, c: bending((k[0], k[1], k[2] - c.k), (c.B1, c.B2, c.C)),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.k), (c.B1, c.B2, c.C)),
     )  # fmt: skip
     (branch,) = trace(scene, Discretization("auto", 8, 6), Plan(depth=0, steps=WIDE))
     (special,) = [s for s in branch.special if s.kind == BRANCH_POINT]
@@ -275,7 +275,7 @@ def test_steps_that_do_not_explain_are_repeated() -> None:
     scene = column(
         "nearly uniform", Ring(), (2.6, 3.4), start=circle, planar="e2", constants={"P": 2.6, "B2": 1.0, "e": 1e-4},
         potential=lambda x, c: loads.pressure(x.r, x.dr, c.P), **ROUND,
-        energy=lambda v, k, c: (1 + c.e * ufl.cos(2 * c.s)) * bending(k, (c.B1, c.B2, c.C)),
+        energy=lambda v, k, c: (1 + c.e * ufl.cos(2 * c.s)) * bending_and_twist(k, (c.B1, c.B2, c.C)),
     )  # fmt: skip
     plan = Plan(depth=0, steps=StepControl(largest=0.1), error_bars=False)
     (branch,) = trace(scene, Discretization("auto", 12, 6), plan)

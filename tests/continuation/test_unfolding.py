@@ -11,7 +11,7 @@ from classics import ON_AXIS, SUPPORTS, Found, column, push, turned
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc
 
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, Solver, clamped, free, pinned, sliding, trace
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
@@ -198,7 +198,7 @@ def test_the_bend_of_a_broken_pitchfork_with_default_steps() -> None:
     turn = 0.7332631042882616
 
     def energy(v: Any, k: Any, c: Any) -> Any:
-        return bending((k[0] - 1.0374387e-3, k[1], k[2]), (1.0, 1.27042886, 1.24232511))
+        return bending_and_twist((k[0] - 1.0374387e-3, k[1], k[2]), (1.0, 1.27042886, 1.24232511))
 
     scene = Scene(
         "bend", (0.0, 1.0), "unshearable and inextensible", energy, {"P": Parameter(0.0)}, "P",

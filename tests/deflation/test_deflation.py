@@ -72,7 +72,7 @@ def test_cord() -> None:
         q, end = CORD.solve(guess)
         assert abs(q - guess).max() < 0.1
         assert (end[10], 1 - end[9]) == pytest.approx((p.energy, p.ordinate), abs=1e-4)
-    assert search.tally.count(NEW) == len(new)
+    assert search.tally.tries.count(NEW) == len(new)
     assert len(search.tally.tries) == 24
 
 
@@ -160,7 +160,7 @@ def test_nothing_to_find() -> None:
     search = Deflation(follower, 0.2, [only_one])
     assert search.run(10) == []
     assert len(search.tally.tries) == 10
-    assert search.tally.count(NEW) == 0
+    assert search.tally.tries.count(NEW) == 0
     report = Report(follower.system.comm, stream=out)
     report.say(str(search.tally))
     if follower.system.comm.rank == 0:

@@ -58,6 +58,8 @@ def test_branches_and_special_points(diagram: Diagram) -> None:
     assert {s.kind for s in diagram.special()}.isdisjoint({"end", "user"})
     assert repr(diagram).startswith("<Diagram of 'cord': ")
     assert f"{first.point.load:.6f}"[:6] in diagram._repr_html_()
+    end = diagram["straight"].special[-1]  # at the bound of the range: exact
+    assert f"<td>{end.point.load:.10g}</td>" in diagram._repr_html_()
 
 
 def test_states_at_a_load(diagram: Diagram) -> None:

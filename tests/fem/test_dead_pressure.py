@@ -13,7 +13,7 @@ import pytest
 import ufl
 
 import rodfem.fem.system
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem import Discretization, Observer, Plan, Ring, Scene, Solver, StepControl, trace
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.fem.newton import relax
@@ -31,7 +31,7 @@ def ring(planar: str | None = None, B2: float = 1.0, C: float = 1.0, load: Any =
     given = {"distributed": load} | more
     return classics.column(
         "dead pressure", Ring(), (0.3, 10.0), start=classics.circle, planar=planar, constants={"B2": B2, "C": C},
-        energy=lambda v, k, c: bending(k, (c.B1, c.B2, c.C)), **classics.ROUND, **given,
+        energy=lambda v, k, c: bending_and_twist(k, (c.B1, c.B2, c.C)), **classics.ROUND, **given,
     )  # fmt: skip
 
 

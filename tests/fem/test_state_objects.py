@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from small_states import plain
 
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.parameters import line
@@ -57,7 +57,7 @@ def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> 
         name="moved",
         interval=(0.0, 1.0),
         rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending(k, (1.0, c.B, 1.0)),
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, c.B, 1.0)),
         parameters={"d": Parameter(0.1), "e": Parameter(0.0), "B": Parameter(2.0)},
         load="d",
         ends=(clamped(lambda c: (c.e, 0.0, 0.0)), clamped(lambda c: (c.e, 0.0, 1.0 - c.d))),

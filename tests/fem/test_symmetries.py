@@ -10,7 +10,7 @@ from demo_cases import scene
 from hemitropic_cases import DEFAULT
 from hemitropic_cases import scene as hemitropic
 
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.link import link, writhe
@@ -31,7 +31,7 @@ def column(left: End, right: End, B: float = 2.0) -> Scene:
         name="column",
         interval=(0.0, 1.0),
         rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending(k, (1.0, c.B, 1.0)),
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, c.B, 1.0)),
         parameters={"P": Parameter(0.0), "B": Parameter(B)},
         load="P",
         ends=(left, right),
@@ -49,7 +49,7 @@ def ring(twisting: float = 1.5, B: float = 1.0) -> Scene:
         name="ring",
         interval=(0.0, 2 * pi),
         rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending((k[0], k[1], k[2] - c.t), (1.0, c.B, twisting)),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t), (1.0, c.B, twisting)),
         parameters={"t": Parameter(0.0), "B": Parameter(B)},
         load="t",
         ends=Ring(),
@@ -110,7 +110,7 @@ def test_first_equilibrium_far_from_the_start() -> None:
         name="coiled",
         interval=(0.0, 1.0),
         rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending((k[0], k[1] - c.k0, k[2] - 1.0), (1.0, 1.0, 0.7)),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1] - c.k0, k[2] - 1.0), (1.0, 1.0, 0.7)),
         parameters={"T": Parameter(0.0), "k0": Parameter(6.0)},
         load="T",
         ends=(clamped(), free(lambda c: (0.0, 0.0, c.T))),

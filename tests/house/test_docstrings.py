@@ -129,3 +129,17 @@ def test_the_page_names_files_that_exist() -> None:
     rooms = [HOME, HOME / "rodfem", *(path for path in (HOME / "rodfem").iterdir() if path.is_dir())]
     missing = [n for n in named if not any((room / n).exists() or (room / f"{n}.py").exists() for room in rooms)]
     assert named and not missing, missing
+
+
+@pytest.mark.parametrize("page", sorted((HOME / "docs" / "decisions").glob("*-*.md")), ids=lambda page: page.stem)
+def test_decisions_name_what_there_is(page: Path) -> None:
+    """Files, functions and tests that a page of a decision names in backticks."""
+    text = page.read_text()
+    where = text.split("**Where.**")[1].split("\n\n")[0]
+    for file, names in re.findall(r"`((?:rodfem|forms)/[\w/]+\.\w+)`(?: \(([^)]*)\))?", where):
+        source = (HOME / file).read_text()
+        missing = [name for name in re.findall(r"`(\w+)`", names) if not re.search(rf"\b{name}\b", source)]
+        assert not missing, f"{file} has no {', '.join(missing)}"
+    tests = "\n".join(path.read_text() for path in (HOME / "tests").rglob("test_*.py"))
+    missing = [name for name in re.findall(r"`(test_\w+)`", text) if f"def {name}(" not in tests]
+    assert not missing

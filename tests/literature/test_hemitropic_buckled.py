@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 from forms import loads
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import BRANCH_POINT
 from rodfem.diagram.plan import Plan
@@ -207,7 +207,7 @@ def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
         name="pinned",
         interval=(0.0, 1.0),
         rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending(k, (1.0, 2.0, 1.0)),
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)),
         parameters={"P": 0.0},
         load="P",
         ends=(pinned(), pinned(lambda c: (0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P))),

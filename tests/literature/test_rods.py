@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from scipy.special import fresnel
 
 from forms import loads
-from forms.energy import bending, logarithmic_stretch
+from forms.energy import bending_and_twist, logarithmic_stretch
 from rodfem import Inertia, Ordinate, Ring, Scene, at, clamped, elastic, free, hinged, pinned, sliding
 from rodfem.output.digits import number, rounded_up
 
@@ -54,7 +54,7 @@ def test_whirling_string(EI: float) -> None:
     T, P = 100.0, lambda n: EI * (n * pi) ** 4 + 100.0 * (n * pi) ** 2
     string = column(
         "string", (pinned(), pinned(ON_AXIS, lambda c: (0.0, 0.0, T))), (0.0, 4200.0),
-        energy=lambda v, k, c: bending(k, (EI, EI, EI)),
+        energy=lambda v, k, c: bending_and_twist(k, (EI, EI, EI)),
         potential=lambda x, c: -c.P / 2 * (x.r[0] ** 2 + x.r[1] ** 2),
     )  # fmt: skip
     found = explore(string)
@@ -149,7 +149,7 @@ def coupled() -> tuple[Scene, list[float]]:
         return float(expm(np.array([[-P * A[1, 0], A[1, 1]], [-P * P * A[0, 0] - P, P * A[0, 1]]]))[1, 1])
 
     def energy(v: Any, k: Any, c: Any) -> Any:
-        return GA / 2 * (v[0] ** 2 + v[1] ** 2) + g * v[1] * k[0] + bending(k, (1.0, 2.0, 1.0))
+        return GA / 2 * (v[0] ** 2 + v[1] ** 2) + g * v[1] * k[0] + bending_and_twist(k, (1.0, 2.0, 1.0))
 
     rod = column("shear and bending", (clamped(), free(push)), (0.0, 6.0), rod="inextensible", energy=energy)
     return rod, zeros(moment, 0.05, 6.0, 40) + zeros(lambda P: moment(P, 0.0, 2.0), 0.05, 6.0, 40)
@@ -160,7 +160,7 @@ def softening() -> tuple[Scene, list[float]]:
     EA = 30.0
     rod = column(
         "log", (pinned(), pinned(ON_AXIS, push)), (0.0, 60.0), rod="unshearable", constants={"B2": 3.0},
-        energy=lambda v, k, c: logarithmic_stretch(v, EA) + bending(k, (c.B1, c.B2, c.C)),
+        energy=lambda v, k, c: logarithmic_stretch(v, EA) + bending_and_twist(k, (c.B1, c.B2, c.C)),
     )  # fmt: skip
     return rod, zeros(lambda P: P * exp(-P / EA) - pi**2, 1.0, 60.0, 60)
 
@@ -173,7 +173,10 @@ def strip() -> tuple[Scene, list[float]]:
         return float(np.linalg.det(linearized(B, (0, 0, tau), (0, 0, 0), (0, 0, -P))[3:, 3:]))
 
     rod = column(
-        "strip", (clamped(), free(push)), (0.0, 30.0), energy=lambda v, k, c: bending((k[0], k[1], k[2] - tau), B)
+        "strip",
+        (clamped(), free(push)),
+        (0.0, 30.0),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - tau), B),
     )
     return rod, zeros(tip, 0.1, 30.0, 300)
 
@@ -204,7 +207,9 @@ def turned_end() -> tuple[Scene, list[float]]:
         return float(np.linalg.det(linearized(B, (P, 0, 0), (B[0] * P, 0, 0), (0, 0, 0))[:3, 3:]))
 
     turned = sliding(lambda c: (None, None, None), lambda c: (ufl.cos(c.P / 2), ufl.sin(c.P / 2), 0.0, 0.0))
-    rod = column("turned", (clamped(), turned), (0.0, 15.0), energy=lambda v, k, c: bending(k, B), ordinate=AWAY)
+    rod = column(
+        "turned", (clamped(), turned), (0.0, 15.0), energy=lambda v, k, c: bending_and_twist(k, B), ordinate=AWAY
+    )
     return rod, zeros(spin, 0.5, 15.0, 3000)
 
 
@@ -222,7 +227,7 @@ def test_ring_with_too_much_curvature(n: int) -> None:
     B, C = 1.0, 0.7
     k0 = 1 - ((B + C) - sqrt((B + C) ** 2 + 4 * B * C * (n * n - 1))) / 2
     ring = Scene(
-        "overcurved", (0.0, 2 * pi), RIGID, lambda v, k, c: bending((k[0], k[1] - c.k0, k[2]), (B, 1.0, C)),
+        "overcurved", (0.0, 2 * pi), RIGID, lambda v, k, c: bending_and_twist((k[0], k[1] - c.k0, k[2]), (B, 1.0, C)),
         {"k0": k0 - 0.4}, "k0", Ring(), Ordinate("width", s=pi, of=lambda r, q: hypot(*r)), (k0 - 0.4, k0 + 0.3),
         start=lambda s: np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1),
     )  # type: ignore[arg-type]  # fmt: skip
@@ -235,7 +240,7 @@ def test_clothoid(planar: str | None) -> None:
     a = 30.0
     rod = column(
         "clothoid", (clamped(), free()), (0.0, a), planar=planar, ordinate=AWAY,
-        energy=lambda v, k, c: bending((k[0], k[1] - c.P * c.s, k[2]), (1.0, 1.0, 1.0)),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1] - c.P * c.s, k[2]), (1.0, 1.0, 1.0)),
     )  # fmt: skip
     last = explore(rod).branches[0].points[-1]
     assert (last.load, last.negative) == (a, 0)

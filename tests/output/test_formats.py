@@ -17,7 +17,7 @@ from mpi4py import MPI
 from problem.test_docs import page, scenes
 
 import rodfem
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem.app.many import many
 from rodfem.app.run import run
 from rodfem.continuation.branch import Unexplained
@@ -42,7 +42,7 @@ def column() -> Scene:
     """Euler's, whose buckling load is least at e = 0."""
     return replace(
         scenes()["euler"],
-        energy=lambda v, k, c: bending(k, (1.0 + c.e**2, 2.0, c.C)),
+        energy=lambda v, k, c: bending_and_twist(k, (1.0 + c.e**2, 2.0, c.C)),
         parameters={"P": Parameter(0.0), "e": Parameter(0.1), "C": Parameter(1.0)},
     )
 

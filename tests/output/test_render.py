@@ -15,7 +15,7 @@ import ufl
 from matplotlib.image import imread
 
 from forms import loads
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem.errors import InputError
 from rodfem.output.glyphs import DARK, GREY, LOAD, STEEL, glyphs_of
 from rodfem.output.render import _read, draw_shape_safely, triad
@@ -50,7 +50,7 @@ def column(*ends: Any, **more: Any) -> Scene:
     """A straight rod along e3 between these ends, under a load P."""
     return Scene(
         name="column", interval=(0.0, 1.0), rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending(k, (1.0, 2.0, 1.0)) + 0 * c.P * k[0], parameters={"P": Parameter(1.0)},
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)) + 0 * c.P * k[0], parameters={"P": Parameter(1.0)},
         ends=ends or (clamped(), free()), ordinate=Ordinate("x", s=1.0, of=lambda r, q: r[0]), span=(0.0, 5.0),
         load="P", inertia=Inertia(rho_A=lambda c: 1.0), **more,
     )  # fmt: skip

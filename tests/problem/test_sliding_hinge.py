@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from forms.energy import bending
+from forms.energy import bending_and_twist
 from rodfem import Discretization, InputError, Ordinate, Plan, Scene, Solver, clamped, hinged, run, sliding_hinge, trace
 from rodfem.output.glyphs import STEEL
 from rodfem.output.render import _read
@@ -34,7 +34,7 @@ def push(c: Any) -> Any:
 
 
 def column(left: End, right: End, span: tuple[float, float] = (0.0, 30.0), **more: Any) -> Scene:
-    energy = more.pop("energy", lambda v, k, c: bending(k, (10.0, 1.0, 1.0)))
+    energy = more.pop("energy", lambda v, k, c: bending_and_twist(k, (10.0, 1.0, 1.0)))
     return Scene("column", (0.0, 1.0), "unshearable and inextensible", energy, {"P": 0.0}, "P", (left, right),
                  Ordinate("middle", s=0.5, of=lambda r, q: hypot(r[0], r[1])), span, **more)  # fmt: skip
 
@@ -103,7 +103,7 @@ def test_bent_rod_on_an_inclined_guide(formulation: str) -> None:
     """Curved in its undeformed state, so that it bends from the start: against shooting."""
     scene = column(
         clamped(), sliding_hinge(E2, INCLINED, top, force=push), (0.0, 12.0), planar="e2",
-        energy=lambda v, k, c: bending((k[0], k[1] - BENT, k[2]), (10.0, 1.0, 1.0)),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1] - BENT, k[2]), (10.0, 1.0, 1.0)),
     )  # fmt: skip
     solver = Solver(scene, Discretization(formulation, 8, 6))
     point = solver.equilibrium(2.0)

@@ -214,14 +214,14 @@ def test_deflation_alone(formulation: str) -> None:
 # --- nasty -----------------------------------------------------------------------------------------------------
 
 
-def test_shift_on_an_eigenvalue() -> None:
+@pytest.mark.parametrize("method", SOLVERS)
+def test_shift_on_an_eigenvalue(method: str) -> None:
+    """The first shift may be one, where the count below it is up to round-off (a column on a foundation)."""
     assessor, x = at("cord", "reduced", 20.0, False)
     expected = assessor(x, "dense", 4).values
-    spectrum = assessor.symmetric
-    assert spectrum is not None
     for i in range(3):
-        spectrum.shift = expected[i]
-        found = assessor(x, "shift-invert", 4)
+        assessor.symmetric.shift = expected[i]
+        found = assessor(x, method, 4)
         np.testing.assert_allclose(found.values, expected, rtol=1e-9)
         assert found.certified
 

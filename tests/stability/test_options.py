@@ -44,7 +44,7 @@ def test_nothing_is_left_in_the_database(options: PETSc.Options) -> None:
     system, x = plain("follower", "pointwise", 6, 3, 10.0)
     vibration = NonsymmetricSolver(system).at(x)
     vibration.near(2, 0.0)
-    shift_invert(vibration.matrix, vibration.mass, 2, 1.0, symmetric=False).solve()
+    shift_invert(vibration.matrix, vibration.mass, 2, 1.0).solve()
     assert options.getAll() == before
 
 
@@ -87,7 +87,7 @@ def test_pencil_without_symmetry(options: PETSc.Options) -> None:
     expected = vibration.near(2, 0.0).values[:2]
     options["rodfem_st_pc_factor_mat_solver_type"] = "mumps"
     options["rodfem_st_mat_mumps_icntl_7"], options["rodfem_st_type"] = ORDERING, "cayley"
-    solver = shift_invert(vibration.matrix, vibration.mass, 2, 1.0, symmetric=False)
+    solver = shift_invert(vibration.matrix, vibration.mass, 2, 1.0)
     solver.solve()
     assert solver.getST().getType() == "cayley"
     assert solver.getST().getKSP().getPC().getFactorMatrix().getMumpsIcntl(7) == ORDERING

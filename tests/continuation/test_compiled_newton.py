@@ -1,0 +1,62 @@
+"""The compiled iteration and factors along the rod beside PETSc's matrices, Python's iteration and MUMPS."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from golden_cases import FAMILIES, cases
+
+import rodfem.fem.system
+from rodfem import Discretization, Plan, trace
+from rodfem.continuation.compiled_newton import CompiledNewton
+from rodfem.errors import InputError
+from rodfem.fem.fields import PETSC
+from rodfem.linalg.chain import Chain
+
+pytestmark = pytest.mark.alone
+SAME = 1e-9
+"""Difference of loads and ordinates, relative to numbers greater than one, of two ways to the same state."""
+LOOSE = 1e-6
+"""The same where a row is nearly singular: what Newton's tolerance leaves there is larger."""
+CONSERVATIVE = [name for name, scene in cases().items() if scene().conservative and scene().name not in FAMILIES]
+
+
+@pytest.mark.parametrize("name", CONSERVATIVE)
+def test_every_row_of_every_scene(name: str) -> None:
+    """The first branch: the same steps, loads, ordinates, energies, indices and determinants."""
+    scene = cases()[name]()
+    mesh = Discretization("auto", 8 if scene.start is None else 16, 6)
+    plans = Plan(depth=0, error_bars=False)
+    ours, theirs = (
+        trace(scene, Discretization(mesh.formulation, mesh.elements, mesh.degree, factors=factors), plans)
+        for factors in ("chain", PETSC)
+    )
+    for branch, other in zip(ours.branches, theirs.branches, strict=True):
+        assert [p.negative for p in branch.points] == [p.negative for p in other.points]
+        assert [s.kind for s in branch.special] == [s.kind for s in other.special]
+        for key in ("load", "ordinate", "energy"):
+            a, b = (np.array([getattr(p, key) for p in x.points]) for x in (branch, other))
+            off = abs(a - b) / np.maximum(1.0, abs(b))
+            assert off.max() < LOOSE, (branch.name, key, int(off.argmax()))
+            assert np.median(off) < SAME, (branch.name, key)
+        a, b = (np.array([p.determinant for p in x.points]) for x in (branch, other))
+        known = np.isfinite(a) & np.isfinite(b)
+        assert np.median(abs(a - b)[known]) < SAME * max(1.0, abs(b[known]).max())
+
+
+def test_the_reference_uses_nothing_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With PETSc's factors neither the chain nor the compiled assembly of matrices is used."""
+
+    def never(*arguments: object) -> None:
+        raise AssertionError("compiled code")
+
+    monkeypatch.setattr(Chain, "__call__", never)
+    monkeypatch.setattr(rodfem.fem.system, "matrix_places", never)
+    monkeypatch.setattr(CompiledNewton, "__init__", never)
+    diagram = trace(cases()["demo ruler"](), Discretization("auto", 8, 6, factors=PETSC), Plan(depth=0))
+    assert len(diagram.branches[0].points) > 20
+
+
+def test_unknown_factors_are_refused() -> None:
+    with pytest.raises(InputError, match="chain or petsc"):
+        Discretization(factors="superglue")
