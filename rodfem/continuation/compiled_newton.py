@@ -27,8 +27,9 @@ CONVERGED, FAILED, SINGULAR, BROKEN = range(4)
 """How the iteration ended: :class:`NewtonResult` tells the first two; ``S`` too near singular; no factors at all."""
 
 
-def _declarations(code: str) -> str:
+def declarations() -> str:
     """The structures and functions of the code, for cffi."""
+    code = Path(__file__).with_name("newton.c").read_text()
     first, last = code.index("typedef struct {\n    uintptr_t assemble"), code.index("static double dot(")
     functions = (
         "int assemble_at(const Rod *rod, const double *x);",
@@ -60,8 +61,7 @@ class CompiledNewton:
         """
         system = self.system = inertia.system
         self.inertia, n = inertia, system.fields.unknowns
-        code = Path(__file__).with_name("newton.c").read_text()
-        compiled = module("newton", _declarations(code), Path(__file__).parent)
+        compiled = module("newton", declarations(), Path(__file__).parent)
         self.lib, self.ffi = compiled.lib, compiled.ffi
         self._kept: list[Any] = []
         own, metric = shared(inertia.matrix), shared(system.metric)

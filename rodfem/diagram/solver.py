@@ -10,6 +10,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
+from rodfem.continuation import compiled_newton
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
@@ -71,6 +72,7 @@ class Solver:
         if compat.ALONE:
             compile_ahead("chain", chain.DECLARATIONS)
             compile_ahead("assembly", assembly.DECLARATIONS, Path(assembly.__file__).parent)
+            compile_ahead("newton", compiled_newton.declarations(), Path(compiled_newton.__file__).parent)
         system = System(scene, discretization or Discretization(), comm, clock)
         self.equilibria = BranchSolver(system, spectrum) if scene.conservative else StaticSolver(system)
 
