@@ -10,27 +10,46 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
+from mpi4py import MPI
 
+from forms.importing import without_pkg_resources
+from rodfem.beside import Job
 from rodfem.errors import SetupError
 
 try:
-    import basix
-    import dolfinx
-    import dolfinx.fem.petsc
-    import dolfinx.mesh
-    import ffcx.compiler
-    import ufl
-    from dolfinx import fem
+    with without_pkg_resources():
+        import basix
+        import dolfinx
+        import dolfinx.fem.petsc
+        import dolfinx.mesh
+        import ufl
+        from dolfinx import fem
+        from ffcx.codegeneration import jit
     from petsc4py import PETSc
 except ModuleNotFoundError as missing:
     raise SetupError(
         f"This Python has no module {missing.name!r}: install Debian's python3-dolfinx and run with a virtual "
         "environment made by '/usr/bin/python3 -m venv --system-site-packages .venv' ('make setup' does both)."
     ) from missing
+
+
+_COMPILE = jit._compile_objects
+"""What FFCx calls for objects that its cache lacks, once it has locked their place in it."""
+_LISTENERS: list[Callable[[], None]] = []
+"""Who is told of it."""
+ALONE = MPI.COMM_WORLD.size == 1
+"""Whether there is one process alone: only then does anything work beside it."""
+_JOBS: list[Job] = []
+"""What is compiled beside this process."""
+
+
+class _Begun(BaseException):
+    """A form is compiled elsewhere; no Exception, for which FFCx would unlock its place in the cache."""
 
 
 REAL: Any = np.float64
@@ -141,10 +160,15 @@ def cell_coordinates(mesh: Any, cells: int) -> np.ndarray:
 
 
 def compile_forms(forms: Sequence[Any]) -> list[Any]:
-    """Compile UFL forms; raises :class:`SetupError` where the form cache is locked by a killed run."""
+    """Compile UFL forms: the first, which takes the longest, and all others together, at once.
+
+    Raises :class:`SetupError` where the cache is locked by a killed run.
+    """
     try:
+        compiled = compile_ahead(forms)
+        _wait()
         with _quiet():
-            return [fem.form(form, dtype=REAL) for form in forms]
+            return [f for g in _groups(forms) for f in _compiled(g)] if None in compiled else compiled
     except TimeoutError as locked:
         raise SetupError(
             "A compiled form never became ready, most likely because an earlier run was killed while compiling: "
@@ -201,6 +225,78 @@ def local_table(form: Any) -> sp.csr_matrix:
     local = fem.assemble_matrix(form)  # PETSc brings the parts of other ranks' rows there
     size = int(np.asarray(local.indptr)[-1])
     return sp.csr_matrix((local.data[:size], local.indices[:size], local.indptr), shape=(len(local.indptr) - 1,) * 2)
+
+
+def compile_ahead(forms: Sequence[Any]) -> list[Any]:
+    """Compiled forms; None for those that the cache lacks, which are now compiled into it beside this process.
+
+    One of several ranks begins nothing: there dolfinx compiles on the first rank, while the others wait.
+    """
+    if not ALONE:
+        return [None] * len(forms)
+    _wait()
+    with _quiet():
+        return [form for group in _groups(forms) for form in _compiled_or_begun(group)]
+
+
+def _groups(forms: Sequence[Any]) -> list[Sequence[Any]]:
+    """Forms that share a module of C, one half of the compiler's work in each module."""
+    return [group for group in (forms[:1], forms[1:]) if group]
+
+
+def _compiled_or_begun(group: Sequence[Any]) -> list[Any]:
+    def begin(*arguments: Any, **options: Any) -> None:
+        given = inspect.signature(_COMPILE).bind(*arguments, **options).arguments
+        lock = Path(given["cache_dir"]) / f"{given['module_name']}.c"
+
+        def work() -> None:
+            try:
+                _COMPILE(*arguments, **options)
+            except BaseException:
+                lock.unlink()  # this process compiles it then, and says what is wrong
+                raise
+
+        _say()
+        _JOBS.append(Job(work))
+        raise _Begun
+
+    try:
+        with _instead("_compile_objects", begin):
+            return _compiled(group)
+    except _Begun:
+        return [None] * len(group)
+
+
+def _compiled(group: Sequence[Any]) -> list[Any]:
+    """Forms of dolfinx for UFL forms that share one module of C."""
+    compile_all = jit.compile_forms
+    made: list[Any] = []
+
+    def compile_one(forms: Any, *arguments: Any, **options: Any) -> Any:
+        if not made:
+            made.extend(compile_all(list(group), *arguments, **options))
+        objects, *rest = made
+        return [next(found for form, found in zip(group, objects, strict=True) if form is forms[0])], *rest
+
+    with _instead("compile_forms", compile_one):
+        return [fem.form(form, dtype=REAL) for form in group]
+
+
+def _wait() -> None:
+    """Await all that is compiled beside this process."""
+    while _JOBS:
+        _JOBS.pop().wait()
+
+
+@contextmanager
+def _instead(name: str, function: Callable[..., Any]) -> Iterator[None]:
+    """Have ``function`` in the place of one of FFCx's."""
+    usual = getattr(jit, name)
+    setattr(jit, name, function)
+    try:
+        yield
+    finally:
+        setattr(jit, name, usual)
 
 
 class Integral(NamedTuple):
@@ -266,19 +362,28 @@ def destroy_garbage(comm: Any) -> None:
 
 
 @contextmanager
-def announce_compilation(say: Callable[[], None]) -> Iterator[None]:
-    """Call ``say`` once if forms are compiled inside the block."""
-    compile_objects = ffcx.compiler.compile_ufl_objects
+def announce_compilation(say: Callable[[], None]) -> Iterator[list[bool]]:
+    """Call ``say`` once if forms are compiled inside the block; yields a list that is empty until then."""
     said: list[bool] = []
 
-    def compile_aloud(*arguments: Any, **options: Any) -> Any:
+    def once() -> None:
         if not said:
             said.append(True)
             say()
-        return compile_objects(*arguments, **options)
 
-    ffcx.compiler.compile_ufl_objects = compile_aloud
+    def compile_aloud(*arguments: Any, **options: Any) -> Any:
+        _say()
+        return _COMPILE(*arguments, **options)
+
+    _LISTENERS.append(once)
     try:
-        yield
+        with _instead("_compile_objects", compile_aloud):
+            yield said
     finally:
-        ffcx.compiler.compile_ufl_objects = compile_objects
+        _LISTENERS.remove(once)
+
+
+def _say() -> None:
+    """Say that something is compiled."""
+    for listener in _LISTENERS:
+        listener()

@@ -12,8 +12,8 @@ from typing import Any
 
 from benchmarks.common import MPIRUN, ROOT, environment
 
-HEAVY = ("numpy", "scipy.spatial.transform", "scipy.optimize", "mpi4py.MPI", "petsc4py.PETSc", "slepc4py.SLEPc")
-IMPORTS = (*HEAVY, "ufl", "dolfinx.fem", "h5py", "rodfem.app.run")
+HEAVY = ("numpy", "scipy.sparse", "mpi4py.MPI", "petsc4py.PETSc", "slepc4py.SLEPc")
+IMPORTS = (*HEAVY, "forms", "rodfem.compat", "h5py", "rodfem.app.run")
 """Modules imported one after the other to see what each adds."""
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.optimize import brentq
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import END
@@ -15,6 +14,7 @@ from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import HIGHEST
 from rodfem.fem.system import System
+from rodfem.roots import zero_between
 from rodfem.tolerances import ROUND_OFF, unit
 
 LOCATED = 1e-10
@@ -67,6 +67,6 @@ def _bracketed_zero(stretch: Callable[[float], float], coarse: Point, span: floa
     for _ in range(14):
         b, other = a + step, stretch(a + step)
         if value * other <= 0:
-            return float(brentq(stretch, a, b, xtol=ROUND_OFF * span))
+            return zero_between(stretch, a, b, ROUND_OFF * span)
         a, value, step = b, other, 1.7 * step
     raise ConvergenceError("the zero of the stretch was not found on the finer mesh")

@@ -7,6 +7,7 @@ module is missing.
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -178,6 +179,7 @@ def main(
     ``parser`` is that of :func:`parser_for`, ``scene_of`` makes the scene from the parsed options, and ``arguments``
     replace those of the command line.  Bad input is an :class:`~rodfem.errors.InputError`.
     """
+    os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")  # Open MPI 4 starts a daemon otherwise, 0.2 s
     given = list(sys.argv[1:] if arguments is None else arguments)
     ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
     options = parser.parse_args(ours)

@@ -8,12 +8,12 @@ from typing import Protocol
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.optimize import brentq
 
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent, between, predict
 from rodfem.codim2.singular import Destroyed
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
+from rodfem.roots import zero_between
 
 LOCATED = 1e-8
 """Arclength to which turning points and cusps are located: their parameters are so to its square."""
@@ -168,7 +168,7 @@ class Tracer:
             return self.criterion.correct(p, x, (dp, dx), a)
 
         try:
-            s = brentq(lambda s: f(at(s)), a.s, b.s, xtol=LOCATED)
+            s = zero_between(lambda s: f(at(s)), a.s, b.s, LOCATED)
             node = at(s)
         except (ConvergenceError, ValueError):
             return []

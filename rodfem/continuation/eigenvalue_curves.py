@@ -9,7 +9,6 @@ eigenvalue is multiple.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from rodfem.stability.nonsymmetric import ALIKE, Frequencies, NonsymmetricPencil, groups
 from rodfem.tolerances import TINY
@@ -33,6 +32,8 @@ class Curves:
 
         Without ``keep`` the next load goes on from the one before all the same.
         """
+        from scipy.optimize import linear_sum_assignment  # slow to load
+
         numbers = [-1] * len(found.values)
         last = self._last
         weighed = pencil.weighed(found.vectors)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from scipy.optimize import linear_sum_assignment
 
 from rodfem.continuation.locate import SHARP, real_root, zero_uncertainty
 from rodfem.errors import ConvergenceError
@@ -39,6 +38,8 @@ def unmatched(found: Frequencies, others: np.ndarray) -> list[list[int]]:
 
     Equal ones are together.
     """
+    from scipy.optimize import linear_sum_assignment  # slow to load
+
     upper = [i for i, v in enumerate(found.values) if v.imag > 0]
     mine, there = found.values[upper][:, None], others[others.imag > 0]
     distance = abs(mine - there[None, :]) / abs(mine)

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 from petsc4py import PETSc
-from scipy.optimize import brentq
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.solvers import BranchSolver, hermite
@@ -23,6 +22,7 @@ from rodfem.fem.newton import correct
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, project_out
 from rodfem.problem.events import Event
+from rodfem.roots import zero_between
 from rodfem.stability.inertia import ROUGH, Factored
 from rodfem.tolerances import round_off
 
@@ -381,6 +381,6 @@ def locate_event(
 
     if value(low) * value(high) > 0:
         raise ConvergenceError(f"The event {event.name!r} does not happen between the ends of the piece.")
-    s = float(brentq(value, low, high, xtol=ALONG))
+    s = zero_between(value, low, high, ALONG)
     x, there = solve_beside(solver, curve, s, aside)
     return there, x, ALONG + 2 * abs(there - s)

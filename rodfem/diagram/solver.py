@@ -17,8 +17,11 @@ from rodfem.deflation.search import find_equilibria
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.fem import assembly, compiled_newton
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
+from rodfem.linalg import chain
+from rodfem.linalg.compiled import compile_ahead
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
@@ -65,6 +68,10 @@ class Solver:
         """
         if scene.conservative:
             compat.require_real_petsc()
+        if compat.ALONE:
+            compile_ahead("chain", chain.DECLARATIONS)
+            compile_ahead("assembly", assembly.DECLARATIONS, Path(assembly.__file__).parent)
+            compile_ahead("newton", compiled_newton.declarations(), Path(compiled_newton.__file__).parent)
         system = System(scene, discretization or Discretization(), comm, clock)
         self.equilibria = BranchSolver(system, spectrum) if scene.conservative else StaticSolver(system)
 

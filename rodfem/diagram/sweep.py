@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 from petsc4py import PETSc
-from scipy.optimize import brentq, newton
 
 from rodfem.adaptivity.error_estimate import bound, halved
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
@@ -29,6 +28,7 @@ from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.transfer import Transfer, richer_system
+from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
 from rodfem.stability.nonsymmetric import (
     EPS,
@@ -303,7 +303,7 @@ class Sweep:
                 return self._real(a.x, load)[number]
 
             try:
-                found.append(float(brentq(mu, *loads, xtol=ROUND_OFF * max(map(abs, loads)))))
+                found.append(zero_between(mu, loads[0], loads[1], ROUND_OFF * max(map(abs, loads))))
             except (ConvergenceError, IndexError, ValueError):
                 self.observer.warn(
                     f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
@@ -428,6 +428,7 @@ def _zero_between(measured: AtLoad, cluster: Cluster, load: float) -> tuple[floa
 
 def _zero(measured: AtLoad, cluster: Cluster, load: float) -> float:
     """Load near ``load`` at which the mean of the eigenvalues of a cluster vanishes."""
+    from scipy.optimize import newton  # slow to load
 
     def mean(load: float) -> float:
         return measured(load, cluster).cluster.mean

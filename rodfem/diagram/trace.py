@@ -17,6 +17,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import Solver
 from rodfem.diagram.sweep import FREQUENCIES, Sweep
 from rodfem.fem.fields import Discretization
+from rodfem.fem.transfer import compile_richer
 from rodfem.problem.scene import Scene
 from rodfem.timing import Clock
 
@@ -66,11 +67,13 @@ def trace(
     plan = plan or Plan()
     plan.check(scene)
     recorder, clock = Recorder(observer or Observer()), Clock()
-    with compat.announce_compilation(recorder.compiling):
+    with compat.announce_compilation(recorder.compiling) as compiled:
         with clock("setup"):
             mesh = _mesh(scene, discretization or Discretization(), plan, recorder, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
         recorder.system(found.system, plan.accuracy)
+        if compiled and plan.error_bars and compat.ALONE:
+            compile_richer(found.system)
 
         def complete() -> None:
             compat.destroy_garbage(comm)

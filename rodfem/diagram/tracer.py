@@ -7,8 +7,6 @@ from dataclasses import replace
 from itertools import pairwise
 from math import isnan
 
-from scipy.optimize import brentq
-
 from rodfem.adaptivity.accuracy_control import AccuracyControl
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
@@ -24,6 +22,7 @@ from rodfem.diagram.events import Events
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
 from rodfem.errors import ConvergenceError
+from rodfem.roots import zero_between
 from rodfem.stability.round_off import resolve
 from rodfem.tolerances import DRIFT, INSIDE, SAME_SPECIAL, SAME_STATE, unit
 
@@ -266,7 +265,7 @@ class Tracer:
                 return system.scalar(solve_at(self.solver, lambda t: hermite(a, b, t), s)) - load
 
             margin = INSIDE * (q.arclength - p.arclength)
-            s = brentq(beyond, p.arclength + margin, q.arclength - margin, xtol=EXACT)
+            s = zero_between(beyond, p.arclength + margin, q.arclength - margin, EXACT)
             x = solve_at(self.solver, lambda t: hermite(a, b, t), s)
             system.set_load(x, load)
         return self.solver.point(x, s, self.solver.load_tangent(x, q.load > p.load), outcome)
@@ -301,7 +300,7 @@ class Tracer:
             return shape.stretch(solve_at(self.solver, lambda t: hermite(a, b, t), s))
 
         h = b.arclength - a.arclength
-        s = brentq(stretch, a.arclength + INSIDE * h, b.arclength, xtol=ALONG)
+        s = zero_between(stretch, a.arclength + INSIDE * h, b.arclength, ALONG)
         x = solve_at(self.solver, lambda t: hermite(a, b, t), s)
         row = self.solver.row(hermite(a, b, s)[1])
         last = self.solver.point(x, s, self.solver.tangent(row, at=x))

@@ -31,8 +31,9 @@ CONVERGED, FAILED, SINGULAR, BROKEN = range(4)
 """How an iteration ended: it converged, or not; ``S`` was too near singular; there were no factors at all."""
 
 
-def _declarations(code: str) -> str:
+def declarations() -> str:
     """The structures and functions of the code, for cffi."""
+    code = Path(__file__).with_name("newton.c").read_text()
     return code[code.index("typedef struct {") : code.index("static double dot(")] + FUNCTIONS
 
 
@@ -82,8 +83,7 @@ class CompiledNewton:
     def __init__(self, system: System, matrix: PETSc.Mat, factors: Chain) -> None:
         """Hand all arrays over: of the ``system``, of a ``matrix`` of it with all columns, and its ``factors``."""
         self.system, self.matrix, self.factors, n = system, matrix, factors, system.fields.unknowns
-        code = Path(__file__).with_name("newton.c").read_text()
-        compiled = module("newton", _declarations(code), Path(__file__).parent)
+        compiled = module("newton", declarations(), Path(__file__).parent)
         self.lib, self.ffi = compiled.lib, compiled.ffi
         self._kept: list[Any] = []
         own, metric = shared(matrix), shared(system.metric)

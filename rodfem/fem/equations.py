@@ -19,6 +19,7 @@ from forms.rotation import rotation
 from rodfem import compat
 from rodfem.fem.assembly import Assembler, Cells, vector_places
 from rodfem.fem.fields import Fields
+from rodfem.fem.literals import with_constants
 from rodfem.fem.parameters import Line, load_line
 from rodfem.problem.contribution import Site
 from rodfem.problem.local_state import Constants, Place, place
@@ -32,7 +33,8 @@ if TYPE_CHECKING:
 class Equations:
     """Compiled forms of one scene on one :class:`~rodfem.fem.fields.Fields`.
 
-    All numbers of a scene are dolfinx Constants, so that nothing is compiled again for other values.  Every
+    All numbers of a scene are dolfinx Constants, so that nothing is compiled again for other values: parameters, and
+    those that its functions have in them (:mod:`rodfem.fem.literals`).  Every
     parameter is ``p = base + direction * load`` with the scalar unknown ``load``: any of them can be varied.
 
     Attributes
@@ -61,6 +63,16 @@ class Equations:
 
     def __init__(self, fields: Fields) -> None:
         """Derive and compile the forms."""
+        forms = self._derive(fields)
+        self._taken: Line | None = None
+        self.cells = Cells.of(fields)
+        self._assemblers = [Assembler(form, self.cells) for form in compat.compile_forms(forms)]
+        self.jacobian, self.residual, self.energy, self.metric, self.kinetic, *more = self._assemblers
+        self.ordinate = more[0] if more else None
+        self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
+
+    def _derive(self, fields: Fields) -> list[Any]:
+        """Forms in UFL: second and first derivative of the Lagrangian, energy, metric, mass, ordinate along the rod."""
         self.fields, scene = fields, fields.scene
         mesh, k = fields.mesh, fields.discretization.degree
         self.names, self.line = list(scene.parameters), load_line(scene)
@@ -90,7 +102,7 @@ class Equations:
             if measure is not None or of.nodal:
                 L += sum(term * (measure or dx_nodes) for term in of.lagrangian(site))
         work = sum(term * (measure or dx) for of, site, measure in sites for term in of.virtual_work(site))
-        first = ufl.derivative(L, u, test) - work
+        first = ufl.derivative(with_constants(L, mesh), u, test) - with_constants(work, mesh)
         second = ufl.derivative(first, u, trial)
         metric = (inertia.rotation_metric(a.q, b.q) if scene.normal is None else a.turned * b.turned) / length
         if f.r is not None:
@@ -101,15 +113,15 @@ class Equations:
         kinetic += sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
         self.massless = apply_algebra_lowering(kinetic).empty()
         self.uniform = not extract_type(first, ufl.SpatialCoordinate) and not scene.joints
-        forms = [first, second, W * dx, metric * dx, kinetic]
+        others = [W * dx, metric * dx, kinetic]
         if not scene.ordinate.places:
-            forms.append((0.0 * c.s + scene.ordinate.of(along, c)) * dx)
-        self._taken: Line | None = None
-        self.cells = Cells.of(fields)
-        self._assemblers = [Assembler(form, self.cells) for form in compat.compile_forms(forms)]
-        self.residual, self.jacobian, self.energy, self.metric, self.kinetic, *more = self._assemblers
-        self.ordinate = more[0] if more else None
-        self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
+            others.append((0.0 * c.s + scene.ordinate.of(along, c)) * dx)
+        return [second, first, *(with_constants(form, mesh) for form in others)]
+
+    @classmethod
+    def compile_ahead(cls, fields: Fields) -> None:
+        """Begin to compile beside this process what another instance finds then in the cache."""
+        compat.compile_ahead(cls.__new__(cls)._derive(fields))
 
     def take(self, line: Line) -> None:
         """Let the constants of the forms be the parameters of a ``line``."""

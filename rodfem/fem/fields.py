@@ -15,7 +15,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from dolfinx import fem
 from mpi4py import MPI
 
 from rodfem import compat
@@ -153,7 +152,7 @@ class Fields:
         self.mesh = mesh or self._mesh()
         parts = [(b.continuous, b.degree, b.size) for b in self.blocks] + [(False, 0, len(names))]
         self.space = compat.mixed_space(self.mesh, parts)
-        self.u = fem.Function(self.space, dtype=compat.REAL)
+        self.u = compat.fem.Function(self.space, dtype=compat.REAL)
         cells = self.mesh.topology.index_map(1)
         self.owned_cells, local_cells = cells.size_local, cells.size_local + cells.num_ghosts
         self.vertices = compat.cell_vertices(self.mesh, local_cells)
@@ -234,7 +233,7 @@ class Fields:
         count = len(self.free_owned)
         self.offset = sum(self.comm.allgather(count)[: self.comm.rank])
         self.field_unknowns = self.comm.allreduce(count)
-        numbers = fem.Function(self.space, dtype=compat.REAL)
+        numbers = compat.fem.Function(self.space, dtype=compat.REAL)
         numbers.x.array[:] = -1.0
         numbers.x.array[self.free_owned] = self.offset + np.arange(count)
         numbers.x.scatter_forward()
@@ -274,7 +273,7 @@ class Fields:
         """Local values with those of ghosts from the ranks that own them."""
         if self.comm.size == 1:
             return local
-        function = fem.Function(self.space, dtype=compat.REAL)
+        function = compat.fem.Function(self.space, dtype=compat.REAL)
         function.x.array[:] = local
         function.x.scatter_forward()
         return np.array(function.x.array)

@@ -8,16 +8,26 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.fem.fields import HIGHEST
+from rodfem.fem.equations import Equations
+from rodfem.fem.fields import HIGHEST, Discretization, Fields
 from rodfem.fem.system import System
 
 
-def richer_system(system: System) -> System:
-    """Return the system of the same rod on halves of its elements, of one degree more (but of the highest one)."""
+def richer(system: System) -> Discretization:
+    """Halves of the elements of a system, of one degree more (but of the highest one)."""
     d = system.fields.discretization
     halves = replace(d, vertices=tuple(map(float, system.fields.all_vertices())))
-    finer = halves.finer(2, richer=int(d.degree < HIGHEST))
-    return System(system.scene, finer, system.comm, system.clock, symmetries=system.symmetries)
+    return halves.finer(2, richer=int(d.degree < HIGHEST))
+
+
+def richer_system(system: System) -> System:
+    """Return the system of the same rod that is :func:`richer`."""
+    return System(system.scene, richer(system), system.comm, system.clock, symmetries=system.symmetries)
+
+
+def compile_richer(system: System) -> None:
+    """Begin to compile the forms of that beside this process."""
+    Equations.compile_ahead(Fields(system.scene, richer(system), system.comm))
 
 
 class Transfer:

@@ -12,6 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from rodfem.beside import Job
+
 FLAGS = ["-O3", "-march=native"]
 """Of the compiler: fast loops, and no -ffast-math, which would hide what is no number."""
 
@@ -30,18 +32,28 @@ def _processor() -> str:
         return platform.processor()
 
 
+_HERE = Path(__file__).parent
+_JOBS: dict[str, Job] = {}
+"""What is compiled beside this process, by name."""
+
+
+def compile_ahead(name: str, declarations: str, beside: Path = _HERE) -> None:
+    """Begin to compile in another process what :func:`module` finds then in the cache, unless that has it."""
+    full, code = _named(name, declarations, beside)
+    if full not in _JOBS and _found(full) is None:
+        _JOBS[full] = Job(lambda: _compile(full, code, declarations))
+
+
 @cache
-def module(name: str, declarations: str, beside: Path = Path(__file__).parent) -> Any:
+def module(name: str, declarations: str, beside: Path = _HERE) -> Any:
     """The compiled module of ``name.c`` in the folder ``beside``, with ``lib`` and ``ffi`` of cffi.
 
     ``declarations`` are its functions in C.  Raises what the compiler raises.
     """
-    code = (beside / f"{name}.c").read_text()
-    key = hashlib.sha1("\n".join([code, declarations, *FLAGS, sys.version, _processor()]).encode()).hexdigest()[:16]
-    full, folder = f"rodfem_{name}_{key}", _cache()
-    found = next(folder.glob(f"{full}*.so"), None)
-    if found is None:
-        found = _compile(full, code, declarations, folder)
+    full, code = _named(name, declarations, beside)
+    if full in _JOBS:
+        _JOBS.pop(full).wait()
+    found = _found(full) or _compile(full, code, declarations)
     spec = importlib.util.spec_from_file_location(full, found)
     assert spec is not None and spec.loader is not None
     out = importlib.util.module_from_spec(spec)
@@ -49,13 +61,25 @@ def module(name: str, declarations: str, beside: Path = Path(__file__).parent) -
     return out
 
 
-def _compile(full: str, code: str, declarations: str, folder: Path) -> Path:
+def _named(name: str, declarations: str, beside: Path) -> tuple[str, str]:
+    """Name in the cache, which tells all that the compiled code depends on, and the code of ``name.c``."""
+    code = (beside / f"{name}.c").read_text()
+    key = hashlib.sha1("\n".join([code, declarations, *FLAGS, sys.version, _processor()]).encode()).hexdigest()[:16]
+    return f"rodfem_{name}_{key}", code
+
+
+def _found(full: str) -> Path | None:
+    return next(_cache().glob(f"{full}*.so"), None)
+
+
+def _compile(full: str, code: str, declarations: str) -> Path:
     """Compile in a folder of its own; what is moved to the cache is whole, whoever else compiles it meanwhile."""
     from cffi import FFI
 
     builder = FFI()
     builder.cdef(declarations)
     builder.set_source(full, code, extra_compile_args=FLAGS, libraries=["m"])
+    folder = _cache()
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder) as room:
         made = Path(builder.compile(tmpdir=room))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 
 COMM = MPI.COMM_WORLD
+KEYWORD = "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
 DEGREES = pytest.mark.parametrize("degree", [1, 2, 3, 6, 8])
 
 
@@ -108,8 +110,7 @@ def test_a_second_system_compiles_nothing() -> None:
 
 def test_compilation_is_announced_once(folder: Path) -> None:
     mesh = compat.interval_mesh(COMM, 4, 0.0, 1.0)
-    keyword = "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
-    cache: dict[str, Any] = {keyword: {"cache_dir": str(folder)}}
+    cache: dict[str, Any] = {KEYWORD: {"cache_dir": str(folder)}}
     said: list[str] = []
 
     def integrate() -> float:
@@ -123,6 +124,32 @@ def test_compilation_is_announced_once(folder: Path) -> None:
     with compat.announce_compilation(lambda: said.append("again")):
         assert integrate() == pytest.approx(1 / 2 + 1 / 3, rel=1e-14)
     assert COMM.allreduce(said, op=MPI.SUM) == ["compiling"]
+
+
+@pytest.mark.alone
+def test_forms_are_compiled_beside_this_process(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that the cache lacks, in two modules; begun ahead, they are found there; and what fails says why."""
+    form = partial(fem.form, **{KEYWORD: {"cache_dir": str(folder)}})
+    monkeypatch.setattr(compat.fem, "form", form)
+    mesh = compat.interval_mesh(COMM, 4, 0.0, 1.0)
+    x = ufl.SpatialCoordinate(mesh)[0]
+    forms = [x**n * ufl.dx for n in (1, 2, 3)]
+    said: list[str] = []
+    with compat.announce_compilation(lambda: said.append("compiling")) as compiled:
+        assert compat.compile_ahead(forms) == [None, None, None]
+        assert said == ["compiling"]
+        assert compiled
+        found = [fem.assemble_scalar(form) for form in compat.compile_forms(forms)]
+    np.testing.assert_allclose(found, [1 / 2, 1 / 3, 1 / 4], rtol=1e-14)
+    assert len(list(folder.glob("libffcx_forms_*.c"))) == 2
+    assert None not in compat.compile_ahead(forms)
+
+    def broken(*_: object, **__: object) -> None:
+        raise RuntimeError("no compiler")
+
+    monkeypatch.setattr("cffi.FFI.compile", broken)
+    with pytest.raises(RuntimeError, match="no compiler"):
+        compat.compile_forms([x**4 * ufl.dx])
 
 
 @pytest.mark.short

@@ -16,6 +16,11 @@ import rodfem
 
 HOME = Path(__file__).parents[2]
 HEAVY = ("dolfinx", "matplotlib", "mpi4py", "petsc4py", "slepc4py", "pyvista")
+UNUSED = (
+    *("pkg_resources", "setuptools", "ffcx.compiler", "matplotlib", "pyvista", "jinja2"),
+    *("scipy.optimize", "scipy.interpolate", "scipy.spatial", "scipy.integrate"),
+)
+"""Modules that a run without pictures does not need, each a part of the time that a person waits for it."""
 
 pytestmark = pytest.mark.alone
 
@@ -84,3 +89,33 @@ def test_a_scene_is_stated_without_what_computes_and_draws(statement: str) -> No
     out = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=HOME).stdout
     assert "rodfem" in out.split()
     assert not {*HEAVY} & {*out.split()}
+
+
+def test_a_run_without_pictures_loads_nothing_else(tmp_path: Path) -> None:
+    """Once its forms are compiled; and whoever needs ``pkg_resources`` afterwards has it."""
+    words = ["hemitropic", "--no-figures", "--range", "0", "0.05", "--elements", "2", "--degree", "2"]
+    program = (
+        f"import sys, runpy; sys.argv = {[*words, '--output', str(tmp_path)]!r}; "
+        "runpy.run_path('demos/hemitropic.py', run_name='__main__'); print('LOADED', *sys.modules); "
+        "import ufl, pkg_resources; print(ufl.__version__ == pkg_resources.get_distribution('fenics-ufl').version)"
+    )
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=HOME)
+    out = done.stdout
+    loaded = out[out.index("LOADED") :].split()
+    assert {"dolfinx", "h5py", "rodfem.app.run"} <= {*loaded}
+    assert not {*UNUSED} & {*loaded}
+    assert loaded[-1] == "True"
+
+
+@pytest.mark.parametrize("order", ["rodfem.Discretization", "rodfem.trace", "forms", "rodfem.compat"])
+def test_versions_are_known_without_the_package_manager(order: str) -> None:
+    """Whatever is loaded first; and any other name of ``pkg_resources`` is that of the real one."""
+    first, _, name = order.rpartition(".")
+    program = (
+        f"import sys; {f'from {first} import {name}' if first else f'import {name}'}; "
+        "assert 'pkg_resources' not in sys.modules; from forms.importing import without_pkg_resources as w\n"
+        "with w():\n    from pkg_resources import parse_version\nimport pkg_resources\n"
+        "assert pkg_resources.parse_version is parse_version"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=HOME)

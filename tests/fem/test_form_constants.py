@@ -1,0 +1,63 @@
+"""Numbers in the functions of a scene are values of its compiled forms, not part of their text."""
+
+from __future__ import annotations
+
+from math import pi
+
+import pytest
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from rodfem import compat
+from rodfem.diagram.plan import Plan
+from rodfem.diagram.trace import trace
+from rodfem.fem.fields import Discretization
+from rodfem.fem.literals import with_constants
+from rodfem.problem.ends import clamped, free
+from rodfem.problem.scene import Ordinate, Scene
+
+COMM = MPI.COMM_WORLD
+
+
+def column(stiffness: float, weight: float) -> Scene:
+    """Euler's column of that bending stiffness, whose dead load is ``weight`` times the parameter."""
+    return Scene(
+        name="column",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: 0.5 * stiffness * (k[0] ** 2 + 2.6 * k[1] ** 2 + k[2] ** 2),
+        parameters={"P": 0.0},
+        load="P",
+        ends=(clamped(), free(lambda c: (0.0, 0.0, -weight * c.P))),
+        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
+        span=(0.0, 1.2 * stiffness / weight * pi**2 / 4),
+    )
+
+
+def test_another_number_compiles_nothing() -> None:
+    """And each column buckles at Euler's load of its own numbers."""
+    said: list[str] = []
+    for stiffness, weight in ((1.234, 0.7), (2.345, 1.7)):
+        with compat.announce_compilation(lambda: said.append("compiling")):
+            diagram = trace(column(stiffness, weight), Discretization("reduced", 4, 4), Plan(depth=0, error_bars=False))
+        (buckling,) = [s for s in diagram["straight"].special if s.kind == "branch point"]
+        assert buckling.point.load == pytest.approx(pi**2 / 4 * stiffness / weight, rel=1e-9)
+        if stiffness == 1.234:
+            said.clear()
+    assert COMM.allreduce(said, op=MPI.SUM) == []
+
+
+@pytest.mark.alone
+def test_values_are_those_of_the_numbers() -> None:
+    """Also in conditions and in the base of a power; exponents, integers and the numbers of formulas stay."""
+    mesh = compat.interval_mesh(MPI.COMM_SELF, 8, 0.0, 1.0)
+    x = ufl.SpatialCoordinate(mesh)[0]
+    dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": 8})
+    form = (0.5 * (x + 1.7) ** 2.5 + ufl.conditional(ufl.lt(x, 0.375), 3.3 * x, 7 * x) + ufl.bessel_J(1, 2.9 * x)) * dx
+    mapped = with_constants(form, mesh)
+    assert sorted(float(c.value) for c in mapped.constants()) == [0.375, 1.7, 2.9, 3.3]
+    values = [fem.assemble_scalar(f) for f in compat.compile_forms([form, mapped])]
+    assert values[1] == pytest.approx(values[0], rel=1e-14)
+    for nothing in (0, 0.5 * x * dx, 7 * x**1.5 * dx):
+        assert not getattr(with_constants(nothing, mesh), "constants", list)()
