@@ -1,6 +1,9 @@
-"""Conversion of matrices of a rank's own unknowns to PETSc and back."""
+"""Conversion of matrices of a rank's own unknowns to PETSc and back, and the entries that PETSc stores."""
 
 from __future__ import annotations
+
+from functools import cache
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,3 +41,63 @@ def local_rows(matrix: PETSc.Mat) -> sp.csr_matrix:
 def gathered(matrix: PETSc.Mat) -> sp.csr_matrix:
     """All of a matrix on every rank."""
     return sp.vstack(matrix.comm.tompi4py().allgather(local_rows(matrix))).tocsr()
+
+
+STORED = """
+int MatMPIAIJGetSeqAIJ(void *matrix, void **block, void **rest, void *columns);
+int MatSeqAIJGetArrayRead(void *matrix, void **values);
+int MatSeqAIJRestoreArrayRead(void *matrix, void **values);
+"""
+"""Functions of PETSc that petsc4py does not have: they show where the entries of a matrix are."""
+
+
+@cache
+def _petsc() -> tuple[Any, Any]:
+    """PETSc's library, which petsc4py has loaded, and what calls it."""
+    from cffi import FFI
+
+    ffi = FFI()
+    ffi.cdef(STORED)
+    return ffi, ffi.dlopen(PETSc.__file__)
+
+
+class Entries:
+    """Entries of this rank's rows of an AIJ matrix whose pattern stays, without the search that PETSc makes for each.
+
+    Attributes
+    ----------
+    starts, columns
+        Pattern of the rows, with global columns in ascending order.
+    stored
+        Places of these entries among :meth:`values`: those in columns of this rank's unknowns are stored first.
+    """
+
+    def __init__(self, matrix: PETSc.Mat) -> None:
+        """Learn the pattern of ``matrix``."""
+        self.matrix = matrix
+        self.starts, self.columns, _ = matrix.getValuesCSR()
+        begin, end = matrix.getOwnershipRangeColumn()
+        own = (self.columns >= begin) & (self.columns < end)
+        self._counts = [int(own.sum()), int((~own).sum())]
+        self.stored = np.where(own, np.cumsum(own) - 1, self._counts[0] + np.cumsum(~own) - 1)
+
+    def values(self) -> np.ndarray:
+        """Values now; PETSc's own where one rank has all of the matrix: they are not kept."""
+        ffi, lib = _petsc()
+        whole = ffi.cast("void *", self.matrix.handle)
+        if self.matrix.comm.size == 1:
+            return self._values(whole, self._counts[0])
+        blocks = ffi.new("void *[2]")
+        lib.MatMPIAIJGetSeqAIJ(whole, blocks, blocks + 1, ffi.NULL)
+        return np.concatenate([self._values(block, n) for block, n in zip(blocks, self._counts, strict=True)])
+
+    @staticmethod
+    def _values(block: Any, number: int) -> np.ndarray:
+        if not number:
+            return np.empty(0, PETSc.ScalarType)
+        ffi, lib = _petsc()
+        at = ffi.new("void **")
+        lib.MatSeqAIJGetArrayRead(block, at)
+        out = np.frombuffer(ffi.buffer(at[0], number * np.dtype(PETSc.ScalarType).itemsize), PETSc.ScalarType)
+        lib.MatSeqAIJRestoreArrayRead(block, at)
+        return out
