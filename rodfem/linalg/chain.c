@@ -46,7 +46,7 @@ typedef struct chain {
     Front *front;
     int *unknowns, *target;  /* of all fronts; places of the entries in their fronts, row and column in turn */
     long *source;            /* places of the entries among the values of the matrix */
-    int *starts, *indices;   /* pattern of the matrix */
+    int *starts, *indices, *places; /* pattern of the matrix, and places of its entries among the values given */
     double *scale, *work, *dense, *schur, *forward, *back;
     char *of_border;
     int *place, *left, *right;      /* place of an unknown in the front at hand; unknowns of the Schur complement */
@@ -83,9 +83,9 @@ static int at_least(double **array, size_t *room, size_t size)
 void chain_free(chain *c)
 {
     if (!c) return;
-    free(c->front); free(c->unknowns); free(c->target); free(c->source); free(c->starts); free(c->indices);
-    free(c->scale); free(c->work); free(c->of_border); free(c->dense); free(c->schur);
-    free(c->forward); free(c->back); free(c->place); free(c->left); free(c->right);
+    free(c->front); free(c->unknowns); free(c->target); free(c->source); free(c->starts); free(c->indices); free(c->places);
+    free(c->scale); free(c->work); free(c->of_border); free(c->dense); free(c->schur); free(c->forward); free(c->back);
+    free(c->place); free(c->left); free(c->right);
     free(c->order.data); free(c->panel.data); free(c->pivot.data);
     free(c);
 }
@@ -100,37 +100,41 @@ static int close_front(Front *f, Pile *unknowns, const int *active, int count)
     return rest != NULL;
 }
 
-/* Fronts of a matrix of n rows with the pattern (starts, indices).  The unknowns come in the `sequence` of elimination,
-   in `groups` groups, group g from begin[g] to begin[g + 1]; those of the last group, the border, may couple to all.
-   A front has those of the border that couple to it or to one before.  A group that adds no unknown to the front before
-   it belongs to that front.  The border of an `open` chain is not eliminated; rows of a symmetric matrix that belong to
-   the border need not have their entries in other columns then.  NULL: out of memory.  */
-chain *chain_new(int n, const int *starts, const int *indices, const int *sequence, int groups, const int *begin,
-                 int symmetric, int open, int largest)
+/* Fronts of a matrix of n rows with the pattern (starts, indices), whose entries are at `places` among the values that
+   are given later.  The unknowns come in the `sequence` of elimination, in `groups` groups, group g from begin[g] to
+   begin[g + 1]; those of the last group, the border, may couple to all.  A front has those of the border that couple to
+   it or to one before.  A group that adds no unknown to the front before it belongs to that front.  The border of an
+   `open` chain is not eliminated; rows of a symmetric matrix that belong to the border need not have their entries in
+   other columns then.  NULL: out of memory.  */
+chain *chain_new(int n, const int *starts, const int *indices, const int *places, const int *sequence, int groups,
+                 const int *begin, int symmetric, int open, int largest)
 {
     chain *c = calloc(1, sizeof(chain));
-    int *turn = malloc((n + 1) * sizeof(int)), *seen = malloc((n + 1) * sizeof(int));
+    int *seen = calloc(n + 1, sizeof(int));
     int *active = malloc((n + 1) * sizeof(int)), *owner = malloc((n + 1) * sizeof(int));
     int *below = calloc(n + 2, sizeof(int)), *rows = malloc((starts[n] + 1) * sizeof(int)); /* the transposed pattern */
     int *entry = malloc((starts[n] + 1) * sizeof(int));
     Pile unknowns = {NULL, 0, 0, sizeof(int)}, target = {NULL, 0, 0, 2 * sizeof(int)}, source = {NULL, 0, 0, sizeof(long)};
-    if (!c || !turn || !seen || !active || !owner || !below || !rows || !entry) goto failed;
+    if (!c || !seen || !active || !owner || !below || !rows || !entry) goto failed;
     c->n = n; c->symmetric = symmetric; c->open = open; c->largest = largest;
     c->border = n - begin[groups - 1];
     c->order.width = sizeof(int); c->panel.width = c->pivot.width = sizeof(double);
     c->front = calloc(groups + 1, sizeof(Front));
     c->starts = malloc((n + 1) * sizeof(int));
     c->indices = malloc((starts[n] + 1) * sizeof(int));
+    c->places = malloc((starts[n] + 1) * sizeof(int));
     c->scale = malloc((n + 1) * sizeof(double));
     c->work = malloc((n + 1) * sizeof(double));
     c->of_border = calloc(n + 1, 1);
     c->place = malloc((n + 1) * sizeof(int));
     c->left = malloc((n + 1) * sizeof(int));
     c->right = malloc((n + 1) * sizeof(int));
-    if (!c->front || !c->starts || !c->indices || !c->scale || !c->work || !c->of_border || !c->place || !c->left || !c->right) goto failed;
+    if (!c->front || !c->starts || !c->indices || !c->places || !c->scale || !c->work || !c->of_border || !c->place
+        || !c->left || !c->right) goto failed;
     memcpy(c->starts, starts, (n + 1) * sizeof(int));
     memcpy(c->indices, indices, starts[n] * sizeof(int));
-    for (int i = 0; i < n; i++) { turn[sequence[i]] = i; seen[i] = 0; owner[i] = -1; }
+    memcpy(c->places, places, starts[n] * sizeof(int));
+    for (int i = 0; i < n; i++) owner[i] = -1;
     for (int k = 0; k < starts[n]; k++) below[indices[k] + 2]++;
     for (int i = 0; i < n; i++) below[i + 2] += below[i + 1];
     for (int i = 0; i < n; i++)
@@ -146,7 +150,7 @@ chain *chain_new(int n, const int *starts, const int *indices, const int *sequen
             if (!seen[u]) { seen[u] = 1; active[count++] = u; }
             for (int k = starts[u]; k < starts[u + 1]; k++) {
                 int v = indices[k];
-                if (!seen[v] && turn[v] >= a) { seen[v] = 1; active[count++] = v; }
+                if (!seen[v]) { seen[v] = 1; active[count++] = v; }
             }
         }
         if (count > before || !c->fronts || (last && (border < n || open))) {
@@ -185,7 +189,7 @@ chain *chain_new(int n, const int *starts, const int *indices, const int *sequen
                 long *from = room_for(&source, 1);
                 int *to = room_for(&target, 1);
                 if (!from || !to) goto failed;
-                *from = e; to[0] = p; to[1] = q;
+                *from = places[e]; to[0] = p; to[1] = q;
             }
         }
         if (!symmetric) for (int k = 0; k < f->own; k++) { /* columns of the fully summed in the rows of the others */
@@ -196,17 +200,18 @@ chain *chain_new(int n, const int *starts, const int *indices, const int *sequen
                 long *from = room_for(&source, 1);
                 int *to = room_for(&target, 1);
                 if (!from || !to) goto failed;
-                *from = entry[e]; to[0] = c->place[u]; to[1] = k;
+                *from = places[entry[e]]; to[0] = c->place[u]; to[1] = k;
             }
         }
         f->entries = (long)source.used - f->first;
     }
     c->source = source.data;
     c->target = target.data;
-    free(turn); free(seen); free(active); free(owner); free(below); free(rows); free(entry);
+    free(seen); free(active); free(owner); free(below); free(rows); free(entry);
     return c;
 failed:
-    free(turn); free(seen); free(active); free(owner); free(below); free(rows); free(entry); free(unknowns.data); free(target.data); free(source.data);
+    free(seen); free(active); free(owner); free(below); free(rows); free(entry);
+    free(unknowns.data); free(target.data); free(source.data);
     chain_free(c);
     return NULL;
 }
@@ -228,7 +233,7 @@ static void equilibrate_border(chain *c, const double *values, double least)
     for (int i = 0; i < c->n; i++)
         for (int k = c->starts[i]; k < c->starts[i + 1]; k++) {
             int j = c->indices[k];
-            double a = fabs(values[k]);
+            double a = fabs(values[c->places[k]]);
             if (c->of_border[i] == c->of_border[j] || a < least) continue;
             if (c->of_border[j]) size[j] += a * s[i];
             else if (!c->symmetric) size[i] += a * s[j];
@@ -247,7 +252,7 @@ static int measure(chain *c, const double *values, double least)
         double most = 0, sum = 0, mine = s[i];
         for (int k = c->starts[i]; k < c->starts[i + 1]; k++) {
             int j = c->indices[k];
-            double a = fabs(values[k]);
+            double a = fabs(values[c->places[k]]);
             if (a < least) continue;
             a *= mine * s[j];
             if (a > most) most = a;
@@ -433,7 +438,7 @@ int chain_factor(chain *c, const double *values)
 {
     double most = 0, sum = 0;
     for (int k = 0; k < c->starts[c->n]; k++) {
-        double a = fabs(values[k]);
+        double a = fabs(values[c->places[k]]);
         sum += a;
         if (a > most) most = a;
     }

@@ -23,8 +23,8 @@ from rodfem.linalg.matrices import Entries
 
 DECLARATIONS = """
 typedef struct chain chain;
-chain *chain_new(int n, const int *starts, const int *indices, const int *sequence, int groups, const int *begin,
-                 int symmetric, int open, int largest);
+chain *chain_new(int n, const int *starts, const int *indices, const int *places, const int *sequence, int groups,
+                 const int *begin, int symmetric, int open, int largest);
 void chain_free(chain *c);
 int chain_factor(chain *c, const double *values);
 int chain_forward(chain *c, int k, const double *b, double *rest);
@@ -97,22 +97,25 @@ class Elimination:
         indices: np.ndarray,
         order: tuple[np.ndarray, np.ndarray],
         *,
+        places: np.ndarray | None = None,
         is_open: bool = False,
     ) -> None:
         """Find the fronts of the pattern (``starts``, ``indices``); the ``order`` is that of :func:`sequence`.
 
-        ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  A symmetric open chain may lack the entries of
-        its border's rows that are in other columns.
+        ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  ``places`` are those of the pattern's entries
+        among the values that are to be factored, unless they are the same.  A symmetric open chain may lack the entries
+        of its border's rows that are in other columns.
         """
         compiled = module("chain", DECLARATIONS)
         self.lib, self.ffi = compiled.lib, compiled.ffi
         self.rows, self.regular = len(starts) - 1, False
-        pattern = [np.ascontiguousarray(x, dtype=np.int32) for x in (starts, indices, *order)]
+        places = np.arange(len(indices)) if places is None else places
+        pattern = [np.ascontiguousarray(x, dtype=np.int32) for x in (starts, indices, places, *order)]
         made = self.lib.chain_new(
             self.rows,
-            *(self._pointer(x, "int") for x in pattern[:3]),
+            *(self._pointer(x, "int") for x in pattern[:4]),
             len(order[1]) - 1,
-            self._pointer(pattern[3], "int"),
+            self._pointer(pattern[4], "int"),
             kind == "cholesky",
             is_open,
             LARGEST,
@@ -214,7 +217,7 @@ class Chain(ByColumns):
             self._matrix, self._entries = matrix, Entries(matrix)
             pattern, n = (self._entries.starts, self._entries.columns), matrix.size[0]
             self.elimination = Elimination(self.kind, *pattern, sequence(*pattern, np.arange(n - self.border, n)))
-        self.elimination.factor(self._entries.values())
+        self.elimination.factor(self._entries.values()[0])
         self.regular = self.elimination.regular
 
     def solve_columns(self, right: np.ndarray) -> np.ndarray:

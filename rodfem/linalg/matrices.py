@@ -68,8 +68,10 @@ class Entries:
     ----------
     starts, columns
         Pattern of the rows, with global columns in ascending order.
-    stored
+    places
         Places of these entries among :meth:`values`: those in columns of this rank's unknowns are stored first.
+    number
+        How many there are.
     """
 
     def __init__(self, matrix: PETSc.Mat) -> None:
@@ -78,18 +80,18 @@ class Entries:
         self.starts, self.columns, _ = matrix.getValuesCSR()
         begin, end = matrix.getOwnershipRangeColumn()
         own = (self.columns >= begin) & (self.columns < end)
-        self._counts = [int(own.sum()), int((~own).sum())]
-        self.stored = np.where(own, np.cumsum(own) - 1, self._counts[0] + np.cumsum(~own) - 1)
+        self._counts, self.number = [int(own.sum()), int((~own).sum())], len(own)
+        self.places = np.where(own, np.cumsum(own) - 1, self._counts[0] + np.cumsum(~own) - 1)
 
-    def values(self) -> np.ndarray:
-        """Values now; PETSc's own where one rank has all of the matrix: they are not kept."""
+    def values(self) -> list[np.ndarray]:
+        """Values now, in the arrays of PETSc: not to be kept."""
         ffi, lib = _petsc()
         whole = ffi.cast("void *", self.matrix.handle)
         if self.matrix.comm.size == 1:
-            return self._values(whole, self._counts[0])
+            return [self._values(whole, self.number)]
         blocks = ffi.new("void *[2]")
         lib.MatMPIAIJGetSeqAIJ(whole, blocks, blocks + 1, ffi.NULL)
-        return np.concatenate([self._values(block, n) for block, n in zip(blocks, self._counts, strict=True)])
+        return [self._values(block, n) for block, n in zip(blocks, self._counts, strict=True)]
 
     @staticmethod
     def _values(block: Any, number: int) -> np.ndarray:

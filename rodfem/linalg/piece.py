@@ -18,9 +18,9 @@ class Piece:
 
     Attributes
     ----------
-    starts, columns
-        Pattern of the piece: unknowns of its rank, then others of the interface.
-    border, places
+    starts, columns, places
+        Pattern of the piece: unknowns of its rank, then others of the interface; places of its entries in the values.
+    border, interface
         Unknowns of the interface that this piece has, and their places on the interface, in ascending order.
     shared
         Number of unknowns on the interface.
@@ -39,29 +39,24 @@ class Piece:
         number[interface] = np.arange(len(interface))
         outer_row, outer_column = number[rows] >= 0, number[columns] >= 0
 
-        kept = np.flatnonzero(~outer_row | outer_column)
-        i, j, source = rows[kept], columns[kept], self._entries.stored[kept]
-        self._sent: np.ndarray | None = None
-        if not symmetric:
-            row, column = self._exchange(rows, columns, np.flatnonzero(outer_row & ~outer_column))
-            i, j = np.append(i, row), np.append(j, column)
-            source = np.append(source, len(columns) + np.arange(len(row)))
+        kept, below = np.flatnonzero(~outer_row | outer_column), np.flatnonzero(outer_row & ~outer_column)
+        self._exchanged, stored = not symmetric, self._entries.number
+        row, column = self._exchange(rows, columns, below) if self._exchanged else (below[:0], below[:0])
+        i, j = np.append(rows[kept], row), np.append(columns[kept], column)
+        places = np.append(self._entries.places[kept], stored + np.arange(len(row)))
+        self._values = np.empty(stored + len(row), dtype=PETSc.ScalarType)
         self.shared, found = len(interface), number[np.concatenate([own, i, j])]
-        self.places = np.unique(found[found >= 0])
-        unknowns = interface[self.places]
+        self.interface = np.unique(found[found >= 0])
+        unknowns = interface[self.interface]
         others = unknowns[(unknowns < begin) | (unknowns >= end)]
         local = np.full(self._ranges[-1], -1)
         local[begin:end] = np.arange(end - begin)
         local[others] = end - begin + np.arange(len(others))
         self.border = local[unknowns]
         size = end - begin + len(others)
-        table = sp.csr_matrix((source, (local[i], local[j])), shape=(size, size))
+        table = sp.csr_matrix((places, (local[i], local[j])), shape=(size, size))
         table.sort_indices()
-        self.starts, self.columns, self._source = table.indptr, table.indices, table.data
-        # entries that come from other ranks, and their places among those received
-        self._late = np.flatnonzero(self._source >= len(columns))
-        self._order = self._source[self._late] - len(columns)
-        self._values = np.zeros(table.nnz, dtype=PETSc.ScalarType)
+        self.starts, self.columns, self.places = table.indptr, table.indices, table.data
 
     def _cut(self, rows: np.ndarray, columns: np.ndarray, first: int) -> np.ndarray:
         """Global numbers of this rank's unknowns on the interface with other ranks, scalars not included."""
@@ -85,17 +80,15 @@ class Piece:
         owner = self._owner(columns[entries])
         parts = [entries[owner == r] for r in range(self.comm.size)]
         got = self.comm.alltoall([(rows[part], columns[part]) for part in parts])
-        self._sent = self._entries.stored[np.concatenate(parts)]
+        self._sent = self._entries.places[np.concatenate(parts)]
         self._counts = [len(part) for part in parts], [len(row) for row, _ in got]
         row, column = (np.concatenate(part) for part in zip(*got, strict=True))
         return row, column
 
     def values(self) -> np.ndarray:
-        """Values of the piece's entries now; collective."""
-        stored = self._entries.values()
-        np.take(stored, self._source, out=self._values, mode="clip")  # those that come later are beyond the end
-        if self._sent is not None:
-            received = np.empty(sum(self._counts[1]), dtype=stored.dtype)
-            self.comm.Alltoallv([stored[self._sent], self._counts[0]], [received, self._counts[1]])
-            self._values[self._late] = received[self._order]
-        return self._values
+        """Values now: those of this rank's rows, then those received; collective."""
+        values, stored = self._values, self._entries.number
+        np.concatenate(self._entries.values(), out=values[:stored])
+        if self._exchanged:
+            self.comm.Alltoallv([values[self._sent], self._counts[0]], [values[stored:], self._counts[1]])
+        return values

@@ -71,9 +71,10 @@ class Pieces(ByColumns):
         """Find this rank's piece, and the borders of all."""
         self.comm = matrix.comm.tompi4py()
         self.piece = piece = Piece(matrix, self.scalars, symmetric=self.kind == "cholesky")
-        self._borders = self.comm.allgather(piece.places)
-        order = sequence(piece.starts, piece.columns, piece.border)
-        self.elimination = Elimination(self.kind, piece.starts, piece.columns, order, is_open=True)
+        self._borders = self.comm.allgather(piece.interface)
+        pattern = piece.starts, piece.columns
+        order = sequence(*pattern, piece.border)
+        self.elimination = Elimination(self.kind, *pattern, order, places=piece.places, is_open=True)
         self.joint = dense_elimination(self.kind, piece.shared)
 
     def _join(self, complements: tuple[np.ndarray, ...]) -> None:

@@ -18,13 +18,15 @@ static int joined(chain *c, int symmetric, int k, double *x)
     double *left = malloc((size_t)m * m * sizeof(double) + 1), *turned = malloc((size_t)m * m * sizeof(double) + 1);
     double *rest = malloc((size_t)m * k * sizeof(double) + 1);
     int *starts = malloc((m + 1) * sizeof(int)), *indices = malloc((size_t)m * m * sizeof(int) + 1);
+    int *places = malloc((size_t)m * m * sizeof(int) + 1);
     chain_schur(c, left);
     for (int i = 0; i < m; i++) for (int j = 0; j < m; j++) {
         turned[i * m + j] = left[symmetric && i < j ? i * m + j : j * m + i];
         indices[i * m + j] = j;
+        places[i * m + j] = i * m + j;
     }
     for (int i = 0; i <= m; i++) starts[i] = i * m;
-    chain *joint = chain_new(m, starts, indices, indices, 2, begin, symmetric, 0, 2000);
+    chain *joint = chain_new(m, starts, indices, places, indices, 2, begin, symmetric, 0, 2000);
     if (!joint || chain_factor(joint, turned) > 1) status = 2;
     if (!status) {
         status = chain_forward(c, k, x, rest) || chain_forward(joint, k, rest, NULL);
@@ -32,7 +34,7 @@ static int joined(chain *c, int symmetric, int k, double *x)
         chain_back(c, k, rest, x);
     }
     chain_free(joint);
-    free(left); free(turned); free(rest); free(starts); free(indices);
+    free(left); free(turned); free(rest); free(starts); free(indices); free(places);
     return status;
 }
 
@@ -62,16 +64,21 @@ int main(void)
         }
         if (symmetric) for (int i = 0; i < n; i++) for (int j = 0; j < i; j++) a[i * n + j] = a[j * n + i];
         int *starts = malloc((n + 1) * sizeof(int)), *indices = malloc((size_t)n * n * sizeof(int)), used = 0;
+        int *places = malloc((size_t)n * n * sizeof(int));
         double *values = malloc((size_t)n * n * sizeof(double));
         for (int i = 0; i < n; i++) {
             starts[i] = used;
             sequence[i] = i;
-            for (int j = 0; j < n; j++) if (coupled[i * n + j]) { indices[used] = j; values[used++] = a[i * n + j]; }
+            for (int j = 0; j < n; j++) if (coupled[i * n + j]) {
+                places[used] = (int)((size_t)n * n) - 1 - used; /* values come in reverse */
+                values[places[used]] = a[i * n + j];
+                indices[used++] = j;
+            }
         }
         starts[n] = used;
         int open = trial / 2 % 2, k = 1 + whole(&state, 6);
         double *x = calloc((size_t)n * k, sizeof(double)), *b = calloc((size_t)n * k, sizeof(double));
-        chain *c = chain_new(n, starts, indices, sequence, groups, begin, symmetric, open, 2000);
+        chain *c = chain_new(n, starts, indices, places, sequence, groups, begin, symmetric, open, 2000);
         if (!c) return 2;
         for (int repeat = 0; repeat < 2; repeat++) {
             int status = chain_factor(c, values);
@@ -92,7 +99,7 @@ int main(void)
             }
         }
         chain_free(c);
-        free(a); free(x); free(b); free(coupled); free(begin); free(sequence); free(starts); free(indices); free(values);
+        free(a); free(x); free(b); free(coupled); free(begin); free(sequence); free(starts); free(indices); free(places); free(values);
     }
     printf("%d wrong\n", wrong);
     return wrong > 0;

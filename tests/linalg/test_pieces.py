@@ -5,12 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from golden_cases import cases
 from mpi4py import MPI
 from petsc4py import PETSc
 from random_chains import chain_of_cells, petsc, random_chain
 
+from rodfem import Discretization
+from rodfem.diagram.solver import Solver
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.chain import Elimination, sequence
+from rodfem.linalg.factorization import Mumps
+from rodfem.linalg.matrices import gathered, petsc_matrix
 from rodfem.linalg.pieces import Pieces, added, dense_elimination
 
 KINDS = pytest.mark.parametrize("kind", ["cholesky", "lu"])
@@ -183,3 +188,40 @@ def test_all_ranks_hear_of_trouble() -> None:
     dense[0] = dense[:, 0] = 0.0
     factors(petsc(dense, coupled, PETSc.COMM_WORLD))
     assert not factors.regular and factors.inertia() == (0, 1) and factors.determinant() == -np.inf
+
+
+@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="nothing is cut on one rank")
+@pytest.mark.parametrize("name", list(cases()))
+def test_pieces_of_every_scene(name: str) -> None:
+    """Rings, joints, planar rods, integral constraints: wherever the ranks cut them."""
+    scene = cases()[name]()
+    found = Solver(scene, Discretization("auto", 8, 6)).equilibria
+    system = found.system
+    x = found.start(scene.span[0] + 0.37 * (scene.span[1] - scene.span[0]), 0.3)
+    system.set_phase(x)
+    row = system.metric * x
+    row.axpy(1.0, system.load_axis())
+    solves(Pieces("lu", system.fields.dense_rows), system.at(x).jacobian(row))
+    if not scene.conservative:
+        return
+    factors = Pieces("cholesky", system.fields.dense_rows)
+    matrix, shift = found.inertia.at(x).matrix, 0.0
+    for wanted in (-3.0, -1e-3, 0.3):
+        sigma = wanted * system.stiffness_scale
+        matrix.axpy(shift - sigma, found.inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        matrix.stateIncrease()
+        shift = sigma
+        solves(factors, matrix)
+        alone = Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3})  # dense eigenvalues are lost in round-off here
+        alone(petsc_matrix(MPI.COMM_SELF, gathered(matrix)))
+        assert factors.inertia() == alone.inertia()
+
+
+def solves(factors: Pieces, matrix: PETSc.Mat) -> None:
+    """Assert that factors of a matrix solve."""
+    factors(matrix)
+    assert factors.regular
+    right, out = matrix.createVecs()
+    right.array[:] = np.random.default_rng(0).normal(size=right.size)[slice(*matrix.getOwnershipRange())]
+    factors.solve(right, out)
+    assert (matrix * out - right).norm() < 1e-14 * matrix.norm(PETSc.NormType.INFINITY) * out.norm()
