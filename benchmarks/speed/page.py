@@ -86,7 +86,7 @@ def faster(store: Store) -> str:
     return (
         f"One rod of {longest} elements faster on 2 ranks than on 1: {'met' if min(gains) > 1 else 'missed'}, "
         f"{digits(gains[0], 2)} times as fast an equilibrium, {digits(gains[1], 2)} times an index. What falls "
-        "short of 2 is the inverse of each rank's piece at the cut, the copies of its matrix, and messages."
+        "short of 2 is assembly, the copies of each rank's entries, and messages."
     )
 
 

@@ -61,7 +61,8 @@ class CompiledCorrector(CompiledNewton):
         state = x.array_r
         failed = self.lib.assemble_at(self.rod, self.ffi.cast("double *", state.ctypes.data))
         failed = failed or self.lib.solve_at(self.rod, self.block, self.ffi.NULL)
-        self.factors.regular, found = not failed, self._held()
+        self.factors.adopt(regular=not failed)
+        found = self._held()
         return None if failed else found
 
     def correct(self, x: PETSc.Vec, row: PETSc.Vec, limits: Limits) -> Ended:

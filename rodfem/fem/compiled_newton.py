@@ -137,8 +137,9 @@ class CompiledNewton:
         rod.entry_places = system.matrix_places(self._pattern, True).pointer
         rod.assemble = equations.residual.function
         self.factors.prepare(self.matrix)
-        rod.factors = self.factors.pointer
-        rod.factor, rod.solve, rod.negative, rod.zero = self.factors.functions
+        elimination = self.factors.elimination
+        rod.factors = elimination.pointer
+        rod.factor, rod.solve, rod.negative, rod.zero = elimination.functions
         self._active[:], self._offsets[:] = 0, system.phase.offsets
         for i, row in system.phase.rows.items():
             self._active[i], self._conditions[i, : len(row)] = 1, row
@@ -158,6 +159,6 @@ class CompiledNewton:
             status = self.lib.correct(self.rod, self.block, newton, *pointers)
             if status >= SINGULAR:
                 state[:] = begin
-        self.factors.regular = status < SINGULAR and not newton.singular
+        self.factors.adopt(regular=status < SINGULAR and not newton.singular)
         self.matrix.stateIncrease()
         return Ended(status, newton.iterations, newton.error, newton.moved)

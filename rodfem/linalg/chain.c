@@ -20,7 +20,8 @@
 #define THRESHOLD 0.01 /* least pivot over the largest entry of its column: multipliers are bounded by its inverse */
 #define GOOD 10.0      /* growth of a pivot that is taken without looking for a better one */
 #define CANCELLED 1e-8 /* a pair of pivots whose determinant is smaller than this, over its terms, is none */
-#define SWEEPS 3       /* of the equilibration */
+#define SWEEPS 3       /* of the equilibration, at least */
+#define MOST 10        /* and at most: fine meshes need six */
 #define SERVES 16.0    /* a scale serves while all sizes are within this of one */
 
 typedef struct {
@@ -40,17 +41,19 @@ typedef struct {
 } Pile;
 
 typedef struct chain {
-    int n, symmetric, fronts, largest; /* largest: order that a front may have */
+    int n, symmetric, open, border, fronts, largest; /* border: unknowns of the last group; largest: order of a front */
+    int rest;                /* unknowns that an open chain leaves: delayed ones, then the border */
     Front *front;
     int *unknowns, *target;  /* of all fronts; places of the entries in their fronts, row and column in turn */
     long *source;            /* places of the entries among the values of the matrix */
-    int *starts, *indices;   /* pattern of the matrix */
-    double *scale, *work, *dense, *schur;
+    int *starts, *indices, *places; /* pattern of the matrix, and places of its entries among the values given */
+    double *scale, *work, *dense, *schur, *forward, *back;
     char *of_border;
     int *place, *left, *right;      /* place of an unknown in the front at hand; unknowns of the Schur complement */
-    size_t dense_room, schur_room;
+    size_t dense_room, schur_room, forward_room, back_room;
     Pile order, panel, pivot;
     int negative, zero, scaled;
+    long exponents;          /* of the scale, their sum */
     double determinant, growth;
 } chain;
 
@@ -80,89 +83,92 @@ static int at_least(double **array, size_t *room, size_t size)
 void chain_free(chain *c)
 {
     if (!c) return;
-    free(c->front); free(c->unknowns); free(c->target); free(c->source); free(c->starts); free(c->indices);
-    free(c->scale); free(c->work); free(c->of_border); free(c->dense); free(c->schur); free(c->place); free(c->left); free(c->right);
+    free(c->front); free(c->unknowns); free(c->target); free(c->source); free(c->starts); free(c->indices); free(c->places);
+    free(c->scale); free(c->work); free(c->of_border); free(c->dense); free(c->schur); free(c->forward); free(c->back);
+    free(c->place); free(c->left); free(c->right);
     free(c->order.data); free(c->panel.data); free(c->pivot.data);
     free(c);
 }
 
-/* Fronts of a matrix of n rows with the pattern (starts, indices).  The unknowns come in the `sequence` of elimination,
-   in `groups` groups, group g from begin[g] to begin[g + 1]; those of the last group, the border, may couple to all.
-   A group that adds no unknown to the front before it belongs to that front.  NULL: out of memory.  */
-chain *chain_new(int n, const int *starts, const int *indices, const int *sequence, int groups, const int *begin,
-                 int symmetric, int largest)
+/* Add the unknowns that later fronts have as well.  */
+static int close_front(Front *f, Pile *unknowns, const int *active, int count)
+{
+    f->m = f->own + count;
+    if (!count) return 1;
+    int *rest = room_for(unknowns, count);
+    if (rest) memcpy(rest, active, count * sizeof(int));
+    return rest != NULL;
+}
+
+/* Fronts of a matrix of n rows with the pattern (starts, indices), whose entries are at `places` among the values that
+   are given later.  The unknowns come in the `sequence` of elimination, in `groups` groups, group g from begin[g] to
+   begin[g + 1]; those of the last group, the border, may couple to all.  A front has those of the border that couple to
+   it or to one before.  A group that adds no unknown to the front before it belongs to that front.  The border of an
+   `open` chain is not eliminated; rows of a symmetric matrix that belong to the border need not have their entries in
+   other columns then.  NULL: out of memory.  */
+chain *chain_new(int n, const int *starts, const int *indices, const int *places, const int *sequence, int groups,
+                 const int *begin, int symmetric, int open, int largest)
 {
     chain *c = calloc(1, sizeof(chain));
-    int *turn = malloc((n + 1) * sizeof(int)), *seen = malloc((n + 1) * sizeof(int));
+    int *seen = calloc(n + 1, sizeof(int));
     int *active = malloc((n + 1) * sizeof(int)), *owner = malloc((n + 1) * sizeof(int));
     int *below = calloc(n + 2, sizeof(int)), *rows = malloc((starts[n] + 1) * sizeof(int)); /* the transposed pattern */
     int *entry = malloc((starts[n] + 1) * sizeof(int));
     Pile unknowns = {NULL, 0, 0, sizeof(int)}, target = {NULL, 0, 0, 2 * sizeof(int)}, source = {NULL, 0, 0, sizeof(long)};
-    if (!c || !turn || !seen || !active || !owner || !below || !rows || !entry) goto failed;
-    c->n = n; c->symmetric = symmetric; c->largest = largest;
+    if (!c || !seen || !active || !owner || !below || !rows || !entry) goto failed;
+    c->n = n; c->symmetric = symmetric; c->open = open; c->largest = largest;
+    c->border = n - begin[groups - 1];
     c->order.width = sizeof(int); c->panel.width = c->pivot.width = sizeof(double);
     c->front = calloc(groups + 1, sizeof(Front));
     c->starts = malloc((n + 1) * sizeof(int));
     c->indices = malloc((starts[n] + 1) * sizeof(int));
+    c->places = malloc((starts[n] + 1) * sizeof(int));
     c->scale = malloc((n + 1) * sizeof(double));
     c->work = malloc((n + 1) * sizeof(double));
     c->of_border = calloc(n + 1, 1);
     c->place = malloc((n + 1) * sizeof(int));
     c->left = malloc((n + 1) * sizeof(int));
     c->right = malloc((n + 1) * sizeof(int));
-    if (!c->front || !c->starts || !c->indices || !c->scale || !c->work || !c->of_border || !c->place || !c->left || !c->right) goto failed;
+    if (!c->front || !c->starts || !c->indices || !c->places || !c->scale || !c->work || !c->of_border || !c->place
+        || !c->left || !c->right) goto failed;
     memcpy(c->starts, starts, (n + 1) * sizeof(int));
     memcpy(c->indices, indices, starts[n] * sizeof(int));
-    for (int i = 0; i < n; i++) { turn[sequence[i]] = i; seen[i] = 0; owner[i] = -1; }
+    memcpy(c->places, places, starts[n] * sizeof(int));
+    for (int i = 0; i < n; i++) owner[i] = -1;
     for (int k = 0; k < starts[n]; k++) below[indices[k] + 2]++;
     for (int i = 0; i < n; i++) below[i + 2] += below[i + 1];
     for (int i = 0; i < n; i++)
         for (int k = starts[i]; k < starts[i + 1]; k++) { int e = below[indices[k] + 1]++; rows[e] = i; entry[e] = k; }
     for (int i = begin[groups - 1]; i < n; i++) c->of_border[sequence[i]] = 1;
-    int border = begin[groups - 1], count = 0; /* of active unknowns: in the front, not fully summed yet; no border */
+    if (!room_for(&unknowns, n + 1)) goto failed; /* some, even if there are no unknowns at all */
+    unknowns.used = 0;
+    int border = begin[groups - 1], count = 0; /* of active unknowns: in the front, not fully summed yet */
     for (int g = 0; g < groups; g++) {
-        int a = begin[g], b = begin[g + 1], more = 0;
+        int a = begin[g], b = begin[g + 1], before = count, last = g == groups - 1;
         for (int i = a; i < b; i++) {
             int u = sequence[i];
-            if (!seen[u] && i < border) { seen[u] = 1; active[count++] = u; more = 1; }
+            if (!seen[u]) { seen[u] = 1; active[count++] = u; }
             for (int k = starts[u]; k < starts[u + 1]; k++) {
                 int v = indices[k];
-                if (!seen[v] && turn[v] >= a && turn[v] < border) { seen[v] = 1; active[count++] = v; more = 1; }
+                if (!seen[v]) { seen[v] = 1; active[count++] = v; }
             }
         }
-        if (more || !c->fronts || (g == groups - 1 && border < n)) c->fronts++;
-        Front *f = &c->front[c->fronts - 1];
-        int *at = room_for(&unknowns, b - a);
-        if (!at && b > a) goto failed;
-        memcpy(at, sequence + a, (b - a) * sizeof(int));
-        f->own += b - a;
-        for (int i = a; i < b; i++) owner[sequence[i]] = c->fronts - 1;
+        if (count > before || !c->fronts || (last && (border < n || open))) {
+            if (c->fronts && !close_front(&c->front[c->fronts - 1], &unknowns, active, before)) goto failed;
+            c->fronts++;
+        }
+        if (b > a) {
+            int *at = room_for(&unknowns, b - a);
+            if (!at) goto failed;
+            memcpy(at, sequence + a, (b - a) * sizeof(int));
+        }
+        c->front[c->fronts - 1].own += b - a;
         int kept = 0; /* those of this group are not active any more */
+        for (int i = a; i < b; i++) owner[sequence[i]] = c->fronts - 1;
         for (int i = 0; i < count; i++) if (owner[active[i]] < 0) active[kept++] = active[i];
         count = kept;
-        /* what is left is the front's unless the next group belongs to it, too: written again then */
-        f->m = f->own + count;
-        f->unknowns = NULL;
-        int next_more = 1;
-        if (g + 1 < groups && begin[g + 1] < border) {
-            next_more = 0;
-            for (int i = begin[g + 1]; i < begin[g + 2] && !next_more; i++) {
-                int u = sequence[i];
-                if (!seen[u]) next_more = 1;
-                for (int k = starts[u]; k < starts[u + 1] && !next_more; k++) {
-                    int v = indices[k];
-                    if (!seen[v] && turn[v] >= begin[g + 1] && turn[v] < border) next_more = 1;
-                }
-            }
-        }
-        if (next_more) {
-            int last = g == groups - 1;
-            int *rest = room_for(&unknowns, count + (last ? 0 : n - border));
-            if (!rest && count) goto failed;
-            memcpy(rest, active, count * sizeof(int));
-            if (!last) { memcpy(rest + count, sequence + border, (n - border) * sizeof(int)); f->m += n - border; }
-        }
     }
+    close_front(&c->front[c->fronts - 1], &unknowns, active, 0); /* all are fully summed */
     c->unknowns = unknowns.data;
     unknowns.data = NULL;
     int *list = c->unknowns;
@@ -183,7 +189,7 @@ chain *chain_new(int n, const int *starts, const int *indices, const int *sequen
                 long *from = room_for(&source, 1);
                 int *to = room_for(&target, 1);
                 if (!from || !to) goto failed;
-                *from = e; to[0] = p; to[1] = q;
+                *from = places[e]; to[0] = p; to[1] = q;
             }
         }
         if (!symmetric) for (int k = 0; k < f->own; k++) { /* columns of the fully summed in the rows of the others */
@@ -194,17 +200,18 @@ chain *chain_new(int n, const int *starts, const int *indices, const int *sequen
                 long *from = room_for(&source, 1);
                 int *to = room_for(&target, 1);
                 if (!from || !to) goto failed;
-                *from = entry[e]; to[0] = c->place[u]; to[1] = k;
+                *from = places[entry[e]]; to[0] = c->place[u]; to[1] = k;
             }
         }
         f->entries = (long)source.used - f->first;
     }
     c->source = source.data;
     c->target = target.data;
-    free(turn); free(seen); free(active); free(owner); free(below); free(rows); free(entry);
+    free(seen); free(active); free(owner); free(below); free(rows); free(entry);
     return c;
 failed:
-    free(turn); free(seen); free(active); free(owner); free(below); free(rows); free(entry); free(unknowns.data); free(target.data); free(source.data);
+    free(seen); free(active); free(owner); free(below); free(rows); free(entry);
+    free(unknowns.data); free(target.data); free(source.data);
     chain_free(c);
     return NULL;
 }
@@ -226,53 +233,54 @@ static void equilibrate_border(chain *c, const double *values, double least)
     for (int i = 0; i < c->n; i++)
         for (int k = c->starts[i]; k < c->starts[i + 1]; k++) {
             int j = c->indices[k];
-            double a = fabs(values[k]);
+            double a = fabs(values[c->places[k]]);
             if (c->of_border[i] == c->of_border[j] || a < least) continue;
-            if (c->of_border[i]) size[i] += a * s[j];
-            else if (!c->symmetric) size[j] += a * s[i];
+            if (c->of_border[j]) size[j] += a * s[i];
+            else if (!c->symmetric) size[i] += a * s[j];
         }
     for (int i = 0; i < c->n; i++) if (c->of_border[i]) s[i] = lowered(1.0, size[i], 1);
 }
 
-/* Sizes of the rows of D A D, and of its columns: their largest entries, of the border their sums.  */
-static void measure(chain *c, const double *values, double least)
+/* Sizes of the rows of D A D, and of its columns: their largest entries, of the border their sums; whether all are near
+   one.  */
+static int measure(chain *c, const double *values, double least)
 {
     double *size = c->work, *s = c->scale;
     memset(size, 0, c->n * sizeof(double));
     for (int i = 0; i < c->n; i++) {
+        if (c->symmetric && c->of_border[i]) continue;
         double most = 0, sum = 0, mine = s[i];
         for (int k = c->starts[i]; k < c->starts[i + 1]; k++) {
             int j = c->indices[k];
-            double a = fabs(values[k]);
+            double a = fabs(values[c->places[k]]);
             if (a < least) continue;
             a *= mine * s[j];
             if (a > most) most = a;
-            if (!c->of_border[j]) sum += a;
-            if (c->symmetric) continue;
-            if (!c->of_border[j]) { if (a > size[j]) size[j] = a; } else if (!c->of_border[i]) size[j] += a;
+            if (c->of_border[j]) { if (!c->of_border[i]) size[j] += a; continue; }
+            sum += a;
+            if (!c->symmetric && a > size[j]) size[j] = a;
         }
         if (c->of_border[i]) size[i] += sum; else if (most > size[i]) size[i] = most;
     }
+    for (int i = 0; i < c->n; i++) if (size[i] != 0 && !(size[i] > 1 / SERVES && size[i] < SERVES)) return 0;
+    return 1;
 }
 
 /* Equilibration in powers of two (Ruiz, RAL-TR-2001-034): the largest entries of the rows and columns of D A D are about
    one.  The scale of the matrix before is kept as long as it serves.  */
 static void equilibrate(chain *c, const double *values, double least)
 {
-    double *size = c->work, *s = c->scale;
-    if (c->scaled) {
-        int good = 1;
-        measure(c, values, least);
-        for (int i = 0; i < c->n && good; i++) good = size[i] == 0 || (size[i] > 1 / SERVES && size[i] < SERVES);
-        if (good) return;
-    }
+    double *s = c->scale;
+    if (c->scaled && measure(c, values, least)) return;
     for (int i = 0; i < c->n; i++) s[i] = 1.0;
-    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+    for (int sweep = 0;; sweep++) {
         equilibrate_border(c, values, least);
-        measure(c, values, least);
-        for (int i = 0; i < c->n; i++) if (!c->of_border[i]) s[i] = lowered(s[i], size[i], 2);
+        int serves = measure(c, values, least);
+        if ((serves && sweep >= SWEEPS) || sweep == MOST) break;
+        for (int i = 0; i < c->n; i++) if (!c->of_border[i]) s[i] = lowered(s[i], c->work[i], 2);
     }
-    equilibrate_border(c, values, least);
+    c->exponents = 0;
+    for (int i = 0; i < c->n; i++) if (!c->open || !c->of_border[i]) c->exponents += ilogb(s[i]);
     c->scaled = 1;
 }
 
@@ -424,13 +432,13 @@ static int eliminate_general(chain *c, double *a, int m, int full, int *rows, in
 
 /* --- the whole chain ---------------------------------------------------------------------------------------------- */
 
-/* Factor the matrix of the given values: 0, 1 where it is exactly singular, 2 where a front is too large or memory ends,
+/* Factor the matrix of the given values; an open chain leaves the Schur complement of [delayed | border]: 0, 1 where it is exactly singular, 2 where a front is too large or memory ends,
    3 where a value is no number.  */
 int chain_factor(chain *c, const double *values)
 {
     double most = 0, sum = 0;
     for (int k = 0; k < c->starts[c->n]; k++) {
-        double a = fabs(values[k]);
+        double a = fabs(values[c->places[k]]);
         sum += a;
         if (a > most) most = a;
     }
@@ -442,15 +450,17 @@ int chain_factor(chain *c, const double *values)
     equilibrate(c, values, NOTHING * most);
     const double *s = c->scale;
     int delayed = 0, remaining = 0; /* of the Schur complement: fully summed unknowns first */
+    c->rest = 0;
     for (int index = 0; index < c->fronts; index++) {
         Front *f = &c->front[index];
-        int m = delayed + f->m, full = delayed + f->own, last = index == c->fronts - 1;
+        int m = delayed + f->m, last = index == c->fronts - 1, kept = last && c->open;
+        int full = kept ? 0 : delayed + f->own;
         if (m > c->largest + f->m || !at_least(&c->dense, &c->dense_room, (size_t)m * m + 1)) return 2;
         double *a = c->dense;
         memset(a, 0, (size_t)m * m * sizeof(double));
         f->size = m;
         f->rows = (long)c->order.used;
-        if (!room_for(&c->order, (size_t)(c->symmetric ? m : 2 * m))) return 2;
+        if (!room_for(&c->order, (size_t)(c->symmetric ? m : 2 * m) + 1)) return 2;
         int *rows = (int *)c->order.data + f->rows, *columns = c->symmetric ? rows : rows + m;
         f->columns = f->rows + (c->symmetric ? 0 : m);
         memcpy(rows, c->left, delayed * sizeof(int));
@@ -485,7 +495,7 @@ int chain_factor(chain *c, const double *values)
         memcpy(panel, a, (size_t)m * done * sizeof(double));
         if (!c->symmetric) for (int k = 0; k < done; k++) /* rows of U, one after the other */
             for (int j = 0; j < m; j++) panel[(size_t)m * done + (size_t)k * m + j] = A(k, j);
-        if (last) { c->zero = m - done; break; }
+        if (last && !kept) { c->zero = m - done; break; }
         remaining = m - done;
         if (!at_least(&c->schur, &c->schur_room, (size_t)remaining * remaining + 1)) return 2;
         for (int j = 0; j < remaining; j++)
@@ -494,76 +504,152 @@ int chain_factor(chain *c, const double *values)
         memcpy(c->right, columns + done, remaining * sizeof(int));
         delayed = full - done;
     }
-    for (int i = 0; i < c->n; i++) c->determinant -= 2 * log(s[i]);
+    c->rest = c->open ? remaining : 0;
+    c->determinant -= 2 * log(2.0) * (double)c->exponents;
     return c->zero ? 1 : 0;
 }
 
-/* Solve for k columns of b, one after the other (n each), into x; they may be the same.  */
-int chain_solve(const chain *c, int k, const double *b, double *x)
+/* --- solutions ---------------------------------------------------------------------------------------------------- */
+
+#define WIDTH 4 /* columns solved for at once: the factors are read once for all of them */
+#define ALL(q) for (int q = 0; q < w; q++)
+
+/* L z = y for w columns, interleaved: those of one unknown are next to each other.  */
+static inline void down(const chain *c, const int w, double *y, double *z)
 {
-    double *y = malloc(((size_t)c->n + 1) * sizeof(double)), *z = malloc(((size_t)c->largest + c->n + 1) * sizeof(double));
-    if (!y || !z) { free(y); free(z); return 2; }
-    const int *order = c->order.data;
-    const double *panels = c->panel.data, *pivots = c->pivot.data;
-    for (int column = 0; column < k; column++) {
-        const double *right = b + (size_t)column * c->n;
-        double *out = x + (size_t)column * c->n;
-        for (int i = 0; i < c->n; i++) y[i] = right[i] * c->scale[i];
-        for (int index = 0; index < c->fronts; index++) { /* L z = y */
-            const Front *f = &c->front[index];
-            const int *rows = order + f->rows;
-            const double *l = panels + f->values;
-            int m = f->size;
-            for (int i = 0; i < m; i++) z[i] = y[rows[i]];
-            for (int j = 0; j < f->pivots; j++) {
-                double t = z[j];
-                if (t != 0) for (int i = j + 1; i < m; i++) z[i] -= l[(size_t)j * m + i] * t;
+    for (int index = 0; index < c->fronts; index++) {
+        const Front *f = &c->front[index];
+        const int *rows = (const int *)c->order.data + f->rows;
+        const double *l = (const double *)c->panel.data + f->values;
+        int m = f->size;
+        for (int i = 0; i < m; i++) ALL(q) z[i * w + q] = y[(size_t)rows[i] * w + q];
+        for (int j = 0; j < f->pivots; j++)
+            for (int i = j + 1; i < m; i++) ALL(q) z[i * w + q] -= l[(size_t)j * m + i] * z[j * w + q];
+        for (int i = 0; i < m; i++) ALL(q) y[(size_t)rows[i] * w + q] = z[i * w + q];
+        if (!c->symmetric) continue;
+        const double *d = (const double *)c->pivot.data + f->diagonal;
+        for (int j = 0; j < f->pivots; j++) { /* D */
+            double *u = y + (size_t)rows[j] * w;
+            if (d[2 * j + 1] == 0) { ALL(q) u[q] /= d[2 * j]; continue; }
+            double *v = y + (size_t)rows[j + 1] * w;
+            double e = d[2 * j], g = d[2 * j + 1], h = d[2 * j + 2], det = e * h - g * g;
+            ALL(q) {
+                double a = u[q], b = v[q];
+                u[q] = (h * a - g * b) / det;
+                v[q] = (e * b - g * a) / det;
             }
-            for (int i = 0; i < m; i++) y[rows[i]] = z[i];
+            j++;
         }
-        if (c->symmetric) for (int index = 0; index < c->fronts; index++) { /* D */
-            const Front *f = &c->front[index];
-            const int *rows = order + f->rows;
-            const double *d = pivots + f->diagonal;
-            for (int j = 0; j < f->pivots; j++) {
-                if (d[2 * j + 1] == 0) { y[rows[j]] /= d[2 * j]; continue; }
-                double e = d[2 * j], g = d[2 * j + 1], h = d[2 * j + 2], det = e * h - g * g;
-                double u = y[rows[j]], v = y[rows[j + 1]];
-                y[rows[j]] = (h * u - g * v) / det;
-                y[rows[j + 1]] = (e * v - g * u) / det;
-                j++;
-            }
-        }
-        double *w = c->symmetric ? y : out; /* solutions belong to columns, right-hand sides to rows */
-        for (int index = c->fronts - 1; index >= 0; index--) {
-            const Front *f = &c->front[index];
-            const int *rows = order + f->rows, *columns = order + f->columns;
-            int m = f->size;
-            if (c->symmetric) {
-                const double *l = panels + f->values;
-                for (int i = 0; i < m; i++) z[i] = y[rows[i]];
-                for (int j = f->pivots - 1; j >= 0; j--) {
-                    double t = z[j];
-                    for (int i = j + 1; i < m; i++) t -= l[(size_t)j * m + i] * z[i];
-                    z[j] = t;
-                }
-            } else {
-                const double *u = panels + f->values + (size_t)m * f->pivots;
-                for (int i = f->pivots; i < m; i++) z[i] = w[columns[i]];
-                for (int j = f->pivots - 1; j >= 0; j--) {
-                    double t = y[rows[j]];
-                    for (int i = j + 1; i < m; i++) t -= u[(size_t)j * m + i] * z[i];
-                    z[j] = t / u[(size_t)j * m + j];
-                }
-            }
-            for (int i = 0; i < f->pivots; i++) w[columns[i]] = z[i];
-        }
-        for (int i = 0; i < c->n; i++) out[i] = w[i] * c->scale[i];
     }
-    free(y); free(z);
+}
+
+/* L^t x = y or U x = y.  Solutions belong to columns, right-hand sides to rows: x may be y if they are the same.  */
+static inline void up(const chain *c, const int w, const double *y, double *x, double *z)
+{
+    for (int index = c->fronts - 1; index >= 0; index--) {
+        const Front *f = &c->front[index];
+        const int *rows = (const int *)c->order.data + f->rows, *columns = (const int *)c->order.data + f->columns;
+        int m = f->size;
+        const double *u = (const double *)c->panel.data + f->values + (c->symmetric ? 0 : (size_t)m * f->pivots);
+        for (int i = f->pivots; i < m; i++) ALL(q) z[i * w + q] = x[(size_t)columns[i] * w + q];
+        for (int j = f->pivots - 1; j >= 0; j--) {
+            double t[WIDTH];
+            ALL(q) t[q] = y[(size_t)rows[j] * w + q];
+            for (int i = j + 1; i < m; i++) ALL(q) t[q] -= u[(size_t)j * m + i] * z[i * w + q];
+            ALL(q) z[j * w + q] = c->symmetric ? t[q] : t[q] / u[(size_t)j * m + j];
+        }
+        for (int i = 0; i < f->pivots; i++) ALL(q) x[(size_t)columns[i] * w + q] = z[i * w + q];
+    }
+}
+
+/* The same with a width that the compiler knows.  */
+static void down_by(const chain *c, int w, double *y, double *z)
+{
+    switch (w) {
+    case 1: down(c, 1, y, z); break;
+    case 2: down(c, 2, y, z); break;
+    case 3: down(c, 3, y, z); break;
+    default: down(c, WIDTH, y, z);
+    }
+}
+
+static void up_by(const chain *c, int w, const double *y, double *x, double *z)
+{
+    switch (w) {
+    case 1: up(c, 1, y, x, z); break;
+    case 2: up(c, 2, y, x, z); break;
+    case 3: up(c, 3, y, x, z); break;
+    default: up(c, WIDTH, y, x, z);
+    }
+}
+
+/* Scale between the i-th unknown that an open chain leaves and the chain's own: its border is left unscaled.  */
+static double unscaled(const chain *c, const int *unknowns, int i)
+{
+    return i < c->rest - c->border ? 1.0 : 1.0 / c->scale[unknowns[i]];
+}
+
+/* Order of the largest front, delayed pivots included.  */
+int chain_largest(const chain *c)
+{
+    int most = 0;
+    for (int i = 0; i < c->fronts; i++) if (c->front[i].size > most) most = c->front[i].size;
+    return most;
+}
+
+static int room_for_columns(chain *c, int k)
+{
+    return at_least(&c->forward, &c->forward_room, (size_t)c->n * k + 1)
+        && at_least(&c->back, &c->back_room, ((size_t)c->n + chain_largest(c)) * WIDTH + 1);
+}
+
+/* Eliminate from k columns of b, one after the other (n each); what an open chain leaves of them goes to `rest`.
+   2: out of memory.  */
+int chain_forward(chain *c, int k, const double *b, double *rest)
+{
+    if (!room_for_columns(c, k)) return 2;
+    for (int column = 0; column < k; column += WIDTH) {
+        int w = k - column < WIDTH ? k - column : WIDTH;
+        double *y = c->forward + (size_t)column * c->n;
+        const double *right = b + (size_t)column * c->n;
+        for (int i = 0; i < c->n; i++) ALL(q) y[(size_t)i * w + q] = right[(size_t)q * c->n + i] * c->scale[i];
+        down_by(c, w, y, c->back);
+        for (int i = 0; i < c->rest; i++)
+            ALL(q) rest[(size_t)(column + q) * c->rest + i] = y[(size_t)c->left[i] * w + q] * unscaled(c, c->left, i);
+    }
     return 0;
 }
 
+/* Substitute back in those columns, into x: `rest` are the solutions of what an open chain left.  */
+void chain_back(chain *c, int k, const double *rest, double *x)
+{
+    for (int column = 0; column < k; column += WIDTH) {
+        int w = k - column < WIDTH ? k - column : WIDTH;
+        double *y = c->forward + (size_t)column * c->n, *z = c->back + (size_t)c->n * WIDTH;
+        double *solved = c->symmetric ? y : c->back, *out = x + (size_t)column * c->n;
+        for (int i = 0; i < c->rest; i++)
+            ALL(q) solved[(size_t)c->right[i] * w + q] = rest[(size_t)(column + q) * c->rest + i] * unscaled(c, c->right, i);
+        up_by(c, w, y, solved, z);
+        for (int i = 0; i < c->n; i++) ALL(q) out[(size_t)q * c->n + i] = solved[(size_t)i * w + q] * c->scale[i];
+    }
+}
+
+/* Solutions x of a closed chain for k columns of b.  2: out of memory.  */
+int chain_solve(chain *c, int k, const double *b, double *x)
+{
+    if (chain_forward(c, k, b, NULL)) return 2;
+    chain_back(c, k, NULL, x);
+    return 0;
+}
+
+/* The Schur complement that an open chain leaves, dense, column after column; of a symmetric one the lower triangle.  */
+void chain_schur(const chain *c, double *out)
+{
+    for (int j = 0; j < c->rest; j++) for (int i = 0; i < c->rest; i++)
+        out[(size_t)j * c->rest + i] = c->schur[(size_t)j * c->rest + i] * unscaled(c, c->left, i) * unscaled(c, c->right, j);
+}
+
+int chain_rest(const chain *c) { return c->rest; }
 int chain_negative(const chain *c) { return c->negative; }
 int chain_zero(const chain *c) { return c->zero; }
 int chain_fronts(const chain *c) { return c->fronts; }

@@ -18,18 +18,24 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.compiled import module
-from rodfem.linalg.matrices import values_of
+from rodfem.linalg.factorization import ByColumns
+from rodfem.linalg.matrices import Entries
 
 DECLARATIONS = """
 typedef struct chain chain;
-chain *chain_new(int n, const int *starts, const int *indices, const int *sequence, int groups, const int *begin,
-                 int symmetric, int largest);
+chain *chain_new(int n, const int *starts, const int *indices, const int *places, const int *sequence, int groups,
+                 const int *begin, int symmetric, int open, int largest);
 void chain_free(chain *c);
 int chain_factor(chain *c, const double *values);
-int chain_solve(const chain *c, int k, const double *b, double *x);
+int chain_forward(chain *c, int k, const double *b, double *rest);
+void chain_back(chain *c, int k, const double *rest, double *x);
+int chain_solve(chain *c, int k, const double *b, double *x);
+void chain_schur(const chain *c, double *out);
+int chain_rest(const chain *c);
 int chain_negative(const chain *c);
 int chain_zero(const chain *c);
 int chain_fronts(const chain *c);
+int chain_largest(const chain *c);
 double chain_determinant(const chain *c);
 double chain_growth(const chain *c);
 int chain_delayed(const chain *c);
@@ -40,65 +46,91 @@ SINGULAR, TOO_LARGE = 1, 2
 """What ``chain_factor`` returns for a matrix that is exactly singular, and where it gives up."""
 
 
-def sequence(pattern: sp.csr_matrix, border: int) -> tuple[np.ndarray, np.ndarray]:
+def sequence(starts: np.ndarray, columns: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Order of elimination along a chain, (n,), and where its groups begin, (groups + 1,).
 
     Unknowns with the same couplings form a group (a supervariable): the interior of a cell, or a vertex.  The last
-    group is the border, the last ``border`` rows of the ``pattern``, which is symmetric.
+    group is the ``border``.  Of the two directions that is chosen in which fewer fronts have unknowns of the border:
+    towards them.  The pattern, (``starts``, ``columns``), is symmetric.
     """
-    inner = pattern.shape[0] - border
-    fields = sp.csr_matrix(pattern[:inner, :inner])
-    fields.data = np.ones(fields.nnz)
+    n = len(starts) - 1
+    numbers = np.setdiff1d(np.arange(n), border)
+    inner = len(numbers)
+    if not inner:
+        return border, np.array([0, n])
+    rows = sp.csr_matrix((np.ones(len(columns)), columns, starts), shape=(n, n))[numbers]
+    fields = rows[:, numbers]
     along = np.asarray(reverse_cuthill_mckee(fields, symmetric_mode=True), dtype=np.int64)
+    along = _towards(sp.csc_matrix(rows[:, border]), along)
     # rows with the same nonzeros have the same sum of random numbers, which differ
     sums = fields @ np.random.default_rng(1).random(inner)
     _, group = np.unique(sums, return_inverse=True)
-    first = np.full(group.max(initial=-1) + 1, inner)
-    np.minimum.at(first, group[along], np.arange(inner))
+    first = np.empty(group.max() + 1, dtype=np.int64)
+    first[group[along[::-1]]] = np.arange(inner)[::-1]  # of several the last stays, the first along the chain
     order = along[np.argsort(first[group[along]], kind="stable")]
-    changes = np.flatnonzero(np.diff(group[order], prepend=-1)) if inner else np.array([], dtype=int)
-    return (
-        np.concatenate([order, np.arange(inner, inner + border)]).astype(np.int32),
-        np.concatenate([changes, [inner, inner + border]]).astype(np.int32),
-    )
+    changes = np.flatnonzero(np.diff(group[order], prepend=-1))
+    return np.append(numbers[order], border), np.append(changes, [inner, n])
 
 
-class Chain:
-    """:class:`~rodfem.linalg.factorization.Factors` of matrices with one pattern, on this rank.
+def _towards(couplings: sp.csc_matrix, along: np.ndarray) -> np.ndarray:
+    """The order ``along`` or its reverse, in which unknowns of the border couple later to those before them."""
+    inner, begin = len(along), couplings.indptr[:-1][np.diff(couplings.indptr) > 0]
+    if not len(begin):
+        return along
+    turn = np.empty(inner, dtype=np.int64)
+    turn[along] = np.arange(inner)
+    first, last = (pick.reduceat(turn[couplings.indices], begin) for pick in (np.minimum, np.maximum))
+    return along[::-1] if (last + 1).sum() < (inner - first).sum() else along
 
-    ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  The last ``border`` rows of a matrix may couple to
-    all others.  ``regular`` is false where the last one was exactly singular.
+
+class Elimination:
+    """The compiled elimination of matrices with one pattern, given as arrays on this rank.
+
+    The chain is closed, and all of it is eliminated; or it is open, and its border is not: what is left is the Schur
+    complement of the pivots that were delayed to the end, and of the border.  ``regular`` is false where the last
+    matrix was exactly singular.
     """
 
-    def __init__(self, kind: str, border: int) -> None:
-        """Keep the number of scalars for when there is a matrix."""
-        self.kind, self.border = kind, border
-        self.compiled = module("chain", DECLARATIONS)
-        self.lib, self.ffi = self.compiled.lib, self.compiled.ffi
-        self.regular = False
-        self._handle: int = 0
-        self._chain: Any = None
+    def __init__(
+        self,
+        kind: str,
+        starts: np.ndarray,
+        indices: np.ndarray,
+        order: tuple[np.ndarray, np.ndarray],
+        *,
+        places: np.ndarray | None = None,
+        is_open: bool = False,
+    ) -> None:
+        """Find the fronts of the pattern (``starts``, ``indices``); the ``order`` is that of :func:`sequence`.
 
-    def __call__(self, matrix: PETSc.Mat) -> None:
-        """Factor ``matrix``; raises :class:`ConvergenceError` where it is no chain, or holds what is no number."""
-        self.prepare(matrix)
-        values = values_of(matrix)
-        status = self.lib.chain_factor(self._chain, self._pointer(values, "double"))
-        self.regular = status == 0
-        if status > SINGULAR:
-            why = "its fronts are too large" if status == TOO_LARGE else "it has entries that are no numbers"
-            raise ConvergenceError(f"The matrix could not be factored along the rod: {why}.")
+        ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  ``places`` are those of the pattern's entries
+        among the values that are to be factored, unless they are the same.  A symmetric open chain may lack the entries
+        of its border's rows that are in other columns.
+        """
+        compiled = module("chain", DECLARATIONS)
+        self.lib, self.ffi = compiled.lib, compiled.ffi
+        self.rows, self.regular = len(starts) - 1, False
+        places = np.arange(len(indices)) if places is None else places
+        pattern = [np.ascontiguousarray(x, dtype=np.int32) for x in (starts, indices, places, *order)]
+        made = self.lib.chain_new(
+            self.rows,
+            *(self._pointer(x, "int") for x in pattern[:4]),
+            len(order[1]) - 1,
+            self._pointer(pattern[4], "int"),
+            kind == "cholesky",
+            is_open,
+            LARGEST,
+        )
+        if made == self.ffi.NULL:
+            raise MemoryError(f"No memory for the factors of {self.rows} unknowns.")
+        self._chain = self.ffi.gc(made, self.lib.chain_free)
 
-    def prepare(self, matrix: PETSc.Mat) -> None:
-        """Find the fronts of a ``matrix``, unless they are known."""
-        if self._chain is None or matrix.handle != self._handle:
-            starts, indices, _ = matrix.getValuesCSR()
-            self._set_up(matrix.size[0], starts, indices)
-            self._handle = matrix.handle
+    def _pointer(self, array: np.ndarray, kind: str = "double") -> Any:
+        return self.ffi.cast(f"{kind} *", array.ctypes.data)
 
     @property
     def pointer(self) -> Any:
-        """The chain, for other compiled code; it sets :attr:`regular`."""
+        """The chain, for other compiled code."""
         return self._chain
 
     @property
@@ -107,52 +139,54 @@ class Chain:
         names = ("factor", "solve", "negative", "zero")
         return [int(self.ffi.cast("uintptr_t", self.ffi.addressof(self.lib, f"chain_{name}"))) for name in names]
 
-    def _pointer(self, array: np.ndarray, kind: str) -> Any:
-        return self.ffi.from_buffer(f"{kind}[]", array)
+    def factor(self, values: np.ndarray) -> None:
+        """Eliminate; raises :class:`ConvergenceError` where the matrix is no chain, or holds what is no number."""
+        values = np.ascontiguousarray(values.real)
+        status = self.lib.chain_factor(self._chain, self._pointer(values))
+        self.regular = status == 0
+        if status > SINGULAR:
+            why = "its fronts are too large" if status == TOO_LARGE else "it has entries that are no numbers"
+            raise ConvergenceError(f"The matrix could not be factored along the rod: {why}.")
 
-    def _set_up(self, n: int, starts: np.ndarray, indices: np.ndarray) -> None:
-        starts, indices = starts.astype(np.int32), indices.astype(np.int32)
-        order, groups = sequence(sp.csr_matrix((np.ones(len(indices)), indices, starts), shape=(n, n)), self.border)
-        made = self.lib.chain_new(
-            n,
-            *(self._pointer(x, "int") for x in (starts, indices, order)),
-            len(groups) - 1,
-            self._pointer(groups, "int"),
-            self.kind == "cholesky",
-            LARGEST,
-        )
-        if made == self.ffi.NULL:
-            raise MemoryError(f"No memory for the factors of {n} unknowns.")
-        self._chain, self.rows = self.ffi.gc(made, self.lib.chain_free), n
+    def forward(self, right: np.ndarray) -> np.ndarray:
+        """Eliminate from ``right`` (n, k); the right-hand sides (rest, k) of what an open chain leaves.
 
-    def solve_columns(self, right: np.ndarray) -> np.ndarray:
-        """Solutions (n, k) for ``right`` (n, k); raises :class:`MemoryError` where there is no room for them."""
-        out = np.array(right, dtype=float, order="F")
-        room = self.ffi.cast("double *", out.ctypes.data)
-        if self.lib.chain_solve(self._chain, out.shape[1], room, room):
+        Raises :class:`MemoryError` where there is no room.
+        """
+        right = np.asarray(right, dtype=float, order="F")
+        rest = np.empty((self.rest, right.shape[1]), order="F")
+        if self.lib.chain_forward(self._chain, right.shape[1], self._pointer(right), self._pointer(rest)):
             raise MemoryError(f"No memory for solutions of {self.rows} unknowns.")
+        return rest
+
+    def back(self, rest: np.ndarray) -> np.ndarray:
+        """Solutions (n, k) for the last right-hand sides, given those (rest, k) of what an open chain leaves."""
+        rest = np.asarray(rest, dtype=float, order="F")
+        out = np.empty((self.rows, rest.shape[1]), order="F")
+        self.lib.chain_back(self._chain, rest.shape[1], self._pointer(rest), self._pointer(out))
         return out
 
-    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Solve with the last factors."""
-        out.array[:] = self.solve_columns(right.array_r.real[:, None])[:, 0]
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Solutions (n, k) of a closed chain for ``right`` (n, k)."""
+        return self.back(self.forward(right))
 
-    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Solve for all columns of a dense matrix."""
-        out.getDenseArray()[:] = self.solve_columns(right.getDenseArray().real)
+    def schur(self) -> np.ndarray:
+        """Schur complement (rest, rest) that an open chain leaves, delayed pivots first; else (0, 0)."""
+        out = np.empty((self.rest, self.rest), order="F")
+        self.lib.chain_schur(self._chain, self._pointer(out))
+        return out
 
-    def columns(self, rows: np.ndarray, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Columns ``rows`` of the inverse; ``right`` is room for their right-hand sides."""
-        units = np.zeros((self.rows, len(rows)))
-        units[rows, np.arange(len(rows))] = 1.0
-        out.getDenseArray()[:] = self.solve_columns(units)
+    @property
+    def rest(self) -> int:
+        """Number of unknowns that an open chain leaves."""
+        return int(self.lib.chain_rest(self._chain))
 
     def inertia(self) -> tuple[int, int]:
-        """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
+        """Number of negative pivots of the symmetric matrix last factored, and of those that are zero."""
         return int(self.lib.chain_negative(self._chain)), int(self.lib.chain_zero(self._chain))
 
     def determinant(self) -> float:
-        """Logarithm of the size of the determinant of the matrix last factored; -inf where it is zero."""
+        """Logarithm of the size of the product of the pivots of the matrix last factored; -inf where one is zero."""
         return float(self.lib.chain_determinant(self._chain)) if self.regular else -inf
 
     @property
@@ -169,3 +203,51 @@ class Chain:
     def fronts(self) -> int:
         """Number of fronts."""
         return int(self.lib.chain_fronts(self._chain))
+
+    @property
+    def largest(self) -> int:
+        """Order of the largest front of the last factors."""
+        return int(self.lib.chain_largest(self._chain))
+
+
+class Chain(ByColumns):
+    """:class:`~rodfem.linalg.factorization.Factors` of matrices with one pattern, on one rank.
+
+    ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  The last ``border`` rows of a matrix may couple to
+    all others.  ``regular`` is false where the last one was exactly singular; ``elimination`` has its factors.
+    """
+
+    def __init__(self, kind: str, border: int) -> None:
+        """Keep the number of scalars for when there is a matrix."""
+        self.kind, self.border = kind, border
+        self.regular = False
+        self._matrix: PETSc.Mat | None = None
+
+    def __call__(self, matrix: PETSc.Mat) -> None:
+        """Factor ``matrix``; raises :class:`ConvergenceError` where it is no chain, or holds what is no number."""
+        self.prepare(matrix)
+        self.elimination.factor(self._entries.values()[0])
+        self.regular = self.elimination.regular
+
+    def prepare(self, matrix: PETSc.Mat) -> None:
+        """Find the fronts of a ``matrix``, unless they are known."""
+        if self._matrix is None or matrix.handle != self._matrix.handle:
+            self._matrix, self._entries = matrix, Entries(matrix)
+            pattern, n = (self._entries.starts, self._entries.columns), matrix.size[0]
+            self.elimination = Elimination(self.kind, *pattern, sequence(*pattern, np.arange(n - self.border, n)))
+
+    def adopt(self, *, regular: bool) -> None:
+        """The factors are those that other compiled code has just made by :attr:`Elimination.functions`."""
+        self.regular = self.elimination.regular = regular
+
+    def solve_columns(self, right: np.ndarray) -> np.ndarray:
+        """Solutions (n, k) for ``right`` (n, k); raises :class:`MemoryError` where there is no room for them."""
+        return self.elimination.solve(right)
+
+    def inertia(self) -> tuple[int, int]:
+        """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
+        return self.elimination.inertia()
+
+    def determinant(self) -> float:
+        """Logarithm of the size of the determinant of the matrix last factored; -inf where it is zero."""
+        return self.elimination.determinant()

@@ -21,7 +21,7 @@ from rodfem.errors import ConvergenceError
 PETSC_ERR_LIB = 76
 """PETSc's error code for a failure in a library below."""
 LONG = 20_000
-"""Unknowns from which a rod is cut at the ranks; with fewer each rank factors all of it.
+"""Unknowns from which a rod is long: it is gathered on no rank.
 
 MUMPS in parallel gains nothing on a chain: the elimination tree that QAMD makes of one is as deep as the chain is long,
 and at 1e5 elements MUMPS's parallel analysis overflows its stack on it.
@@ -32,14 +32,14 @@ BALANCED = {"mat_mumps_icntl_7": 4}
 """MUMPS's ordering that makes balanced trees (PORD), slowly: for long rods where MUMPS itself is parallel."""
 
 
-def is_cut(comm: MPI.Comm, unknowns: int) -> bool:
-    """Whether a rod of so many unknowns is cut at the ranks."""
+def is_spread(comm: MPI.Comm, unknowns: int) -> bool:
+    """Whether a rod of so many unknowns is too long to be gathered on each of several ranks."""
     return bool(comm.size > 1 and unknowns >= LONG)
 
 
 def ordering(matrix: PETSc.Mat) -> dict[str, int]:
     """MUMPS's ordering for a matrix on all its ranks."""
-    return BALANCED if is_cut(matrix.comm.tompi4py(), matrix.size[0]) else DENSE_ROWS
+    return BALANCED if is_spread(matrix.comm.tompi4py(), matrix.size[0]) else DENSE_ROWS
 
 
 @contextmanager
@@ -80,64 +80,24 @@ class Factors(Protocol):
         """Logarithm of the size of the determinant of the symmetric matrix last factored."""
 
 
-class LocalFactors(Factors, Protocol):
-    """Factors on this rank alone, of which single columns of the inverse are asked for, too."""
-
-    kind: str
-
-    def columns(self, rows: np.ndarray, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Columns ``rows`` of the inverse; ``right`` is room for their right-hand sides."""
-
-
-class Block:
-    """Solves with factors on this rank for the columns of arrays, all at once."""
-
-    def __init__(self, factors: LocalFactors, rows: int) -> None:
-        """Make no room yet."""
-        self.factors, self.rows = factors, rows
-        self._room: dict[int, tuple[PETSc.Mat, PETSc.Mat]] = {}
-
-    def room(self, columns: int) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """Right-hand sides and solutions."""
-        if columns not in self._room:
-            right = PETSc.Mat().createDense((self.rows, columns), comm=PETSc.COMM_SELF)
-            right.setUp()
-            right.assemble()
-            self._room[columns] = right, right.duplicate()
-        return self._room[columns]
-
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solutions (n, k) for ``right`` (n, k)."""
-        given, out = self.room(right.shape[1])
-        given.getDenseArray()[:] = right
-        self.factors.solve_all(given, out)
-        return np.array(out.getDenseArray())
-
-    def columns(self, rows: np.ndarray) -> np.ndarray:
-        """Columns ``rows`` of the inverse (n, k)."""
-        given, out = self.room(len(rows))
-        self.factors.columns(rows, given, out)
-        return np.array(out.getDenseArray())
-
-
-class Spread(ABC):
-    """Solves on several ranks, for vectors and for columns of dense matrices."""
+class ByColumns(ABC):
+    """Solves for columns of arrays, of vectors and of dense matrices."""
 
     @abstractmethod
-    def spread(self, right: np.ndarray) -> np.ndarray:
-        """Solve for the columns of the rows of this rank."""
+    def solve_columns(self, right: np.ndarray) -> np.ndarray:
+        """Solve for the columns (n, k) of the n rows of this rank."""
 
     def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
         """Solve with the last factors."""
-        out.array[:] = self.spread(right.array_r[:, None])[:, 0]
+        out.array[:] = self.solve_columns(right.array_r.real[:, None])[:, 0]
 
     def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
         """Solve for all columns of a dense matrix at once."""
-        out.getDenseArray()[:] = self.spread(right.getDenseArray())
+        out.getDenseArray()[:] = self.solve_columns(right.getDenseArray().real)
 
 
 class Mumps:
-    """Factors by MUMPS.
+    """Factors by MUMPS, on all ranks of a matrix.
 
     Unknowns are ordered by an approximate minimum degree that knows dense rows (QAMD): what MUMPS chooses by itself
     takes ten times as long to order the matrix of 3e4 elements with an integral constraint.  PETSc's options change
@@ -158,7 +118,7 @@ class Mumps:
         self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
         self.prefix = prefix or f"rodfem_{kind}_"
         self.room = 50
-        self.ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        self.ksp = PETSc.KSP()
         self.factor: PETSc.Mat | None = None
         self.regular = False
         self._matrix = 0
@@ -194,16 +154,6 @@ class Mumps:
         """Solve for all columns of a dense matrix at once: the cost is that of the call, hardly of a column."""
         self.ksp.getPC().getFactorMatrix().matSolve(right, out)
 
-    def columns(self, rows: np.ndarray, right: PETSc.Mat, out: PETSc.Mat) -> None:
-        """Columns ``rows`` of the inverse; MUMPS skips what the zeros of their right-hand sides spare it."""
-        starts = np.arange(len(rows) + 1, dtype=PETSc.IntType)
-        units = PETSc.Mat().createAIJ(
-            (len(rows), right.size[0]),
-            csr=(starts, rows.astype(PETSc.IntType), np.ones(len(rows))),
-            comm=PETSc.COMM_SELF,
-        )
-        self.solve_all(PETSc.Mat().createTranspose(units), out)
-
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
         negative, zero, _ = self.ksp.getPC().getFactorMatrix().getInertia()
@@ -216,7 +166,8 @@ class Mumps:
         return log(mantissa) + factor.getMumpsInfog(34) * log(2.0) if mantissa else -inf
 
     def _prepare(self, matrix: PETSc.Mat) -> None:
-        self.ksp.reset()
+        self.ksp.destroy()
+        self.ksp.create(matrix.comm)
         self.ksp.setType("preonly")
         self.ksp.setOptionsPrefix(self.prefix)
         pc = self.ksp.getPC()
@@ -230,9 +181,10 @@ class Mumps:
         self.factor.setMumpsIcntl(14, self.room)
         if self.kind == "cholesky":
             self.factor.setMumpsIcntl(33, 1)  # the determinant
+            self.factor.setMumpsIcntl(13, 1)  # the root of the tree is on one rank, which counts
         for control, value in self.controls.items():
             self.factor.setMumpsIcntl(control, value)
         for control, threshold in self.thresholds.items():
             self.factor.setMumpsCntl(control, threshold)
-        with preferred(self.prefix, DENSE_ROWS):
+        with preferred(self.prefix, ordering(matrix)):
             self.ksp.setUp()

@@ -1,8 +1,10 @@
-"""Conversion of matrices of a rank's own unknowns to PETSc and back, and PETSc matrices whose values numpy has, too."""
+"""Conversion of matrices of a rank's own unknowns to PETSc and back, the entries that PETSc stores, and shared ones."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -70,7 +72,63 @@ def shared(matrix: PETSc.Mat) -> Shared | None:
     return found
 
 
-def values_of(matrix: PETSc.Mat) -> np.ndarray:
-    """Real parts of the values of this rank's rows, not to be written to."""
-    found = shared(matrix)
-    return np.ascontiguousarray(matrix.getValuesCSR()[2].real) if found is None else found.values
+STORED = """
+int MatMPIAIJGetSeqAIJ(void *matrix, void **block, void **rest, void *columns);
+int MatSeqAIJGetArrayRead(void *matrix, void **values);
+int MatSeqAIJRestoreArrayRead(void *matrix, void **values);
+"""
+"""Functions of PETSc that petsc4py does not have: they show where the entries of a matrix are."""
+
+
+@cache
+def _petsc() -> tuple[Any, Any]:
+    """PETSc's library, which petsc4py has loaded, and what calls it."""
+    from cffi import FFI
+
+    ffi = FFI()
+    ffi.cdef(STORED)
+    return ffi, ffi.dlopen(PETSc.__file__)
+
+
+class Entries:
+    """Entries of this rank's rows of an AIJ matrix whose pattern stays, without the search that PETSc makes for each.
+
+    Attributes
+    ----------
+    starts, columns
+        Pattern of the rows, with global columns in ascending order.
+    places
+        Places of these entries among :meth:`values`: those in columns of this rank's unknowns are stored first.
+    number
+        How many there are.
+    """
+
+    def __init__(self, matrix: PETSc.Mat) -> None:
+        """Learn the pattern of ``matrix``."""
+        self.matrix = matrix
+        self.starts, self.columns, _ = matrix.getValuesCSR()
+        begin, end = matrix.getOwnershipRangeColumn()
+        own = (self.columns >= begin) & (self.columns < end)
+        self._counts, self.number = [int(own.sum()), int((~own).sum())], len(own)
+        self.places = np.where(own, np.cumsum(own) - 1, self._counts[0] + np.cumsum(~own) - 1)
+
+    def values(self) -> list[np.ndarray]:
+        """Values now, in the arrays of PETSc: not to be kept."""
+        ffi, lib = _petsc()
+        whole = ffi.cast("void *", self.matrix.handle)
+        if self.matrix.comm.size == 1:
+            return [self._values(whole, self.number)]
+        blocks = ffi.new("void *[2]")
+        lib.MatMPIAIJGetSeqAIJ(whole, blocks, blocks + 1, ffi.NULL)
+        return [self._values(block, n) for block, n in zip(blocks, self._counts, strict=True)]
+
+    @staticmethod
+    def _values(block: Any, number: int) -> np.ndarray:
+        if not number:
+            return np.empty(0, PETSc.ScalarType)
+        ffi, lib = _petsc()
+        at = ffi.new("void **")
+        lib.MatSeqAIJGetArrayRead(block, at)
+        out = np.frombuffer(ffi.buffer(at[0], number * np.dtype(PETSc.ScalarType).itemsize), PETSc.ScalarType)
+        lib.MatSeqAIJRestoreArrayRead(block, at)
+        return out

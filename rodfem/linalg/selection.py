@@ -1,4 +1,4 @@
-"""Choice of the factors for a matrix: along the rod or MUMPS's; on several ranks whole on each, or piece by piece."""
+"""Choice of the factors for a matrix: along the rod, on several ranks each its piece, or MUMPS's."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from petsc4py import PETSc
 
 from rodfem.errors import InputError
 from rodfem.linalg.chain import Chain
-from rodfem.linalg.factorization import Factors, LocalFactors, Mumps, is_cut
-from rodfem.linalg.replicated import Copied
-from rodfem.linalg.substructured import SubstructuredFactors
+from rodfem.linalg.factorization import Factors, Mumps
+from rodfem.linalg.pieces import Pieces
 
 CHAIN, MUMPS = "chain", "mumps"
-"""Names of what factors on one rank."""
+"""Names of what factors."""
 
 
 def package(prefix: str) -> str:
-    """Name of what factors on one rank: PETSc's option with the prefix, or what is best.
+    """Name of what factors a rod's matrices: PETSc's option with the prefix, or what is best.
 
     Raises :class:`InputError` for another name.
     """
@@ -44,8 +43,6 @@ def factors_of(
     or ``cholesky`` (LDL^t), ``comm`` that of the matrices.
     """
     prefix = prefix or f"rodfem_{kind}_"
-    along = unknowns > 0 and package(prefix) == CHAIN
-    factors: LocalFactors = Chain(kind, scalars) if along else Mumps(kind, controls, thresholds, prefix)
-    if comm.size == 1:
-        return factors
-    return SubstructuredFactors(scalars, factors) if is_cut(comm, unknowns) else Copied(factors)
+    if not unknowns or package(prefix) == MUMPS:
+        return Mumps(kind, controls, thresholds, prefix)
+    return Chain(kind, scalars) if comm.size == 1 else Pieces(kind, scalars)

@@ -24,16 +24,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
+from mpi4py import MPI
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem import compat
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, Mumps, is_cut
-from rodfem.linalg.replicated import Copy
+from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, is_spread
+from rodfem.linalg.matrices import gathered, petsc_matrix
 from rodfem.linalg.selection import factors_of
-from rodfem.linalg.substructured import SubstructuredFactors
 from rodfem.stability import mode_type
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.pencil import (
@@ -118,7 +118,6 @@ class NonsymmetricSolver(PencilMatrices):
     def __init__(self, system: System) -> None:
         """Allocate the matrices of the pencil once."""
         super().__init__(system)
-        self.copies: list[Copy] = []
         self.inverted: tuple[PETSc.Mat, Factors] | None = None
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
 
@@ -190,11 +189,10 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         """The pencil; of a rod that is not long all of it on each rank, which solves alone."""
         pencil = self.matrix, self.mass
         comm = self.system.comm
-        if comm.size == 1 or is_cut(comm, self.matrix.getSize()[0]):
+        if comm.size == 1 or is_spread(comm, self.matrix.getSize()[0]):
             return pencil
-        copies = self._shared.copies = self._shared.copies or [Copy(matrix) for matrix in pencil]
-        self._own = copies[0].own
-        whole, mass = (copy.update(matrix) for copy, matrix in zip(copies, pencil, strict=True))
+        self._own = slice(*self.matrix.getOwnershipRange())
+        whole, mass = (petsc_matrix(MPI.COMM_SELF, gathered(matrix)) for matrix in pencil)
         return whole, mass
 
     def _near(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> Frequencies:
@@ -362,20 +360,17 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def _inverse(self, matrix: PETSc.Mat, mass: PETSc.Mat, target: complex) -> Inverse | None:
         """Inverse of ``matrix - target mass`` along the rod, piece by piece on several ranks; None: SLEPc's own.
 
-        A complex shift makes a pencil of twice the size, which is SLEPc's and MUMPS's.  On several ranks MUMPS gives up
-        on a long rod: the zero block of the multipliers delays more pivots than its analysis has made room for.
+        On one rank the pencil of twice the size that a complex shift makes is SLEPc's and MUMPS's.  On several MUMPS
+        gives up on a long rod: the zero block of the multipliers delays more pivots than its analysis has room for.
         """
         rows, comm = matrix.size[0], matrix.comm.tompi4py()
-        doubled = rows > self.matrix.size[0]
-        if doubled and not is_cut(comm, rows):
+        if comm.size == 1 and rows > self.matrix.size[0]:
             return None
-        dense_rows, kept = self.system.fields.dense_rows, self._shared.inverted
-        factors: Factors
-        if doubled:
-            shifted, factors = matrix.copy(), SubstructuredFactors(dense_rows, Mumps("lu", {8: 0}, prefix=FACTORS))
-        elif kept is None:
+        kept = self._shared.inverted
+        if kept is None or kept[0].size != matrix.size:
             along = rows if self.system.fields.along else 0
-            shifted, factors = matrix.copy(), factors_of("lu", comm, along, dense_rows, {8: 0}, prefix=FACTORS)
+            factors = factors_of("lu", comm, along, self.system.fields.dense_rows, {8: 0}, prefix=FACTORS)
+            shifted = matrix.copy()
             self._shared.inverted = shifted, factors
         else:
             shifted, factors = kept
@@ -384,7 +379,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         factors(shifted)
         if not factors.regular:
             raise ConvergenceError(_singular(target))
-        return Inverse(factors, shifted if comm.size > 1 else None)
+        return Inverse(factors)
 
 
 def groups(values: np.ndarray, tolerance: float = MULTIPLE) -> list[list[int]]:

@@ -197,26 +197,15 @@ def shift_invert(matrix: PETSc.Mat, mass: PETSc.Mat, number: int, target: comple
 
 
 class Inverse:
-    """Python context of a PETSc preconditioner that solves with factors made elsewhere.
+    """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
 
-    Of a given ``matrix`` they are the factors, and one step of iterative refinement follows: the pieces of a cut rod
-    lose digits where they are joined.
-    """
-
-    def __init__(self, factors: Factors, matrix: PETSc.Mat | None = None) -> None:
+    def __init__(self, factors: Factors) -> None:
         """Keep the factors."""
-        self.factors, self.matrix = factors, matrix
-        if matrix is not None:
-            self._residual, self._correction = matrix.createVecRight(), matrix.createVecRight()
+        self.factors = factors
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
         """Solve for ``z``."""
         self.factors.solve(b, z)
-        if self.matrix is not None:
-            self.matrix.mult(z, self._residual)
-            self._residual.aypx(-1.0, b)
-            self.factors.solve(self._residual, self._correction)
-            z.axpy(1.0, self._correction)
 
 
 def use_inverse(solver: SLEPc.EPS, context: object) -> None:

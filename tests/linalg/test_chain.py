@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from golden_cases import cases
 from mpi4py import MPI
 from petsc4py import PETSc
+from random_chains import petsc, random_chain
 from small_states import scene as small_scene
 
 import rodfem.linalg
@@ -30,34 +30,6 @@ BACKWARD = 1e-14
 """Backward error of a solution."""
 
 
-def petsc(dense: np.ndarray, coupled: np.ndarray) -> PETSc.Mat:
-    """Matrix with a given pattern."""
-    pattern = sp.csr_matrix(coupled)
-    pattern.sort_indices()
-    values = dense[pattern.nonzero()]
-    return PETSc.Mat().createAIJ(dense.shape, csr=(pattern.indptr, pattern.indices, values), comm=PETSc.COMM_SELF)
-
-
-def random_chain(rng: np.random.Generator, *, symmetric: bool) -> tuple[np.ndarray, np.ndarray, int]:
-    """Matrix of cells that share vertices, with zero blocks as of multipliers, in random order; pattern, border."""
-    cells, vertex, inner, border = rng.integers((1, 1, 0, 0), (9, 6, 9, 5))
-    fields = cells * (vertex + inner) + vertex
-    n = fields + border
-    dense, coupled = np.zeros((n, n)), np.zeros((n, n), dtype=bool)
-    for first in np.arange(cells) * (vertex + inner):
-        cell = np.arange(first, first + 2 * vertex + inner)
-        block = rng.normal(size=(len(cell), len(cell)))
-        zero = rng.random(len(cell)) < 0.4
-        block[np.ix_(zero, zero)] = 0.0
-        dense[np.ix_(cell, cell)] += block + block.T if symmetric else block
-        coupled[np.ix_(cell, cell)] = True
-    across = rng.normal(size=(2, border, fields))
-    dense[fields:, :fields], dense[:fields, fields:] = across[0], across[0 if symmetric else 1].T
-    coupled[fields:], coupled[:, fields:] = True, True
-    order = np.append(rng.permutation(fields), np.arange(fields, n))
-    return dense[np.ix_(order, order)], coupled[np.ix_(order, order)], int(border)
-
-
 @pytest.mark.parametrize("symmetric", [True, False])
 def test_random_chains(symmetric: bool) -> None:
     rng, tried, delayed = np.random.default_rng(3), 0, 0
@@ -73,8 +45,8 @@ def test_random_chains(symmetric: bool) -> None:
         size = abs(dense).sum(axis=1).max() * abs(found).max()
         assert factors.regular and abs(dense @ found - right).max() < 100 * BACKWARD * size
         assert factors.determinant() == pytest.approx(np.linalg.slogdet(dense)[1], abs=1e-5)
-        assert factors.growth <= 100.0 or factors.fronts == 1
-        delayed += factors.delayed
+        assert factors.elimination.growth <= 100.0 or factors.elimination.fronts == 1
+        delayed += factors.elimination.delayed
         if symmetric:
             assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
     assert delayed > 100
@@ -176,8 +148,8 @@ def test_few_pivots_are_delayed(formulation: str, elements: int, degree: int) ->
     found.count()
     factors = found.factors
     assert isinstance(factors, Chain)
-    assert factors.fronts >= elements - 1
-    assert factors.delayed < elements / 4
+    assert factors.elimination.fronts >= elements - 1
+    assert factors.elimination.delayed < elements / 4
 
 
 @pytest.mark.alone

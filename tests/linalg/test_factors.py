@@ -11,11 +11,9 @@ from petsc4py import PETSc
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
-from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Mumps
 from rodfem.linalg.matrices import gathered
-from rodfem.linalg.replicated import Copied
-from rodfem.linalg.substructured import SubstructuredFactors
+from rodfem.linalg.pieces import Pieces
 from rodfem.stability.assessment import Assessor
 from rodfem.stability.inertia import Inertia
 
@@ -26,7 +24,7 @@ STATES = pytest.mark.parametrize(
     ("name", "state", "load"),
     [("cord", "plain", 30.0), ("cord", "buckled", 40.0), ("hemitropic", "plain", 0.25), ("hemitropic", "buckled", 0.2)],
 )
-SHARED = pytest.mark.parametrize("shared", ["pieces", "copies"])
+PACKAGES = pytest.mark.parametrize("package", ["chain", "mumps"])
 SIGMAS = (-30.0, -3.0, -0.1, 0.0, 0.1, 2.0, 40.0)
 
 
@@ -37,10 +35,11 @@ def at(name: str, state: str, formulation: str, load: float) -> tuple[System, PE
     return system, x
 
 
-def symmetric(system: System, shared: str) -> SubstructuredFactors | Copied:
+def symmetric(system: System, package: str) -> Pieces | Mumps:
     """LDL^t factors."""
-    factors = Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3})
-    return Copied(factors) if shared == "copies" else SubstructuredFactors(system.fields.dense_rows, factors)
+    if package == "chain":
+        return Pieces("cholesky", system.fields.dense_rows)
+    return Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3})
 
 
 def whole(vector: PETSc.Vec) -> np.ndarray:
@@ -48,12 +47,12 @@ def whole(vector: PETSc.Vec) -> np.ndarray:
     return np.concatenate(vector.comm.tompi4py().allgather(vector.array_r))
 
 
-@SHARED
+@PACKAGES
 @FORMULATIONS
 @STATES
-def test_inertia_and_solutions(name: str, state: str, formulation: str, load: float, shared: str) -> None:
+def test_inertia_and_solutions(name: str, state: str, formulation: str, load: float, package: str) -> None:
     system, x = at(name, state, formulation, load)
-    inertia, factors = Inertia(system), symmetric(system, shared)
+    inertia, factors = Inertia(system), symmetric(system, package)
     right, out = inertia.seed(1), system.new_vector()
     for sigma in SIGMAS:
         matrix = inertia.at(x).matrix
@@ -61,17 +60,18 @@ def test_inertia_and_solutions(name: str, state: str, formulation: str, load: fl
         dense = gathered(matrix).toarray()
         factors(matrix)
         assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
+        assert factors.determinant() == pytest.approx(np.linalg.slogdet(dense)[1], rel=1e-9)
         factors.solve(right, out)
         expected = np.linalg.solve(dense, whole(right))
         np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
 
 
-@SHARED
+@PACKAGES
 @FORMULATIONS
-def test_inertia_beside_a_branch_point(formulation: str, shared: str) -> None:
+def test_inertia_beside_a_branch_point(formulation: str, package: str) -> None:
     """The straight rod loses stability at 0.1143042145: eigenvalues are near zero there."""
     system, x = at("hemitropic", "plain", formulation, 0.1143042145)
-    inertia, factors = Inertia(system), symmetric(system, shared)
+    inertia, factors = Inertia(system), symmetric(system, package)
     for sigma in (-1e-5, 1e-5):
         matrix = inertia.at(x).matrix
         matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
@@ -80,10 +80,10 @@ def test_inertia_beside_a_branch_point(formulation: str, shared: str) -> None:
         assert factors.inertia() == (negative, 0)
 
 
-@SHARED
-def test_many_right_hand_sides(shared: str) -> None:
+@PACKAGES
+def test_many_right_hand_sides(package: str) -> None:
     system, x = at("hemitropic", "buckled", "pointwise", 0.2)
-    inertia, factors = Inertia(system), symmetric(system, shared)
+    inertia, factors = Inertia(system), symmetric(system, package)
     matrix = inertia.at(x).matrix
     matrix.axpy(1.0, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     factors(matrix)
@@ -101,16 +101,14 @@ def test_many_right_hand_sides(shared: str) -> None:
         np.testing.assert_allclose(out.getDenseArray()[:, i], one.array_r, rtol=1e-8, atol=1e-12)
 
 
-@SHARED
-@pytest.mark.parametrize("package", ["chain", "mumps"])
+@PACKAGES
 @FORMULATIONS
 @pytest.mark.parametrize(("name", "load"), [("follower", 10.0), ("hemitropic", 0.3)])
-def test_matrix_without_symmetry(formulation: str, name: str, load: float, package: str, shared: str) -> None:
+def test_matrix_without_symmetry(formulation: str, name: str, load: float, package: str) -> None:
     if name == "follower":
         formulation = "pointwise"
     system, x = at(name, "plain", formulation, load)
-    alone = Chain("lu", system.fields.dense_rows) if package == "chain" else Mumps("lu", {8: 0})
-    factors = Copied(alone) if shared == "copies" else SubstructuredFactors(system.fields.dense_rows, alone)
+    factors = Pieces("lu", system.fields.dense_rows) if package == "chain" else Mumps("lu", {8: 0})
     row = system.metric * x
     system.set_load(row, 1.0)
     matrix = system.at(x).jacobian(row)
@@ -141,7 +139,7 @@ def frequencies(n: int) -> np.ndarray:
 def test_pieces_may_be_singular_where_the_whole_is_not() -> None:
     """At eigenvalues of all parts of the chain the whole is counted right, and solved with."""
     n = 24
-    factors = SubstructuredFactors(1, Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}))
+    factors = Pieces("cholesky", 1)
     exact = frequencies(n)
     for sigma in np.unique(np.round([s for m in range(1, n) for s in frequencies(m)], 12)):
         if abs(exact - sigma).min() < 1e-6:
@@ -164,7 +162,7 @@ def test_long_rods_are_cut(formulation: str, elements: int) -> None:
         solver = Solver(small_states.scene("cord"), Discretization(formulation, elements, 1), comm).equilibria
         system = solver.system
         for factors in (solver.inertia.factors, system.lu):
-            assert isinstance(factors, SubstructuredFactors) == (comm.size > 1)
+            assert isinstance(factors, Pieces) == (comm.size > 1)
         system.set_phase(None)
         x, outcome = solver.at_load(solver.start(20.0), 20.0)
         assert outcome.converged
