@@ -27,6 +27,7 @@ from rodfem.fem.newton import TOLERANCE, NewtonResult, correct, relax
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
+from rodfem.linalg.factorization import AlongRod, Factors
 from rodfem.linalg.orthogonal import combine
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.out_of_plane import InSpace
@@ -118,6 +119,22 @@ class StaticSolver:
         assert first is not None
         return first
 
+    def factors(self) -> list[Factors]:
+        """All factors that this solver makes."""
+        return [self.system.lu]
+
+    def notices(self) -> list[str]:
+        """Sentences for the record that nobody has read: symmetries that were none, factors by the last resort."""
+        out = self.system.verification.read()
+        for factors in self.factors():
+            if isinstance(factors, AlongRod) and factors.times:
+                out.append(
+                    f"{factors.times} matrices could not be factored along the rod, too many pivots were delayed: "
+                    "MUMPS factored them."
+                )
+                factors.times = 0
+        return out
+
     def is_stable(self, x: PETSc.Vec) -> bool:
         """Whether an equilibrium is stable, as far as is known without counting."""
         return True
@@ -152,6 +169,10 @@ class BranchSolver(StaticSolver):
         """Index in space of a planar rod, where all its loads have a potential there."""
         scene = self.system.scene
         return None if scene.planar is None or scene.without_potential(in_space=True) else InSpace(self.system)
+
+    def factors(self) -> list[Factors]:
+        """Those of Newton's method, and the symmetric ones that count."""
+        return [*super().factors(), self.inertia.factors]
 
     def is_stable(self, x: PETSc.Vec) -> bool:
         """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""

@@ -122,7 +122,7 @@ class Sweep:
             x = at_load(self.solver, x, float(load))
             before = self.last
             point = self._point(x)
-            for notice in self.solver.system.verification.read():
+            for notice in self.solver.notices():
                 self.observer.warn(notice)
             if grid:
                 self._between(branch, grid[-1], point, before, self.last)

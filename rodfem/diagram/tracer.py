@@ -377,7 +377,7 @@ class Tracer:
         return equivalent(a, b, max(tolerance, across), across**0.5)
 
     def _check_symmetry(self, point: Point) -> None:
-        for notice in self.solver.system.verification.read():
+        for notice in self.solver.notices():
             self.observer.warn(notice)
         if point.drift > DRIFT * self.solver.inertia.scale:
             self.control.drifting(point)

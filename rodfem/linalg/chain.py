@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.compiled import module
-from rodfem.linalg.factorization import ByColumns
+from rodfem.linalg.factorization import AlongRod, GaveUpError, Mumps
 from rodfem.linalg.matrices import Entries
 
 DECLARATIONS = """
@@ -104,8 +104,9 @@ class Elimination:
         """Find the fronts of the pattern (``starts``, ``indices``); the ``order`` is that of :func:`sequence`.
 
         ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  ``places`` are those of the pattern's entries
-        among the values that are to be factored, unless they are the same.  A symmetric open chain may lack the entries
-        of its border's rows that are in other columns.
+        among the values that are to be factored, unless they are the same.  With ``is_open`` the border, the last
+        group, is not eliminated; a symmetric one may lack the entries of its border's rows that are in other columns.
+        Raises :class:`MemoryError` where there is no room.
         """
         compiled = module("chain", DECLARATIONS)
         self.lib, self.ffi = compiled.lib, compiled.ffi
@@ -140,13 +141,19 @@ class Elimination:
         return [int(self.ffi.cast("uintptr_t", self.ffi.addressof(self.lib, f"chain_{name}"))) for name in names]
 
     def factor(self, values: np.ndarray) -> None:
-        """Eliminate; raises :class:`ConvergenceError` where the matrix is no chain, or holds what is no number."""
+        """Eliminate; raises :class:`GaveUpError` where the matrix is no chain.
+
+        Raises :class:`ConvergenceError` where it holds what is no number.
+        """
         values = np.ascontiguousarray(values.real)
         status = self.lib.chain_factor(self._chain, self._pointer(values))
         self.regular = status == 0
+        if status == TOO_LARGE:
+            raise GaveUpError("The matrix could not be factored along the rod: its fronts are too large.")
         if status > SINGULAR:
-            why = "its fronts are too large" if status == TOO_LARGE else "it has entries that are no numbers"
-            raise ConvergenceError(f"The matrix could not be factored along the rod: {why}.")
+            raise ConvergenceError(
+                "The matrix could not be factored along the rod: it has entries that are no numbers."
+            )
 
     def forward(self, right: np.ndarray) -> np.ndarray:
         """Eliminate from ``right`` (n, k); the right-hand sides (rest, k) of what an open chain leaves.
@@ -210,21 +217,21 @@ class Elimination:
         return int(self.lib.chain_largest(self._chain))
 
 
-class Chain(ByColumns):
+class Chain(AlongRod):
     """:class:`~rodfem.linalg.factorization.Factors` of matrices with one pattern, on one rank.
 
     ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  The last ``border`` rows of a matrix may couple to
     all others.  ``regular`` is false where the last one was exactly singular; ``elimination`` has its factors.
     """
 
-    def __init__(self, kind: str, border: int) -> None:
-        """Keep the number of scalars for when there is a matrix."""
+    def __init__(self, kind: str, border: int, resort: Mumps | None = None) -> None:
+        """Keep the number of scalars, and the last ``resort``, for when there is a matrix of this ``kind``."""
+        super().__init__(resort)
         self.kind, self.border = kind, border
-        self.regular = False
         self._matrix: PETSc.Mat | None = None
 
-    def __call__(self, matrix: PETSc.Mat) -> None:
-        """Factor ``matrix``; raises :class:`ConvergenceError` where it is no chain, or holds what is no number."""
+    def eliminate(self, matrix: PETSc.Mat) -> None:
+        """Factor ``matrix``; raises :class:`GaveUpError` where it is no chain."""
         self.prepare(matrix)
         self.elimination.factor(self._entries.values()[0])
         self.regular = self.elimination.regular
@@ -238,16 +245,12 @@ class Chain(ByColumns):
 
     def adopt(self, *, regular: bool) -> None:
         """The factors are those that other compiled code has just made by :attr:`Elimination.functions`."""
-        self.regular = self.elimination.regular = regular
+        self.resorted, self.regular, self.elimination.regular = False, regular, regular
 
     def solve_columns(self, right: np.ndarray) -> np.ndarray:
         """Solutions (n, k) for ``right`` (n, k); raises :class:`MemoryError` where there is no room for them."""
         return self.elimination.solve(right)
 
-    def inertia(self) -> tuple[int, int]:
-        """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
-        return self.elimination.inertia()
-
-    def determinant(self) -> float:
-        """Logarithm of the size of the determinant of the matrix last factored; -inf where it is zero."""
-        return self.elimination.determinant()
+    def eliminated(self) -> tuple[tuple[int, int], float]:
+        """Inertia and determinant by elimination."""
+        return self.elimination.inertia(), self.elimination.determinant()

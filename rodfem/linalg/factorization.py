@@ -188,3 +188,54 @@ class Mumps:
             self.factor.setMumpsCntl(control, threshold)
         with preferred(self.prefix, ordering(matrix)):
             self.ksp.setUp()
+
+
+class GaveUpError(ConvergenceError):
+    """The elimination along the rod needs fronts that are too large: too many pivots were delayed."""
+
+
+class AlongRod(ByColumns):
+    """Factors by elimination along the rod, and, of a matrix on which that gives up, by the last resort.
+
+    ``times`` is the number of those matrices; ``regular`` as for all :class:`Factors`.
+    """
+
+    def __init__(self, resort: Mumps | None) -> None:
+        """Keep the last ``resort``; None: :class:`GaveUpError` is raised instead."""
+        self.resort, self.resorted, self.times, self.regular = resort, False, 0, False
+
+    @abstractmethod
+    def eliminate(self, matrix: PETSc.Mat) -> None:
+        """Factor along the rod; raises :class:`GaveUpError` on all ranks where one gives up."""
+
+    @abstractmethod
+    def eliminated(self) -> tuple[tuple[int, int], float]:
+        """Inertia and determinant by elimination."""
+
+    def __call__(self, matrix: PETSc.Mat) -> None:
+        """Factor ``matrix``; raises :class:`ConvergenceError` where it holds what is no number."""
+        self.resorted = False
+        try:
+            self.eliminate(matrix)
+        except GaveUpError:
+            if self.resort is None:
+                raise
+            self.resort(matrix)
+            self.resorted, self.regular = True, self.resort.regular
+            self.times += 1
+
+    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Solve with the last factors."""
+        (self.resort.solve if self.resort and self.resorted else super().solve)(right, out)
+
+    def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
+        """Solve for all columns of a dense matrix at once."""
+        (self.resort.solve_all if self.resort and self.resorted else super().solve_all)(right, out)
+
+    def inertia(self) -> tuple[int, int]:
+        """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
+        return self.resort.inertia() if self.resort and self.resorted else self.eliminated()[0]
+
+    def determinant(self) -> float:
+        """Logarithm of the size of the determinant of the matrix last factored; -inf where it is zero."""
+        return self.resort.determinant() if self.resort and self.resorted else self.eliminated()[1]

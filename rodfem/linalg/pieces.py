@@ -29,39 +29,40 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.chain import Elimination, sequence
-from rodfem.linalg.factorization import ByColumns
+from rodfem.linalg.factorization import AlongRod, Mumps
 from rodfem.linalg.piece import Piece
 
 
-class Pieces(ByColumns):
+class Pieces(AlongRod):
     """:class:`~rodfem.linalg.factorization.Factors` on several ranks of matrices whose pattern is symmetric and stays.
 
     ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia).  What round-off decides is the same on all ranks, also
     where their processors are not: inertia and determinant are rank 0's.
     """
 
-    def __init__(self, kind: str, scalars: int) -> None:
-        """Share the last ``scalars`` unknowns."""
+    def __init__(self, kind: str, scalars: int, resort: Mumps | None = None) -> None:
+        """Share the last ``scalars`` unknowns of matrices of this ``kind``; keep the last ``resort``."""
+        super().__init__(resort)
         self.kind, self.scalars = kind, scalars
-        self.regular = False
         self._matrix: PETSc.Mat | None = None
         self._inertia, self._determinant = (0, 0), -inf
 
-    def __call__(self, matrix: PETSc.Mat) -> None:
-        """Factor ``matrix``; raises :class:`ConvergenceError` on all ranks where one gives up."""
+    def eliminate(self, matrix: PETSc.Mat) -> None:
+        """Factor ``matrix``; raises what one of the ranks raises on all of them."""
         if self._matrix is None or matrix.handle != self._matrix.handle:
             self._matrix = matrix
             self._set_up(matrix)
-        trouble, elimination = "", self.elimination
+        trouble: ConvergenceError | None = None
+        elimination = self.elimination
         values = self.piece.values()
         try:
             elimination.factor(values)
         except ConvergenceError as error:
-            trouble = str(error)
+            trouble = error
         part = trouble, elimination.inertia()[0], elimination.determinant(), elimination.schur()
         troubles, negative, determinants, complements = zip(*self.comm.allgather(part), strict=True)
-        if any(troubles):
-            raise ConvergenceError(next(filter(None, troubles)))
+        for of_a_rank in filter(None, troubles):
+            raise of_a_rank
         self._join(complements)
         own, zero = self.joint.inertia()
         found = self.joint.regular, (sum(negative) + own, zero), sum(determinants) + self.joint.determinant()
@@ -95,13 +96,9 @@ class Pieces(ByColumns):
         solved = self.joint.solve(joint)
         return self.elimination.back(solved[self._mine])[: len(right)]
 
-    def inertia(self) -> tuple[int, int]:
-        """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
-        return self._inertia
-
-    def determinant(self) -> float:
-        """Logarithm of the size of the determinant of the matrix last factored; -inf where it is zero."""
-        return self._determinant
+    def eliminated(self) -> tuple[tuple[int, int], float]:
+        """Inertia and determinant by elimination."""
+        return self._inertia, self._determinant
 
 
 def added(
@@ -109,7 +106,7 @@ def added(
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Joint matrix of the Schur complements of all pieces, and the places there of what each of them leaves.
 
-    ``borders`` are the places of their unknowns on the interface, which has ``shared`` of them; delayed pivots are
+    ``complements`` are dense matrices; ``borders`` are the places of their unknowns on the interface, which has ``shared`` of them; delayed pivots are
     before these, and come first in the joint matrix.  Of ``symmetric`` ones the lower triangles are given.
     """
     delayed = [len(part) - len(border) for part, border in zip(complements, borders, strict=True)]

@@ -38,11 +38,12 @@ def factors_of(
 ) -> Factors:
     """Factors for matrices of ``unknowns`` rows along a rod on a communicator, the last ``scalars`` of which are dense.
 
-    Those of another matrix, of 0 unknowns, are MUMPS's.  ``controls`` are MUMPS's ICNTL, ``thresholds`` its CNTL;
-    PETSc's options begin with ``rodfem_lu_`` or ``rodfem_cholesky_``, or with another ``prefix``.  ``kind`` is ``lu``
-    or ``cholesky`` (LDL^t), ``comm`` that of the matrices.
+    Those of another matrix, of 0 unknowns, are MUMPS's, which is the last resort of the others.  ``controls`` are its
+    ICNTL, ``thresholds`` its CNTL; PETSc's options begin with ``rodfem_lu_`` or ``rodfem_cholesky_``, or with another
+    ``prefix``.  ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the matrices.
     """
     prefix = prefix or f"rodfem_{kind}_"
+    mumps = Mumps(kind, controls, thresholds, prefix)
     if not unknowns or package(prefix) == MUMPS:
-        return Mumps(kind, controls, thresholds, prefix)
-    return Chain(kind, scalars) if comm.size == 1 else Pieces(kind, scalars)
+        return mumps
+    return (Chain if comm.size == 1 else Pieces)(kind, scalars, mumps)

@@ -16,6 +16,7 @@ from random_chains import petsc, random_chain
 from small_states import scene as small_scene
 
 import rodfem.linalg
+import rodfem.linalg.chain
 from rodfem import Discretization, Plan, trace
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.diagram.solver import Solver
@@ -167,3 +168,18 @@ def test_clean_under_the_sanitizers(tmp_path: Path) -> None:
     assert built.returncode == 0, built.stderr
     done = run([str(program)])
     assert (done.returncode, done.stdout) == (0, "0 wrong\n"), done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("scene", ["cord", "hemitropic"])
+def test_the_last_resort(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without any room for delayed pivots MUMPS makes factors, the diagram is the same, and it says so."""
+    mesh, plan = Discretization("pointwise", 6, 3), Plan(depth=0, error_bars=False)
+    expected = trace(small_scene(scene), mesh, plan)
+    monkeypatch.setattr(rodfem.linalg.chain, "LARGEST", 0)
+    found = trace(small_scene(scene), mesh, plan)
+    assert any("MUMPS factored them" in warning for warning in found.warnings)
+    for ours, theirs in zip(found.branches, expected.branches, strict=True):
+        assert [s.kind for s in ours.special] == [s.kind for s in theirs.special]
+        assert [p.negative for p in ours.points] == [p.negative for p in theirs.points]
+        np.testing.assert_allclose([p.load for p in ours.points], [p.load for p in theirs.points], rtol=1e-9)
+    assert not any("MUMPS" in warning for warning in expected.warnings)
