@@ -106,8 +106,9 @@ def added(
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Joint matrix of the Schur complements of all pieces, and the places there of what each of them leaves.
 
-    ``complements`` are dense matrices; ``borders`` are the places of their unknowns on the interface, which has ``shared`` of them; delayed pivots are
-    before these, and come first in the joint matrix.  Of ``symmetric`` ones the lower triangles are given.
+    ``complements`` are dense matrices; ``borders`` are the places of their unknowns on the interface, which has
+    ``shared`` of them; delayed pivots are before these, and come first in the joint matrix.  Of ``symmetric`` ones the
+    lower triangles are given.
     """
     delayed = [len(part) - len(border) for part, border in zip(complements, borders, strict=True)]
     begin = np.cumsum([0, *delayed])
