@@ -138,12 +138,16 @@ class State(Evaluation):
 
         The caller assembles the matrix (``matrix.assemble()``) when all is added.
         """
-        if (own := shared(matrix)) is None:
+        if (own := shared(matrix)) is not None:
+            self._add(form, self.system.matrix_places(own.pattern, load), own.values)
+            matrix.stateIncrease()
+        elif (pattern := matrix.getAttr("pattern")) is not None:
+            spread, places = self.system.spread(matrix, pattern, load)
+            self.equations.take(self.line)
+            spread.add(form, self.local, places)
+        else:
             self._register()
             compat.assemble_matrix(matrix, form.form, *self.system.maps(load))
-            return
-        self._add(form, self.system.matrix_places(own.pattern, load), own.values)
-        matrix.stateIncrease()
 
     def factor(self, row: PETSc.Vec, damping: float = 0.0) -> None:
         """Factor the Jacobian, with ``damping`` times the metric added, for :meth:`System.solve`."""

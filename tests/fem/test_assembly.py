@@ -8,8 +8,10 @@ from dolfinx import fem
 from golden_cases import cases
 from mpi4py import MPI
 from petsc4py import PETSc
+from small_states import scene
 
 from rodfem import Discretization, compat
+from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.solver import Solver
 
 EXACT = 1e-14
@@ -20,13 +22,13 @@ EXACT = 1e-14
 @pytest.mark.parametrize("name", list(cases()))
 def test_forms_of_every_scene(name: str) -> None:
     """Energy, equations, Jacobian with and without the load, and kinetic metric, at bent states of a graded mesh."""
-    scene = cases()[name]()
-    a, b = scene.interval
-    cuts = np.sort(np.append(a + (b - a) * np.linspace(0, 1, 7) ** 1.1, scene.joints))
+    made = cases()[name]()
+    a, b = made.interval
+    cuts = np.sort(np.append(a + (b - a) * np.linspace(0, 1, 7) ** 1.1, made.joints))
     mesh = Discretization("auto", len(cuts) - 1, 6, vertices=tuple(cuts.tolist()))
-    found = Solver(scene, mesh, MPI.COMM_SELF).equilibria
+    found = Solver(made, mesh, MPI.COMM_SELF).equilibria
     system, equations = found.system, found.system.equations
-    state = system.at(found.start(scene.span[0] + 0.3 * (scene.span[1] - scene.span[0]), 0.4))
+    state = system.at(found.start(0.7 * made.span[0] + 0.3 * made.span[1], 0.4))
     vector = state.evaluate(lambda: fem.assemble_vector(equations.residual.form).array.copy())  # takes the values
     assert abs(state.covector() - vector).max() <= EXACT * abs(vector).max()
     assert state.energy() == pytest.approx(fem.assemble_scalar(equations.energy.form), rel=EXACT, abs=EXACT)
@@ -50,3 +52,28 @@ def test_forms_of_every_scene(name: str) -> None:
         size = theirs.norm(PETSc.NormType.INFINITY)
         theirs.axpy(-1.0, ours)
         assert theirs.norm(PETSc.NormType.INFINITY) <= EXACT * size
+
+
+@pytest.mark.short
+@pytest.mark.parametrize(("name", "formulation"), [("cord", "reduced"), ("hemitropic", "pointwise"), ("ring", "auto")])
+def test_matrices_on_all_ranks(name: str, formulation: str) -> None:
+    """Rows that another rank owns are sent there: PETSc's matrices are dolfinx's own."""
+    made = cases()["demo ring"]() if name == "ring" else scene(name)
+    system = Solver(made, Discretization(formulation, 8, 6)).equilibria.system
+    solver = StaticSolver(system)
+    state = system.at(solver.start(0.7 * made.span[0] + 0.3 * made.span[1], 0.4))
+    for form, load, ours in (
+        (system.equations.jacobian, True, system.state_matrix(load=True)),
+        (system.equations.jacobian, False, system.state_matrix()),
+        (system.equations.kinetic, False, system.metric_matrix()),
+    ):
+        state.assemble_into(ours, form, load=load)
+        ours.assemble()
+        values = ours.getValuesCSR()[2].copy()
+        ours.zeroEntries()
+        state.evaluate(lambda: np.zeros(0))  # takes the values
+        compat.assemble_matrix(ours, form.form, *system.maps(load))
+        ours.assemble()
+        theirs = ours.getValuesCSR()[2]
+        size = system.comm.allreduce(abs(theirs).max(), op=MPI.MAX)
+        assert abs(values - theirs).max() <= EXACT * size
