@@ -68,7 +68,8 @@ class CompiledCorrector(CompiledNewton):
     def correct(self, x: PETSc.Vec, row: PETSc.Vec, limits: Limits) -> Ended:
         """As the base class; ``x`` is as it was also where ``S`` is too near singular."""
         outcome = super().correct(x, row, limits)
-        self._held()
+        if self.newton.factorisations:  # else the matrix holds what it held before
+            self._held()
         return outcome
 
     def _held(self) -> Factored:
@@ -76,8 +77,10 @@ class CompiledCorrector(CompiledNewton):
         self.inertia.border.array[:] = self.border
         return self.inertia.hold()
 
-    def last_factored(self) -> tuple[State, PETSc.Vec]:
-        """The iterate that was factored last, and the equations there."""
+    def last_factored(self) -> tuple[State, PETSc.Vec] | None:
+        """The iterate that the last correction factored last, and the equations there; None where it factored none."""
+        if not self.newton.factorisations:
+            return None
         x, equations = self.system.new_vector(), self.system.new_vector()
         x.array[:], equations.array[:] = self.factored, self.equations
         return self.system.at(x), equations

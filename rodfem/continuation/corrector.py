@@ -212,7 +212,8 @@ class Corrector:
         system, origin = self.system, x.copy()
         with system.clock("solve"):
             ended = compiled.correct(x, row, limits(system, most, reach, tolerance))
-        if not system.symmetries or system.verify(self.inertia.matrix, *compiled.last_factored()):
+        last = compiled.last_factored() if system.symmetries else None
+        if last is None or system.verify(self.inertia.matrix, *last):
             return None if ended.status >= SINGULAR else result(ended)
         origin.copy(x)  # with a condition that belongs to no symmetry: once more without it
         return self._compiled_correct(compiled, x, row, most, reach, tolerance)

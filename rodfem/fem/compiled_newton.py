@@ -159,6 +159,7 @@ class CompiledNewton:
             status = self.lib.correct(self.rod, self.block, newton, *pointers)
             if status >= SINGULAR:
                 state[:] = begin
-        self.factors.adopt(regular=status < SINGULAR and not newton.singular)
-        self.matrix.stateIncrease()
+        if newton.factorisations:
+            self.factors.adopt(regular=status < SINGULAR and not newton.singular)
+            self.matrix.stateIncrease()
         return Ended(status, newton.iterations, newton.error, newton.moved)

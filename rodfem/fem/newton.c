@@ -9,6 +9,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#define MOST 8 /* vectors of a block */
+
 typedef int assemble_form(const void *, const void *, const double *, const double *, double *);
 typedef int factor_matrix(void *, const double *);
 typedef int solve_columns(const void *, int, const double *, double *);
@@ -38,7 +40,7 @@ typedef struct {
 } Rod;
 
 typedef struct {
-    int block, started;         /* number of vectors; whether they are those of a state nearby */
+    int block, started;         /* number of vectors, at most MOST; whether they are those of a state nearby */
     double *vectors, *images;   /* n x block: v and M v */
     const double *fresh, *fresh_images;
     double share, near_zero;    /* weight of a fresh vector; distance from zero below which S is too near singular */
@@ -52,6 +54,7 @@ typedef struct {
     double reach, tolerance;    /* bound of a correction; error that is small enough */
     double converged, still, kept, shrunk; /* constants of rodfem/fem/newton.py */
     int iterations, singular;   /* singular: the Jacobian was, exactly */
+    int factorisations;         /* made so far: none where the equations are no numbers at x */
     int status;                 /* 0: converged, 1: not, 2: S too near singular, 3: factors failed */
     double error, moved;
     double *step, *origin, *equations; /* correction; x at first; residual */
@@ -157,7 +160,7 @@ int solve_at(const Rod *rod, Block *b, const double *r)
         double growth = 0;
         if (r) memcpy(b->right, r, n * sizeof(double)); else memset(b->right, 0, n * sizeof(double));
         memcpy(b->right + n, rod->border, n * sizeof(double));
-        double *block = b->right + 2 * (size_t)n, *solved = b->solved + 2 * (size_t)n, sizes[8];
+        double *block = b->right + 2 * (size_t)n, *solved = b->solved + 2 * (size_t)n, sizes[MOST];
         for (int j = 0; j < b->block; j++) {
             double *v = b->vectors + (size_t)j * n, *image = b->images + (size_t)j * n;
             for (int i = 0; i < n; i++) {
@@ -203,12 +206,14 @@ int correct(const Rod *rod, Block *b, Newton *newton, double *x, const double *r
     int n = rod->n, fresh = 1;
     double previous = INFINITY, size = INFINITY;
     newton->status = 1;
+    newton->singular = newton->factorisations = 0;
     newton->moved = INFINITY;
     memcpy(newton->origin, x, n * sizeof(double));
     for (newton->iterations = 1; newton->iterations <= newton->most; newton->iterations++) {
         double *r = newton->equations;
         if (residual_at(rod, x, r)) return newton->status = 3;
         if (!isfinite(dot(n, r, r))) break; /* outside of where the stored energy is defined */
+        newton->factorisations += fresh;
         if (!b) {
             if (fresh && jacobian_at(rod, x, row)) return newton->status = 3;
             int failed = fresh ? ((factor_matrix *)rod->factor)(rod->factors, rod->values) : 0;

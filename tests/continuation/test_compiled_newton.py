@@ -8,6 +8,7 @@ from golden_cases import FAMILIES, cases
 
 import rodfem.fem.system
 from rodfem import Discretization, Plan, trace
+from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
 from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.fields import PETSC
@@ -60,3 +61,21 @@ def test_the_reference_uses_nothing_compiled(monkeypatch: pytest.MonkeyPatch) ->
 def test_unknown_factors_are_refused() -> None:
     with pytest.raises(InputError, match="chain or petsc"):
         Discretization(factors="superglue")
+
+
+def test_a_guess_without_equations_drops_no_symmetry() -> None:
+    """Where nothing was factored the matrix holds another state, and verifies nothing."""
+    solver = Solver(cases()["demo hemitropic"](), Discretization("auto", 8, 6)).equilibria
+    system = solver.system
+    x, _ = solver.first(0.05)
+    assert solver.corrector.correct(x, solver.axis) is not None
+    held = solver.inertia.at(solver.start(0.3, 0.4))
+    held.below(-5.0)
+    guess = x.copy()
+    guess.setValue(0, float("nan"))
+    guess.assemble()
+    outcome = solver.corrector.correct(guess, solver.axis)
+    assert outcome is not None
+    assert not outcome.converged
+    assert not system.verification.dropped
+    held.nearest(1)  # the factors are still those of that state
