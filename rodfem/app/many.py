@@ -14,9 +14,11 @@ from typing import Any
 from mpi4py import MPI
 
 from rodfem.app.run import on_first, writable
+from rodfem.diagram.solver import RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.file_format import RESULT
 from rodfem.output.files import save_json
+from rodfem.problem.arguments import checked, each, function, path
 from rodfem.problem.scene import Scene
 
 Work = Callable[[Scene], dict[str, Any]]
@@ -28,10 +30,11 @@ def key_of(scene: Scene) -> dict[str, Any]:
     return {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants}
 
 
+@checked(scenes=each(SCENE), work=function("work"), folder=path("results/map"), comm=RANKS, progress=function("print"))
 def many(
     scenes: Sequence[Scene],
     work: Work,
-    folder: Path,
+    folder: Path | str,
     comm: MPI.Comm = MPI.COMM_WORLD,
     progress: Callable[[int, int], None] = lambda done, all_of_them: None,
 ) -> list[dict[str, Any]]:
@@ -42,6 +45,7 @@ def many(
     ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`InputError` where ``folder``
     cannot be written, or has a result in another or a newer format.  ``scenes`` are shared among the ranks of ``comm``.
     """
+    folder = Path(folder)
     on_first(comm, lambda: writable(folder))
     files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]
     on_first(comm, lambda: _check(files))

@@ -15,12 +15,14 @@ from rodfem.continuation.branch import Branch
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
+from rodfem.diagram.solver import MESH, RANKS, SCENE
+from rodfem.diagram.trace import PLAN, trace
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.output.files import save_json, save_states
 from rodfem.output.typical import typical_state
+from rodfem.problem.arguments import checked, function, path
 from rodfem.problem.scene import Scene
 
 atexit.register(gc.freeze)  # what there is at the end goes with the process: a search for garbage in it takes 0.15 s
@@ -56,11 +58,19 @@ def writable(folder: Path) -> None:
         raise InputError(f"The output folder {folder} cannot be written ({reason})", ANOTHER_FOLDER) from error
 
 
+@checked(
+    scene=SCENE,
+    discretization=MESH,
+    plan=PLAN,
+    output=path("results/column"),
+    comm=RANKS,
+    words=function("str"),
+)
 def run(
     scene: Scene,
     discretization: Discretization | None = None,
     plan: Plan | None = None,
-    output: Path | None = None,
+    output: Path | str | None = None,
     *,
     figures: bool = True,
     comm: MPI.Comm = MPI.COMM_WORLD,
@@ -93,7 +103,7 @@ def run(
         Rewords each line on the terminal.
     """
     plan = plan or Plan()
-    output = output or Path("results") / scene.name
+    output = Path(output or Path("results") / scene.name)
     plan.check(scene)
     on_first(comm, lambda: writable(output))
     terminal = Terminal(plan, output, comm, quiet, words)

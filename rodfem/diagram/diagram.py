@@ -13,11 +13,12 @@ from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.deflation.search import equilibria_at
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.solver import Solver
+from rodfem.diagram.solver import MESH, METHOD, POINT, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
 from rodfem.output.files import as_data, save_json, save_states
+from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Verdict
 from rodfem.timing import Clock
@@ -85,6 +86,7 @@ class Diagram:
                 return branch
         raise KeyError(f"no branch {key!r}: there are {', '.join(repr(b.name) for b in self.branches)}")
 
+    @checked(kind=text("fold"), branch=text("branch 1"))
     def special(self, kind: str | None = None, branch: str | None = None) -> list[SpecialPoint]:
         """Special points, of one kind ("fold", "branch point", "flutter", "divergence", ...) or one branch if named.
 
@@ -94,6 +96,7 @@ class Diagram:
         every = [s for b in chosen for s in b.special]
         return [s for s in every if (s.kind == kind if kind is not None else not s.kind.given)]
 
+    @checked(load=number(1.0))
     def at(self, load: float) -> list[Point]:
         """All equilibria of the diagram at exactly ``load``, computed there, each with its own index.
 
@@ -112,6 +115,7 @@ class Diagram:
             return [self.solver(guess).equilibrium(load, guess)]
         return equilibria_at(solver, self.branches, load, lambda p: self._on(p, finest))
 
+    @checked(point=POINT)
     def solver(self, point: Point | SpecialPoint) -> Solver:
         """Return the solver of the mesh that a point belongs to."""
         mesh = point.point.mesh if isinstance(point, SpecialPoint) else point.mesh
@@ -121,14 +125,23 @@ class Diagram:
 
     # --- what it can be asked ------------------------------------------------------------------------------------
 
+    @checked(point=POINT, method=METHOD, number=count(4, 1))
     def assess(self, point: Point | SpecialPoint, method: str = "auto", number: int = 4) -> Verdict:
         """Decide the stability of a point with a given method: see :meth:`rodfem.Solver.assess`."""
         return self.solver(point).assess(point, method, number)
 
+    @checked(point=POINT, number=count(3, 1), method=METHOD)
     def modes(self, point: Point | SpecialPoint, number: int = 3, method: str = "auto") -> Modes:
         """Left-most modes of a point: see :meth:`rodfem.Solver.modes`."""
         return self.solver(point).modes(point, number, method)
 
+    @checked(
+        special=a(SpecialPoint, "a special point, as in diagram.special('fold')[0]"),
+        parameter=text("A"),
+        interval=interval(-3.0, 0.0),
+        load=interval(0.0, 1.0),
+        steps=a(StepControl, "a StepControl, as in StepControl(largest=0.02)"),
+    )
     def locus(
         self,
         special: SpecialPoint,
@@ -160,10 +173,12 @@ class Diagram:
         low, high = sorted(load or self.span)
         return locus(self.solvers[special.point.mesh], special, parameter, ((low, high), interval), steps or STEPS)
 
+    @checked(load=number(1.0), tries=count(24), seed=count(0))
     def search(self, load: float, tries: int = 24, seed: int = 0) -> list[Point]:
         """Equilibria at ``load`` that are on no branch, by ``tries`` deflated Newton iterations; none twice."""
         return Solver.of(self.solvers[self._finest()]).search(load, self.at(load), tries, seed)
 
+    @checked(discretization=MESH)
     def again(self, discretization: Discretization | None = None, **changes: Any) -> Diagram:
         """Trace once more with another discretisation or plan: ``again(span=(60, 4))``, ``again(accuracy=1e-8)``.
 
@@ -194,6 +209,7 @@ class Diagram:
         systems = [solver.system for solver in self.solvers]
         return as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy)
 
+    @checked(folder=path("results/column"))
     def save(self, folder: Path | str) -> Path:
         """Write ``diagram.json`` and ``states.h5`` into a folder, which is made; returns it."""
         folder, comm = Path(folder), self.solvers[0].system.comm
@@ -205,6 +221,7 @@ class Diagram:
         comm.barrier()
         return folder
 
+    @checked(path=path("diagram.png"))
     def plot(self, path: Path | str | None = None) -> Figure:
         """Draw the diagram with stability and special points; also into a file, if a ``path`` is given."""
         if self.scene.conservative:
@@ -216,6 +233,7 @@ class Diagram:
             figure.savefig(Path(path))
         return figure
 
+    @checked(point=POINT, path=path("shape.png"), caption=text("stable"))
     def show(self, point: Point | SpecialPoint, path: Path | str | None = None, caption: str | None = None) -> Snapshot:
         """Draw the rod at a point, with its supports and loads; also into a file, if a ``path`` is given.
 

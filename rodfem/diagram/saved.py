@@ -14,11 +14,12 @@ from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.solver import Solver
+from rodfem.diagram.solver import RANKS, SCENE, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM
 from rodfem.output.files import COLUMNS, OPTIONAL, SPECIAL, load_json, load_state
+from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, unit
 
@@ -28,6 +29,7 @@ OF_BRANCH = ("name", "parent", "ended", "columns", "special")
 OF_SPECIAL = ("kind", "multiplicity", "meets", "law", *SPECIAL)
 
 
+@checked(folder=path("results/column"), scene=SCENE, comm=RANKS)
 def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Diagram:
     """Read a diagram that :meth:`Diagram.save` or :func:`rodfem.run` has written; collective.
 

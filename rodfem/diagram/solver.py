@@ -25,9 +25,18 @@ from rodfem.linalg.compiled import compile_ahead
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
+from rodfem.problem.arguments import Check, a, checked, count, number, path, text
 from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Verdict, assess
 from rodfem.timing import Clock
+
+SCENE: Check = a(Scene, "a rodfem.Scene")
+MESH: Check = a(Discretization, "a Discretization, as in Discretization(elements=8, degree=6)")
+RANKS: Check = a(MPI.Comm, "a communicator of mpi4py, as in comm=MPI.COMM_SELF")
+POINT: Check = a((Point, SpecialPoint), "a point of a branch, as in diagram['branch 1'].points[0]")
+STATE: Check = a((Point, SpecialPoint, PETSc.Vec), "a point of a branch or a vector of the solver's system")
+METHOD: Check = text("auto")
+"""Checks of arguments that several functions have."""
 
 
 class Solver:
@@ -40,6 +49,7 @@ class Solver:
         :class:`~rodfem.continuation.solvers.StaticSolver` where a load has no potential.
     """
 
+    @checked(scene=SCENE, discretization=MESH, comm=RANKS, spectrum=count(4), clock=a(Clock, "a Clock"))
     def __init__(
         self,
         scene: Scene,
@@ -109,6 +119,7 @@ class Solver:
             return self._sweep.at(x)
         return self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True))
 
+    @checked(load=number(1.0), guess=STATE)
     def equilibrium(self, load: float, guess: Point | PETSc.Vec | None = None) -> Point:
         """Equilibrium at exactly ``load``.
 
@@ -137,6 +148,7 @@ class Solver:
             )
         return self.point(x)
 
+    @checked(point=STATE, method=METHOD, number=count(4, 1))
     def assess(self, point: Point | SpecialPoint | PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
         """Decide the stability of an equilibrium on this mesh by a given method.
 
@@ -154,15 +166,15 @@ class Solver:
         """
         return assess(self.equilibria, state_of(point), method, number)
 
+    @checked(point=STATE, number=count(3, 1), method=METHOD)
     def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
         """Left-most modes of an equilibrium on this mesh, each with its value, motion and error.
 
         There are ``number`` of them.  Raises :class:`~rodfem.errors.InputError` for fewer than one.
         """
-        if isinstance(number, bool) or not isinstance(number, int) or number < 1:
-            raise InputError(f"{number!r} modes cannot be computed: ask for 1 or more, as in modes(point, 3).")
         return self._finder(state_of(point), number, method)[1]
 
+    @checked(states=path("results/column/states.h5"), branch=text("branch 1"), row=count(0))
     def restore(self, states: Path | str, branch: str, row: int) -> Point:
         """Equilibrium of a saved row; it is solved anew, as the mesh may be another one.
 
@@ -171,6 +183,7 @@ class Solver:
         x = load_state(Path(states), branch, row, self.equilibria)
         return self.equilibrium(self.equilibria.system.scalar(x), x)
 
+    @checked(load=number(1.0), tries=count(24), seed=count(0))
     def search(self, load: float, known: Sequence[Point] = (), tries: int = 24, seed: int = 0) -> list[Point]:
         """Equilibria at ``load`` beside the ``known`` ones, by ``tries`` deflated Newton iterations.
 

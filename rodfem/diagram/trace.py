@@ -14,14 +14,18 @@ from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.frequency_mesh import frequency_mesh
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.solver import Solver
+from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
 from rodfem.diagram.sweep import FREQUENCIES, Sweep
 from rodfem.fem.fields import Discretization
 from rodfem.fem.transfer import compile_richer
+from rodfem.problem.arguments import a, checked
 from rodfem.problem.scene import Scene
 from rodfem.timing import Clock
 
+PLAN = a(Plan, "a Plan, as in Plan(at=(1.0,), depth=1)")
 
+
+@checked(scene=SCENE, discretization=MESH, plan=PLAN, observer=a(Observer, "a rodfem.Observer"), comm=RANKS)
 def trace(
     scene: Scene,
     discretization: Discretization | None = None,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite, nan
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
@@ -23,9 +24,16 @@ from rodfem.tolerances import NEGLIGIBLE
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
+STRAIGHT = (0.0, 0.0, 0.5), (1.0, 0.0, 0.0, 0.0)
+"""Centreline, in units of the rod's length, and quaternion at the middle of a straight rod."""
+
 
 def check_kinds(scene: Scene) -> None:
     """Check the kind of all that a scene is made of; raises :class:`SceneError`."""
+    for words, name in (("scene", scene.name), ("first branch, states,", scene.states)):
+        check_file_name(words, name)
+    if not isinstance(scene.title, str):
+        raise SceneError(f"The title is {scene.title!r}: give a text.")
     if not isinstance(scene.ends, Iterable) or [isinstance(end, End) for end in scene.ends] != [True, True]:
         raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
     for what, given, kind, example in (
@@ -45,6 +53,7 @@ def check_kinds(scene: Scene) -> None:
             raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
         if not isinstance(getattr(parameter, "value", parameter), Real):
             raise SceneError(f"The parameter {name} is {parameter!r}: give a number or a Parameter.")
+    check_places_are_numbers(scene)
     if not (hasattr(scene.inertia, "rho_A") and hasattr(scene.inertia, "rho_I")):
         raise SceneError(f"The inertia is {scene.inertia!r}: give one, as in Inertia(rho_A=lambda c: 1.0).")
     if not hasattr(scene.ordinate, "places"):
@@ -58,14 +67,44 @@ def check_kinds(scene: Scene) -> None:
             raise SceneError(f"The {what} is no function of {role.arguments} argument(s): give {role.call}.") from None
 
 
+def check_file_name(whose: str, name: object) -> None:
+    """Raise :class:`SceneError` for a name that cannot be that of a folder, or of an entry of a file."""
+    if not isinstance(name, str) or name in ("", ".", "..") or any(c in name for c in "/\\\0\n"):
+        raise SceneError(
+            f"The {whose} has the name {name!r}: give a text without slashes, as it names folders and entries of files."
+        )
+
+
+def check_places_are_numbers(scene: Scene) -> None:
+    """Raise :class:`SceneError` for an arclength that is no finite number."""
+    places = [("ordinate", s) for s in getattr(scene.ordinate, "places", ())]
+    places += [("attachment", x.s) for x in scene.attachments] + [("break", s) for s in scene.breaks]
+    for what, s in [*places, *(("constraint", x.s) for x in scene.constraints if x.s is not None)]:
+        if not isinstance(s, Real) or not isfinite(s):
+            raise SceneError(f"The {what} is at s = {s!r}: give an arclength, one number.")
+
+
+def check_finite(what: str, value: Any) -> None:
+    """Raise :class:`SceneError` unless a ``value`` of the constants alone is a finite real number."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = nan
+    if not isfinite(number):
+        raise SceneError(f"The {what} is {value}: return a finite real number.")
+
+
 def check_shapes(scene: Scene) -> None:
     """Check that forces and moments are vectors, and energies and constraints scalars."""
     c = scene.constants()
     for what, function, role in functions_of(scene):
         if role.call == "f(c)" and role.size:
             check_vector(what, function(c), role.size)
+            for i, value in enumerate(function(c)):
+                check_finite(f"component {i + 1} of the {what}", value)
         elif role.call == "f(c)" and role.size == 0:
             check_scalar(what, function(c))
+            check_finite(what, function(c))
     for what, function, known in functions_of_places(scene):
         check_scalar(what, function(known, c))
 
@@ -105,15 +144,19 @@ def check_load(scene: Scene) -> None:
 
 
 def check_ordinate(scene: Scene) -> None:
-    """Raise where the ordinate is no number, for a state where it need not be defined but of the right type."""
+    """Raise :class:`SceneError` where the ordinate is no number, at states where it need not be defined."""
     if not scene.ordinate.places:
         check_scalar("ordinate along the rod", scene.ordinate.of(some_places(scene)[1], scene.constants()))
         return
-    try:
-        scene.ordinate.of(np.array([0.2, 0.3, 0.4]), np.array([0.5, 0.1, 0.7, 0.5]))
-    except SceneError as trouble:
-        if isinstance(trouble.__cause__, (TypeError, LookupError, AttributeError, NameError)):
-            raise
+    values = []
+    for r, q in (((0.2, 0.3, 0.4), (0.5, 0.1, 0.7, 0.5)), ((-0.2, 0.1, 0.9), (0.7, -0.1, 0.1, 0.7)), STRAIGHT):
+        try:
+            values.append(scene.ordinate.of(np.array(r) * scene.length, np.array(q)))
+        except SceneError as trouble:
+            if isinstance(trouble.__cause__, (TypeError, LookupError, AttributeError, NameError)):
+                raise
+    if values and not any(map(isfinite, values)):
+        raise SceneError(f"The ordinate is {values[0]} whatever the state: return a finite number.")
 
 
 def check_start(scene: Scene) -> None:
@@ -169,10 +212,20 @@ def check_scene(scene: Scene) -> None:
 def check_convexity(scene: Scene) -> None:
     """Raise :class:`SceneError` where the stored energy is not strictly convex at the undeformed state."""
     for s in scene.samples() if scene.depends_on_s() else [None]:
-        stiffness = scene.stiffness(s)
-        lowest = np.linalg.eigvalsh(stiffness)[0] if stiffness.size else 1.0
-        if lowest <= NEGLIGIBLE * abs(stiffness).max(initial=0.0):
-            where = "" if s is None else f" at s = {s:g}"
+        where = "" if s is None else f" at s = {s:g}"
+        try:
+            stiffness = scene.stiffness(s)
+        except TypeError as trouble:  # of float(), for a complex number
+            raise SceneError(f"The stored energy is no real number{where}: leave complex numbers out.") from trouble
+        if not np.isfinite(stiffness).all():
+            raise SceneError(
+                f"The second derivative of the stored energy at the undeformed state is not finite{where}: choose "
+                "constants for which it is."
+            )
+        units = np.where(np.arange(len(stiffness)) < len(stiffness) - 3, 1.0, 1.0 / scene.length)  # curvature: 1/length
+        balanced = units[:, None] * stiffness * units
+        lowest = np.linalg.eigvalsh(balanced)[0] if stiffness.size else 1.0
+        if lowest <= NEGLIGIBLE * abs(balanced).max(initial=0.0):
             raise SceneError(
                 f"The stored energy is not convex{where}: its second derivative at the undeformed state has the "
                 f"eigenvalue {lowest:.3g}; choose constants for which all are positive."

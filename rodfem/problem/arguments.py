@@ -1,0 +1,131 @@
+"""Checks of the arguments of public functions, declared once for each at its head.
+
+:func:`checked` takes a check for each argument by name: a function of the argument's name and value that returns the
+value to go on with, or raises :class:`InputError` in one sentence that names the value, what was expected and an
+example.  A default is not checked.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Iterable
+from functools import wraps
+from math import isfinite
+from pathlib import Path
+from reprlib import Repr
+from typing import Any, ParamSpec, TypeVar
+
+from rodfem.errors import InputError
+from rodfem.problem.kinds import real, reals, whole
+
+P = ParamSpec("P")
+T = TypeVar("T")
+Check = Callable[[str, Any], Any]
+SHORT = Repr()
+SHORT.maxother = SHORT.maxstring = 60
+
+
+def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Decorator of a function whose arguments are checked, and converted, before anything else is done."""
+
+    def decorate(function: Callable[P, T]) -> Callable[P, T]:
+        signature = inspect.signature(function)
+        defaults = {name: parameter.default for name, parameter in signature.parameters.items()}
+
+        @wraps(function)
+        def call(*arguments: P.args, **named: P.kwargs) -> T:
+            given = signature.bind(*arguments, **named)
+            for name, check in checks.items():
+                if name in given.arguments and given.arguments[name] is not defaults[name]:
+                    given.arguments[name] = check(name, given.arguments[name])
+            return function(*given.args, **given.kwargs)
+
+        return call
+
+    return decorate
+
+
+def a(kind: type | tuple[type, ...], example: str) -> Check:
+    """Check for an object of a class, or of one of some; raises :class:`InputError` for anything else."""
+
+    def check(name: str, value: Any) -> Any:
+        if not isinstance(value, kind):
+            raise InputError(f"{name} is {SHORT.repr(value)}: give {example}.")
+        return value
+
+    return check
+
+
+def count(example: int, least: int = 0) -> Check:
+    """Check for a whole number, ``least`` or more; raises :class:`InputError` for anything else."""
+
+    def check(name: str, value: Any) -> int:
+        number = whole(name, value, example)
+        if number < least:
+            raise InputError(f"{name} is {number}: give {least} or more, as in {name}={example}.")
+        return number
+
+    return check
+
+
+def number(example: float) -> Check:
+    """Check for a finite real number; raises :class:`InputError` for anything else."""
+
+    def check(name: str, value: Any) -> float:
+        found = real(name, value, example)
+        if not isfinite(found):
+            raise InputError(f"{name} is {found:g}: give a finite number, as in {name}={example:g}.")
+        return found
+
+    return check
+
+
+def interval(low: float, high: float) -> Check:
+    """Check for two finite numbers, as in ``(low, high)``; raises :class:`InputError` for anything else."""
+
+    def check(name: str, value: Any) -> tuple[float, ...]:
+        found = reals(name, value, (low, high), 2)
+        if not all(map(isfinite, found)):
+            raise InputError(f"{name} is {found}: give two finite numbers, as in {name}={(low, high)}.")
+        return found
+
+    return check
+
+
+def each(one: Check) -> Check:
+    """Check for a sequence each of whose items passes a check; raises :class:`InputError` for anything else."""
+
+    def check(name: str, values: Any) -> list[Any]:
+        if not isinstance(values, Iterable) or isinstance(values, (str, bytes)):
+            raise InputError(f"{name} is {SHORT.repr(values)}: give a list.")
+        return [one(f"{name}[{i}]", value) for i, value in enumerate(values)]
+
+    return check
+
+
+def path(example: str) -> Check:
+    """Check for a path, or the name of one; raises :class:`InputError` for anything else."""
+
+    def check(name: str, value: Any) -> Path:
+        if not isinstance(value, (str, os.PathLike)) or not str(value):
+            raise InputError(f"{name} is {SHORT.repr(value)}: give a path, as in {name}={example!r}.")
+        return Path(value)
+
+    return check
+
+
+def text(example: str) -> Check:
+    """Check for a string."""
+    return a(str, f"a text, as in {example!r}")
+
+
+def function(example: str) -> Check:
+    """Check for a function; raises :class:`InputError` for anything else."""
+
+    def check(name: str, value: Any) -> Any:
+        if not callable(value):
+            raise InputError(f"{name} is {SHORT.repr(value)}: give a function, as in {name}={example}.")
+        return value
+
+    return check
