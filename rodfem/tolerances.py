@@ -1,6 +1,7 @@
 """Numerical policy: what is relative to what, and the constants that mean the same in several packages.
 
-A tolerance has no unit.  Arclengths are relative to the rod's length, loads and ordinates to themselves or to one,
+A tolerance has no unit.  Arclengths are relative to the rod's length, loads and ordinates to themselves or to
+their natural size (:mod:`rodfem.problem.units`: one, where a scene is stated in numbers not far from it),
 differences of loads to the span, eigenvalues to the rod's lowest bending eigenvalue (``Inertia.scale``), and entries of
 matrices to the largest one.  Distances of states and lengths along a branch are in the metric: about the root mean
 square of the rotation, in radian.  What is absolute says so.
@@ -35,14 +36,14 @@ DRIFT = 1e-6
 """Largest drift scalar of an equilibrium, over the lowest bending eigenvalue: beyond it a mesh breaks a symmetry."""
 
 
-def unit(*values: float) -> float:
-    """What errors of numbers are relative to: the largest of them, at least one."""
-    return max(1.0, *map(abs, values))
+def unit(*values: float, one: float) -> float:
+    """What errors of numbers are relative to: the largest of them, at least ``one``, their natural size."""
+    return max(one, *map(abs, values))
 
 
-def round_off(value: float) -> float:
-    """Uncertainty of a load or an ordinate that is solved for, or given."""
-    return ROUND_OFF * unit(value)
+def round_off(value: float, one: float) -> float:
+    """Uncertainty of a load or an ordinate that is solved for, or given; ``one`` is its natural size."""
+    return ROUND_OFF * unit(value, one=one)
 
 
 def same_place(x: Any, s: float, length: float) -> Any:

@@ -54,6 +54,7 @@ class AccuracyControl:
     def __init__(self, meshes: Meshes, bounds: tuple[float, float]) -> None:
         """Begin a branch; its points at the ``bounds`` of the load are judged at that very load."""
         self.meshes, self.bounds = meshes, bounds
+        self.units = meshes.solvers[0].units
         self.checked: Checked | None = None
         self.place, self.error, self.tries = -np.inf, np.inf, 0
         self.excused = -np.inf
@@ -93,7 +94,7 @@ class AccuracyControl:
     def check(self, special: SpecialPoint) -> None:
         """Raise :class:`TooCoarse` for a special point with too large an error, where another mesh may help."""
         error = self._error_of(special)
-        located = special.located_to / unit(special.point.load)
+        located = special.located_to / unit(special.point.load, one=self.units.load)
         if error > self.accuracy > located and special.point.arclength > self.excused:
             raise TooCoarse(
                 special.point, error, special.null_vectors, 2.0 if special.test_function == "stretch" else 1.0
@@ -115,7 +116,7 @@ class AccuracyControl:
             return
         special.point.estimate = error = self._error_of(special)
         if error > self.accuracy and not special.note:
-            located = special.located_to / unit(special.point.load) > self.accuracy
+            located = special.located_to / unit(special.point.load, one=self.units.load) > self.accuracy
             why = f"located to {special.located_to:.0e} only" if located else "finer meshes did not lower the error"
             special.note = f"accuracy {self.accuracy:g} not reached: {why}"
 
@@ -176,8 +177,8 @@ class AccuracyControl:
                 modes,
                 why=f"index {point.negative}, {negative} on a richer mesh",
             )
-        values = point.load, point.ordinate
-        error = max(e / unit(v) for e, v in zip(again.errors(point), values, strict=True))
+        values = (point.load, self.units.load), (point.ordinate, self.units.ordinate)
+        error = max(e / unit(v, one=one) for e, (v, one) in zip(again.errors(point), values, strict=True))
         return error if again.resolved else max(error, GROWN * self.accuracy)
 
     @staticmethod

@@ -149,6 +149,7 @@ class Enriched:
             raise ConvergenceError(
                 f"the richer discretisation has no equilibrium near load {point.load:.8g}: use more elements"
             )
+        units = system.scene.units
         load, ordinate = system.scalar(x), self.solver.shape.ordinate(x)
         equations, step = system.new_vector(), system.new_vector()
         system.at(x).residual(equations)
@@ -156,7 +157,7 @@ class Enriched:
         x.axpy(-1.0, step)
         last = system.scalar(x), self.solver.shape.ordinate(x)
         moved = np.abs(np.subtract(last, (load, ordinate)))
-        left = STEADY * moved + ROUND_OFF * np.maximum(1.0, np.abs(last))
+        left = STEADY * moved + ROUND_OFF * np.maximum((units.load, units.ordinate), np.abs(last))
         changed = self._indicators[1].changed(first, x, state=True)
         return Again(x, *last, float(left[0]), float(left[1]), self.rho([point.x], [x]), changed)
 
@@ -178,9 +179,12 @@ class Enriched:
         x, tangent = self.transfer(point.x, state=True), self.transfer(point.tangent, state=False)
 
         _, found, along = locate_event(self.solver, event, _straight(x, tangent), -WINDOW, WINDOW)
-        load, ordinate = self.system.scalar(found), self.solver.shape.ordinate(found)
+        load, ordinate, units = self.system.scalar(found), self.solver.shape.ordinate(found), self.solver.units
         slope = abs(ordinate_along(self.solver, found, tangent))
-        left = abs(point.slope) * along + round_off(load), slope * along + round_off(ordinate)
+        left = (
+            abs(point.slope) * along + round_off(load, units.load),
+            slope * along + round_off(ordinate, units.ordinate),
+        )
         changed = self._indicators[1].changed(x, found, state=True)
         return Again(found, load, ordinate, *left, self.rho([point.x], [found]), changed)
 
@@ -202,7 +206,7 @@ class Enriched:
             found = refine(solver, curve, 0.0, WINDOW, mode, test_function, beside=point.load)
         ordinate = solver.shape.ordinate(found.x)
         slope = ordinate_along(solver, found.x, found.tangent)
-        left = abs(slope) * found.along + round_off(ordinate)
+        left = abs(slope) * found.along + round_off(ordinate, self.solver.units.ordinate)
         sharp, indicator = solver.inertia.held.sharpened(mode), self._indicators[1]  # by the factors of a state nearby
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(indicator.changed(x, found.x, state=True), indicator.changed(mode, sharp, state=False))

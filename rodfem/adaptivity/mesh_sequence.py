@@ -105,10 +105,11 @@ class Meshes:
         return self._richer[number]
 
     def error_of(self, special: SpecialPoint) -> float:
-        """Estimated error of a special point in load and ordinate, relative to those that exceed one."""
-        error = special.ordinate_error / unit(special.point.ordinate)
+        """Estimated error of a special point in load and ordinate, relative to those that exceed their natural size."""
+        units = self.solvers[0].units
+        error = special.ordinate_error / unit(special.point.ordinate, one=units.ordinate)
         if special.kind.singular or special.test_function == "stretch":
-            error = max(error, special.error_estimate / unit(special.point.load))
+            error = max(error, special.error_estimate / unit(special.point.load, one=units.load))
         return error
 
     def raised(self, trouble: TooCoarse, tries: int) -> BranchSolver:

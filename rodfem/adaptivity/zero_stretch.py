@@ -52,7 +52,14 @@ def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
     (load2, ordinate2, *_), (load, ordinate, energy, last) = found
     x = solver.shape.restore(sample)
     point = replace(coarse, x=x, tangent=None, load=load, ordinate=ordinate, energy=energy, stretch=last)
-    special = SpecialPoint(END, point, point.negative, point.negative, LOCATED * unit(load), test_function="stretch")
+    special = SpecialPoint(
+        END,
+        point,
+        point.negative,
+        point.negative,
+        LOCATED * unit(load, one=solver.units.load),
+        test_function="stretch",
+    )
     left = 1.0 if d.degree == 1 else 0.25
     special.error_estimate = max(left * abs(load - load2), special.located_to)
     special.ordinate_error = max(left * abs(ordinate - ordinate2), special.located_to)

@@ -18,8 +18,9 @@ from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.modes import Modes
-from rodfem.output.digits import in_words, index_in_words, number, rounded_up
+from rodfem.output.digits import in_decimals, in_words, index_in_words, number, rounded_up
 from rodfem.problem.scene import Scene
+from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
 from rodfem.timing import WORK, Clock
 
@@ -47,14 +48,15 @@ def _mesh(system: System) -> str:
     return f"{words}, {system.fields.unknowns} unknowns"
 
 
-def _roots(point: Point) -> dict[str, str]:
-    """Frequencies of a point in words for each kind of motion; a complex pair of them once, with +-."""
+def _roots(point: Point, one: float) -> dict[str, str]:
+    """Frequencies of a point, of a natural size ``one``, in words for each kind of motion; a complex pair once."""
     words: dict[str, list[str]] = {}
     for value, kind in zip(point.omega2, point.motion, strict=True):
         w = complex(*value) ** 0.5
         if value[1] >= 0:
-            text = f"{w.real:.4f}" if value[0] >= 0 else f"{abs(w.imag):.4f}i"
-            words.setdefault(kind, []).append(text if value[1] == 0 else f"{w.real:.4f}+-{abs(w.imag):.4f}i")
+            re, im = in_decimals(w.real, 4, one), in_decimals(abs(w.imag), 4, one)
+            text = re if value[0] >= 0 else f"{im}i"
+            words.setdefault(kind, []).append(text if value[1] == 0 else f"{re}+-{im}i")
     return {kind: "  ".join(texts[:4]) + (" ..." if len(texts) > 4 else "") for kind, texts in words.items()}
 
 
@@ -65,7 +67,7 @@ class Report(Observer):
         self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None, words: Callable[[str], str] = str
     ) -> None:
         """Print what ``words`` makes of each line to ``stream``, by default the terminal."""
-        self.count, self.words = INDEX, words
+        self.count, self.words, self.units = INDEX, words, ONES
         self.on = comm.rank == 0
         self.stream = stream or sys.stdout
         self.live = self.on and self.stream.isatty() and comm.size == 1
@@ -97,6 +99,7 @@ class Report(Observer):
         if accuracy is not None and scene.conservative:
             self.say(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
+        self.units = scene.units
         self.count = INDEX if scene.conservative else UNSTABLE
         if not scene.conservative:
             loads = ", ".join(scene.without_potential())
@@ -148,8 +151,8 @@ class Report(Observer):
         """Keep one line up to date while a branch is traced (on a terminal only)."""
         if self.live:
             self.say(
-                f"  ... {len(branch.points)} points, load {point.load:.5f}, "
-                f"ordinate {point.ordinate:.5f}, {self.count} {point.negative}",
+                f"  ... {len(branch.points)} points, load {in_decimals(point.load, 5, self.units.load)}, "
+                f"ordinate {in_decimals(point.ordinate, 5, self.units.ordinate)}, {self.count} {point.negative}",
                 end="",
             )
 
@@ -158,11 +161,11 @@ class Report(Observer):
         self.say("  " + self._line(special))
 
     def _line(self, special: SpecialPoint) -> str:
-        p = special.point
+        p, units = special.point, self.units
         connects_to = f"  meets {special.connects_to[0]}" if special.connects_to else ""
         return (
-            f"{special.kind.code}   {round(p.load, 10) + 0.0:<14.10f} {round(p.ordinate, 9) + 0.0:<14.9f} "
-            f"{p.energy:<10.6f} "
+            f"{special.kind.code}   {in_decimals(p.load, 10, units.load):<14} "
+            f"{in_decimals(p.ordinate, 9, units.ordinate):<14} {in_decimals(p.energy, 6, units.energy):<10} "
             f"{index_in_words(special):>{max(6, len(self.count))}} {p.zero:>5}  {special.located_to:.0e}{connects_to}"
         )
 
@@ -227,7 +230,7 @@ class Report(Observer):
             return
         self.say(f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load}")
         shown = points[:: max(1, (len(points) - 1) // (rows - 1))]
-        columns = [_roots(p) for p in shown]
+        columns = [_roots(p, self.units.omega2**0.5) for p in shown]
         widths = {
             kind: max(len(c.get(kind, "")) for c in [*columns, {kind: kind}])
             for kind in sorted({k for c in columns for k in c})
@@ -235,7 +238,7 @@ class Report(Observer):
         self.say(f"  {load:>10}  " + "   ".join(f"{kind:<{width}}" for kind, width in widths.items()))
         for p, column in zip(shown, columns, strict=True):
             words = "   ".join(f"{column.get(kind, ''):<{width}}" for kind, width in widths.items())
-            self.say(f"  {p.load:10.4f}  {words}".rstrip())
+            self.say(f"  {in_decimals(p.load, 4, self.units.load):>10}  {words}".rstrip())
         if "torsion" not in widths:
             self.say("  no frequency of torsion is among them: without inertia about d3 all are infinite")
 

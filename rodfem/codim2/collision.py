@@ -68,7 +68,7 @@ class Collision:
         dq = dq if dq @ forward >= 0 else -dq
         system.line = self.plane.along(p, 0)
         system.set_load(x, float(p[0]))
-        located = np.maximum(last * abs(across) * width, ROUND_OFF * np.maximum(1.0, abs(p)))
+        located = np.maximum(last * abs(across) * width, ROUND_OFF * np.maximum(self.plane.sizes, abs(p)))
         ordinate = self.solver.shape.ordinate(x)
         still, modes = system.new_vector(), as_vectors(system, clearest.cluster.basis)
         return LocusPoint(p, x, dq * width, still, located, ordinate=ordinate, omega2=omega2, modes=modes)

@@ -14,6 +14,7 @@ from rodfem.errors import SceneError
 from rodfem.fem.parameters import Line, line
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
+from rodfem.problem.units import size
 
 Interval = tuple[float, float]
 Tangent = tuple[np.ndarray, PETSc.Vec | None]
@@ -53,7 +54,8 @@ class LocusPoint:
 class Plane:
     """Lines in the plane of two parameters of the scene of a system.
 
-    The first parameter is the scene's load.  ``bounds`` are their intervals, whose ``width`` (2,) scales them.
+    The first parameter is the scene's load.  ``bounds`` are their intervals, whose ``width`` (2,) scales them,
+    and ``sizes`` (2,) their natural sizes.
     """
 
     def __init__(self, system: System, parameter: str, bounds: tuple[Interval, Interval]) -> None:
@@ -75,6 +77,7 @@ class Plane:
             replace(scene, parameters={**scene.parameters, parameter: replace(scene.parameters[parameter], value=end)})
         self.bounds = np.array(bounds, dtype=float)
         self.width = self.bounds[:, 1] - self.bounds[:, 0]
+        self.sizes = np.array([size(x) for x in abs(self.bounds).max(axis=1)])
 
     def line(self, origin: np.ndarray, direction: np.ndarray) -> Line:
         """Line on which the scalar unknown ``load`` stands for ``t`` in ``origin + t direction``."""

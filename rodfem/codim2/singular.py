@@ -278,7 +278,7 @@ class Singular:
         forward = along[0] / width**2 @ dp + ((self.metric * dx).dot(along[1]) if along[1] else 0.0)
         size = size if forward >= 0 else -size
         dx.scale(1.0 / size)
-        located = np.maximum(last, ROUND_OFF * np.maximum(1.0, abs(p)))
+        located = np.maximum(last, ROUND_OFF * np.maximum(self.plane.sizes, abs(p)))
         return LocusPoint(
             p,
             x,

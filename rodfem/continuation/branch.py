@@ -181,9 +181,9 @@ class SpecialPoint:
     event: Event | None = None
 
     @classmethod
-    def given(cls, kind: Kind, point: Point) -> SpecialPoint:
-        """One at a load that is given: nothing changes there."""
-        return cls(kind, point, point.negative, point.negative, round_off(point.load))
+    def given(cls, kind: Kind, point: Point, one: float) -> SpecialPoint:
+        """One at a load that is given, of a natural size ``one``: nothing changes there."""
+        return cls(kind, point, point.negative, point.negative, round_off(point.load, one))
 
     def __repr__(self) -> str:
         """Kind, load and change of the index."""

@@ -64,7 +64,7 @@ class Curves:
             outside[group] = 1.0 - np.minimum(share, 1.0)
             begin += basis.shape[1]
         a, b = last.values[:, None], found.values[None, :]
-        return np.asarray(outside + abs(a - b) / np.maximum(np.maximum(abs(a), abs(b)), 1.0))
+        return np.asarray(outside + abs(a - b) / np.maximum(np.maximum(abs(a), abs(b)), found.one))
 
 
 def _span(pencil: NonsymmetricPencil, found: Frequencies, group: list[int], energy: np.ndarray) -> np.ndarray:

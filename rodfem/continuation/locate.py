@@ -172,13 +172,15 @@ class Located:
     arithmetic: float
 
 
-def interpolate(samples: list[Sample], test_function: str, guess: float, noise: float = 0.0) -> Located | None:
+def interpolate(
+    samples: list[Sample], test_function: str, guess: float, one: float, noise: float = 0.0
+) -> Located | None:
     """Zero of ``mu`` or of the load's slope by Chebyshev interpolation; None where it is not near the piece.
 
     The uncertainty of the load is what the last coefficients of the two interpolants can contribute at the zero, at
     least what the solver's tolerance leaves open, and what round-off of size ``noise`` in ``mu``, the same in all
     samples, moves the zero by.  ``samples`` are at Chebyshev nodes; ``test_function`` is ``mu`` or ``slope``; of
-    several zeros the one nearest to the parameter ``guess`` is taken.
+    several zeros the one nearest to the parameter ``guess`` is taken.  ``one`` is the natural size of the load.
     """
     s = np.array([p.s for p in samples])
     middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
@@ -196,7 +198,7 @@ def interpolate(samples: list[Sample], test_function: str, guess: float, noise: 
     left = zero_uncertainty(f, root)
     # the last coefficients bound what the series leaves out; a shift of the zero moves the load by its slope
     tail = abs(load[-1]) + abs(slope_at) * left
-    floor = round_off(load_at)
+    floor = round_off(load_at, one)
     moved = abs(noise / float(chebyshev.chebval(root, chebyshev.chebder(f)))) if test_function == "mu" else 0.0
     arithmetic = floor + abs(slope_at) * moved
     weights, slopes = _barycentric(t, root)
@@ -252,14 +254,15 @@ def refine(
     no zero is found near by.
     """
     best: Located | None = None
+    one = solver.units.load
     count = NODES if beside is None else FEWER
     for _ in range(10):
         nodes = center + half * np.cos(np.pi * (np.arange(count)[::-1] + 0.5) / count)
         samples = [sample(solver, curve, s, mode, persistent, counted=beside is None) for s in nodes]
-        located = interpolate(samples, test_function, center, samples[-1].found.noise(mode))
+        located = interpolate(samples, test_function, center, one, samples[-1].found.noise(mode))
         # inside the nodes the interpolant is trusted: sharpen; outside it, move there; without a zero, by a secant
         if located is not None and abs(located.s - center) <= half:
-            sharp = SHARP if beside is None else max(SHARP, PART * abs(located.load - beside))
+            sharp = SHARP * one if beside is None else max(SHARP * one, PART * abs(located.load - beside))
             # a shorter piece that gains less than a digit has met round-off
             settled = best is not None and located.uncertainty > 0.1 * best.uncertainty
             if settled or located.uncertainty - located.arithmetic < sharp:

@@ -24,7 +24,7 @@ AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 BESIDE = 1e-3
 """Distance along a branch, in the metric, over which the slope of the ordinate is taken."""
 CONSTANT = 1e-12
-"""Leading coefficient of the ordinate in the amplitude below which it does not change: absolute."""
+"""Leading coefficient of the ordinate in the amplitude below which it does not change, over its natural size."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Origin:
 def origin_of(solver: BranchSolver, special: SpecialPoint) -> Origin:
     """Branch point of a mesh; along a branch its ordinate is as uncertain as its load, times the ratio of slopes."""
     p = special.point
-    left = round_off(p.ordinate)
+    left = round_off(p.ordinate, solver.units.ordinate)
     if p.tangent is not None and p.slope:
         left += abs(ordinate_along(solver, p.x, p.tangent) / p.slope) * special.located_to
     return Origin(p.x, p.load, p.ordinate, special.located_to, left)
@@ -78,8 +78,10 @@ def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -
     growth = abs(ordinates[0] / ordinates[3]) if ordinates[3] else np.inf
     odd = growth < (AMPLITUDES[0] / AMPLITUDES[3]) ** 1.5
 
+    one = solver.units.ordinate
+
     def leading(loads: np.ndarray, ordinates: np.ndarray, count: int = 4) -> float:
-        return _leading(loads[:4], ordinates[:4], odd, count)
+        return _leading(loads[:4], ordinates[:4] / one, odd, count) / one ** (2 if odd else 1)
 
     best = leading(loads, ordinates)
     if not np.isfinite(best):

@@ -17,8 +17,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.continuation.branch import Point
+from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.corrector import Corrector
+from rodfem.continuation.kinds import Kind
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
@@ -29,6 +30,7 @@ from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
 from rodfem.linalg.factorization import AlongRod, Factors
 from rodfem.linalg.orthogonal import combine
+from rodfem.problem.units import Units
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.round_off import decide
@@ -74,6 +76,15 @@ class StaticSolver:
         undeformed = np.array([1.0 if i == 2 else 0.0 for i in system.scene.free_strains])
         named = {f.turning.name: turned.reshape(*x.shape, -1), "v": undeformed, LOAD: load}
         return self.shape.with_centreline(NodalValues(f, f.filled(named), system.line))
+
+    @property
+    def units(self) -> Units:
+        """Natural sizes of the rod's numbers."""
+        return self.system.scene.units
+
+    def given(self, kind: Kind, point: Point) -> SpecialPoint:
+        """Special point at a load that is given."""
+        return SpecialPoint.given(kind, point, self.units.load)
 
     def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, NewtonResult]:
         """Equilibrium at exactly ``load`` by Newton's method from ``guess``."""

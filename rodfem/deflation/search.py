@@ -37,7 +37,7 @@ SAME = 1e-5
 LEAST, GREATEST = 0.3, 3.0
 """Root mean square rotation, in radian, of the first and of the last guess from the state that it starts from."""
 SAME_ENERGY, LEAST_ENERGY = 1e-6, 1e-12
-"""Equilibria that slide are one if their energies differ by less than this part of them, or of the latter: absolute."""
+"""Equilibria that slide are one if their energies agree to the first, or to the second of their natural size."""
 
 NEW, KNOWN, FAILED, INADMISSIBLE = "new", "known", "without convergence", "not admissible"
 
@@ -174,7 +174,10 @@ class Deflation(DeflatedNewton):
             point = solver.point(x, 0.0, solver.load_tangent(x, True), outcome)
         except ConvergenceError:  # an index that cannot be counted
             return None, FAILED
-        if self.slides and any(abs(point.energy - e) <= SAME_ENERGY * max(abs(e), LEAST_ENERGY) for e in self.energies):
+        if self.slides and any(
+            abs(point.energy - e) <= SAME_ENERGY * max(abs(e), LEAST_ENERGY * solver.units.energy)
+            for e in self.energies
+        ):
             return None, KNOWN
         if point.drift > DRIFT * solver.inertia.scale or not point.stretch > 0:
             return None, INADMISSIBLE

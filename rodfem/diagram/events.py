@@ -38,5 +38,5 @@ def _special(solver: BranchSolver, event: Event, a: Point, b: Point) -> SpecialP
     s, x, along = locate_event(solver, event, curve, a.arclength + margin, b.arclength - margin)
     tangent = solver.tangent(solver.row(curve(s)[1]), at=x)
     point = solver.point(x, s, tangent)
-    left = abs(point.slope) * along + round_off(point.load)
+    left = abs(point.slope) * along + round_off(point.load, solver.units.load)
     return SpecialPoint(EVENT, point, point.negative, point.negative, left, note=event.name, event=event)

@@ -236,7 +236,8 @@ class Explorer(Tracer):
 
         The metric need not share the symmetry: points at one distance in it need not be mirror images themselves.
         """
-        if equivalent(a, b):
+        units = self.solver.units
+        if equivalent(a, b, units):
             return True
         inner, outer = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
         piece = Branch("", None, 0, [replace(special.point, arclength=0.0), outer])
@@ -252,7 +253,7 @@ class Explorer(Tracer):
             return False
         tail = replace(parent, points=parent.points[-TAIL:])
         known = equilibria_at(self.solver, [tail], point.load, self.here)
-        return any(equivalent(point, other, SAME_STATE) for other in known)
+        return any(equivalent(point, other, self.solver.units, SAME_STATE) for other in known)
 
     def _traced_already(self, branch: Branch, special: SpecialPoint) -> bool:
         """Whether another branch ended at this branch point coming along the same way."""
@@ -261,6 +262,6 @@ class Explorer(Tracer):
             for end in other.special:
                 if end.connects_to is not None and self.alike(end.point, b, SAME_SPECIAL):
                     before = other.points[max(end.row - 2, 0) : end.row]
-                    if any(near(a, p) for p in before):
+                    if any(near(a, p, self.solver.units) for p in before):
                         return True
         return False

@@ -51,7 +51,8 @@ def frequency_mesh(
     for _ in range(MOST):
         finer = replace(mesh, elements=ceil(REFINED * mesh.elements))
         richer = _frequencies(System(scene, finer, comm, symmetries=first.symmetries), loads, number)
-        change = max(_change(v[:number], w) for v, w in zip(values, richer, strict=True))
+        one = scene.units.omega2
+        change = max(_change(v[:number], w, one) for v, w in zip(values, richer, strict=True))
         if change >= least:
             break
         best, least = mesh, change
@@ -69,7 +70,7 @@ def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndar
     found = []
     for load in loads:
         x = at_load(solver, x, float(load))
-        values = eigensolver.at(x).near(number + 2, SHIFT).values
+        values = eigensolver.at(x).near(number + 2, SHIFT * system.scene.units.omega2).values
         found.append(values[np.argsort(abs(values))][: number + 2])
     if min(map(len, found)) < number:
         remedy = Remedy("ask for fewer ({})", Argument("Plan", "spectrum"))
@@ -77,6 +78,6 @@ def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndar
     return found
 
 
-def _change(values: np.ndarray, richer: np.ndarray) -> float:
-    """Largest relative distance of values from the nearest of the richer ones."""
-    return max(float(abs(richer - v).min() / unit(v)) for v in values)
+def _change(values: np.ndarray, richer: np.ndarray, one: float) -> float:
+    """Largest distance of values from the nearest of the richer ones, relative to values greater than ``one``."""
+    return max(float(abs(richer - v).min() / unit(v, one=one)) for v in values)

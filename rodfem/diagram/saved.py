@@ -21,7 +21,7 @@ from rodfem.file_format import DIAGRAM
 from rodfem.output.files import COLUMNS, OPTIONAL, SPECIAL, load_json, load_state
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
-from rodfem.tolerances import NEGLIGIBLE, unit
+from rodfem.tolerances import NEGLIGIBLE
 
 NEEDED = ("range", "accuracy", "constants", "discretization", "meshes")
 """Entries of a diagram, beside those that all of its readers need."""
@@ -81,7 +81,7 @@ def _check(data: dict[str, Any], scene: Scene, folder: Path) -> None:
         )
     for constant, value in data["constants"].items():
         known = scene.parameters.get(constant)
-        if known is None or abs(known.value - value) > NEGLIGIBLE * unit(value):
+        if known is None or abs(known.value - value) > NEGLIGIBLE * abs(value):
             there = "has no such parameter" if known is None else f"has {known.value:.12g}"
             raise InputError(
                 f"{folder} was computed with {constant} = {value:.12g}, and the scene {there}: give the scene that was "

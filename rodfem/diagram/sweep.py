@@ -54,7 +54,7 @@ DRIVEN = 1e-7
 MEAN = 10.0
 """Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
 SHIFT = -1e-3
-"""Eigenvalues are sought next to this one: beside zero, where the tangent matrix is singular."""
+"""Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix is singular."""
 BESIDE = 1e-4
 """Relative distance of a shift from the pair that is sought there, and of the first two loads of a secant method."""
 AGAIN = 1e-7
@@ -94,7 +94,7 @@ class Sweep:
         complete.  The ``plan`` names the loads.
         """
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
-        self.span = plan.over(solver.system.scene)
+        self.span, self.units = plan.over(solver.system.scene), solver.system.scene.units
         self.eigensolver = NonsymmetricSolver(solver.system)
         self.number = plan.spectrum or FREQUENCIES
         self.curves, self.last = Curves(), NONE
@@ -129,11 +129,11 @@ class Sweep:
             branch.points.append(point)
             grid.append(point)
             if load in self.plan.at:
-                self._special(branch, SpecialPoint.given(USER, point))
+                self._special(branch, self.solver.given(USER, point))
             self.observer.progress(branch, point)
         branch.ended = "end of range"
         last = branch.points[-1]
-        branch.special.append(SpecialPoint.given(END, last))
+        branch.special.append(self.solver.given(END, last))
         branch.renumber()
         if self.plan.error_bars:
             self._error_bars(branch)
@@ -170,7 +170,7 @@ class Sweep:
             energy=solver.energy(x),
             stretch=solver.shape.stretch(x),
             negative=found.unstable(found.noise),
-            zero=int((abs(values) < REAL).sum()) + system.active_drifts(x),
+            zero=int((abs(values) < REAL * self.units.omega2).sum()) + system.active_drifts(x),
             slope=float("nan"),
             drift=0.0,
             error=0.0,
@@ -184,9 +184,12 @@ class Sweep:
 
         A complex shift looks for a pair that may be farther from the origin than all that the real shift found.
         """
-        near = pencil.near(max(self.number, FREQUENCIES) + 6, SHIFT)
+        one = self.units.omega2
+        near = pencil.near(max(self.number, FREQUENCIES) + 6, SHIFT * one)
         reach = SEEN * abs(near.values).max()
-        found = list(zip(_without_round_off(near.values), near.errors, near.kinds, near.vectors.T, strict=True))
+        found = list(
+            zip(_without_round_off(near.values, SHIFT * one), near.errors, near.kinds, near.vectors.T, strict=True)
+        )
         for pair in (v for v in self.last.values if v.imag > 0 and abs(v) > reach):
             beside = pencil.near(2, pair * (1 + BESIDE))
             for value, error, kind, vector in zip(
@@ -194,12 +197,12 @@ class Sweep:
             ):
                 both = [(value, vector), (value.conjugate(), vector.conj())]
                 for v, x_v in both if abs(value.imag) > REAL * abs(value) else both[:1]:
-                    if all(abs(v - other) > AGAIN * unit(v) for other, *_ in found):
+                    if all(abs(v - other) > AGAIN * unit(v, one=one) for other, *_ in found):
                         found.append((v, error, kind, x_v))
         real = [(complex(v.real) if abs(v.imag) < REAL * abs(v) else complex(v), *rest) for v, *rest in found]
-        order = sorted(real, key=lambda f: (round(f[0].real, 6), f[0].imag))
+        order = sorted(real, key=lambda f: (round(f[0].real / one, 6), f[0].imag))
         values, errors, kinds, vectors = zip(*order, strict=True)
-        return Frequencies(np.array(values), np.array(errors), kinds, np.stack(vectors, axis=1))
+        return Frequencies(np.array(values), np.array(errors), kinds, np.stack(vectors, axis=1), one)
 
     def _between(self, branch: Branch, a: Point, b: Point, before: Frequencies, after: Frequencies) -> None:
         """Locate what happens between two loads: eigenvalues that collide, and real ones that pass through zero."""
@@ -252,7 +255,7 @@ class Sweep:
                 if event is None:
                     continue
                 event.change *= sign
-                same = [e for e in events if abs(e.load - event.load) < SAME * unit(e.load)]
+                same = [e for e in events if abs(e.load - event.load) < SAME * unit(e.load, one=self.units.load)]
                 if same:
                     same[0].change += event.change
                     if abs(event.omega2) < abs(same[0].omega2):
@@ -272,7 +275,7 @@ class Sweep:
                 f"the frequencies are double at {self._load} = {there.load:.6g} and become complex at once: "
                 f"flutter at every {self._load} {side} {there.load:.6g} next to it"
             )
-            floor = round_off(there.load)
+            floor = round_off(there.load, self.units.load)
             return _Event(FLUTTER, there.load, cluster.size, floor, other.cluster.mean, other.cluster, note)
         if other.discriminant < 0:
             return None
@@ -311,7 +314,7 @@ class Sweep:
                 return []
         together: list[list[float]] = []
         for load in sorted(found):
-            if together and abs(load - together[-1][0]) < TOGETHER * unit(load):
+            if together and abs(load - together[-1][0]) < TOGETHER * unit(load, one=self.units.load):
                 together[-1].append(load)
             else:
                 together.append([load])
@@ -320,10 +323,12 @@ class Sweep:
     def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> _Event:
         """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
         pencil, number = self.eigensolver.at(at_load(self.solver, guess, loads[0])), len(loads)
-        found = pencil.near(number + 2, SHIFT)
+        found = pencil.near(number + 2, SHIFT * self.units.omega2)
         cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
-        load, uncertainty = _zero_between(self._measured(self.solver, self.eigensolver, guess), cluster, loads[0])
-        uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load))
+        load, uncertainty = _zero_between(
+            self._measured(self.solver, self.eigensolver, guess), cluster, loads[0], self.units.load
+        )
+        uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
         return _Event(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
@@ -345,7 +350,7 @@ class Sweep:
                 point = s.point
                 guess = transfer(point.x, state=True)
                 x = at_load(richer, guess, point.load)
-                left = round_off(point.ordinate)
+                left = round_off(point.ordinate, self.units.ordinate)
                 s.ordinate_error = s.error_estimate = bound(point.ordinate, richer.shape.ordinate(x), left, rho)
                 if s.kind == FLUTTER:
                     load, left, mu = self._richer_flutter(richer, eigensolver, transfer, guess, s)
@@ -354,10 +359,10 @@ class Sweep:
                     s.omega2_error = bound(s.omega2, mu, MEAN * abs(mu) * max(relative, ROUND_OFF), rho)
                 elif s.kind == DIVERGENCE:
                     measured, cluster = self._measured(richer, eigensolver, x), self._transferred(transfer, s)
-                    load = _zero(measured, cluster, point.load)
+                    load = _zero(measured, cluster, point.load, self.units.load)
                     s.error_estimate = max(bound(point.load, load, s.located_to, rho), s.located_to)
                 asked = self.plan.accuracy
-                if asked is not None and s.error_estimate > asked * unit(s.point.load):
+                if asked is not None and s.error_estimate > asked * unit(s.point.load, one=self.units.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"
 
     def _transferred(self, transfer: Transfer, s: SpecialPoint) -> Cluster:
@@ -401,23 +406,23 @@ def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
     return x
 
 
-def _without_round_off(values: np.ndarray) -> np.ndarray:
-    """Eigenvalues next to :data:`SHIFT`, imaginary parts that are round-off of real ones dropped: (k,).
+def _without_round_off(values: np.ndarray, shift: float) -> np.ndarray:
+    """Eigenvalues next to a ``shift``, imaginary parts that are round-off of real ones dropped: (k,).
 
     The solver has ``1 / (mu - shift)`` to round-off of the largest of them: ``mu`` to ``eps |mu - shift|^2 / min |mu -
     shift|``, and one near zero to that of the matrix.
     """
-    apart, least = abs(values - SHIFT), NEAR_ZERO * abs(values).max()
+    apart, least = abs(values - shift), NEAR_ZERO * abs(values).max()
     doubt = np.maximum(REAL * np.maximum(abs(values), least), MANY * EPS * apart**2 / apart.min())
     return np.where(abs(values.imag) < doubt, values.real, values)
 
 
-def _zero_between(measured: AtLoad, cluster: Cluster, load: float) -> tuple[float, float]:
+def _zero_between(measured: AtLoad, cluster: Cluster, load: float, one: float) -> tuple[float, float]:
     """Load near ``load`` at which the mean of a cluster vanishes, and what round-off of the mean leaves open.
 
     The mean is sampled over :data:`AROUND`, and interpolated: its scatter shows in the last coefficients.
     """
-    half = AROUND * unit(load)
+    half = AROUND * unit(load, one=one)
     nodes = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
     series = chebyshev.chebfit(nodes, [measured(load + half * t, cluster).cluster.mean for t in nodes.tolist()], 5)
     root = real_root(series, 0.0)
@@ -426,11 +431,11 @@ def _zero_between(measured: AtLoad, cluster: Cluster, load: float) -> tuple[floa
     return load + half * root, half * zero_uncertainty(series, root)
 
 
-def _zero(measured: AtLoad, cluster: Cluster, load: float) -> float:
-    """Load near ``load`` at which the mean of the eigenvalues of a cluster vanishes."""
+def _zero(measured: AtLoad, cluster: Cluster, load: float, one: float) -> float:
+    """Load near ``load``, of natural size ``one``, at which the mean of the eigenvalues of a cluster vanishes."""
     from scipy.optimize import newton  # slow to load
 
     def mean(load: float) -> float:
         return measured(load, cluster).cluster.mean
 
-    return float(newton(mean, load, x1=load + BESIDE * unit(load), tol=round_off(load)))
+    return float(newton(mean, load, x1=load + BESIDE * unit(load, one=one), tol=round_off(load, one)))

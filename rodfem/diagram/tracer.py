@@ -22,6 +22,7 @@ from rodfem.diagram.events import Events
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
 from rodfem.errors import ConvergenceError
+from rodfem.problem.units import Units
 from rodfem.roots import zero_between
 from rodfem.stability.round_off import resolve
 from rodfem.tolerances import DRIFT, INSIDE, SAME_SPECIAL, SAME_STATE, unit
@@ -112,7 +113,7 @@ class Tracer:
             self._finish(back)
             return
         first = branch.points[0]
-        branch.special.append(SpecialPoint.given(END, first))
+        branch.special.append(self.solver.given(END, first))
         branch.special[-1].note = f"begins here: {back.ended}"
         branch.renumber()
         self.trace(branch)
@@ -233,7 +234,7 @@ class Tracer:
                     if slope:
                         s = min(max(s + (load - self.solver.system.scalar(x)) / slope, p.arclength), q.arclength)
                 point = self._user_between(a, b, load, (p, q), s)
-                found.append(SpecialPoint.given(USER, point))
+                found.append(self.solver.given(USER, point))
         return found
 
     def _first_users(self, branch: Branch) -> None:
@@ -306,7 +307,14 @@ class Tracer:
         last = self.solver.point(x, s, self.solver.tangent(row, at=x))
         if self._between(branch, a, last):
             return
-        special = SpecialPoint(END, last, last.negative, last.negative, LOCATED, test_function="stretch")
+        special = SpecialPoint(
+            END,
+            last,
+            last.negative,
+            last.negative,
+            LOCATED * self.solver.units.load,
+            test_function="stretch",
+        )
         if self.plan.error_bars:
             try:
                 with self.solver.system.clock.scope("error bars"):
@@ -362,7 +370,11 @@ class Tracer:
         first = branch.points[1]
         if max(abs(a.slope), abs(b.slope)) < VERTICAL * (self.high - self.low):  # equal loads: compare the states
             return distance(self.solver.system, b.x, self.here(branch.points[0]).x) < b.arclength - a.arclength
-        if (a.load - first.load) * (b.load - first.load) > 0 or not near(first, a, 4) or a.slope * first.slope <= 0:
+        if (
+            (a.load - first.load) * (b.load - first.load) > 0
+            or not near(first, a, self.solver.units, 4)
+            or a.slope * first.slope <= 0
+        ):
             return False
         s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
         guess = hermite(a, b, s)[0]
@@ -374,7 +386,7 @@ class Tracer:
     def alike(self, a: Point, b: Point, tolerance: float) -> bool:
         """Whether two points are equivalent, up to what the accuracy leaves open where they are on two meshes."""
         across = 0.0 if a.mesh == b.mesh or self.meshes.accuracy is None else 30 * self.meshes.accuracy
-        return equivalent(a, b, max(tolerance, across), across**0.5)
+        return equivalent(a, b, self.solver.units, max(tolerance, across), across**0.5)
 
     def _check_symmetry(self, point: Point) -> None:
         for notice in self.solver.notices():
@@ -430,7 +442,7 @@ class Tracer:
             self._singular_end(branch, last)
             last = branch.points[-1]
         if not any(s.point is last for s in branch.special):
-            branch.special.append(SpecialPoint.given(END, last))
+            branch.special.append(self.solver.given(END, last))
             branch.renumber()
         if self.plan.error_bars or self.plan.accuracy:
             self._error_bars(branch)
@@ -449,15 +461,19 @@ class Tracer:
                 self.control.label(special)
 
 
-def equivalent(a: Point, b: Point, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:
+def equivalent(a: Point, b: Point, units: Units, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:
     """Whether two points agree in all that a symmetry leaves alone: load, energy and stretch.
 
-    Loads and energies of ``a`` and ``b`` may differ by ``tolerance``, relative to values greater than one; so may
-    stretches, or by ``of_strain`` where that is larger.
+    Loads and energies of ``a`` and ``b`` may differ by ``tolerance``, relative to values greater than the rod's
+    ``units``; so may stretches, or by ``of_strain`` where that is larger.
     """
     strain = max(tolerance, of_strain)
-    pairs = ((a.load, b.load, tolerance), (a.energy, b.energy, tolerance), (a.stretch, b.stretch, strain))
-    return all(abs(p - q) <= allowed * unit(p, q) for p, q, allowed in pairs)
+    pairs = (
+        (a.load, b.load, tolerance, units.load),
+        (a.energy, b.energy, tolerance, units.energy),
+        (a.stretch, b.stretch, strain, 1.0),
+    )
+    return all(abs(p - q) <= allowed * unit(p, q, one=one) for p, q, allowed, one in pairs)
 
 
 def reversed_point(point: Point, total: float) -> Point:
@@ -479,7 +495,8 @@ def reversed_branch(branch: Branch) -> Branch:
     return out
 
 
-def near(a: Point, b: Point, steps: float = 2.0) -> bool:
-    """Whether two points could be neighbours on one branch, seen through load and energy."""
+def near(a: Point, b: Point, units: Units, steps: float = 2.0) -> bool:
+    """Whether points ``a``, ``b`` of a rod with these ``units`` could be neighbours, ``steps`` apart, on one branch."""
     reach = 0.05 * steps
-    return abs(a.load - b.load) <= reach * unit(a.load) and abs(a.energy - b.energy) <= reach * unit(a.energy)
+    close = abs(a.load - b.load) <= reach * unit(a.load, one=units.load)
+    return close and abs(a.energy - b.energy) <= reach * unit(a.energy, one=units.energy)

@@ -190,8 +190,10 @@ def generic_state(equations: Equations, seed: int, decay: float = DECAY) -> Eval
     scene, named = fields.scene, dict[str, Any]()
     for block in fields.blocks:
         x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
-        named[block.name] = _generic(fields, block, x[..., None], rng, decay)
-    named |= {unknown.name: rng.normal() for unknown in fields.unknown_scalars}
+        size = scene.units.force if block.multiplier else scene.units.length if block.name == "r" else 1.0
+        named[block.name] = size * _generic(fields, block, x[..., None], rng, decay)
+    for unknown in fields.unknown_scalars:
+        named[unknown.name] = rng.normal() * (scene.units.force if unknown.multiplier else scene.units.length)
     low, high = sorted(scene.span)
     named[LOAD] = low + (high - low) * rng.uniform(0.1, 0.9)
     return Evaluation(equations, fields.filled(named), equations.line)

@@ -274,6 +274,32 @@ class System:
         """Lowest bending eigenvalue of the rod relative to the metric, up to a number about one."""
         return float(np.linalg.eigvalsh(self.scene.stiffness()[-3:, -3:])[0] * np.pi**2 / self.scene.length)
 
+    @cached_property
+    def sizes(self) -> PETSc.Vec:
+        """Natural size of each unknown: rotations are of order one, the others have units."""
+        f, units = self.fields, self.scene.units
+        named = {b.name: units.force if b.multiplier else units.length if b.name == "r" else 1.0 for b in f.blocks}
+        named |= {x.name: units.force if x.multiplier else units.length for x in f.unknown_scalars}
+        return self.vector(f.filled(named | {LOAD: units.load}), [units.moment] * len(self.drifts))
+
+    def magnitude(self, matrix: PETSc.Mat) -> float:
+        """Largest row sum of a second variation, in which unknowns are in units of their natural sizes."""
+        if self.scene.units.ordinary:
+            return float(matrix.norm(PETSc.NormType.INFINITY))
+        scaled = matrix.copy()
+        scaled.diagonalScale(self.sizes, self.sizes)
+        size = float(scaled.norm(PETSc.NormType.INFINITY))
+        scaled.destroy()
+        return size
+
+    def in_units(self, vector: PETSc.Vec, power: int) -> PETSc.Vec:
+        """Vector times a power of the natural sizes: 1 for equations, -1 for a change of state."""
+        if self.scene.units.ordinary:
+            return vector
+        out = vector.copy()
+        (out.pointwiseMult if power > 0 else out.pointwiseDivide)(vector, self.sizes)
+        return out
+
     def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> bool:
         """Solve with the last factors; False where the matrix was found singular."""
         with self.clock("solve"):

@@ -80,7 +80,7 @@ class Verification:
         candidates = [i for i in range(len(self.system.symmetries)) if i not in self.dropped]
         if not candidates:
             return []
-        self._norm = self._norm or matrix.norm(PETSc.NormType.INFINITY)
+        self._norm = self._norm or self.system.magnitude(matrix)
         generators = self.system.generators.at(state)
 
         def holds(chosen: list[int]) -> bool:
@@ -121,7 +121,7 @@ class Verification:
         if system.has_scalars:
             left.setValues(system.drifts, self._none)  # phase conditions, no part of S
         left.assemble()
-        size, length = system.norm(g) ** 2, g.norm()
+        size, length = system.norm(g) ** 2, system.in_units(g, -1).norm()
         zero = ZERO * system.stiffness_scale * max(size, TINY) + EPS * self._norm * length**2
         quotient = float(np.real(left.dot(g)))
         if system.symmetries[chosen[0]].along:
@@ -131,6 +131,7 @@ class Verification:
             pulled = system.generators.pulled_back(self._unloaded(state, equations))
             left.axpy(1.0, system.generators.vector(weights @ pulled[chosen]))
             quotient = float(np.real(left.dot(g)))
+        left = system.in_units(left, 1)
         if left.norm() > small:
             self._across_closing(matrix, left)
         return left.norm() <= small and abs(quotient) <= zero
@@ -168,6 +169,7 @@ class Verification:
                 if unknown.group.motion is Motion.CLOSING:
                     column = self.system.new_vector()
                     matrix.getColumnVector(fields.scalars[unknown.name], column)
+                    column = self.system.in_units(column, 1)
                     column.normalize()
                     self._closing.append(column)
         for column in self._closing:

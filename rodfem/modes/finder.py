@@ -146,7 +146,10 @@ class ModeFinder:
         if not outcome.converged:
             return np.full(len(values), np.inf)
         others = assessor(y, number=2 * len(values) + 2 if np.iscomplexobj(values) else len(values)).values
-        rho, left = halved(self.system.fields.discretization.degree), FLOOR * max(1.0, float(abs(values).max()))
+        rho, left = (
+            halved(self.system.fields.discretization.degree),
+            FLOOR * max(self.system.scene.units.moment, float(abs(values).max())),
+        )
         if np.iscomplexobj(values):
             others = np.array([others[np.argmin(abs(others - v))] for v in values])
         return np.array([bound(v, other, left, rho) for v, other in zip(values, others, strict=True)])

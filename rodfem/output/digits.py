@@ -7,6 +7,8 @@ from math import ceil, floor, isfinite, log10
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.tolerances import NEGLIGIBLE
 
+FINEST, LARGEST = 9e-15, 1e12
+"""Least error, and greatest number, that are written without an exponent."""
 WHOLE = 1e-9
 """Round-off of the logarithm of a power of ten."""
 
@@ -28,9 +30,20 @@ def number(value: float, error: float, resolved: bool | None = True) -> str:
     if not isfinite(error):
         return f"{value:.8g} (no estimate)"
     digits = min(max(-floor(log10(rounded_up(error)) + WHOLE), 0), 13) if error > 0 else 13
-    shown = round(value, digits) + 0.0
     least = "at least " if resolved is False else ""
-    return f"{shown:.{digits}f} ({least}{rounded_up(error + abs(value - shown)):.0e})"
+    if (error > 0 and error < FINEST) or abs(value) >= LARGEST:  # of a rod whose units are far from its own size
+        significant = floor(log10(abs(value))) - floor(log10(error)) if abs(value) > error > 0 else 0
+        text = f"{value:.{min(max(significant, 0), 13)}e}" if abs(value) > error else "0"
+    else:
+        text = f"{round(value, digits) + 0.0:.{digits}f}"
+    return f"{text} ({least}{rounded_up(error + abs(value - float(text))):.0e})"
+
+
+def in_decimals(value: float, decimals: int, one: float) -> str:
+    """Write a number with some decimals, or, where its natural size ``one`` is far from one, as many digits."""
+    if one == 1.0:
+        return f"{round(value, decimals) + 0.0:.{decimals}f}"
+    return "0" if abs(value) < 10.0**-decimals * one else f"{value:.{max(decimals - 4, 3)}e}"
 
 
 def in_words(special: SpecialPoint) -> tuple[str, str, str]:

@@ -24,6 +24,7 @@ from rodfem.problem.contribution import Contribution
 from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
 from rodfem.problem.local_state import Constants, watched
 from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
+from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import check_kinds, check_scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
 
@@ -309,6 +310,11 @@ class Scene(Contribution):
             if any(abs(b - a) > NEGLIGIBLE * max(abs(a), abs(b)) for a, *others in pairs for b in others):
                 found.append(i)
         return tuple(found)
+
+    @cached_property
+    def units(self) -> Units:
+        """Natural sizes of the rod's numbers."""
+        return units_of(self)
 
     @property
     def free_strains(self) -> tuple[int, ...]:

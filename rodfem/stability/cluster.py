@@ -23,7 +23,7 @@ from rodfem.stability.nonsymmetric import REAL, Frequencies, NonsymmetricPencil
 from rodfem.tolerances import TINY
 
 BESIDE = 1e-3
-"""Distance from zero at which eigenvalues near zero are looked for: the matrix is singular there."""
+"""Distance from zero, over their natural size, where those near it are sought: the matrix is singular there."""
 LEAST = 0.25
 """Share of a vector in an invariant subspace below which the vector does not belong to it."""
 
@@ -63,8 +63,9 @@ def cluster_of(pencil: NonsymmetricPencil, found: Frequencies, chosen: list[int]
 def measure(pencil: NonsymmetricPencil, cluster: Cluster) -> Measured:
     """Find at a state a cluster known from a state nearby; raises :class:`ConvergenceError`."""
     basis, size = _real_span(pencil, cluster.basis), cluster.size
+    beside = BESIDE * pencil.system.scene.units.omega2
     for number in (size + 2, 3 * size + 10):
-        found = pencil.near(number, 0.97 * cluster.mean if abs(cluster.mean) > BESIDE else -BESIDE)
+        found = pencil.near(number, 0.97 * cluster.mean if abs(cluster.mean) > beside else -beside)
         weighed = pencil.weighed(found.vectors)
         inside = pencil.product(basis, weighed)
         energy = pencil.squares(found.vectors, weighed)

@@ -144,10 +144,11 @@ class Inertia:
     def _settle_band(self) -> None:
         system = self.system
         if not self.resolution:  # the band of round-off, eps |S| / m, for the smallest weight m of the metric
-            weights = self.metric.getDiagonal().array_r  # not the load's, which has the units of the span
-            mass = weights[weights > 0]
+            weights = self.metric.getDiagonal()  # not the load's, which has the units of the span
+            weights.pointwiseMult(weights, system.sizes * system.sizes)
+            mass = weights.array_r[weights.array_r > 0]
             smallest = system.comm.allreduce(float(mass.min()) if len(mass) else np.inf, op=MPI.MIN)
-            self.resolution = 10 * EPS * self.matrix.norm(PETSc.NormType.INFINITY) / smallest
+            self.resolution = 10 * EPS * system.magnitude(self.matrix) / smallest
             self.tolerance = max(self.tolerance, self.resolution)
 
     def modes_near_zero(self, x: PETSc.Vec, number: int, accuracy: float = NULL) -> list[PETSc.Vec]:

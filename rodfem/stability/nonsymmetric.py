@@ -20,7 +20,7 @@ A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -76,18 +76,19 @@ class Frequencies:
     """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and backward ``errors`` (k,).
 
     ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors`` (n, k) are complex, with the
-    n unknowns of this rank.
+    n unknowns of this rank.  ``one`` is their natural size.
     """
 
     values: np.ndarray
     errors: np.ndarray
     kinds: tuple[str, ...] = ()
     vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    one: float = 1.0
 
     @property
     def noise(self) -> float:
         """Magnitude below which an eigenvalue counts as zero."""
-        return REAL * max(1.0, float(abs(self.values).min(initial=np.inf)))
+        return REAL * max(self.one, float(abs(self.values).min(initial=np.inf)))
 
     def diverged(self) -> int:
         """Number of negative real eigenvalues."""
@@ -148,12 +149,13 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
-        transposed = self.matrix.copy()
+        matrix, _ = self.in_units()
+        transposed = matrix.copy()
         transposed.transpose()
-        transposed.axpy(-1.0, self.matrix, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        transposed.axpy(-1.0, matrix, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         begin, end = transposed.getOwnershipRange()
         rows = [(i, *transposed.getRow(i)) for i in range(begin, end)]
-        size = self.matrix.norm(PETSc.NormType.INFINITY)
+        size = matrix.norm(PETSc.NormType.INFINITY)
         mine = [
             (i, j, v)
             for i, columns, values in rows
@@ -187,8 +189,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
 
     def _whole(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """The pencil; of a rod that is not long all of it on each rank, which solves alone."""
-        pencil = self.matrix, self.mass
-        comm = self.system.comm
+        pencil, comm = self.in_units(), self.system.comm
         if comm.size == 1 or is_spread(comm, self.matrix.getSize()[0]):
             return pencil
         self._own = slice(*self.matrix.getOwnershipRange())
@@ -196,6 +197,8 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         return whole, mass
 
     def _near(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> Frequencies:
+        units, sizes = self.system.scene.units, self.system.sizes.array_r.real
+        target /= units.omega2
         with self.system.clock("stability"):
             if matrix.getSize()[0] < DENSE * (2 * number + 20):
                 found = self._dense(matrix, mass)
@@ -206,15 +209,19 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             found = sorted(found, key=lambda p: abs(p.value - target))[: number + SPARE]
             third = abs(found[min(2, len(found) - 1)].value - target)
             found = [p for p in found if abs(p.value - target) <= FAR * third]
+            if not units.ordinary:
+                found = [replace(p, value=p.value * units.omega2, parts=[x * sizes for x in p.parts]) for p in found]
             for pair in found:
                 self._complete(pair)
             kinds = self._kinds(found)
-        order = sorted(range(len(found)), key=lambda i: (round(found[i].value.real, 9), found[i].value.imag))
+        one = units.omega2
+        order = sorted(range(len(found)), key=lambda i: (round(found[i].value.real / one, 9), found[i].value.imag))
         return Frequencies(
             np.array([found[i].value for i in order]),
             np.array([found[i].error for i in order]),
             tuple(kinds[i] for i in order),
             np.stack([found[i].vector for i in order], 1),
+            one,
         )
 
     def _kinds(self, found: list[_Pair]) -> list[str]:

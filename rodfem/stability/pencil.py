@@ -74,6 +74,20 @@ class StatePencil(Generic[Matrices]):
         """Kinetic metric ``M``."""
         return self._held().mass
 
+    def in_units(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """The pencil for unknowns and eigenvalues in units of their natural sizes.
+
+        Round-off makes finite eigenvalues of the infinite ones, among the others where multipliers have large units.
+        """
+        units, sizes = self.system.scene.units, self.system.sizes
+        if units.ordinary:
+            return self.matrix, self.mass
+        scaled = self.matrix.copy(), self.mass.copy()
+        for matrix, size in zip(scaled, (units.energy, units.energy / units.omega2), strict=True):
+            matrix.diagonalScale(sizes, sizes)
+            matrix.scale(1.0 / size)
+        return scaled
+
 
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> State:
     """Assemble tangent matrix and kinetic metric at the state ``x``, without the symmetries' phase conditions.

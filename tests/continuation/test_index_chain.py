@@ -328,7 +328,7 @@ def test_mirror_images_are_compared_at_one_load() -> None:
     first = leave(solver, special, way, 0.05)
     way.scale(-1.0)
     image = leave(solver, special, way, 0.05 * (1 + 1e-4))
-    assert not equivalent(first, image)
+    assert not equivalent(first, image, solver.units)
     assert explorer._mirrored(special, first, image) and explorer._mirrored(special, image, first)
     assert not explorer._mirrored(special, replace(first, energy=1.001 * first.energy), image)
 

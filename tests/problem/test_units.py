@@ -7,9 +7,12 @@ import pytest
 
 import rodfem
 from forms.energy import bending_and_twist
-from rodfem import Discretization, Ordinate, Plan, Scene, clamped, free
+from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free
+from rodfem.output import digits
 from rodfem.problem.local_state import Constants
 
+DNA, PIPELINE = (1e-8, 2e-28, 1e-15), (1e4, 1e9, 1e3)
+"""Lengths, stiffnesses and masses per length in SI units."""
 MESH = Discretization(elements=4, degree=5)
 
 
@@ -38,8 +41,8 @@ def column(length: float, stiffness: float, rod: str) -> Scene:
 @pytest.mark.parametrize("rod", ["unshearable and inextensible", "flexible"])
 @pytest.mark.parametrize(
     ("length", "stiffness"),
-    [(1.0, 1e6), (1e-3, 1.0), (1e4, 1e9), (1e-4, 1e-8), (1.0, 1e-9)],
-    ids=["steel bar", "wire, m", "pipeline, SI", "fibre, SI", "thread"],
+    [(1.0, 1e6), (1e-3, 1.0), (1e4, 1e9), (1e-4, 1e-8), (1e-8, 2e-28)],
+    ids=["steel bar", "wire", "pipeline", "fibre", "DNA"],
 )
 def test_dimensionless_diagram(length: float, stiffness: float, rod: str) -> None:
     """Loads, ordinates and indices of all rows in units of the rod are those of the rod of unit length and stiffness.
@@ -47,9 +50,7 @@ def test_dimensionless_diagram(length: float, stiffness: float, rod: str) -> Non
     Of a column whose loads are of order 1e6 no buckling was found: the weight of the load in the metric, one over the
     square of the span, was taken for the smallest mass of a perturbation.
     """
-    one, other = (
-        rodfem.trace(column(*units, rod), MESH, Plan(depth=1)) for units in ((1.0, 1.0), (length, stiffness))
-    )
+    one, other = (rodfem.trace(column(*units, rod), MESH, Plan(depth=1)) for units in ((1.0, 1.0), (length, stiffness)))
     assert [[(str(s.kind), s.negative_before, s.negative_after) for s in b.special] for b in one] == [
         [(str(s.kind), s.negative_before, s.negative_after) for s in b.special] for b in other
     ]
@@ -59,3 +60,51 @@ def test_dimensionless_diagram(length: float, stiffness: float, rod: str) -> Non
         assert [p.negative for p in a.points] == [p.negative for p in b.points]
         found = np.array([(s.point.load / load, s.point.ordinate / area) for s in b.special])
         np.testing.assert_allclose(found, [(s.point.load, s.point.ordinate) for s in a.special], rtol=1e-9, atol=1e-10)
+
+
+def pushed(length: float, stiffness: float, mass: float) -> Scene:
+    """Rod under a follower load."""
+    return Scene(
+        name="pushed",
+        interval=(0.0, length),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist(k, (c.EI, 1.3 * c.EI, 0.8 * c.EI)),
+        parameters={"P": 0.0, "EI": stiffness},
+        load="P",
+        ends=(clamped(), free(follower=lambda c: (0.0, 0.0, -c.P))),
+        inertia=Inertia(rho_A=lambda c: mass, rho_I=lambda c: (0.0, 0.0, 0.0)),
+        ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]),
+        span=(0.0, 24 * stiffness / length**2),
+    )
+
+
+@pytest.mark.parametrize("units", [DNA, PIPELINE], ids=["DNA", "pipeline"])
+def test_flutter(units: tuple[float, float, float]) -> None:
+    """Beck's load 20.0509536 EI / L^2 and the frequencies of a cantilever: roots of 1 + cos x cosh x, to the fourth."""
+    length, stiffness, mass = units
+    diagram = rodfem.trace(pushed(*units), Discretization(elements=4, degree=6), Plan(error_bars=False))
+    (flutter,) = diagram.special("flutter")
+    assert flutter.point.load * length**2 / stiffness == pytest.approx(20.05095361897, rel=1e-9)
+    omega2 = np.array(diagram["straight"].points[0].omega2)[[0, 2], 0] * mass * length**4 / stiffness
+    np.testing.assert_allclose(omega2, np.array([1.875104068711961, 4.694091132974174]) ** 4, rtol=1e-7)
+    assert [p.negative for p in diagram["straight"].points if p.load < flutter.point.load][-1] == 0
+
+
+@pytest.mark.parametrize("method", ["shift-invert", "cayley", "slicing", "dense", "reduction"])
+def test_methods(method: str) -> None:
+    """Eigenvalues of a flexible rod by each method, in the kinetic metric of unit rotary inertia."""
+    values = []
+    for length, stiffness in ((1.0, 1.0), DNA[:2]):
+        solver = rodfem.Solver(column(length, stiffness, "flexible"), MESH)
+        verdict = solver.assess(solver.equilibrium(5.0 * stiffness / length**2), method)
+        assert verdict.negative == 2
+        values.append(np.array(verdict.values) * length**2 / stiffness)
+    np.testing.assert_allclose(values[1], values[0], rtol=1e-8)
+
+
+def test_numbers_in_words() -> None:
+    """A load of 1e-11 is written with its digits, by the terminal and in tables."""
+    assert digits.number(7.89568359e-11, 8e-19) == "7.89568359e-11 (8e-19)"
+    assert digits.number(0.3216500866, 3e-7) == "0.3216501 (4e-07)"
+    assert digits.in_decimals(1.026438867e-10, 10, 1e-10) == "1.026439e-10"
+    assert digits.in_decimals(1.0, 3, 1.0) == "1.000"

@@ -30,7 +30,8 @@ class Slicing(SymmetricMethod):
 
         Raises :class:`InputError` for an empty interval, :class:`ConvergenceError` where an end is an eigenvalue.
         """
-        pencil = self.work.below(x)
+        pencil, units = self.work.below(x), self.work.system.scene.units
+        matrix, mass = pencil.in_units()
         low, high = interval or enclose(pencil, number)
         if not low < high:
             raise InputError(f"An interval from {low:g} to {high:g} is empty: give its lower end first.")
@@ -38,7 +39,7 @@ class Slicing(SymmetricMethod):
             low, high = low - wider * (high - low), high + wider * (high - low)
             wanted = pencil.below(high) - pencil.below(low)
             try:
-                solver = in_interval(pencil.matrix, pencil.mass, low, high)
+                solver = in_interval(matrix, mass, low / units.omega2, high / units.omega2)
                 solver.solve()
             except PETSc.Error as trouble:
                 if trouble.ierr != PETSC_ERR_PLIB:
@@ -47,12 +48,13 @@ class Slicing(SymmetricMethod):
                 break
         else:
             raise ConvergenceError(f"An end of the interval from {low:.6g} to {high:.6g} is an eigenvalue: move it.")
-        values = np.array([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
+        values = units.omega2 * np.array([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
         complete = len(values) == wanted
         order = np.argsort(values)[: None if interval else number]
         vectors = [self.work.system.new_vector() for _ in order]
         for i, vector in zip(order, vectors, strict=True):
             solver.getEigenvector(int(i), vector)
+            vector.pointwiseMult(vector, self.work.system.sizes)
         solver.destroy()
         values = values[order]
         return Found(values, vectors, pencil.backward_errors(values, vectors), complete, FACTORISATIONS)

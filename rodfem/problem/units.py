@@ -1,0 +1,88 @@
+"""Natural sizes of a rod's numbers in the units in which its scene is stated.
+
+What is small is small beside them.  A scene whose numbers are of order one has the size one for each, and so has one
+that is not far from it: results do not depend on where a rod's length is between a tenth and ten.  Stated in metres and
+newtons the load of a DNA molecule is 1e-12, the stiffness of a steel bar 1e6: then the sizes are the rod's own.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import ufl
+
+from rodfem.errors import SceneError
+from rodfem.problem.local_state import some_places
+
+if TYPE_CHECKING:
+    from rodfem.problem.scene import Scene
+
+ORDINARY = 1e3
+"""Sizes between this and its inverse count as one."""
+SOME_ROTATIONS = ((0.5, 0.1, 0.7, 0.5), (0.7, -0.1, 0.1, 0.7), (1.0, 0.0, 0.0, 0.0))
+SOME_PLACES = ((0.2, 0.3, 0.4), (-0.2, 0.1, 0.9), (0.0, 0.0, 0.5))
+"""Rotations and places, in units of the rod's length, at which an ordinate shows its size."""
+
+
+class Units(NamedTuple):
+    """Natural sizes.
+
+    Attributes
+    ----------
+    length, force, moment, energy
+        Of the rod: its length and stiffness.
+    load, ordinate
+        Of the numbers that are recorded.
+    omega2
+        Of eigenvalues of the motion.
+    """
+
+    length: float
+    force: float
+    moment: float
+    energy: float
+    load: float
+    ordinate: float
+    omega2: float
+
+    @property
+    def ordinary(self) -> bool:
+        """Whether all of them are one."""
+        return all(x == 1.0 for x in self)
+
+
+ONES = Units(*[1.0] * len(Units._fields))
+"""Those of a scene in numbers of order one."""
+
+
+def units_of(scene: Scene) -> Units:
+    """Natural sizes of a scene: by its length, its lowest bending stiffness, its mass and its range of loads."""
+    length, stiffness = scene.length, float(np.linalg.eigvalsh(scene.stiffness()[-3:, -3:])[0])
+    c = scene.constants()
+    mass = max(float(scene.inertia.rho_A(c)), *(float(x) / length**2 for x in scene.inertia.rho_I(c)))
+    sizes = length, stiffness / length**2, stiffness / length, stiffness / length, max(map(abs, scene.span))
+    ordinary = all(size(x) == 1.0 for x in sizes)
+    ordinate = 1.0 if ordinary else _of_ordinate(scene)
+    omega2 = stiffness / (mass * length**4) if mass > 0 else 1.0
+    return Units(*map(size, (*sizes, ordinate, omega2)))
+
+
+def size(value: float) -> float:
+    """Natural size of numbers like ``value``: one, unless that is far from it."""
+    return 1.0 if not isfinite(value) or 1.0 / ORDINARY <= value <= ORDINARY or value == 0 else float(value)
+
+
+def _of_ordinate(scene: Scene) -> float:
+    """Largest size of the ordinate in some states; one where that cannot be told."""
+    try:
+        if scene.ordinate.places:
+            pairs = zip(SOME_PLACES, SOME_ROTATIONS, strict=True)
+            values = [scene.ordinate.of(np.array(r) * scene.length, np.array(q)) for r, q in pairs]
+        else:
+            integrand = ufl.as_ufl(scene.ordinate.of(some_places(scene)[1], scene.constants()))
+            values = [float(integrand(())) * scene.length]
+    except SceneError:  # of the person's own function, at a state where it need not be defined
+        return 1.0
+    return max((abs(x) for x in values if isfinite(x)), default=1.0)
