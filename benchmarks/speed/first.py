@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import subprocess
 import sys
 import tempfile
@@ -13,6 +14,8 @@ from typing import Any
 from benchmarks.common import MPIRUN, ROOT, environment
 
 HEAVY = ("numpy", "scipy.sparse", "mpi4py.MPI", "petsc4py.PETSc", "slepc4py.SLEPc")
+PROCESSES = {"hemitropic": 1.2, "cord": 1.2, "ruler": 1.2, "ring": 1.8}
+"""Demos, and the seconds that are aimed at."""
 IMPORTS = (*HEAVY, "forms", "rodfem.compat", "h5py", "rodfem.app.run")
 """Modules imported one after the other to see what each adds."""
 
@@ -67,6 +70,22 @@ def first_minute(runs: int) -> dict[str, Any]:
         "imports": {name: median(a[name] for a in added) for name in added[0]},
         "runs": runs,
     }
+
+
+def processes(runs: int) -> list[dict[str, Any]]:
+    """Processor time of whole demos without figures, with warm caches; medians."""
+    out = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, goal in PROCESSES.items():
+            command = [sys.executable, f"demos/{name}.py", "--no-figures", "--output", folder]
+            seconds = []
+            for _ in range(runs + 1):
+                before = resource.getrusage(resource.RUSAGE_CHILDREN)
+                subprocess.run(command, check=True, cwd=ROOT, env=environment(), capture_output=True, timeout=600)
+                after = resource.getrusage(resource.RUSAGE_CHILDREN)
+                seconds.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+            out.append({"demo": name, "goal": goal, "seconds": median(seconds[1:])})
+    return out
 
 
 def map_of_rods(couplings: int, ranks: int) -> dict[str, float]:

@@ -101,6 +101,13 @@ def many(store: Store) -> str:
     return table(["ranks", "rods", "s", "taken up again, s", "difference, s", "speed-up", "of the difference"], out)
 
 
+def whole(rows: list[Row]) -> str:
+    """Processor time of whole processes beside their goals."""
+    verdicts = [(r, "met" if r["seconds"] <= r["goal"] else "missed") for r in rows]
+    cells = [[r["demo"], f"{r['goal']:g}", digits(r["seconds"]), verdict] for r, verdict in verdicts]
+    return table(["demo", "goal, s", "s", ""], cells)
+
+
 def minute(data: Row) -> str:
     """First special point, cold and warm, and imports."""
     rows = [[name, digits(data[name]["first"]), digits(data[name]["end"])] for name in ("cold", "warm")]
@@ -144,7 +151,7 @@ def write(store: Store, path: Path, figures: dict[str, str]) -> None:
         lines += [_figure(figures, "special", "Error of special points against time")]
         lines += ["## The paper's discretisation", words.PAPER, tables.paper(store)]
     if store.rows("auto") and store.rows("branches"):
-        lines += ["## Goals", words.GOALS, tables.goals(store)]
+        lines += ["## Goals", words.GOALS, tables.goals(store), words.SWEEPS, tables.sweeps(store)]
         lines += ["## Beside AUTO-07p", words.AUTO, tables.beside_auto(store)]
     if store.rows("bvp"):
         lines += ["## Beside scipy", words.SCIPY, tables.beside_scipy(store)]
@@ -158,6 +165,8 @@ def write(store: Store, path: Path, figures: dict[str, str]) -> None:
         lines += ["### Ranks", words.RANKS, scaling(store), faster(store)]
     if store.rows("map"):
         lines += ["## Many rods", words.MANY, many(store)]
+    if demos := store.rows("processes"):
+        lines += ["## Whole processes", words.PROCESSES, whole(demos)]
     for data in store.rows("first"):
         lines += ["## First minute", words.MINUTE, minute(data)]
     if store.rows("branches"):

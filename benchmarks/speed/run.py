@@ -14,7 +14,7 @@ from benchmarks.auto.output import AutoError
 from benchmarks.auto.settings import ACCURACIES, at_accuracy
 from benchmarks.common import measured
 from benchmarks.references import deviation
-from benchmarks.speed.first import first_minute, map_of_rods
+from benchmarks.speed.first import first_minute, map_of_rods, processes
 from benchmarks.store import Store
 from benchmarks.targets import TARGETS
 
@@ -127,6 +127,7 @@ def everything(store: Store, size: Size) -> None:
             arguments = ("--each", "buckled", "reduced", n // cores)
             store.measure(f"scaling/each/{n}/{ranks}", partial(_run, "growth", arguments, ranks))
     store.measure("first", partial(_if_it_runs, partial(first_minute, size.runs)))
+    store.measure("processes", partial(processes, size.runs))
     for ranks in range(1, cores + 1):
         store.measure(f"map/{ranks}", partial(_if_it_runs, partial(map_of_rods, size.couplings, ranks)))
 

@@ -22,8 +22,8 @@ of the branch (and whose finer ones of the same degree are, too). The ratio is h
 """
 GOALS = """
 Time per accepted point over AUTO's, full rod against full rod, on one core: of following alone (rodfem with its index,
-AUTO has none), and with special points and all else included. The goals are a ratio of 1 at an error of 1e-6 and of 0.5
-at 1e-8. The reason is where rodfem's time goes.
+AUTO has none), and with special points and all else included; and over AUTO's half rod, of which it makes use of the
+symmetry, against the full rod here. The reason is where rodfem's time goes.
 """
 AUTO = """
 For each error the fastest discretisation of either: AUTO's NTST x NCOL found by a sweep (`benchmarks/auto`), rodfem's
@@ -53,5 +53,12 @@ no program for several ranks has it back.
 """
 MANY = """
 `demos/map.py` with fewer rods, wall time. Taken up again, when all is finished, it only starts, reads and draws.
+"""
+SWEEPS = """
+Of a sweep of frequencies, time per load, six or more of them at each.
+"""
+PROCESSES = """
+Processor time (user and system) of whole processes, `python demos/... --no-figures`, warm, error bars and files
+included; medians.
 """
 MINUTE = "`python demos/hemitropic.py --no-figures`, wall time. Cold is with an empty cache of compiled forms."
