@@ -85,7 +85,10 @@ def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> f
     matrix = system.at(x).jacobian(solver.axis)
     derivative = matrix * solver.axis
     system.set_load(derivative, 0.0)
-    if derivative.norm() < INSENSITIVE * matrix.norm():  # a trivial state: its equations do not feel the load
+    derivative, null_vector = system.in_units(derivative, 1), system.in_units(null_vector, -1)
+    if (
+        derivative.norm() < INSENSITIVE * system.matrix_in_units(matrix).norm()
+    ):  # a trivial state: its equations do not feel the load
         return 0.0
     return float(abs(derivative.dot(null_vector)) / (derivative.norm() * null_vector.norm()))
 

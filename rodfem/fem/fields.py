@@ -269,6 +269,16 @@ class Fields:
             out[copies] = named.get(name, 0.0)
         return np.where(self.number < 0, self.clamps, out)
 
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """Natural size of each local value: rotations are of order one, the others have units."""
+        units, out = self.scene.units, np.ones(len(self.number))
+        for block in self.blocks:
+            out[self.dofs[block.name]] = units.of_field(block)
+        for size, copies in zip([*map(units.of_scalar, self.unknown_scalars), units.load], self.copies.T, strict=True):
+            out[copies] = size
+        return out
+
     def scattered(self, local: np.ndarray) -> np.ndarray:
         """Local values with those of ghosts from the ranks that own them."""
         if self.comm.size == 1:

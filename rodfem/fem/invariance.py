@@ -62,6 +62,7 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
         rows.append(row)
         sizes.append(size)
         # conditions on the weights a of a symmetry: invariance, and no motion of what an end holds
+        changes /= fields.sizes  # conditions and motions are beside others in other units
         held.append(changes[:, _held(fields)].T)
         free = changes[:, fields.number >= 0]
         moved += fields.comm.allreduce(free @ free.T, op=MPI.SUM)
@@ -70,7 +71,7 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
     asked_at = np.flatnonzero(greatest <= WILD * greatest.min())
     # the null space is relative to the magnitudes of the terms that cancel in each combination
     terms = abs(free.T) @ np.max([sizes[i] for i in asked_at], axis=0)
-    terms = np.where(terms > 0, terms, 1.0)
+    terms = np.where(terms > 0, terms, terms.max(initial=0.0) or 1.0)
     null = free @ (_null_space(np.vstack([rows[i] for i in asked_at]) @ free / terms) / terms[:, None])
     if null.shape[1] == 0:
         return []
@@ -100,7 +101,7 @@ def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
         changes = np.array([*(s.change(state) for s in single), derivative(state)])
         row, terms = _change_of_functional(state, single, changes)
         rows.append(row[0] / terms.max())
-        held.append(changes[:-1, _held(fields)].T)
+        held.append((changes[:-1] / fields.sizes)[:, _held(fields)].T)
     free = _null_space(np.vstack(held))
     exact, along = np.array(rows)[:, :-1] @ free, np.array(rows)[:, -1]
     # dL[derivative] + sum_j a_j dL[g_j] = 0 at all states, for one a: least squares, and its residual decides
@@ -190,10 +191,8 @@ def generic_state(equations: Equations, seed: int, decay: float = DECAY) -> Eval
     scene, named = fields.scene, dict[str, Any]()
     for block in fields.blocks:
         x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
-        size = scene.units.force if block.multiplier else scene.units.length if block.name == "r" else 1.0
-        named[block.name] = size * _generic(fields, block, x[..., None], rng, decay)
-    for unknown in fields.unknown_scalars:
-        named[unknown.name] = rng.normal() * (scene.units.force if unknown.multiplier else scene.units.length)
+        named[block.name] = scene.units.of_field(block) * _generic(fields, block, x[..., None], rng, decay)
+    named |= {unknown.name: rng.normal() * scene.units.of_scalar(unknown) for unknown in fields.unknown_scalars}
     low, high = sorted(scene.span)
     named[LOAD] = low + (high - low) * rng.uniform(0.1, 0.9)
     return Evaluation(equations, fields.filled(named), equations.line)

@@ -276,21 +276,17 @@ class System:
 
     @cached_property
     def sizes(self) -> PETSc.Vec:
-        """Natural size of each unknown: rotations are of order one, the others have units."""
-        f, units = self.fields, self.scene.units
-        named = {b.name: units.force if b.multiplier else units.length if b.name == "r" else 1.0 for b in f.blocks}
-        named |= {x.name: units.force if x.multiplier else units.length for x in f.unknown_scalars}
-        return self.vector(f.filled(named | {LOAD: units.load}), [units.moment] * len(self.drifts))
+        """Natural size of each unknown."""
+        return self.vector(self.fields.sizes, [self.scene.units.moment] * len(self.drifts))
 
-    def magnitude(self, matrix: PETSc.Mat) -> float:
-        """Largest row sum of a second variation, in which unknowns are in units of their natural sizes."""
+    def matrix_in_units(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Second variation at fixed load for unknowns in units of their natural sizes."""
         if self.scene.units.ordinary:
-            return float(matrix.norm(PETSc.NormType.INFINITY))
-        scaled = matrix.copy()
-        scaled.diagonalScale(self.sizes, self.sizes)
-        size = float(scaled.norm(PETSc.NormType.INFINITY))
-        scaled.destroy()
-        return size
+            return matrix
+        scaled, sizes = matrix.copy(), self.sizes.copy()
+        self.set_load(sizes, 0.0)  # its row is that of a unit matrix, without units
+        scaled.diagonalScale(sizes, sizes)
+        return scaled
 
     def in_units(self, vector: PETSc.Vec, power: int) -> PETSc.Vec:
         """Vector times a power of the natural sizes: 1 for equations, -1 for a change of state."""

@@ -80,7 +80,7 @@ class Verification:
         candidates = [i for i in range(len(self.system.symmetries)) if i not in self.dropped]
         if not candidates:
             return []
-        self._norm = self._norm or self.system.magnitude(matrix)
+        self._norm = self._norm or self.system.matrix_in_units(matrix).norm(PETSc.NormType.INFINITY)
         generators = self.system.generators.at(state)
 
         def holds(chosen: list[int]) -> bool:

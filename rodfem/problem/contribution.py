@@ -49,6 +49,8 @@ class Group:
         What rigid motions do to them.
     known
         ``known(c)``, values (3,) of the components of a vector that are no unknowns, None elsewhere.
+    moment
+        Whether a multiplier is a moment, not a force.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Group:
     equation: str
     motion: Motion
     known: Callable[[Constants], Sequence[Any]] | None = field(default=None, compare=False)
+    moment: bool = False
 
 
 @dataclass(frozen=True)

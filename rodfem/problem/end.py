@@ -130,7 +130,7 @@ class End(Contribution):
         directions = self._stiff(normal)
         motion = Motion.MIXED if len(directions) == 2 else Motion.VECTOR
         words = f"moment at the {SIDES[number]} end"
-        group = Group(f"m{LETTERS[number]}", words, "rotation of an end, direction {}", motion)
+        group = Group(f"m{LETTERS[number]}", words, "rotation of an end, direction {}", motion, moment=True)
         return [Unknown(group, i, direction) for i, direction in enumerate(directions)]
 
     def lagrangian(self, at: Site) -> Iterator[Any]:

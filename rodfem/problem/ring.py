@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from rodfem.problem.local_state import Constants
     from rodfem.problem.scene import Scene
 
-CLOSING_MOMENT = Group("t", "closing moment", "closing of the ring's rotation, component {}", Motion.CLOSING)
+CLOSING_MOMENT = Group(
+    "t", "closing moment", "closing of the ring's rotation, component {}", Motion.CLOSING, moment=True
+)
 CLOSING_FORCE = Group("f", "closing force", "closing of the ring along e{}", Motion.CLOSING)
 
 

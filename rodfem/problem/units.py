@@ -17,6 +17,7 @@ from rodfem.errors import SceneError
 from rodfem.problem.local_state import some_places
 
 if TYPE_CHECKING:
+    from rodfem.problem.contribution import Block, Unknown
     from rodfem.problem.scene import Scene
 
 ORDINARY = 1e3
@@ -46,6 +47,16 @@ class Units(NamedTuple):
     load: float
     ordinate: float
     omega2: float
+
+    def of_field(self, block: Block) -> float:
+        """Natural size of the values of a field."""
+        return self.force if block.multiplier else self.length if block.name == "r" else 1.0
+
+    def of_scalar(self, unknown: Unknown) -> float:
+        """Natural size of a scalar unknown."""
+        if not unknown.multiplier:
+            return self.length
+        return self.moment if unknown.group.moment else self.force
 
     @property
     def ordinary(self) -> bool:

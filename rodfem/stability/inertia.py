@@ -148,7 +148,7 @@ class Inertia:
             weights.pointwiseMult(weights, system.sizes * system.sizes)
             mass = weights.array_r[weights.array_r > 0]
             smallest = system.comm.allreduce(float(mass.min()) if len(mass) else np.inf, op=MPI.MIN)
-            self.resolution = 10 * EPS * system.magnitude(self.matrix) / smallest
+            self.resolution = 10 * EPS * system.matrix_in_units(self.matrix).norm(PETSc.NormType.INFINITY) / smallest
             self.tolerance = max(self.tolerance, self.resolution)
 
     def modes_near_zero(self, x: PETSc.Vec, number: int, accuracy: float = NULL) -> list[PETSc.Vec]:

@@ -18,8 +18,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.errors import ConvergenceError
 from rodfem.stability.inertia import EPS, NULL, ZERO_BAND, Factored, Index
 
+MANY = 100
+"""Most eigenvalues in the band that are decided one by one."""
 SPARE = 2
 """Vectors more than there are eigenvalues in the band."""
 
@@ -47,6 +50,8 @@ class Decision:
 def decide(found: Factored) -> Decision:
     """Count at a state; eigenvalues within the band are decided by their Rayleigh quotients.
 
+    Raises :class:`ConvergenceError` where there are too many of those.
+
     Factorisations are those of the count alone, the last of which serves :meth:`~Factored.nearest` here and afterwards.
     """
     index, inertia = found.count(), found.inertia
@@ -55,6 +60,11 @@ def decide(found: Factored) -> Decision:
     least = ZERO_BAND * inertia.scale
     if inside == 0 or inertia.resolution <= least:
         return Decision(index, inertia.tolerance, np.zeros(0), np.zeros(0))
+    if inside > MANY:
+        raise ConvergenceError(
+            f"{inside} eigenvalues are within round-off of the count, {inertia.resolution:.2g} in the metric: the mesh "
+            "is too fine for this rod; use fewer elements of a higher degree."
+        )
     theta, vectors = found.nearest(inside + SPARE)
     nearest = np.argsort(abs(theta))[:inside]
     doubt = np.array([max(quotient_error(found.matrix, vectors[i]), least) for i in nearest])
