@@ -13,6 +13,7 @@ from typing import Any
 
 from mpi4py import MPI
 
+from rodfem.app.interrupts import held
 from rodfem.diagram.solver import RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.file_format import RESULT
@@ -20,7 +21,7 @@ from rodfem.output.files import save_json
 from rodfem.output.folder import locked
 from rodfem.problem.arguments import checked, each, function, path
 from rodfem.problem.scene import Scene
-from rodfem.ranks import on_first
+from rodfem.ranks import end_together, on_first
 
 Work = Callable[[Scene], dict[str, Any]]
 
@@ -48,6 +49,7 @@ def many(
     shared among the ranks of ``comm``.
     """
     folder = Path(folder)
+    end_together()
     with locked(folder, comm):
         files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]
         return _shared(scenes, work, files, comm, progress)
@@ -66,7 +68,8 @@ def _shared(
         for done, i in enumerate(range(comm.rank, len(scenes), comm.size), start=1):
             if _saved(files[i], key_of(scenes[i])) is None:
                 result = _result(scenes[i], work)
-                save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
+                with held():
+                    save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
             if comm.rank == 0:
                 progress(min(done * comm.size, len(scenes)), len(scenes))
     except InputError as error:  # a file cannot be written: the other ranks go on with theirs

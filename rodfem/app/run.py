@@ -11,6 +11,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
+from rodfem.app.interrupts import held
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.solvers import StaticSolver
@@ -136,7 +137,7 @@ class Terminal(Report):
 
     def complete(self, diagram: Diagram) -> None:
         """Save all that there is: an interrupted run keeps all completed branches."""
-        with diagram.clock("files"):
+        with diagram.clock("files"), held():
             first = len(diagram) == 1
             if first:
                 on_first(diagram.solvers[0].system.comm, lambda: remove_earlier(self.output))
