@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 DRAFTS = ".*.part.*"
 """Names of drafts: that of the file, whose suffix says what it is to those who write it."""
+NO_MEMORY = "unable to allocate memory"
+"""Words of the HDF5 library."""
 ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
 
 
@@ -67,11 +69,19 @@ def write_whole(contents: Mapping[Path, bytes]) -> None:
 
 
 def with_added(path: Path, add: Callable[[h5py.File], None], *, first: bool) -> bytes:
-    """Contents of an HDF5 file to which ``add`` adds, a new one if ``first``; the file itself stays as it is."""
+    """Contents of an HDF5 file to which ``add`` adds, a new one if ``first``; the file itself stays as it is.
+
+    Raises :class:`MemoryError` where there is no room for it.
+    """
     import h5py
 
-    with h5py.File(path, "w" if first else "r+", driver="core", backing_store=False) as file:
-        add(file)
-        file.flush()
-        image: bytes = file.id.get_file_image()
+    try:
+        with h5py.File(path, "w" if first else "r+", driver="core", backing_store=False) as file:
+            add(file)
+            file.flush()
+            image: bytes = file.id.get_file_image()
+    except OSError as error:  # as the library calls it
+        if NO_MEMORY in str(error):
+            raise MemoryError(str(error)) from error
+        raise
     return image

@@ -237,5 +237,10 @@ def main(
         raise KeyboardInterrupt(f"interrupted; the branches that were finished are in {options.output}") from None
     except (InputError, SetupError, ConvergenceError) as trouble:
         complain(parser.in_options(str(trouble)))
+    except MemoryError:
+        complain(
+            "Memory is exhausted: use fewer elements or a lower degree; the branches that were finished are in "
+            f"{options.output}."
+        )
     except PETSc.Error as trouble:
         complain(f"PETSc gave up ({str(trouble).splitlines()[0]}): try other constants or another discretisation.")

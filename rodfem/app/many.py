@@ -16,6 +16,7 @@ from mpi4py import MPI
 from rodfem.app.interrupts import held
 from rodfem.diagram.solver import RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.faults import as_failure
 from rodfem.file_format import RESULT
 from rodfem.output.files import save_json
 from rodfem.output.folder import locked
@@ -43,7 +44,8 @@ def many(
     """Return ``work(scene)`` for all scenes, in order, on every rank; rods are dealt out to the ranks in turn.
 
     ``work`` gets no communicator but must use ``MPI.COMM_SELF``, and returns what JSON can hold.  Where it raises
-    :class:`InputError` or :class:`ConvergenceError` the result is ``{"error": sentence}``, and the others go on.
+    :class:`InputError` or :class:`ConvergenceError`, or a numerical library or memory gives up, the result is
+    ``{"error": sentence}``, and the others go on.
     ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`InputError` where ``folder``
     cannot be written, is in use by another process, or has a result in another or a newer format.  ``scenes`` are
     shared among the ranks of ``comm``.
@@ -83,7 +85,8 @@ def _shared(
 def _result(scene: Scene, work: Work) -> dict[str, Any]:
     """What the work returns, or the sentence of its error."""
     try:
-        return work(scene)
+        with as_failure(MPI.COMM_SELF):
+            return work(scene)
     except (InputError, ConvergenceError) as trouble:
         return {"error": str(trouble)}
 
