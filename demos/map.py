@@ -21,6 +21,7 @@ from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.problem.ends import clamped
 from rodfem.problem.scene import Ordinate, Parameter, Scene
+from rodfem.whole_files import draft_of
 
 
 def scene(A: float, highest: float) -> Scene:
@@ -70,7 +71,8 @@ def draw(couplings: np.ndarray, loads: np.ndarray, results: list[dict], path: Pa
         axes.annotate(label, (couplings[middle], line[middle]), (0, -12), textcoords="offset points", color="white")
     figure.colorbar(picture, label="mid-point displacement of the stable state")
     axes.set(xlabel="$A$", ylabel=r"$\lambda$", title="Compressed hemitropic rod; lines: index of the straight one")
-    figure.savefig(path)
+    with draft_of(path) as draft:
+        figure.savefig(draft)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+INTERRUPTED = 130
+"""Status of a program that is interrupted."""
+
 
 @dataclass(frozen=True)
 class Argument:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 from rodfem.app.terminal import Report
@@ -17,6 +18,7 @@ from rodfem.fem.system import System
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import save_modes
 from rodfem.output.plot_modes import draw_modes
+from rodfem.ranks import on_first
 from rodfem.stability.assessment import Assessor
 
 
@@ -56,14 +58,14 @@ def assess_all(
             report.warn(str(trouble))
             continue
         report.verdict(branch.name, where, verdict, modes)
-        if system.comm.rank == 0:
-            path = output / "modes.h5"
-            save_modes(modes, path, branch.name, special.row, about, first=not saved, scene=scene)
+        keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, about)
+        on_first(system.comm, partial(keep, first=not saved, scene=scene))
         saved.append((branch.name, special.row))
     if not saved:
         return
     pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
     for (name, row), picture in zip(saved, pictures, strict=False):
-        for suffix in (".png", ".gif") if system.comm.rank == 0 else ():
-            draw_modes(output / "modes.h5", name, row, output / f"{picture}{suffix}")
+        for suffix in (".png", ".gif"):
+            target = output / f"{picture}{suffix}"
+            on_first(system.comm, partial(draw_modes, output / "modes.h5", name, row, target))
     report.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *(f'{p}.png, .gif' for p in pictures)])}")

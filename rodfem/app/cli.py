@@ -1,7 +1,7 @@
 """The command line that all demos share.
 
 Importing this module checks the installation first: a script gets one sentence, and leaves with status 2, where a
-module is missing.
+module is missing.  From then on an interrupt is one sentence and status 130 (:mod:`rodfem.app.interrupts`).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
+from rodfem.app.interrupts import listen
 from rodfem.errors import ConvergenceError, InputError, SetupError
 from rodfem.stability.methods import AUTO, METHODS
 
@@ -33,6 +34,7 @@ def check_installation() -> None:
 
 
 check_installation()
+listen()
 
 
 ARGUMENT = re.compile(r"\b(?:Discretization|Plan|StepControl|run)\((\w+)=([^()]*)\)")
@@ -71,13 +73,20 @@ class Parser(argparse.ArgumentParser):
 
 
 def complain(sentence: str) -> NoReturn:
-    """Print one sentence on rank 0 and leave with status 2 on every rank."""
+    """Print one sentence on rank 0 and leave with status 2 on every rank; one that complains alone ends the others."""
     from mpi4py import MPI
 
-    if MPI.COMM_WORLD.rank == 0:
+    from rodfem.ranks import all_come
+
+    comm = MPI.COMM_WORLD
+    if comm.rank == 0:
         sys.stderr.write(f"error: {sentence}\n")
         sys.stderr.flush()
-    MPI.COMM_WORLD.barrier()
+    if not all_come(comm):
+        if comm.rank:
+            sys.stderr.write(f"error: {sentence}\n")
+            sys.stderr.flush()
+        comm.Abort(2)
     sys.exit(2)
 
 
@@ -177,7 +186,8 @@ def main(
 
     ``defaults`` gives values that the other options call for, by name, for options that the user does not give.
     ``parser`` is that of :func:`parser_for`, ``scene_of`` makes the scene from the parsed options, and ``arguments``
-    replace those of the command line.  Bad input is an :class:`~rodfem.errors.InputError`.
+    replace those of the command line.  Bad input is an :class:`~rodfem.errors.InputError`; an interrupt is raised as
+    KeyboardInterrupt, with the sentence that the program ends with.
     """
     os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")  # Open MPI 4 starts a daemon otherwise, 0.2 s
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -224,12 +234,13 @@ def main(
         )
         run(scene, discretization, plan, options.output, figures=options.figures, words=parser.in_options)
     except KeyboardInterrupt:
-        from mpi4py import MPI
-
-        if MPI.COMM_WORLD.rank == 0:
-            sys.stderr.write(f"\ninterrupted; the branches that were finished are in {options.output}\n")
-        sys.exit(130)
+        raise KeyboardInterrupt(f"interrupted; the branches that were finished are in {options.output}") from None
     except (InputError, SetupError, ConvergenceError) as trouble:
         complain(parser.in_options(str(trouble)))
+    except MemoryError:
+        complain(
+            "Memory is exhausted: use fewer elements or a lower degree; the branches that were finished are in "
+            f"{options.output}."
+        )
     except PETSc.Error as trouble:
         complain(f"PETSc gave up ({str(trouble).splitlines()[0]}): try other constants or another discretisation.")

@@ -13,13 +13,16 @@ from typing import Any
 
 from mpi4py import MPI
 
-from rodfem.app.run import on_first, writable
+from rodfem.app.interrupts import held
 from rodfem.diagram.solver import RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.faults import as_failure
 from rodfem.file_format import RESULT
 from rodfem.output.files import save_json
+from rodfem.output.folder import locked
 from rodfem.problem.arguments import checked, each, function, path
 from rodfem.problem.scene import Scene
+from rodfem.ranks import end_together, on_first
 
 Work = Callable[[Scene], dict[str, Any]]
 
@@ -41,27 +44,51 @@ def many(
     """Return ``work(scene)`` for all scenes, in order, on every rank; rods are dealt out to the ranks in turn.
 
     ``work`` gets no communicator but must use ``MPI.COMM_SELF``, and returns what JSON can hold.  Where it raises
-    :class:`InputError` or :class:`ConvergenceError` the result is ``{"error": sentence}``, and the others go on.
+    :class:`InputError` or :class:`ConvergenceError`, or a numerical library or memory gives up, the result is
+    ``{"error": sentence}``, and the others go on.
     ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`InputError` where ``folder``
-    cannot be written, or has a result in another or a newer format.  ``scenes`` are shared among the ranks of ``comm``.
+    cannot be written, is in use by another process, or has a result in another or a newer format.  ``scenes`` are
+    shared among the ranks of ``comm``.
     """
     folder = Path(folder)
-    on_first(comm, lambda: writable(folder))
-    files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]
+    end_together()
+    with locked(folder, comm):
+        files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]
+        return _shared(scenes, work, files, comm, progress)
+
+
+def _shared(
+    scenes: Sequence[Scene], work: Work, files: Sequence[Path], comm: MPI.Comm, progress: Callable[[int, int], None]
+) -> list[dict[str, Any]]:
+    """Do the ``work`` on all ``scenes``, each with a file of its own, as :func:`many` does.
+
+    ``comm`` has the ranks, ``progress`` is called after each scene of the first one.
+    """
     on_first(comm, lambda: _check(files))
-    mine = range(comm.rank, len(scenes), comm.size)
-    for done, i in enumerate(mine, start=1):
-        if _saved(files[i], key_of(scenes[i])) is None:
-            try:
-                result = work(scenes[i])
-            except (InputError, ConvergenceError) as trouble:
-                result = {"error": str(trouble)}
-            save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
-        if comm.rank == 0:
-            progress(min(done * comm.size, len(scenes)), len(scenes))
-    comm.barrier()
+    trouble: InputError | None = None
+    try:
+        for done, i in enumerate(range(comm.rank, len(scenes), comm.size), start=1):
+            if _saved(files[i], key_of(scenes[i])) is None:
+                result = _result(scenes[i], work)
+                with held():
+                    save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
+            if comm.rank == 0:
+                progress(min(done * comm.size, len(scenes)), len(scenes))
+    except InputError as error:  # a file cannot be written: the other ranks go on with theirs
+        trouble = error
+    for other in filter(None, comm.allgather(trouble)):
+        raise other
     found = [_saved(file, key_of(scene)) for file, scene in zip(files, scenes, strict=True)] if comm.rank == 0 else []
     return comm.bcast([{} if result is None else result for result in found])
+
+
+def _result(scene: Scene, work: Work) -> dict[str, Any]:
+    """What the work returns, or the sentence of its error."""
+    try:
+        with as_failure(MPI.COMM_SELF):
+            return work(scene)
+    except (InputError, ConvergenceError) as trouble:
+        return {"error": str(trouble)}
 
 
 def _check(files: Sequence[Path]) -> None:

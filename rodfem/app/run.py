@@ -6,10 +6,12 @@ import atexit
 import gc
 import os
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from mpi4py import MPI
 
+from rodfem.app.interrupts import held
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.solvers import StaticSolver
@@ -17,45 +19,20 @@ from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE
 from rodfem.diagram.trace import PLAN, trace
-from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
-from rodfem.output.files import save_json, save_states
+from rodfem.output.files import save_json, save_run
+from rodfem.output.folder import locked, remove_earlier
 from rodfem.output.typical import typical_state
 from rodfem.problem.arguments import checked, function, path
 from rodfem.problem.scene import Scene
+from rodfem.ranks import on_first
 
 atexit.register(gc.freeze)  # what there is at the end goes with the process: a search for garbage in it takes 0.15 s
 
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
 """Plain text for TeX names in the caption of a picture."""
-
-ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
-
-
-def on_first(comm: MPI.Comm, check: Callable[[], object]) -> None:
-    """Do a check on the first rank, and raise its :class:`InputError` on every rank."""
-    trouble: InputError | None = None
-    if comm.rank == 0:
-        try:
-            check()
-        except InputError as error:
-            trouble = error
-    trouble = comm.bcast(trouble)
-    if trouble is not None:
-        raise trouble
-
-
-def writable(folder: Path) -> None:
-    """Make ``folder``; raises :class:`InputError` where it cannot be written."""
-    probe = folder / f".probe-{os.getpid()}"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe.write_text("")
-        probe.unlink()
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(f"The output folder {folder} cannot be written ({reason})", ANOTHER_FOLDER) from error
 
 
 @checked(
@@ -79,8 +56,10 @@ def run(
 ) -> Diagram:
     """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
-    Files are updated after every branch: an interrupted run keeps all completed branches.  Returns the diagram.  Raises
-    :class:`~rodfem.errors.InputError` for bad input, before any computation, and
+    Files are updated after every branch: an interrupted run keeps all completed branches.  Those of an earlier run in
+    the folder stay until the first branch is complete.  Returns the diagram.  Raises
+    :class:`~rodfem.errors.InputError` for bad input, before any computation, and where the folder cannot be written any
+    more or is in use by another process, and
     :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
 
     Parameters
@@ -105,12 +84,18 @@ def run(
     plan = plan or Plan()
     output = Path(output or Path("results") / scene.name)
     plan.check(scene)
-    on_first(comm, lambda: writable(output))
     terminal = Terminal(plan, output, comm, quiet, words)
-    diagram = trace(scene, discretization, plan, terminal, comm=comm)
+    with locked(output, comm):
+        diagram = trace(scene, discretization, plan, terminal, comm=comm)
+        _report(diagram, terminal, figures)
+    return diagram
+
+
+def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
+    """Print tables, do what the plan asks for beyond branches, and draw the pictures if ``figures``."""
+    scene, plan, output, comm = diagram.scene, terminal.plan, terminal.output, diagram.solvers[0].system.comm
     branches, clock = diagram.branches, diagram.clock
-    if comm.rank == 0:
-        save_json(diagram.data, output / "diagram.json")
+    on_first(comm, lambda: save_json(diagram.data, output / "diagram.json"))
     terminal.table(branches, diagram.solvers[0].system)
     terminal.spectra(branches, scene)
     terminal.frequencies(branches, scene.load)
@@ -122,10 +107,8 @@ def run(
         assess_all(branches, diagram.solvers, plan, output, terminal, figures)
     if plan.locus is not None:
         _loci(branches, diagram.solvers, plan, output, terminal, figures)
-    if figures and comm.rank == 0:
-        _draw(output, terminal)
-    comm.barrier()
-    return diagram
+    if figures:
+        on_first(comm, lambda: _draw(output, terminal))
 
 
 class Terminal(Report):
@@ -154,11 +137,11 @@ class Terminal(Report):
 
     def complete(self, diagram: Diagram) -> None:
         """Save all that there is: an interrupted run keeps all completed branches."""
-        with diagram.clock("files"):
-            if diagram.solvers[0].system.comm.rank == 0:
-                save_json(diagram.data, self.output / "diagram.json")
+        with diagram.clock("files"), held():
             first = len(diagram) == 1
-            save_states(diagram.branches[-1], diagram.solvers, self.output / "states.h5", first=first)
+            if first:
+                on_first(diagram.solvers[0].system.comm, lambda: remove_earlier(self.output))
+            save_run(diagram.data, diagram.branches[-1:], diagram.solvers, self.output, first=first)
 
 
 def _loci(
@@ -174,7 +157,7 @@ def _loci(
     if plan.locus is None:
         return
     name, low, high = plan.locus
-    span = plan.over(solvers[0].system.scene)
+    span, comm = plan.over(solvers[0].system.scene), solvers[0].system.comm
     load = (min(span), max(span))
     saved: list[dict] = []
     for branch in branches:
@@ -196,10 +179,9 @@ def _loci(
             report.say(found.text())
             saved.append(found.data())
             known.append(found)
-            if solvers[0].system.comm.rank == 0:
-                found.save(output / f"locus-{len(saved)}.json")
-    if saved and figures and solvers[0].system.comm.rank == 0:
-        draw_locus(saved, output / "locus.png")
+            on_first(comm, partial(found.save, output / f"locus-{len(saved)}.json"))
+    if saved and figures:
+        on_first(comm, lambda: draw_locus(saved, output / "locus.png"))
         report.say(f"Loci in {output}{os.sep}: locus-1.json ..., locus.png")
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
@@ -17,11 +18,13 @@ from rodfem.diagram.solver import MESH, METHOD, POINT, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
-from rodfem.output.files import as_data, save_json, save_states
+from rodfem.output.files import as_data, save_run
+from rodfem.output.folder import locked
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Verdict
 from rodfem.timing import Clock
+from rodfem.whole_files import draft_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,6 +51,8 @@ class Diagram:
         Sentences on what went wrong without stopping the computation, and on what is worth knowing.
     clock
         Seconds by scope.
+    run
+        Name of this run on the first rank, which its files have in common.
     """
 
     def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[StaticSolver]) -> None:
@@ -55,6 +60,7 @@ class Diagram:
         self.scene, self.plan, self.branches, self.solvers = scene, plan, branches, solvers
         self.warnings: list[str] = []
         self.notes: list[str] = []
+        self.run = uuid4().hex
         self._asked: dict[int, Solver] = {}
 
     # --- what there is ---------------------------------------------------------------------------------------------
@@ -207,18 +213,17 @@ class Diagram:
     def data(self) -> dict[str, Any]:
         """Contents of ``diagram.json``: see docs/files.md."""
         systems = [solver.system for solver in self.solvers]
-        return as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy)
+        return as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy) | {"run": self.run}
 
     @checked(folder=path("results/column"))
     def save(self, folder: Path | str) -> Path:
-        """Write ``diagram.json`` and ``states.h5`` into a folder, which is made; returns it."""
-        folder, comm = Path(folder), self.solvers[0].system.comm
-        if comm.rank == 0:
-            folder.mkdir(parents=True, exist_ok=True)
-            save_json(self.data, folder / "diagram.json")
-        for i, branch in enumerate(self.branches):
-            save_states(branch, self.solvers, folder / "states.h5", first=i == 0)
-        comm.barrier()
+        """Write ``diagram.json`` and ``states.h5`` into a folder, which is made; returns it.
+
+        Raises :class:`~rodfem.errors.InputError` where it cannot be written, or another process writes into it.
+        """
+        folder = Path(folder)
+        with locked(folder, self.solvers[0].system.comm):
+            save_run(self.data, self.branches, self.solvers, folder, first=True)
         return folder
 
     @checked(path=path("diagram.png"))
@@ -230,7 +235,8 @@ class Diagram:
             from rodfem.output.plot_frequencies import figure_of
         figure = figure_of(self.data)
         if path is not None and self.solvers[0].system.comm.rank == 0:
-            figure.savefig(Path(path))
+            with draft_of(Path(path)) as draft:
+                figure.savefig(draft)
         return figure
 
     @checked(point=POINT, path=path("shape.png"), caption=text("stable"))

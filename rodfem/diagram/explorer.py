@@ -46,7 +46,8 @@ class Explorer(Tracer):
         self.trace(self._primary())
         self._branch_off(0)
         for load in self.plan.at if self.plan.tries else ():
-            self._search(load)
+            with self.without(f"The search at {load:g} was given up"):
+                self._search(load)
         return self.branches
 
     def _search(self, load: float) -> None:
@@ -84,10 +85,14 @@ class Explorer(Tracer):
             if branch.depth < self.plan.depth:
                 while self._crossed < len(self.gaps.known):
                     self._crossed += 1
-                    self._detached(self.gaps.known[self._crossed - 1], branch.depth + 1)
+                    gap = self.gaps.known[self._crossed - 1]
+                    with self.without(f"The other side of the gap at {gap.point.load:.8g} was not followed"):
+                        self._detached(gap, branch.depth + 1)
                 for i, special in enumerate(branch.special):
                     if special.to_follow:
-                        self._switch(branch, i, special)
+                        where = f"{branch.name} at {special.point.load:.8g}"
+                        with self.without(f"No branch could be followed from {where}"):
+                            self._switch(branch, i, special)
 
     def _primary(self) -> Branch:
         """First branch: its first state.  Where none is found constraints that repeat each other are named."""
@@ -164,11 +169,7 @@ class Explorer(Tracer):
         special.switched = True
         self.use(special.point.mesh)
         self.solver.damp(special.point.zero - self.solver.system.active_drifts(special.point.x) - special.multiplicity)
-        try:
-            ways = directions(self.solver, special)
-        except ConvergenceError as trouble:
-            self.observer.warn(f"No branch could be followed from {parent.name} at {special.point.load:.8g}: {trouble}")
-            return
+        ways = directions(self.solver, special)
         before = len(self.branches)
         for direction in ways:
             self.use(special.point.mesh)

@@ -18,7 +18,7 @@ from rodfem.diagram.solver import RANKS, SCENE, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM
-from rodfem.output.files import COLUMNS, OPTIONAL, SPECIAL, load_json, load_state
+from rodfem.output.files import COLUMNS, OPTIONAL, SPECIAL, check_run, load_json, load_state
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE
@@ -52,6 +52,7 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
     data = load_json(folder / "diagram.json")
     _check_entries(data, folder / "diagram.json")
     _check(data, scene, folder)
+    check_run(data, folder / "states.h5")
     solvers = [_solver(scene, data["discretization"]["formulation"], mesh, comm) for mesh in data["meshes"]]
     branches = [_branch(entry, solvers, folder / "states.h5") for entry in data["branches"]]
     plan = Plan(tuple(data["range"]), accuracy=data["accuracy"])

@@ -27,6 +27,7 @@ from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.faults import as_failure, without
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
@@ -112,6 +113,30 @@ class Sweep:
         branch = Branch(scene.states, None, 0)
         self.branches.append(branch)
         self.observer.branch(branch)
+        try:
+            with as_failure(self.solver.system.comm):
+                self._sweep(branch)
+            branch.ended = "end of range"
+        except ConvergenceError as trouble:
+            if not branch.points:
+                raise
+            branch.ended = f"no convergence: {trouble}"
+            self.observer.warn(str(trouble))
+        last = branch.points[-1]
+        branch.special.append(self.solver.given(END, last))
+        branch.renumber()
+        comm, warn = self.solver.system.comm, self.observer.warn
+        if self.plan.error_bars:
+            with without("No errors were estimated", comm, warn):
+                self._error_bars(branch)
+        self.observer.finished(branch)
+        with without("The asymmetry of the tangent matrix was not measured", comm, warn):
+            self._asymmetry(last)
+        self.finished()
+        return self.branches
+
+    def _sweep(self, branch: Branch) -> None:
+        """Compute the points of a branch, load by load, and the special points between them."""
         a, b = self.span
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
         x, _ = self.solver.first(a)
@@ -131,21 +156,15 @@ class Sweep:
             if load in self.plan.at:
                 self._special(branch, self.solver.given(USER, point))
             self.observer.progress(branch, point)
-        branch.ended = "end of range"
-        last = branch.points[-1]
-        branch.special.append(self.solver.given(END, last))
-        branch.renumber()
-        if self.plan.error_bars:
-            self._error_bars(branch)
-        self.observer.finished(branch)
+
+    def _asymmetry(self, last: Point) -> None:
+        """Say what the load does to the tangent matrix at the last point."""
         rank, size = self.eigensolver.at(last.x).asymmetry()
         self.observer.note(
             f"  the load makes the tangent matrix non-symmetric by a matrix of rank {rank} "
             f"(largest entry {size:.1e} of |S|):\n"
             f"  factors of the symmetric part and {rank} more solves would do for it (Sherman-Morrison-Woodbury)"
         )
-        self.finished()
-        return self.branches
 
     def at(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of an equilibrium that is not on the way of the sweep."""

@@ -20,6 +20,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
 from rodfem.problem.scene import Scene
+from rodfem.ranks import end_together
 from rodfem.timing import Clock
 
 PLAN = a(Plan, "a Plan, as in Plan(at=(1.0,), depth=1)")
@@ -66,10 +67,12 @@ def trace(
         Where not even a first equilibrium is found.
 
     An error after the first branch was begun, or an interrupt, carries the branches so far in its attribute
-    ``diagram``.
+    ``diagram``.  On several ranks one that nobody catches ends all ranks, which would wait for the one that fails; so
+    does the end of what started them (:func:`rodfem.ranks.end_together`).
     """
     plan = plan or Plan()
     plan.check(scene)
+    end_together()
     recorder, clock = Recorder(observer or Observer()), Clock()
     with compat.announce_compilation(recorder.compiling) as compiled:
         with clock("setup"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from itertools import pairwise
 from math import isnan
@@ -22,6 +23,7 @@ from rodfem.diagram.events import Events
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
 from rodfem.errors import ConvergenceError
+from rodfem.faults import as_failure, without
 from rodfem.problem.units import Units
 from rodfem.roots import zero_between
 from rodfem.stability.round_off import resolve
@@ -88,10 +90,15 @@ class Tracer:
 
     def _attempt(self, branch: Branch) -> None:
         try:
-            self._follow(branch)
+            with as_failure(self.solver.system.comm):
+                self._follow(branch)
         except ConvergenceError as trouble:
             branch.ended = f"no convergence: {trouble}"
             self.observer.warn(str(trouble))
+
+    def without(self, what: str) -> AbstractContextManager[None]:
+        """Go on where the block fails, and warn of ``what`` did not happen and why."""
+        return without(what, self.solver.system.comm, self.observer.warn)
 
     def trace_whole(self, point: Point, name: str, depth: int) -> None:
         """Follow a branch through a point in both directions, as one.
@@ -457,7 +464,8 @@ class Tracer:
         with self.solver.system.clock.scope("error bars"):
             for special in branch.special:
                 if isnan(special.error_estimate):
-                    self.meshes.richer(special.point.mesh).estimate(special)
+                    with self.without(f"No error was estimated at {self.scene.load} = {special.point.load:.8g}"):
+                        self.meshes.richer(special.point.mesh).estimate(special)
                 self.control.label(special)
 
 

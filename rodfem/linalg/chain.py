@@ -239,9 +239,10 @@ class Chain(AlongRod):
     def prepare(self, matrix: PETSc.Mat) -> None:
         """Find the fronts of a ``matrix``, unless they are known."""
         if self._matrix is None or matrix.handle != self._matrix.handle:
-            self._matrix, self._entries = matrix, Entries(matrix)
-            pattern, n = (self._entries.starts, self._entries.columns), matrix.size[0]
+            entries, n = Entries(matrix), matrix.size[0]
+            pattern = entries.starts, entries.columns
             self.elimination = Elimination(self.kind, *pattern, sequence(*pattern, np.arange(n - self.border, n)))
+            self._matrix, self._entries = matrix, entries  # last: there may be no memory for the fronts
 
     def adopt(self, *, regular: bool) -> None:
         """The factors are those that other compiled code has just made by :attr:`Elimination.functions`."""

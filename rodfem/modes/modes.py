@@ -32,6 +32,7 @@ from rodfem.errors import Argument, InputError
 from rodfem.file_format import MODES
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting, read
+from rodfem.whole_files import with_added, write_whole
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
@@ -114,7 +115,8 @@ def save_modes(
     ``states.h5`` (see :func:`rodfem.problem.supports.write`).  ``modes`` are those of row ``row`` of ``branch``;
     ``path`` is that of the file.
     """
-    with h5py.File(path, "w" if first else "a") as file:
+
+    def add(file: h5py.File) -> None:
         if first:
             file.attrs.update(MODES.mark_attributes())
         MODES.check_hdf5(file)
@@ -129,6 +131,8 @@ def save_modes(
             if first:
                 write_section(file, scene)
             write(group, scene, [{name: getattr(modes, name) for name in ("load", "s", "r", "q")}])
+
+    write_whole({path: with_added(path, add, first=first)})
 
 
 def load_modes(path: Path, branch: str, row: int) -> Modes:

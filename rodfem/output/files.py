@@ -9,11 +9,10 @@ natural order along the rod, whatever the number of ranks: to draw them, or to s
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -24,10 +23,15 @@ from rodfem.errors import InputError
 from rodfem.fem.fields import Fields
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM, STATES, read_json
-from rodfem.modes.perturbation import Motions
+from rodfem.modes.perturbation import Motion, Motions
 from rodfem.problem.supports import write as write_supports
 from rodfem.problem.supports import write_section
+from rodfem.ranks import on_first
 from rodfem.timing import Clock
+from rodfem.whole_files import with_added, write_whole
+
+if TYPE_CHECKING:
+    import h5py
 
 COLUMNS = ("load", "ordinate", "energy", "negative", "zero", "stretch", "slope", "drift", "arclength", "error", "mesh")
 
@@ -156,11 +160,14 @@ def _plain(value: Any) -> Any:
     return float(value) if np.isfinite(value) else None
 
 
+def as_json(data: dict[str, Any]) -> bytes:
+    """Text of a JSON file."""
+    return (json.dumps(data, indent=1) + "\n").encode()
+
+
 def save_json(data: dict[str, Any], path: Path) -> None:
-    """Write a diagram whole or not at all, so that an interrupted run leaves the last good file."""
-    draft = path.with_suffix(".json.part")
-    draft.write_text(json.dumps(data, indent=1) + "\n")
-    os.replace(draft, path)
+    """Write a JSON file, as :func:`~rodfem.whole_files.write_whole` does."""
+    write_whole({path: as_json(data)})
 
 
 def load_json(path: Path) -> dict[str, Any]:
@@ -168,42 +175,81 @@ def load_json(path: Path) -> dict[str, Any]:
     return read_json(path, DIAGRAM, ("scene", "parameter", "branches"))
 
 
+def save_run(
+    data: dict[str, Any], branches: Sequence[Branch], solvers: Sequence[StaticSolver], folder: Path, *, first: bool
+) -> None:
+    """Add ``branches`` to ``states.h5`` of a folder, and replace ``diagram.json``; collective, written on rank 0.
+
+    Both are written before either takes its place: a disk that is full changes none.  ``states.h5`` takes it first, so
+    that it has all branches of a ``diagram.json`` of the same run.  Raises :class:`InputError` on every rank where the
+    folder cannot be written.
+
+    Parameters
+    ----------
+    data
+        Contents of ``diagram.json``.
+    branches
+        Branches that ``states.h5`` has not yet.
+    solvers
+        Solvers of the meshes that points name.
+    folder
+        Where the files are, which there is.
+    first
+        Whether ``states.h5`` is a new one.
+    """
+    states = folder / "states.h5"
+    image = states_of(branches, solvers, states, run=data["run"], first=first)
+    on_first(solvers[0].system.comm, lambda: write_whole({folder / "diagram.json": as_json(data), states: image}))
+
+
 def save_states(branch: Branch, solvers: Sequence[StaticSolver], path: Path, first: bool) -> None:
-    """Append the states of a branch to an HDF5 file; collective, written on rank 0.
+    """Add one ``branch`` to an HDF5 file, or write the ``first`` one; collective, written on rank 0.
+
+    ``solvers`` and ``path`` are as in :func:`states_of`.
+    """
+    image = states_of([branch], solvers, path, first=first)
+    on_first(solvers[0].system.comm, lambda: write_whole({path: image}))
+
+
+def states_of(
+    branches: Sequence[Branch], solvers: Sequence[StaticSolver], path: Path, *, first: bool, run: str = ""
+) -> bytes:
+    """Contents of an HDF5 file with the states of ``branches`` added, on rank 0; collective.
 
     Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
     every further field and scalar with P rows, and under ``special/<i>`` the null vectors of its special points:
     displacement ``r``, ``rotation`` in the space frame, and the change of ``q``.  Below it are the groups of
     :func:`rodfem.problem.supports.write`, for pictures; the file has the name of the ``first`` branch and the bending
     stiffness under ``section``.  ``solvers`` are those of the meshes that points name; the rows of a mesh with fewer
-    nodes end in nan.  ``path`` is that of the file.
+    nodes end in nan.  ``path`` is that of the file, which stays as it is; ``run`` names the run that it is of.
     """
-    import h5py
-
-    samples = [solvers[p.mesh].shape.sample(p.x) for p in branch.points]
-    used = {s.point.mesh for s in branch.special}
-    motions = {i: Motions(solvers[i].system) for i in sorted(used)}
-    modes = [[motions[s.point.mesh].at(s.point.x, v) for v in s.null_vectors] for s in branch.special]
+    sampled = [_sampled(branch, solvers) for branch in branches]
     system = solvers[0].system
-    if system.comm.rank:
-        return
-    with h5py.File(path, "w" if first else "a") as file:
-        file.attrs.update(
-            scene=system.scene.name,
-            parameter=system.scene.load,
-            formulation=system.fields.discretization.formulation,
-        )
+
+    def add(file: h5py.File) -> None:
+        about = {"scene": system.scene.name, "parameter": system.scene.load}
+        file.attrs.update(about, formulation=system.fields.discretization.formulation)
         if first:
-            file.attrs.update(STATES.mark_attributes(), first=branch.name)
+            file.attrs.update(STATES.mark_attributes(), first=branches[0].name, run=run)
             write_section(file, system.scene)
-        group = file.create_group(f"branches/{branch.name}")
-        for name in samples[0]:
-            group[name] = _stacked([np.asarray(s[name]) for s in samples])
-        write_supports(group, system.scene, samples)
-        for i, vectors in enumerate(modes):
-            for j, mode in enumerate(vectors):
-                target = group.create_group(f"special/{i}/null_vector_{j}")
-                target["r"], target["q"], target["rotation"] = mode.r, mode.q, mode.w
+        for branch, (samples, modes) in zip(branches, sampled, strict=True):
+            group = file.create_group(f"branches/{branch.name}")
+            for name in samples[0]:
+                group[name] = _stacked([np.asarray(s[name]) for s in samples])
+            write_supports(group, system.scene, samples)
+            for i, vectors in enumerate(modes):
+                for j, mode in enumerate(vectors):
+                    target = group.create_group(f"special/{i}/null_vector_{j}")
+                    target["r"], target["q"], target["rotation"] = mode.r, mode.q, mode.w
+
+    return b"" if system.comm.rank else with_added(path, add, first=first)
+
+
+def _sampled(branch: Branch, solvers: Sequence[StaticSolver]) -> tuple[list[dict[str, np.ndarray]], list[list[Motion]]]:
+    """Samples of the states of a branch, and the null vectors of its special points as motions; collective."""
+    samples = [solvers[p.mesh].shape.sample(p.x) for p in branch.points]
+    motions = {i: Motions(solvers[i].system) for i in sorted({s.point.mesh for s in branch.special})}
+    return samples, [[motions[s.point.mesh].at(s.point.x, v) for v in s.null_vectors] for s in branch.special]
 
 
 def _stacked(rows: list[np.ndarray]) -> np.ndarray:
@@ -223,6 +269,23 @@ def _trimmed(row: Any) -> Any:
         others = tuple(i for i in range(np.ndim(row)) if i != axis)
         row = np.compress(~np.isnan(row).all(axis=others), row, axis=axis)
     return row
+
+
+def check_run(data: dict[str, Any], states: Path) -> None:
+    """Raise :class:`InputError` where ``states.h5`` is of another run than the ``data`` of a ``diagram.json``."""
+    import h5py
+
+    try:
+        with h5py.File(states, "r") as file:
+            STATES.check_hdf5(file)
+            run = file.attrs.get("run")
+    except OSError as trouble:
+        raise InputError(f"{states} is no {STATES.name} ({trouble}): give {STATES.file}.") from trouble
+    if run != data.get("run"):
+        raise InputError(
+            f"{states} and the diagram.json beside it are of different runs: keep the files of one run together, or "
+            "run the scene again."
+        )
 
 
 def mesh_of(system: System) -> dict[str, Any]:

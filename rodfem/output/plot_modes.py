@@ -29,6 +29,7 @@ from rodfem.output.solids import Solid, curve_of, profile_of
 from rodfem.output.view import POINT, view_of
 from rodfem.problem.setting import Setting
 from rodfem.tolerances import TINY
+from rodfem.whole_files import draft_of
 
 __all__ = ["draw_modes", "main"]
 
@@ -83,7 +84,7 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
     rows = ceil(len(numbers) / columns)
     moving = output.suffix.lower() == ".gif"
     output.parent.mkdir(parents=True, exist_ok=True)
-    with rc_context(STYLE | {"axes.grid": False}):
+    with rc_context(STYLE | {"axes.grid": False}), draft_of(output) as draft:
         figure = Figure(figsize=(columns * PANEL[0], rows * PANEL[1] + 0.4), dpi=2 * DPI // 3 if moving else DPI)
         FigureCanvasAgg(figure)
         figure.subplots_adjust(0.01, 0.01, 0.99, 1 - 0.75 / (rows * PANEL[1] + 0.4), 0.04, 0.28)
@@ -93,10 +94,10 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
         if not moving:
             for panel in panels:
                 panel.draw()
-            figure.savefig(output)
+            figure.savefig(draft)
             return output
         writer = PillowWriter(fps=RATE)
-        writer.setup(figure, str(output), figure.dpi)
+        writer.setup(figure, str(draft), figure.dpi)
         for frame in range(FRAMES):
             for panel in panels:
                 panel.draw(frame / FRAMES)

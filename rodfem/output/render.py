@@ -22,6 +22,7 @@ from rodfem.output.solids import Solid, curve_of, profile_of, rod, straight_arro
 from rodfem.output.view import POINT, view_of
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
+from rodfem.whole_files import draft_of
 
 __all__ = ["draw_shape", "draw_shape_safely", "main"]
 
@@ -105,7 +106,8 @@ def draw_shape(
         actor.GetTextProperty().SetJustificationToCentered()
     plotter.enable_anti_aliasing("ssaa")
     path.parent.mkdir(parents=True, exist_ok=True)
-    picture = plotter.screenshot(str(path), return_img=True)
+    with draft_of(path) as draft:
+        picture = plotter.screenshot(str(draft), return_img=True)
     plotter.close()
     if np.ptp(picture) == 0:
         raise RuntimeError(f"the picture {path} came out blank: {LIBRARIES}")

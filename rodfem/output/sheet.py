@@ -13,6 +13,7 @@ from matplotlib.mathtext import MathTextParser
 from matplotlib.patheffects import withStroke
 
 from rodfem.tolerances import NEGLIGIBLE
+from rodfem.whole_files import draft_of
 
 DPI, SIZE, FONT = 200, (7.5, 5.0), 11.0  # 1500 x 1000 pixels
 STYLE = {"font.size": FONT, "font.family": "DejaVu Sans", "axes.grid": True, "grid.color": "0.92"}
@@ -27,8 +28,8 @@ def save(figure: Figure, path: Path) -> Path:
     """Write a figure; the suffix decides the format, and the folder is created where it is missing."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(path, dpi=DPI, format=path.suffix[1:] or "png")
+    with matplotlib.rc_context(STYLE), draft_of(path) as draft:
+        figure.savefig(draft, dpi=DPI, format=path.suffix[1:] or "png")
     return path
 
 

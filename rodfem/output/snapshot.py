@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.output.files import save_states
+from rodfem.whole_files import write_whole
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Snapshot:
         """Write it; its folder is made."""
         path = Path(path)
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(self.png)
+        write_whole({path: self.png})
         return path
 
 

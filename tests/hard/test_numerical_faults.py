@@ -1,0 +1,157 @@
+"""Numerical faults, made on purpose at a chosen moment: the branch ends with the reason, the others go on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import demo_cases
+import numpy as np
+import pytest
+from hemitropic_cases import scene
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import rodfem
+from rodfem.adaptivity.error_estimate import Enriched
+from rodfem.app.many import many
+from rodfem.app.run import run
+from rodfem.continuation.observer import Observer
+from rodfem.continuation.solvers import BranchSolver
+from rodfem.diagram.diagram import Diagram
+from rodfem.errors import ConvergenceError
+from rodfem.stability.nonsymmetric import NonsymmetricPencil
+
+MESH, PLAN = rodfem.Discretization("reduced", 8, 6), rodfem.Plan((0.0, 0.35), depth=1)
+FAULTS: list[tuple[Callable[[], Exception], str]] = [
+    (lambda: ConvergenceError("MUMPS could not factor the matrix."), "MUMPS could not factor the matrix."),
+    (lambda: PETSc.Error(76), "PETSc gave up (error code 76): use smaller steps or another discretisation."),
+    (lambda: PETSc.Error(55), "Memory is exhausted: use fewer elements or a lower degree."),
+    (lambda: MemoryError(), "Memory is exhausted: use fewer elements or a lower degree."),
+    (lambda: np.linalg.LinAlgError("Singular matrix"), "Numbers allow no answer (Singular matrix): use smaller steps"),
+]
+
+
+class On(Observer):
+    """Knows the branch that is being traced."""
+
+    name, saved = "", 0
+
+    def branch(self, branch: Any) -> None:
+        self.name = branch.name
+
+    def complete(self, diagram: Diagram) -> None:
+        self.saved = len(diagram)
+
+
+@pytest.fixture(scope="module")
+def whole() -> Diagram:
+    """What a computation without a fault finds."""
+    return rodfem.trace(scene(), MESH, PLAN)
+
+
+def failing(method: Callable[..., Any], when: Callable[[], bool], fault: Callable[[], Any]) -> Callable[..., Any]:
+    """The method, or the fault instead of it."""
+
+    def instead(*arguments: Any, **options: Any) -> Any:
+        if when():
+            raise fault()
+        return method(*arguments, **options)
+
+    return instead
+
+
+@pytest.mark.short
+@pytest.mark.parametrize(("fault", "sentence"), FAULTS)
+def test_a_branch_ends_and_others_go_on(
+    fault: Callable[[], Exception], sentence: str, whole: Diagram, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    on, calls = On(), [0]
+
+    def on_the_first_side() -> bool:
+        calls[0] += on.name == "branch 1"
+        return on.name == "branch 1" and calls[0] > 3
+
+    monkeypatch.setattr(BranchSolver, "correct", failing(BranchSolver.correct, on_the_first_side, fault))
+    diagram = rodfem.trace(scene(), MESH, PLAN, on)
+    assert [b.name for b in diagram] == [b.name for b in whole] == ["straight", "branch 1", "branch 2"]
+    assert diagram["branch 1"].ended.startswith(f"no convergence: {sentence}")
+    assert [w for w in diagram.warnings if w.startswith(sentence)]
+    assert 2 <= len(diagram["branch 1"].points) < len(whole["branch 1"].points)
+    for name in ("straight", "branch 2"):
+        assert [(p.load, p.negative) for p in diagram[name].points] == [
+            (p.load, p.negative) for p in whole[name].points
+        ]
+        assert diagram[name].ended == whole[name].ended
+    assert on.saved == 3
+
+
+@pytest.mark.short
+def test_a_step_with_nan_is_retried(whole: Diagram, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One correction that gives no numbers costs a smaller step, and changes nothing else."""
+    correct, calls = BranchSolver.correct, [0]
+
+    def broken(self: BranchSolver, x: PETSc.Vec, *arguments: Any) -> Any:
+        calls[0] += 1
+        if calls[0] in (3, 7):
+            x.set(np.nan)
+        return correct(self, x, *arguments)
+
+    monkeypatch.setattr(BranchSolver, "correct", broken)
+    diagram = rodfem.trace(scene(), MESH, PLAN)
+    assert [b.ended for b in diagram] == [b.ended for b in whole]
+    found, expected = ([(str(s.kind), s.point.load) for s in d.special()] for d in (diagram, whole))
+    assert [kind for kind, _ in found] == [kind for kind, _ in expected]
+    np.testing.assert_allclose([load for _, load in found], [load for _, load in expected], rtol=0, atol=1e-9)
+
+
+@pytest.mark.short
+def test_no_error_is_estimated_where_memory_is_exhausted(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = [0]
+
+    def second() -> bool:
+        calls[0] += 1
+        return calls[0] == 2
+
+    monkeypatch.setattr(Enriched, "estimate", failing(Enriched.estimate, second, MemoryError))
+    diagram = rodfem.trace(scene(), MESH, PLAN)
+    assert len(diagram) == 3
+    estimates = [s.error_estimate for b in diagram for s in b.special]
+    assert np.isnan(estimates).tolist() == [False, True] + [False] * (len(estimates) - 2)
+    assert [w for w in diagram.warnings if "Memory is exhausted" in w and w.startswith("No error was estimated at lam")]
+
+
+@pytest.mark.short
+@pytest.mark.parametrize("fault", [lambda: ConvergenceError("SLEPc found none."), lambda: PETSc.Error(76)])
+def test_a_sweep_keeps_what_it_has(
+    fault: Callable[[], Exception], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = [0]
+
+    def later() -> bool:
+        calls[0] += 1
+        return calls[0] > 6
+
+    monkeypatch.setattr(NonsymmetricPencil, "near", failing(NonsymmetricPencil.near, later, fault))
+    diagram = run(
+        demo_cases.scene("follower"), rodfem.Discretization("auto", 6, 3), None, folder, figures=False, quiet=True
+    )
+    (branch,) = diagram
+    assert branch.ended.startswith("no convergence: ") and str(branch.special[-1].kind) == "end"
+    assert len(branch.points) == 6
+    assert rodfem.load_json(folder / "diagram.json")["branches"][0]["ended"] == branch.ended
+
+
+@pytest.mark.alone
+def test_many_rods_go_on(folder: Path) -> None:
+    rods = [demo_cases.scene("cord", turns=turns) for turns in (1.0, 1.5, 2.0)]
+
+    def work(rod: rodfem.Scene) -> dict[str, Any]:
+        if rod is rods[1]:
+            raise MemoryError
+        return {"done": True}
+
+    found = many(rods, work, folder, MPI.COMM_WORLD)
+    assert [r.get("done") for r in found] == [True, None, True]
+    assert found[1]["error"].startswith("Memory is exhausted")
