@@ -47,9 +47,10 @@ lint: setup ## check style and types
 figures: setup ## run all demos
 	@set -e; for demo in demos/*.py; do echo "$$demo"; $(PYTHON) "$$demo"; done
 
-bench: setup ## measure speed against error and every way to judge a state: docs/speed.md, docs/stability.md (half an hour)
+bench: setup ## measure speed, ways to judge a state, hard cases: docs/speed.md, stability.md, robustness.md (40 minutes)
 	$(PYTHON) -m benchmarks.speed
 	$(PYTHON) -m benchmarks.stability
+	$(PYTHON) -m benchmarks.robustness
 
 clean: ## remove what the commands above made, but not .venv
 	rm -rf results build *.egg-info .mypy_cache .ruff_cache .pytest_cache

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -24,7 +25,8 @@ from rodfem.linalg.orthogonal import combine, project_out
 from rodfem.problem.events import Event
 from rodfem.roots import zero_between
 from rodfem.stability.inertia import ROUGH, Factored
-from rodfem.tolerances import round_off
+from rodfem.stability.round_off import resolve
+from rodfem.tolerances import round_off, unit
 
 NODES, FEWER = 6, 4
 """Number of nodes of an interpolant, and of one over a very short piece."""
@@ -43,6 +45,8 @@ REAL = 1e-6
 """Imaginary part below which a zero of an interpolant, in half lengths of its interval, is real."""
 ORDERED = 1e-4
 """Relative change of eigenvalues nearest zero at which their order is known."""
+RESOLVED = 1e-13
+"""Half length of a piece, relative to the arclength, below which its nodes are one point to round-off."""
 ALONG = 1e-13
 """Arclength to which an event is located, in the metric."""
 NARROWER = 6
@@ -147,8 +151,13 @@ def sample(
         return Sample(s, x, solver.system.scalar(x), found.response(mode), below, found)
     index = found.count()
     mu = found.response(mode)
-    crossing = index.zero - found.drifts - persistent  # small ones take the sign of this one
-    return Sample(s, x, solver.system.scalar(x), mu, index.negative + (crossing if mu < 0 else 0), found)
+    crossing = index.zero - found.drifts - persistent
+    if crossing < 2:  # a small one takes the sign of this one
+        low, high = index.negative, index.negative + max(crossing, 0)
+    else:  # several, each by its own quotient: they may have opposite signs
+        low, high = resolve(found)
+        high = min(high, index.negative + crossing)
+    return Sample(s, x, solver.system.scalar(x), mu, high if mu < 0 else low, found)
 
 
 @dataclass
@@ -157,7 +166,7 @@ class Located:
 
     The ``uncertainty`` is of the load, ``along`` is that of the parameter, and ``arithmetic`` the part of the first
     that no sharper interpolation lowers.  At the parameter ``s`` the state is ``x``, the direction ``tangent``, and
-    ``slope`` the load's derivative along it; the index is ``before`` and ``after`` it.
+    ``slope`` the load's derivative along it, ``rate`` that of the eigenvalue; the index is ``before`` and ``after`` it.
     """
 
     s: float
@@ -170,17 +179,24 @@ class Located:
     after: int
     along: float
     arithmetic: float
+    rate: float
 
 
 def interpolate(
-    samples: list[Sample], test_function: str, guess: float, one: float, noise: float = 0.0
+    samples: list[Sample],
+    test_function: str,
+    guess: float,
+    one: float,
+    noise: float = 0.0,
+    ends: tuple[float, float] = (-inf, inf),
 ) -> Located | None:
     """Zero of ``mu`` or of the load's slope by Chebyshev interpolation; None where it is not near the piece.
 
     The uncertainty of the load is what the last coefficients of the two interpolants can contribute at the zero, at
     least what the solver's tolerance leaves open, and what round-off of size ``noise`` in ``mu``, the same in all
     samples, moves the zero by.  ``samples`` are at Chebyshev nodes; ``test_function`` is ``mu`` or ``slope``; of
-    several zeros the one nearest to the parameter ``guess`` is taken.  ``one`` is the natural size of the load.
+    several zeros the one nearest to the parameter ``guess`` is taken, one between the ``ends`` where there is one.
+    ``one`` is the natural size of the load.
     """
     s = np.array([p.s for p in samples])
     middle, half = (s[0] + s[-1]) / 2, (s[-1] - s[0]) / 2
@@ -189,8 +205,9 @@ def interpolate(
     load = chebyshev.chebfit(t, loads - loads[0], len(t) - 1)
     slope = chebyshev.chebder(load)
     # the test function: an eigenvalue at a branch point, the load's derivative at a fold (turning point)
-    f = chebyshev.chebfit(t, values, len(t) - 1) if test_function == "mu" else slope
-    root = real_root(f, (guess - middle) / half)
+    mu = chebyshev.chebfit(t, values, len(t) - 1)
+    f = mu if test_function == "mu" else slope
+    root = real_root(f, (guess - middle) / half, *((end - middle) / half for end in ends))
     if root is None:
         return None
     load_at = float(chebyshev.chebval(root, load)) + loads[0]
@@ -209,14 +226,20 @@ def interpolate(
     return Located(
         *(middle + half * root, x, tangent, load_at, slope_at / half, max(tail - floor, 0.0) + arithmetic),
         *(before[-1], after[0], half * (left + moved), arithmetic),
+        float(chebyshev.chebval(root, chebyshev.chebder(mu))) / half,
     )
 
 
-def real_root(series: np.ndarray, guess: float) -> float | None:
-    """Real zero nearest to ``guess`` of a Chebyshev series on [-1, 1], or a little outside; None without one."""
+def real_root(series: np.ndarray, guess: float, low: float = -inf, high: float = inf) -> float | None:
+    """Real zero nearest to ``guess`` of a Chebyshev series on [-1, 1], or a little outside; None without one.
+
+    Zeros between ``low`` and ``high`` come first.
+    """
     roots = chebyshev.chebroots(series)
     real = roots[abs(roots.imag) < REAL].real
     real = real[abs(real) <= 1.5]
+    within = real[(low <= real) & (real <= high)]
+    real = within if len(within) else real
     return float(real[np.argmin(abs(real - guess))]) if len(real) else None
 
 
@@ -244,22 +267,25 @@ def refine(
     test_function: str,
     persistent: int = 0,
     beside: float | None = None,
+    ends: tuple[float, float] = (-inf, inf),
 ) -> Located:
     """Solve at Chebyshev nodes around ``center``, moved until the zero lies among them, shrunk until it is sharp.
 
     Where only the distance of its load from the one ``beside`` it is wanted, that to :data:`PART` of itself is sharp
     enough, :data:`FEWER` nodes do, and nothing is counted.  ``curve(s)`` returns a predicted state and direction on the
     mesh of ``solver``; ``half`` is the first half length of the piece.  ``test_function`` is ``mu`` or ``slope``,
-    ``mode`` is near the null vector, and ``persistent`` eigenvalues stay zero.  Raises :class:`ConvergenceError` where
-    no zero is found near by.
+    ``mode`` is near the null vector, and ``persistent`` eigenvalues stay zero.  A zero between the ``ends`` is
+    preferred to others.  Raises :class:`ConvergenceError` where no zero is found near by.
     """
     best: Located | None = None
     one = solver.units.load
     count = NODES if beside is None else FEWER
     for _ in range(10):
+        if half < RESOLVED * unit(center, one=1.0):
+            break
         nodes = center + half * np.cos(np.pi * (np.arange(count)[::-1] + 0.5) / count)
         samples = [sample(solver, curve, s, mode, persistent, counted=beside is None) for s in nodes]
-        located = interpolate(samples, test_function, center, one, samples[-1].found.noise(mode))
+        located = interpolate(samples, test_function, center, one, samples[-1].found.noise(mode), ends)
         # inside the nodes the interpolant is trusted: sharpen; outside it, move there; without a zero, by a secant
         if located is not None and abs(located.s - center) <= half:
             sharp = SHARP * one if beside is None else max(SHARP * one, PART * abs(located.load - beside))
@@ -278,7 +304,8 @@ def refine(
             center = nodes[0] + float(np.clip(step, -4 * half, 6 * half))
     if best is not None:
         return best
-    raise ConvergenceError(f"A special point near load {samples[0].load:.8g} could not be located", SMALLER_STEPS)
+    load = solver.system.scalar(curve(center)[0])
+    raise ConvergenceError(f"A special point near load {load:.8g} could not be located", SMALLER_STEPS)
 
 
 def _slopes(samples: list[Sample]) -> list[float]:
@@ -360,7 +387,18 @@ def locate(
     else:
         piece = a.arclength + OFF * h, b.arclength - OFF * h
         guess, mode = crossing_mode(solver, curve, piece, order, still)
-    return refine(solver, curve, guess, min(WINDOW, 0.45 * h), mode, test_function, len(still))
+    ends = a.arclength, b.arclength
+    return refine(solver, curve, guess, min(WINDOW, 0.45 * h), mode, test_function, len(still), ends=ends)
+
+
+def locate_mode(solver: BranchSolver, a: Point, b: Point, guess: float, mode: PETSc.Vec, persistent: int) -> Located:
+    """Locate the zero of the eigenvalue of a ``mode`` near the arclength ``guess`` between two points of a branch.
+
+    ``solver`` has the mesh of the points ``a`` and ``b``; ``persistent`` eigenvalues stay zero.  Raises
+    :class:`ConvergenceError` where no zero is found.
+    """
+    half = min(WINDOW, 0.45 * (b.arclength - a.arclength))
+    return refine(solver, lambda s: hermite(a, b, s), guess, half, mode, "mu", persistent)
 
 
 def event_at(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:

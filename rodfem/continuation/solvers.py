@@ -101,15 +101,24 @@ class StaticSolver:
         """
         guess = self.start(load)
         x, outcome = self.at_load(guess, load)
-        if outcome.converged and (outcome.moved < STRAYED or self.is_stable(x)):
+        if outcome.converged and (self._turned(guess, x) < STRAYED or self.is_stable(x)):
             return x, outcome
         damping, self.system.damping = self.system.damping, STILL * self.system.stiffness_scale
         still, found = self.at_load(guess, load)  # the start may be one of a family, along which it need not move
         self.system.damping = damping
-        if found.converged and found.moved < STRAYED:
+        if found.converged and self._turned(guess, still) < STRAYED:
             return still, found
         other = self.downhill(load)
         return other if other[1].converged else (x, outcome)
+
+    def _turned(self, guess: PETSc.Vec, x: PETSc.Vec) -> float:
+        """Distance of two states without that of their strains, in the metric: a straight rod may stretch far."""
+        difference, f = x - guess, self.system.fields
+        if "v" in f.dofs:
+            begin, end = difference.getOwnershipRange()
+            strains = f.number[f.dofs["v"]].ravel()
+            difference.array[strains[(begin <= strains) & (strains < end)] - begin] = 0.0
+        return self.system.norm(difference)
 
     def downhill(self, load: float) -> tuple[PETSc.Vec, NewtonResult]:
         """Equilibrium at ``load`` by going downhill from the scene's start, and from there bent a little.

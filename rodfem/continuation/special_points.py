@@ -17,13 +17,13 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.locate import Located, across, locate, solve_at
+from rodfem.continuation.locate import Located, across, locate, locate_mode, solve_at
 from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance, hermite
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import project_out
-from rodfem.stability.inertia import NULL
-from rodfem.stability.round_off import decide
+from rodfem.stability.inertia import NULL, Factored
+from rodfem.stability.round_off import decide, quotient_error, resolve
 from rodfem.tolerances import TINY
 
 COUPLED = 1e-5
@@ -38,6 +38,8 @@ FIRST, NEAREST = 0.05, 1e-3
 """Distance of the first point of a branch from the branch point that it leaves: usually, and at least."""
 SHORTEST = 1e-4
 """Amplitude, in the metric, below which no further one is tried from a branch point."""
+CLOSE, STEEP = 2.0, 50.0
+"""How far from its prediction the first point of a branch may lie, in amplitudes: usually, and at most."""
 FIXED = 1e-6
 """Norm of a unit direction's image by a symmetry below which it moves nothing."""
 APART = 1e-7
@@ -74,9 +76,25 @@ def special_at(
     coupling = max(coupling_of(solver, x, v) for v in vectors)
     turning = abs(system.scalar(tangent)) < LEVEL * abs(system.scene.span[1] - system.scene.span[0])
     kind = FOLD if turning and coupling > COUPLED else BRANCH_POINT
-    return SpecialPoint(
-        kind, point, located.before, located.after, located.uncertainty, [v.copy() for v in vectors], coupling
+    apart = _apart(found, vectors, located)
+    special = SpecialPoint(
+        kind, point, located.before, located.after, located.uncertainty + apart, [v.copy() for v in vectors], coupling
     )
+    if apart > located.uncertainty:
+        special.note = f"{len(vectors)} eigenvalues that are not told apart vanish within {apart:.0e}"
+    return special
+
+
+def _apart(found: Factored, vectors: Sequence[PETSc.Vec], located: Located) -> float:
+    """How far apart in load the eigenvalues of several null ``vectors`` vanish that count as zero at a located point.
+
+    By their Rayleigh quotients beyond round-off, and the rate at which one of them changes, which is that of all up to
+    a number about one: twice the distance that follows.
+    """
+    if len(vectors) < 2 or not located.rate:
+        return 0.0
+    quotients = [abs(v.dot(found.matrix * v) + found.shift) - quotient_error(found.matrix, v) for v in vectors]
+    return 2 * max(*quotients, 0.0) * abs(located.slope / located.rate)
 
 
 def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> float:
@@ -101,7 +119,8 @@ def find_special(
     Where the load turns back there is a fold, or a branch point at which this branch ends on another one.  The
     eigenvalues number ``orders`` (0 is the left-most) change sign from ``a`` to ``b``: those that a fold does not
     explain do so at branch points, or further folds.  ``persistent`` eigenvalues are zero all along, beside those of
-    symmetries, and are not numbered.  ``solver`` has the mesh.
+    symmetries, and are not numbered.  ``solver`` has the mesh.  Raises :class:`ConvergenceError` where one is found
+    twice, and another not at all.
     """
     found: list[SpecialPoint] = []
     rest = list(orders)
@@ -111,15 +130,44 @@ def find_special(
         found.append(_special(solver, a, b, low, "slope"))
         if found[0].kind == FOLD:
             own = min(found[0].negative_before, found[0].negative_after)
-            rest = [order for order in rest if order != own]
+            rest = [order for order in rest if not own <= order < own + found[0].multiplicity]
     still = solver.inertia.modes_near_zero(a.x, persistent) if rest and persistent else []
     while rest:
         special = _special(solver, a, b, rest[0], "mu", still)
+        if (known := _same(solver, special, found)) is not None:
+            special = _another(solver, a, b, known, still)
+            if _same(solver, special, found) is not None:
+                raise ConvergenceError(
+                    f"Beside load {known.point.load:.8g} another eigenvalue vanishes, where none was found",
+                    SMALLER_STEPS,
+                )
         found.append(special)
         del rest[: special.multiplicity]
     found.sort(key=lambda s: s.point.arclength)
     _count_between(solver, a, b, found)
     return found
+
+
+def _same(solver: BranchSolver, special: SpecialPoint, found: Sequence[SpecialPoint]) -> SpecialPoint | None:
+    """Special point among those found at which the same eigenvalues vanish at the same place, if there is one."""
+    for known in found:
+        near = abs(special.point.arclength - known.point.arclength) < APART
+        if near and not across(solver.system, special.null_vectors, known.null_vectors):
+            return known
+    return None
+
+
+def _another(solver: BranchSolver, a: Point, b: Point, known: SpecialPoint, still: Sequence[PETSc.Vec]) -> SpecialPoint:
+    """Zero of the eigenvalue nearest zero at a ``known`` special point between ``a`` and ``b`` that is none of its own.
+
+    Where eigenvalues pass each other next to zero their numbers do not tell which is which, and their vectors do.
+    ``solver`` has the mesh, ``still`` are the persistent null vectors.  Raises :class:`ConvergenceError` without one.
+    """
+    own = [*still, *known.null_vectors]
+    vectors = solver.inertia.modes_near_zero(known.point.x, len(own) + 1)
+    mode = across(solver.system, vectors, own)[0]
+    located = locate_mode(solver, a, b, known.point.arclength, mode, len(still))
+    return special_at(solver, located, located.s, still)
 
 
 def _count_between(solver: BranchSolver, a: Point, b: Point, found: list[SpecialPoint]) -> None:
@@ -132,7 +180,7 @@ def _count_between(solver: BranchSolver, a: Point, b: Point, found: list[Special
         if q.point.arclength - p.point.arclength > APART:
             s = (p.point.arclength + q.point.arclength) / 2
             x = solve_at(solver, lambda t: hermite(a, b, t), s)
-            between = decide(solver.inertia.at(x)).index.negative
+            between = resolve(solver.inertia.at(x))[0]
         else:
             rising = b.negative > a.negative
             between = p.negative_before + (p.multiplicity if rising else -p.multiplicity)
@@ -222,15 +270,17 @@ def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, fir
     The amplitude is halved until the point lies where the direction says, within half of its distance.  Where that
     fails, a family of equilibria may leave at once, at each of which the Jacobian is singular (an elastica whose ends
     meet turns as a rigid body about any axis): then Newton's method is damped along the family.  ``solver`` has the
-    mesh, ``first`` is a length in the metric.
+    mesh, ``first`` is a length in the metric.  A transcritical branch whose load changes much faster than its state is
+    farther away: it is tried last.
     """
     system = solver.system
     row, before = solver.row(direction), system.damping
-    for damping in dict.fromkeys((before, before or solver.inertia.tolerance)):
+    dampings = dict.fromkeys((before, before or solver.inertia.tolerance))
+    for damping, reach in (*((damping, CLOSE) for damping in dampings), (before, STEEP)):
         system.damping, amplitude = damping, first
         while amplitude > SHORTEST:
             x = special.point.x + direction * amplitude
-            outcome = correct(system, x, row, reach=2.0 * amplitude)
+            outcome = correct(system, x, row, reach=reach * amplitude)
             if outcome.converged:
                 apart = distance(system, special.point.x, x)
                 return solver.point(x, apart, solver.tangent(row, at=x), outcome)

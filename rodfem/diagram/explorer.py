@@ -132,10 +132,20 @@ class Explorer(Tracer):
                 "choose constants that make it so."
             )
         point = solver.point(x, 0.0, solver.load_tangent(x, stop > start), outcome)
+        self._check_arithmetic()
         family = point.zero - solver.system.active_drifts(x)
         if family > 0:
             self._leave_family(point, family, stop > start)
         return point
+
+    def _check_arithmetic(self) -> None:
+        """Warn where round-off hides the sign of eigenvalues as large as the lowest bending one."""
+        inertia = self.solver.inertia
+        if inertia.resolution > inertia.scale:
+            self.observer.warn(
+                f"The arithmetic of this mesh leaves the sign of eigenvalues up to {inertia.resolution:.2g} open, and "
+                f"the lowest bending one is {inertia.scale:.2g}: take larger elements, or a lower degree."
+            )
 
     def _leave_family(self, point: Point, freedoms: int, increasing: bool) -> None:
         """Give a first point that may move freely at its load the tangent along which the load changes.

@@ -8,7 +8,7 @@ from math import inf
 
 from petsc4py import PETSc
 
-from rodfem.adaptivity.gaps import Gaps
+from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.index_chain import Row, chained
@@ -73,7 +73,7 @@ class SpecialSearch:
             If shorter steps are to be tried.
         """
         self._on(b)
-        rows = [self._here(p) for p in self._open]
+        rows, settled = [self._here(p) for p in self._open], self._open[0]
         self.level = min(rows[0].zero, b.zero)
         if b.zero > self.level:  # the sign of an eigenvalue within the tolerance is settled by the rows that follow
             self._open.append(b)
@@ -83,7 +83,16 @@ class SpecialSearch:
         self._open = [b]
         between = [] if changed else self._touching.between(self.solver, a, b)
         self._touching.add(b, told=changed or any(row.arclength > a.arclength for row in between))
-        return self._examined(self._among([*rows, *between, b]))
+        try:
+            return self._examined(self._among([*rows, *between, b]))
+        except (Gap, Unresolved):
+            self._open = [settled]
+            raise
+
+    @property
+    def settled(self) -> float:
+        """Arclength of the row up to which everything has been found: those after it wait for the sign of a zero."""
+        return self._open[0].arclength
 
     def rest(self) -> list[SpecialPoint]:
         """Special points among the last rows of a branch that only its end shows.
@@ -140,6 +149,12 @@ class SpecialSearch:
             found += specials
             if not ended and not chained(p.low, p.high, specials, q.low, q.high):
                 self._shorten(p.point, q.point)
+        near = [p for p in points[1:-1] if p.zero > self.level]
+        if near and not found and points[-1].zero <= self.level:
+            why.append(
+                f"Near load {near[0].load:.8g} an eigenvalue is nearly zero, and "
+                f"the index is {rows[0].low} on either side: whether it passes zero and comes back is not known."
+            )
         for trouble in why:
             self.observer.warn(trouble)
         return found
@@ -184,6 +199,9 @@ class SpecialSearch:
             found = find_special(self.solver, p.point, q.point, p.crossing(q), self._persistent(p.point.x))
         except ConvergenceError as trouble:
             why = str(trouble)
+        if p.decided and q.decided and found and sum(s.multiplicity for s in found) == abs(q.low - p.low):
+            # counts beside a zero may lie beyond the next one: those of the rows hold for the first and the last
+            found[0].negative_before, found[-1].negative_after = p.low, q.low
         if not why and chained(p.low, p.high, found, q.low, q.high):
             return found
         # bisection: on a shorter piece fewer crossings fall together, until each half explains its own ends

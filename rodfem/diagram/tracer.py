@@ -160,10 +160,7 @@ class Tracer:
             history = [new for _, new in pairs]
             self.solver = solver
             self.observer.mesh(solver.system, trouble.point.load, str(trouble))
-        last = history[-1].arclength
-        branch.points = [p for p in branch.points if p.arclength <= last]
-        branch.special = [s for s in branch.special if s.point.arclength <= last]
-        return history
+        return _cut(branch, history, history[-1].arclength)
 
     def _advance(self, branch: Branch, history: list[Point]) -> None:
         """Append points until the branch ends, which :attr:`Branch.ended` then says."""
@@ -186,7 +183,7 @@ class Tracer:
             try:
                 reason = self._between(branch, previous, item)
             except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
-                self._advance(branch, history)
+                self._advance(branch, _cut(branch, history, self.specials.settled))
                 return
             if reason:
                 branch.ended = reason
@@ -467,6 +464,13 @@ class Tracer:
                     with self.without(f"No error was estimated at {self.scene.load} = {special.point.load:.8g}"):
                         self.meshes.richer(special.point.mesh).estimate(special)
                 self.control.label(special)
+
+
+def _cut(branch: Branch, history: list[Point], last: float) -> list[Point]:
+    """Drop what lies beyond the arclength ``last`` from a branch; what is left of the rows it is followed from."""
+    branch.points = [p for p in branch.points if p.arclength <= last]
+    branch.special = [s for s in branch.special if s.point.arclength <= last]
+    return [p for p in history if p.arclength <= last]
 
 
 def equivalent(a: Point, b: Point, units: Units, tolerance: float = 1e-8, of_strain: float = 0.0) -> bool:

@@ -107,6 +107,8 @@ class Equations:
         metric = (inertia.rotation_metric(a.q, b.q) if scene.normal is None else a.turned * b.turned) / length
         if f.r is not None:
             metric += ufl.dot(a.r, b.r) / length**3
+        elif f.v is not None:  # the strains stand for the centreline: without them a rod that stretches would not move
+            metric += ufl.inner(a.v, b.v) / length
         kinetic = inertia.rotary(f.q, a.q, b.q, tuple(scene.inertia.rho_I(c))) * dx
         if f.r is not None:
             kinetic += inertia.translational(a.r, b.r, scene.inertia.rho_A(c)) * dx

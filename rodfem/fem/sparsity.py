@@ -34,11 +34,11 @@ def bordered_pattern(fields: Fields) -> sp.csr_matrix:
 
 
 def metric_pattern(fields: Fields) -> sp.csr_matrix:
-    """Nonzero pattern of a metric: rotations couple to rotations, the centreline to itself; and the diagonal.
+    """Nonzero pattern of a metric: rotations couple to rotations, centreline or strains to themselves; the diagonal.
 
     A part of :func:`bordered_pattern`.
     """
-    names = [name for name in (fields.turning.name, "r") if name in fields.dofs]
+    names = [name for name in (fields.turning.name, "r" if "r" in fields.dofs else "v") if name in fields.dofs]
     rows = sum(_own_rows(fields, [name]) for name in names)
     size = (fields.local_unknowns, fields.unknowns)
     diagonal = sp.eye(*size, k=fields.offset, format="csr")

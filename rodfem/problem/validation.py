@@ -24,6 +24,7 @@ from rodfem.tolerances import NEGLIGIBLE
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
+EPS = float(np.finfo(float).eps)
 STRAIGHT = (0.0, 0.0, 0.5), (1.0, 0.0, 0.0, 0.0)
 """Centreline, in units of the rod's length, and quaternion at the middle of a straight rod."""
 
@@ -224,12 +225,24 @@ def check_convexity(scene: Scene) -> None:
             )
         units = np.where(np.arange(len(stiffness)) < len(stiffness) - 3, 1.0, 1.0 / scene.length)  # curvature: 1/length
         balanced = units[:, None] * stiffness * units
-        lowest = np.linalg.eigvalsh(balanced)[0] if stiffness.size else 1.0
-        if lowest <= NEGLIGIBLE * abs(balanced).max(initial=0.0):
+        if not is_definite(balanced):
+            lowest = np.linalg.eigvalsh(balanced)[0]
             raise SceneError(
                 f"The stored energy is not convex{where}: its second derivative at the undeformed state has the "
                 f"eigenvalue {lowest:.3g}; choose constants for which all are positive."
             )
+
+
+def is_definite(matrix: np.ndarray) -> bool:
+    """Whether a symmetric matrix is positive definite, by its eigenvalues after scaling to a unit diagonal.
+
+    So stiffnesses may differ by any factor: a stretch 1e14 times as stiff as bending hides no eigenvalue of bending.
+    """
+    diagonal = matrix.diagonal()
+    if not (diagonal > EPS * abs(matrix).max(initial=0.0)).all():
+        return False
+    roots = np.sqrt(diagonal)
+    return bool(matrix.size == 0 or np.linalg.eigvalsh(matrix / roots[:, None] / roots)[0] > NEGLIGIBLE)
 
 
 def check_supports(scene: Scene) -> None:

@@ -285,7 +285,9 @@ class Factored:
                 last, values = values, theta[order] + own.shift
                 vectors = [combine(solved, z[:, j]) for j in order]
                 change = abs(values - last)[:number]
-                if np.all(change <= np.maximum(accuracy * abs(values[:number]), own.resolution)):
+                # a wide band of round-off is that of rough vectors: it does not excuse an inexact smooth one
+                floor = min(own.resolution, accuracy * own.scale)
+                if np.all(change <= np.maximum(accuracy * abs(values[:number]), floor)):
                     break
         own.vectors = vectors
         return values[:number], [v.copy() for v in vectors[:number]]

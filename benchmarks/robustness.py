@@ -1,0 +1,120 @@
+"""Hard cases, what is promised of each and what is measured: writes ``docs/robustness.md``.
+
+Run by ``make bench``.  The cases are those of ``tests/hard``, which tests a few values of each; here all are measured,
+each value in a process of its own.  What is measured is kept in results/robustness/measured.json as it comes: --resume
+goes on where a run was interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from math import isfinite
+from pathlib import Path
+from time import strftime
+from typing import Any
+
+from benchmarks.common import ROOT, digits, machine, measured, table, versions
+from benchmarks.store import Store
+
+sys.path.append(str(ROOT / "tests"))
+
+from hard.case import Case
+from hard.cases import CASES
+
+LIMIT = 150.0
+"""Seconds after which a process that measures is stopped."""
+TITLES = {
+    "stiffness": "Stiffness, meshes, rotations",
+    "bifurcations": "Bifurcations",
+    "published": "Cases of the literature",
+}
+
+
+def measure(group: str, number: int, place: int) -> dict[str, Any]:
+    """Verdict on one value of a case, the error over its bar, and what was said."""
+    case = CASES[group][number]
+    found = case.measure(case.all[place])
+    ratio = found.error / found.bar
+    return {
+        "verdict": found.verdict,
+        "ratio": ratio if isfinite(ratio) else None,
+        "said": found.said,
+        "why": found.wrong,
+    }
+
+
+def results(store: Store, group: str, number: int, case: Case) -> list[dict[str, Any]]:
+    """Those of all values of a case."""
+    found = []
+    for place, value in enumerate(case.all):
+
+        def work(place: int = place) -> list[dict[str, Any]]:
+            return list(measured("benchmarks.robustness", "--measure", group, number, place, limit=LIMIT))
+
+        found.append(store.measure(f"{group}/{case.name}/{value}", work)[0])
+    return found
+
+
+def summary(case: Case, found: list[dict[str, Any]]) -> list[str]:
+    """Row of a case: values that are right with the largest error over its bar, values of which it is said why not."""
+    by: dict[str, list[str]] = {}
+    for value, row in zip(case.all, found, strict=True):
+        shown = f"{value:g}" if isinstance(value, (int, float)) else str(value)
+        by.setdefault(row.get("verdict", row.get("failed", "wrong")), []).append(shown)
+    worst = max((r["ratio"] for r in found if r.get("verdict") == "right"), default=None)
+    words = [f"{'**' if kind != 'right' else ''}{kind}{'**' if kind != 'right' else ''}: {', '.join(values)}"
+             for kind, values in by.items()]  # fmt: skip
+    return [
+        case.name,
+        case.hard,
+        f"{case.promised} ({case.source})",
+        case.parameter,
+        "; ".join(words),
+        digits(worst, 2),
+    ]
+
+
+def page(store: Store) -> str:
+    """The page, with everything measured."""
+    head = ["case", "what makes it hard", "promised", "parameter", "measured", "error over bar"]
+    parts = []
+    for group, cases in CASES.items():
+        rows = [summary(case, results(store, group, number, case)) for number, case in enumerate(cases)]
+        parts.append(f"## {TITLES[group]}\n\n{table(head, rows)}")
+    counts: dict[str, int] = {}
+    for piece in store.pieces.values():
+        verdict = piece["data"][0].get("verdict", "stopped")
+        counts[verdict] = counts.get(verdict, 0) + 1
+    total = ", ".join(f"{number} {verdict}" for verdict, number in sorted(counts.items()))
+    return f"""# Hard cases
+
+Written by `make bench` (`python -m benchmarks.robustness`) in {store.took() / 60:.0f} minutes on
+{machine()}; {versions("petsc4py", "slepc4py", "numpy", "scipy")}; one thread; {strftime("%Y-%m-%d")}.
+
+Each case is a series of problems with a closed form or a published value, by one parameter; `tests/hard` has them, and
+tests some values of each. *Right*: what is promised, to the error bars that the program gives itself; the last column
+is the largest error over its bar (or over what is promised). **said**: the program says in a sentence what it could not
+decide. **wrong**: neither; there should be none. In all: {total}.
+
+{chr(10).join(parts)}
+"""
+
+
+def main() -> None:
+    """Write the page, or measure one value in this process."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--measure", nargs=3, metavar=("GROUP", "NUMBER", "PLACE"))
+    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "robustness.md")
+    parser.add_argument("--resume", action="store_true", help="keep what an interrupted run has measured")
+    given = parser.parse_args()
+    if given.measure:
+        group, number, place = given.measure
+        print(json.dumps(measure(group, int(number), int(place))))
+    else:
+        given.output.write_text(page(Store(ROOT / "results" / "robustness" / "measured.json", given.resume)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,105 @@
+"""A hard case: what makes it hard, what is promised, and what is measured of it against a closed form or a source."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import Any
+
+from rodfem import Diagram, Discretization, Plan, Scene, trace
+from rodfem.continuation.branch import Branch, SpecialPoint
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
+from rodfem.errors import ConvergenceError, InputError
+
+SINGULAR = (FOLD, BRANCH_POINT, IMPERFECT)
+"""Kinds of special points at which an eigenvalue vanishes."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A special point as it should be: load, and the index before and after it."""
+
+    load: float
+    before: int
+    after: int
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Outcome of one case: ``error`` in the case's own measure, the bar that bounds it, and what was said.
+
+    ``error`` is infinite where what was found is not what there is: a special point more or less, another index.
+    """
+
+    error: float
+    bar: float
+    said: tuple[str, ...] = ()
+    wrong: str = ""
+
+    @property
+    def right(self) -> bool:
+        return not self.wrong and self.error <= self.bar
+
+    @property
+    def verdict(self) -> str:
+        """In words: right, said to be undecided, or wrong."""
+        return "right" if self.right else "said" if self.said else "wrong"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A series of problems of one kind, by a parameter: the tests run ``few`` of its values, the page ``all``."""
+
+    name: str
+    hard: str
+    promised: str
+    source: str
+    parameter: str
+    measure: Callable[[Any], Measured]
+    few: tuple[Any, ...]
+    all: tuple[Any, ...]
+
+
+def run(scene: Scene, mesh: Discretization | None = None, **plan: Any) -> Diagram:
+    """Diagram of a scene; what is an error with branches is their diagram, with the error among its warnings."""
+    given = {"depth": 0} | plan
+    try:
+        return trace(scene, mesh, Plan(**given))
+    except (ConvergenceError, InputError) as trouble:
+        diagram: Diagram | None = getattr(trouble, "diagram", None)
+        if diagram is None:
+            raise
+        diagram.warnings.append(str(trouble))
+        return diagram
+
+
+def said(diagram: Diagram) -> tuple[str, ...]:
+    """All that a diagram says it could not decide."""
+    unexplained = [str(u) for b in diagram for u in b.unexplained]
+    ended = [b.ended for b in diagram if b.ended.startswith("no convergence")]
+    notes = [note for note in diagram.notes if "eigenvalue" in note]
+    return (*diagram.warnings, *unexplained, *ended, *notes)
+
+
+def singular(branch: Branch) -> list[SpecialPoint]:
+    return [s for s in branch.special if s.kind in SINGULAR]
+
+
+def compare(found: Sequence[SpecialPoint], expected: Sequence[Change], said: tuple[str, ...] = ()) -> Measured:
+    """Largest error of the loads, relative to its own bar: infinite where other points were found, or other indices.
+
+    Neighbours nearer to each other than the bars may be one point that has the change of all.
+    """
+    left, error = list(expected), 0.0
+    for s in found:
+        bar = max(s.error_estimate if isfinite(s.error_estimate) else s.located_to, 1e-15 * abs(s.point.load))
+        group: list[Change] = []
+        while left and (not group or (group[-1].after != s.negative_after and abs(left[0].load - s.point.load) <= bar)):
+            group.append(left.pop(0))
+        if not group or (group[0].before, group[-1].after) != (s.negative_before, s.negative_after):
+            return Measured(inf, 1.0, said, f"{s!r} where {group} was expected")
+        error = max(error, *(abs(s.point.load - g.load) / bar for g in group))
+    if left:
+        return Measured(inf, 1.0, said, f"{left} missed")
+    return Measured(error, 1.0, said)

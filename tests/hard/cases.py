@@ -1,0 +1,139 @@
+"""All hard cases: what makes each hard, what is promised, where it comes from, and for which values it is measured."""
+
+from __future__ import annotations
+
+from hard import bifurcations, published, ranges, stiffness
+from hard.case import Case
+
+EXACT = "all special points, each within its error bar, with the index on either side"
+SAID = f"{EXACT}; or a sentence that says what is not decided"
+POWERS = tuple(10.0**-i for i in range(2, 13))
+
+STIFFNESS = (
+    Case(
+        "shear and stretch stiffer than bending", "entries of the matrix differ by up to 1e14", SAID,
+        "Haringx' column, P (1 - P/EA + P/GA) = pi^2/4", "exponent of GA",
+        stiffness.haringx, (2, 8, 12, 14), tuple(range(2, 15)),
+    ),
+    Case(
+        "bending ratio", "dozens of weak modes below the first one of the stiff plane", EXACT,
+        "Euler, (2n - 1)^2 pi^2/4", "B2/B1", stiffness.ratio, (1.0, 100.0), (1.0, 10.0, 100.0, 1e3, 1e4),
+    ),
+    Case(
+        "number of linear elements", "a mesh that resolves nothing; round-off that grows with the square", EXACT,
+        "Euler, pi^2/4", "elements", stiffness.elements, (1, 3, 100), (1, 2, 3, 10, 100, 1000, 10_000, 100_000),
+    ),
+    Case(
+        "degree", "one degree more is what bounds the error", EXACT,
+        "Euler, pi^2/4", "degree of 4 elements", stiffness.degree, (1, 5, 12), tuple(range(1, 13)),
+    ),
+    Case(
+        "graded meshes", "round-off grows with the inverse square of the smallest element", SAID,
+        "Euler, pi^2/4", "smallest of 12 elements of degree 6", stiffness.graded, (1e-3, 1e-6, 1e-8),
+        (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
+    ),
+    Case(
+        "rotations past 2 pi and 4 pi", "a double point at ends turned by several radian", EXACT,
+        "Greenhill, C phi = 8.98681891582", "C, at the angle 8.99/C", stiffness.turned, (2.0, 0.6),
+        (4.0, 2.0, 1.2, 0.8, 0.6),
+    ),
+)  # fmt: skip
+BIFURCATIONS = (
+    Case(
+        "two branch points near each other", "one point, or two, within the tolerance of a zero eigenvalue", EXACT,
+        "Euler, B pi^2/4", "relative distance", bifurcations.neighbours, (1e-4, 1e-8, 0.0), (*POWERS, 0.0),
+    ),
+    Case(
+        "a fold pair", "two folds in one step, of a rod that stretches and does not turn", EXACT,
+        "u^3 - a u = P", "distance in load", bifurcations.folds, (1e-2, 1e-6), POWERS[:5],
+    ),
+    Case(
+        "a cusp", "a tangent that is nearly vertical, and no fold", EXACT,
+        "u^3 + a u = P", "a", bifurcations.cusp, (1e-5,), (1e-1, 1e-3, 1e-5, 0.0),
+    ),
+    Case(
+        "an eigenvalue that passes zero and comes back", "the index is the same at both ends of the step", SAID,
+        "P^2 - d^2", "distance in load", bifurcations.crossings, (1e-3, 1e-5, 1e-7), POWERS[:6],
+    ),
+    Case(
+        "two eigenvalues that cross in opposite directions", "the index is 1 on either side, 0 between", SAID,
+        "d - P and d + P", "distance in load", bifurcations.opposite, (1e-4, 1e-6, 1e-8), POWERS[:8],
+    ),
+    Case(
+        "the same, the index 2 between", "neither end of the step shows them", SAID,
+        "-d - P and P - d", "distance in load", bifurcations.opposite_other, (1e-4, 1e-8), POWERS[:8],
+    ),
+    Case(
+        "a transcritical point", "the load changes along the null vector", EXACT,
+        "u (u - a P)", "a", bifurcations.transcritical, (0.1, 1.0), (0.1, 0.5, 1.0, 3.0),
+    ),
+    Case(
+        "a fold beside a branch point", "eigenvalues exchange their numbers next to zero", EXACT,
+        "P = -u^2 and u = g", "g", bifurcations.fold_with_branch_point, (1e-3, 0.0, -1e-3),
+        (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 0.0, -1e-6, -1e-3, -1e-1),
+    ),
+    Case(
+        "an imperfection", "a broken pitchfork, sharper than a step", SAID,
+        "elastica by elliptic integrals", "lateral load", bifurcations.imperfect, (1e-9,),
+        (1e-3, 1e-4, 1e-6, 1e-9, 1e-12, 1e-13),
+    ),
+    Case(
+        "a range about a branch point", "every row has a zero eigenvalue to the tolerance", SAID,
+        "Euler, pi^2/4", "half width", ranges.about, (1e-6, 1e-9), (1e-12, 1e-9, 1e-6, 1e-3, 1.0),
+    ),
+    Case(
+        "the same, downwards", "", SAID, "Euler, pi^2/4", "half width", ranges.back, (1e-6, 1e-9),
+        (1e-9, 1e-6, 1e-3, 1.0),
+    ),
+    Case(
+        "a range between branch points", "it begins and ends beside one", SAID,
+        "Euler, pi^2/4 and pi^2/2", "distance from both", ranges.beside, (1e-6,), (1e-6, 1e-3, 0.1),
+    ),
+    Case(
+        "a load asked for at a branch point", "its equations are singular, or nearly", EXACT,
+        "Euler, pi^2/4", "distance from it", ranges.asked, (0.0, -1e-9), (0.0, 1e-12, -1e-12, 1e-9, -1e-9, 1e-6),
+    ),
+)  # fmt: skip
+PUBLISHED = (
+    Case(
+        "helical springs between hinges", "two critical loads that meet where the spring is 2.6202694 diameters long",
+        EXACT, "Haringx 1948, E/G = 2.6", "part by which the length exceeds that", published.spring, (1e-3, -1e-3),
+        (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, -1e-5, -1e-3),
+    ),
+    Case(
+        "helical springs between clamps", "the same at 5.2405388 diameters", EXACT, "Haringx 1948, E/G = 2.6",
+        "part by which the length exceeds that", published.clamped_spring, (1e-3,), (1e-2, 1e-4, -1e-4),
+    ),
+    Case(
+        "pressed rings", "loads of equal first variation and different second ones; double points, motions that are "
+        "free", EXACT, "n^2 - 1, n^2, (n^2 - 1)^2/(n^2 - 2) for n = 2 to 5 (Boresi 1955, Bodner 1958)", "load",
+        published.ring, ("central",), tuple(published.RINGS),
+    ),
+    Case(
+        "rolled up by an end moment", "rotations of ten turns", "the end within 1e-7 of the circle; stable",
+        "a circle passed by turn after turn", "turns", published.rolled, (2,), (1, 10),
+    ),
+    Case(
+        "column on a foundation at its double point", "one wave and two at one load; four modes where it bends alike "
+        "in all planes", EXACT, "5 pi^2 for k = 4 pi^4", "B2/B1", published.winkler, (1.0,), (2.0, 1.0),
+    ),
+    Case(
+        "a shearable helix", "shear and stretch are the stiffer the more slender it is", "an error that is that of "
+        "slenderness 10 within a factor 2 (no locking)", "uniform strains under a wrench", "slenderness",
+        published.locking, (1e4,), (10.0, 100.0, 1e3, 1e4),
+    ),
+    Case(
+        "cords of many turns", "critical tensions 40 apart at a thousand times that", EXACT,
+        "(2 pi N)^2 - w^2, w = 2 pi n or tan(w/2) = w/2", "turns N", published.cord, (2, 50), (2, 5, 10, 20, 50),
+    ),
+    Case(
+        "localised helical buckling", "27 turns, a helix that fades away, and can slide at hardly any energy", EXACT,
+        "van der Heijden & Thompson 2000; tension 2900.993205792131 at a slack of 0.03", "elements of degree 6",
+        published.localised, (40,), (32, 40, 64),
+    ),
+    Case(
+        "a deep arch of 215 degrees", "a fold far from the undeformed state", EXACT,
+        "DaDeppo & Schmidt 1975, 8.973089969728", "degree of 8 elements", published.arch, (6,), (4, 6, 8),
+    ),
+)  # fmt: skip
+CASES = {"stiffness": STIFFNESS, "bifurcations": BIFURCATIONS, "published": PUBLISHED}

@@ -1,0 +1,191 @@
+"""Hard cases of the literature, each against its closed form or its published value."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import hypot, inf, pi, sqrt
+from typing import Any
+
+import classics
+import closed_forms
+import demo_cases
+import numpy as np
+import ufl
+from classics import SUPPORTS, column
+from hard.case import Change, Measured, compare, run, said, singular
+
+from forms import loads
+from forms.energy import bending_and_twist
+from rodfem import Discretization, Event, Parameter, Ring, Solver, clamped
+
+# --- Haringx' helical springs ---------------------------------------------------------------------------------------
+
+SHEAR = 1 / 2.6
+"""G/E of the wire."""
+SLENDER = pi * sqrt((1 - SHEAR) / (0.5 + SHEAR))
+"""Free length over diameter below which a spring between hinges does not buckle; between clamps twice that."""
+
+
+def spring(above: float, supports: str = "pinned-pinned") -> Measured:
+    """A helical spring as a column of stretch, shear and bending stiffness 1, E/G and D^2/(4 (1/2 + G/E)).
+
+    Its compression at buckling is ``e (1 - (1 - G/E) e) = D^2 q^2/(4 (1/2 + G/E))``: two loads, where the free length
+    over D exceeds the threshold by the part ``above``, and none below it.
+    """
+    waves = pi if supports == "pinned-pinned" else 2 * pi
+    slender = SLENDER * waves / pi * (1 + above)
+    B = 1 / (4 * (0.5 + SHEAR) * slender**2)
+
+    def energy(v: Any, k: Any, c: Any) -> Any:
+        return 0.5 * (c.GA * (v[0] ** 2 + v[1] ** 2) + (v[2] - 1) ** 2) + bending_and_twist(k, (c.B1, c.B2, c.C))
+
+    scene = column("spring", SUPPORTS[supports], (0.4, 0.95), rod="flexible", energy=energy, planar="e2",
+                   constants={"P": 0.4, "GA": 1 / SHEAR, "B1": B, "B2": B, "C": B})  # fmt: skip
+    discriminant = 1 - 4 * (1 - SHEAR) * B * waves**2
+    expected = []
+    if discriminant > 0:
+        low, high = ((1 + sign * sqrt(discriminant)) / (2 * (1 - SHEAR)) for sign in (-1, 1))
+        expected = [Change(x, i, 1 - i) for i, x in enumerate((low, high)) if 0.4 < x < 0.95]
+    diagram = run(scene)
+    return compare(singular(diagram[0]), expected, said(diagram))
+
+
+def clamped_spring(above: float) -> Measured:
+    return spring(above, "clamped-clamped")
+
+
+# --- pressed rings --------------------------------------------------------------------------------------------------
+
+
+def radial(c: Any) -> tuple[Any, ...]:
+    return (c.P * ufl.cos(c.s), 0.0, -c.P * ufl.sin(c.s))
+
+
+def central(x: Any, c: Any) -> Any:
+    return c.P * ufl.sqrt((x.r[0] - 1) ** 2 + x.r[2] ** 2)
+
+
+RINGS: dict[str, tuple[dict[str, Any], Any, int]] = {
+    "hydrostatic": ({"potential": lambda x, c: loads.pressure(x.r, x.dr, c.P)}, lambda n: n * n - 1, 0),
+    "dead": ({"distributed": radial}, lambda n: n * n, 1),
+    "central": ({"potential": central}, lambda n: (n * n - 1) ** 2 / (n * n - 2), 0),
+}
+"""Load, its critical values for n waves, and the index of the circle at small loads (under a dead load it turns)."""
+
+
+def ring(kind: str) -> Measured:
+    """Modes 2 to 5 of a circle in its plane, two of each."""
+    load, critical, index = RINGS[kind]
+    expected = [Change(critical(n), index + 2 * (n - 2), index + 2 * (n - 1)) for n in (2, 3, 4, 5)]
+    span = (0.3, expected[-1].load + 1.0)
+    scene = column("ring", Ring(), span, start=classics.circle, planar="e2", constants={"P": span[0], "B2": 1.0},
+                   **classics.ROUND, **load)  # fmt: skip
+    diagram = run(scene, Discretization("pointwise", 16, 6))
+    return compare(singular(diagram[0]), expected, said(diagram))
+
+
+# --- many turns -----------------------------------------------------------------------------------------------------
+
+
+def rolled(turns: int) -> Measured:
+    """A cantilever of bending stiffness 2 rolled up by an end moment: its end comes back to the clamp at each turn."""
+    most = 4 * pi * turns
+    scene = replace(classics.rolled("moment"), span=(0.0, most))
+    diagram = run(scene, Discretization("pointwise", max(4 * turns, 8), 8), error_bars=False)
+    last, sample = diagram[0].points[-1], diagram.solvers[0].shape.sample(diagram[0].points[-1].x)
+    if last.load != most or {p.negative for p in diagram[0].points} != {0}:
+        return Measured(inf, 1e-7, said(diagram), f"ended at {last.load}")
+    angle, s = 2 * pi * turns, sample["s"]
+    arc = np.stack([1 - np.cos(angle * s), 0 * s, np.sin(angle * s)], axis=1) / angle
+    return Measured(float(abs(sample["r"] - arc).max()), 1e-7, said(diagram))
+
+
+def cord(turns: float) -> Measured:
+    """The first bifurcations of a straight cord, whose tensions grow with the square of the turns and lie 40 apart."""
+    expected = closed_forms.tensions(turns)[:4]
+    high, low = expected[0] + 20.0, (expected[2] + expected[3]) / 2
+    scene = demo_cases.scene("cord", turns=turns, span=(high, low))
+    diagram = run(scene, Discretization("auto", 8, 8))
+    changes = [Change(x, i, i + 1) for i, x in enumerate(expected[:3])]
+    return compare(singular(diagram[0]), changes, said(diagram))
+
+
+LOCALISED = 2900.993205792131
+"""Tension over B/L^2 of 27 turns, C/B = 0.789/1.345, slack 0.03 (moment 98.541496171190744 B/L)."""
+
+
+def localised(elements: int) -> Measured:
+    """Twisted by 27 turns, and buckled into one helix that fades away towards both clamps."""
+    from continuation.test_index_chain import localised as rod
+
+    slack = Event("slack", of=lambda state: 0.97 - state.r[-1, 2])
+    diagram = run(rod(), Discretization("reduced", elements, 6), depth=1, events=(slack,))
+    found = [s for s in diagram.special("event") if abs(s.point.load / LOCALISED - 1) < 0.01]
+    if not found:
+        return Measured(inf, 1.0, said(diagram), "the slack is not met")
+    return Measured(abs(found[0].point.load - LOCALISED), found[0].error_estimate, said(diagram))
+
+
+# --- others ---------------------------------------------------------------------------------------------------------
+
+
+def winkler(B2: float) -> Measured:
+    """A pinned column on a foundation of k = 4 pi^4: one wave and two at 5 pi^2, in each plane it bends in alike."""
+    scene = classics.winkler()
+    parameters = {**scene.parameters, "k": Parameter(4 * pi**4), "B2": Parameter(B2)}
+    scene = replace(scene, parameters=parameters, span=(0.0, 5.9 * pi**2))
+    loads_of = sorted(B * n * n * pi**2 + 4 * pi**2 / n**2 for B in (1.0, B2) for n in (1, 2, 3))
+    expected = [Change(x, i, i + 1) for i, x in enumerate(x for x in loads_of if x < 5.9 * pi**2)]
+    diagram = run(scene)
+    return compare(singular(diagram[0]), expected, said(diagram))
+
+
+def shearable_helix(slenderness: float, degree: int = 4) -> float:
+    """Error of the rotation of a rod that a wrench at its end bends to a helix, of that ``slenderness``."""
+    G, torsion, curvature, C = slenderness**2, 2.0, 3.0, 0.6
+
+    def strains(c: Any) -> tuple[Any, Any, Any]:
+        w = ufl.sqrt(c.k**2 + c.t**2)
+        return w, c.t * (c.C - 1) * c.k / c.G, 1 + c.t * (c.C - 1) * c.t / c.G
+
+    def position(c: Any) -> tuple[Any, ...]:
+        w, v2, v3 = strains(c)
+        along = (v2 * c.k + v3 * c.t) / w**2 * (1 - ufl.sin(w) / w)
+        part = ufl.sin(w) / w
+        return ((1 - ufl.cos(w)) / w**2 * (c.k * v3 - c.t * v2), along * c.k + part * v2, along * c.t + part * v3)
+
+    def rotation(c: Any) -> tuple[Any, ...]:
+        w = ufl.sqrt(c.k**2 + c.t**2)
+        return (ufl.cos(w / 2), 0.0, ufl.sin(w / 2) * c.k / w, ufl.sin(w / 2) * c.t / w)
+
+    def energy(v: Any, k: Any, c: Any) -> Any:
+        return 0.5 * c.G * (v[0] ** 2 + v[1] ** 2 + (v[2] - 1) ** 2) + bending_and_twist(k, (c.B1, c.B2, c.C))
+
+    scene = column(
+        "shearable helix", (clamped(), clamped(position, rotation)), (0.0, torsion), rod="flexible", energy=energy,
+        load="t", constants={"t": 0.0, "k": curvature, "B2": 1.0, "C": C, "G": G},
+        start=lambda s: classics.circle(curvature * s),
+    )  # fmt: skip
+    solver = Solver(scene, Discretization("reduced", 6, degree)).equilibria
+    x = solver.start(0.0)
+    for load in (0.0, 0.5, 1.0, 1.5, torsion):
+        x, outcome = solver.at_load(x, load)
+        if not outcome.converged:
+            return inf
+    state = solver.shape.sample(x)
+    w, s = hypot(curvature, torsion), state["s"]
+    turned = np.stack([np.cos(w * s / 2), 0 * s, np.sin(w * s / 2) * curvature / w, np.sin(w * s / 2) * torsion / w], 1)
+    return float(abs(state["q"] - turned).max())
+
+
+def locking(slenderness: float) -> Measured:
+    """The error over that of a rod of slenderness 10."""
+    return Measured(shearable_helix(slenderness) / shearable_helix(10.0), 2.0)
+
+
+def arch(degree: int) -> Measured:
+    """A clamped and hinged arch of 215 degrees: its first fold, 897 in DaDeppo & Schmidt's hundredths."""
+    scene = classics.deep_arch()
+    diagram = run(scene, Discretization("auto", 8, degree))
+    folds = [s for s in singular(diagram[0])][:1]
+    return compare(folds, [Change(8.973089969728, 0, 1)], said(diagram))

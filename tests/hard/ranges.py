@@ -1,0 +1,50 @@
+"""Ranges of the load of any width about, at and beside branch points, in either direction; loads asked for there."""
+
+from __future__ import annotations
+
+from math import inf
+
+from classics import SUPPORTS, column
+from hard.case import Change, Measured, compare, run, said, singular
+from hard.stiffness import EULER
+
+LOADS = (EULER, 2 * EULER)
+"""Branch points of a cantilever of bending stiffnesses 1 and 2."""
+
+
+def within(low: float, high: float) -> Measured:
+    """Branch points of the straight column in a range, begun at ``low``, which may be the upper end.
+
+    One at the start of a range is no point of its search, and is said to be there.
+    """
+    inside = [x for x in LOADS if min(low, high) < x < max(low, high)]
+    index = sum(x < low for x in LOADS)
+    step = 1 if high > low else -1
+    expected = [Change(x, index + step * i, index + step * (i + 1)) for i, x in enumerate(inside[::step])]
+    diagram = run(column("range", SUPPORTS["clamped-free"], (low, high)), error_bars=False)
+    return compare(singular(diagram[0]), expected, said(diagram))
+
+
+def about(half: float) -> Measured:
+    return within(EULER - half, EULER + half)
+
+
+def back(half: float) -> Measured:
+    return within(EULER + half, EULER - half)
+
+
+def beside(short: float) -> Measured:
+    """A range that ends, or begins, just before a branch point."""
+    return within(EULER + short, 2 * EULER - short)
+
+
+def asked(off: float) -> Measured:
+    """A load asked for: its row is there, and has the index of its side; at the branch point one zero eigenvalue."""
+    scene = column("asked", SUPPORTS["clamped-free"], (0.0, 4.0))
+    diagram = run(scene, at=(EULER + off,), error_bars=False)
+    found = compare(singular(diagram[0]), [Change(EULER, 0, 1)], said(diagram))
+    (row,) = [s.point for s in diagram.special("user", diagram[0].name)]
+    expected = {int(off > 0)} if off else {0, 1}
+    if row.load != EULER + off or not expected & set(range(row.negative, row.negative + row.zero + 1)):
+        return Measured(inf, 1.0, said(diagram), f"row at {row.load}, index {row.negative}, zero {row.zero}")
+    return found

@@ -1,0 +1,70 @@
+"""Hard by their numbers: stiff against bending, meshes of any size and degree, rotations of many turns."""
+
+from __future__ import annotations
+
+from math import pi, sqrt, tan
+
+import classics
+import numpy as np
+from classics import SUPPORTS, column
+from hard.case import Change, Measured, compare, run, said, singular
+from scipy.optimize import brentq
+
+from rodfem import Discretization
+
+EULER = pi**2 / 4
+"""Buckling load of a cantilever of length and bending stiffness one."""
+LONG = 50_000
+"""Elements from which on the mesh's own error, 1e-11, is not estimated."""
+GREENHILL = 2 * brentq(lambda x: tan(x) - x, 4.4, 4.6, xtol=1e-15)
+"""Critical end moment between clamps."""
+
+
+def haringx(exponent: float, formulation: str = "reduced") -> Measured:
+    """``P (1 - P/EA + P/GA) = pi^2/4``, EA = 2 GA."""
+    GA = 10.0**exponent
+    slope = 0.5 / GA  # 1/GA - 1/EA
+    load = 2 * EULER / (1 + sqrt(1 + 4 * slope * EULER))
+    scene = classics.shearable("flexible", GA, 2 * GA)
+    diagram = run(scene, Discretization(formulation, 8, 6))
+    return compare(singular(diagram[0]), [Change(load, 0, 1)], said(diagram))
+
+
+def ratio(B2: float) -> Measured:
+    """Rods of bending ratio B2 about the load of the stiff plane: (2n - 1)^2 weak modes are below."""
+    low, high = 0.9991 * EULER * B2, 1.0009 * EULER * B2
+    weak = [(2 * n - 1) ** 2 * EULER for n in range(1, 200)]
+    loads = sorted([*weak, *(B2 * x for x in weak)])
+    index = sum(x < low for x in loads)
+    inside = [x for x in loads if low < x < high]
+    expected = [Change(x, index + i, index + i + 1) for i, x in enumerate(inside)]
+    scene = column("ratio", SUPPORTS["clamped-free"], (low, high), constants={"B2": B2})
+    diagram = run(scene, Discretization("reduced", 24, 6))
+    return compare(singular(diagram[0]), expected, said(diagram))
+
+
+def euler(mesh: Discretization, error_bars: bool = True) -> Measured:
+    diagram = run(column("mesh", SUPPORTS["clamped-free"], (0.0, 4.0)), mesh, error_bars=error_bars)
+    return compare(singular(diagram[0]), [Change(EULER, 0, 1)], said(diagram))
+
+
+def elements(number: int) -> Measured:
+    return euler(Discretization("reduced", number, 1), error_bars=number < LONG)
+
+
+def degree(p: int) -> Measured:
+    return euler(Discretization("reduced", 4, p))
+
+
+def graded(smallest: float) -> Measured:
+    """Elements that shrink by equal factors towards the clamp, down to ``smallest``."""
+    vertices = (0.0, *np.geomspace(smallest, 1.0, 12))
+    return euler(Discretization("reduced", 12, 6, vertices))
+
+
+def turned(C: float) -> Measured:
+    """Twisted between clamps until the moment C phi is Greenhill's: by 2 pi and more where C is small."""
+    scene = classics.greenhill()
+    scene = scene.varying("phi", (0.0, 1.03 * GREENHILL / C), C=C)
+    diagram = run(scene)
+    return compare(singular(diagram[0]), [Change(GREENHILL / C, 0, 2)], said(diagram))

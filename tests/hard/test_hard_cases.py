@@ -1,0 +1,18 @@
+"""Every hard case in small: it is right, or it says what it could not decide, where that is what is promised."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hard.case import Case
+from hard.cases import CASES, SAID
+
+pytestmark = pytest.mark.alone
+EVERY = [(case, value) for group in CASES.values() for case in group for value in case.few]
+
+
+@pytest.mark.parametrize(("case", "value"), EVERY, ids=[f"{case.name}-{value}" for case, value in EVERY])
+def test_a_hard_case(case: Case, value: Any) -> None:
+    found = case.measure(value)
+    assert found.right or (case.promised == SAID and found.said), f"{found.error:.3g} {found.wrong} {found.said}"
