@@ -1,4 +1,4 @@
-"""Derivative in arclength of the nodal values of all fields on a mesh, as sparse matrices."""
+"""Derivative of the nodal values of all fields on a mesh in arclength, over its natural size, as sparse matrices."""
 
 from __future__ import annotations
 
@@ -47,7 +47,8 @@ def _slopes(fields: Fields, block: Block) -> sp.csr_matrix:
     """Derivative of a field at the nodes of each cell, in the order of the flattened ``fields.dofs``."""
     dofs, ends = fields.dofs[block.name], fields.vertices
     cells, nodes, components = dofs.shape
-    weights = differentiation(block.degree) / (ends[:, 1] - ends[:, 0])[:, None, None]
+    sizes = (ends[:, 1] - ends[:, 0]) / fields.scene.units.length
+    weights = differentiation(block.degree) / sizes[:, None, None]
     shape = (cells, nodes, components, nodes)
     rows = np.broadcast_to(np.arange(dofs.size).reshape(cells, nodes, components, 1), shape)
     columns = np.broadcast_to(dofs.transpose(0, 2, 1)[:, None], shape)

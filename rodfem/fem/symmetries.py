@@ -130,11 +130,11 @@ def may_slide(scene: Scene) -> bool:
 
 
 def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
-    """All elementary generators of the fields and groups of scalars that a scene has."""
+    """All elementary generators of a scene's fields and groups of scalars; translations are by its natural length."""
     groups = {group.name: group for group in fields.groups}
     vectors = [name for name, group in groups.items() if group.motion in (Motion.VECTOR, Motion.POSITION)]
     moved = ["r", *(name for name, group in groups.items() if group.motion is Motion.POSITION)]
-    out = []
+    out, length = [], fields.scene.units.length
     for i, axis in enumerate(AXES, start=1):
         turn = f"rotation about e{i}"
         if fields.scene.normal is None:
@@ -145,7 +145,9 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
         for target in sorted([*vectors, *(b.name for b in fields.blocks if b.name in ("r", "n"))]):
             out.append(Elementary(target, cross(axis), (0.0,) * 3, ""))
             if target in moved:
-                out.append(Elementary(target, ((0.0,) * 3,) * 3, axis, f"translation along e{i}"))
+                out.append(
+                    Elementary(target, ((0.0,) * 3,) * 3, tuple(x * length for x in axis), f"translation along e{i}")
+                )
     for name in sorted(name for name, group in groups.items() if group.motion is Motion.MIXED):
         count = len(fields.groups[groups[name]])
         for i in range(count):

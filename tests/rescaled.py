@@ -1,0 +1,119 @@
+"""Scenes stated in other units of length and force; ``python -m tests.rescaled`` compares all recorded scenes.
+
+Parameters, the load among them, keep their values: what they stand for is converted where a scene uses it.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import golden_cases
+
+import rodfem
+from rodfem.problem.roles import Role, changes
+from rodfem.problem.scene import Scene
+
+DNA = 1e-8, 1e-12
+"""Metres and newtons of one unit of length and force."""
+
+
+class InUnits:
+    """Constants or a place, some attributes of which are converted."""
+
+    def __init__(self, given: Any, factors: dict[str, float]) -> None:
+        self.given, self.factors = given, factors
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self.given, name)
+        return value * self.factors[name] if name in self.factors else value
+
+
+def rescaled(scene: Scene, length: float, force: float) -> Scene:
+    """The same rod in units of which ``length`` and ``force`` make one of the scene's own; masses keep theirs."""
+
+    def constants(c: Any) -> InUnits:
+        return InUnits(c, {"s": 1 / length})
+
+    def place(x: Any) -> InUnits:
+        return InUnits(x, {"s": 1 / length, "length": 1 / length, "r": 1 / length, "k": length})
+
+    def times(values: Any, factor: float) -> tuple[Any, ...]:
+        return tuple(None if x is None else x * factor for x in values)
+
+    factors = {
+        "position": length,
+        "moment": force * length,
+        "follower moment": force * length,
+        "distributed": force / length,
+        "force": force,
+        "follower force": force,
+        "mass per length": 1.0,
+        "rotary inertia per length": length**2,
+        "mass of": length,
+        "rotary inertia of": length**3,
+        "value of": length,
+    }
+
+    def visit(words: str, f: Callable[..., Any], role: Role) -> Any:
+        if role.call == "f(c)":
+            factor = next((x for start, x in factors.items() if words.startswith(start)), 1.0)
+            return lambda c: times(f(constants(c)), factor) if role.size != 0 else factor * f(constants(c))
+        if role.call == "f(x, c)":
+            factor = 1.0 if words == "constraint" else force if role.along else force * length
+            return lambda x, c: factor * f(place(x), constants(c))
+        others: dict[str, Callable[..., Any]] = {
+            "W(v, k, c)": lambda v, k, c: force * f(v, k * length, constants(c)),
+            "start(s)": lambda s: f(s / length),
+            "of(r, q)": lambda r, q: f(r / length, q),
+            "of(x, c)": lambda x, c: f(place(x), constants(c)) / length,
+        }
+        return others[role.call]
+
+    new = changes(scene, visit)
+    ordinate = new.get("ordinate", scene.ordinate)
+    new["ordinate"] = ordinate if ordinate.s is None else replace(ordinate, s=ordinate.s * length)
+    for name in ("attachments", "constraints"):
+        parts = new.get(name, getattr(scene, name))
+        new[name] = tuple(x if x.s is None else replace(x, s=x.s * length) for x in parts)
+    if not scene.has_inertia:
+        new["inertia"] = rodfem.Inertia(rho_I=lambda c: (length**2,) * 3)
+    a, b = (s * length for s in scene.interval)
+    return replace(scene, interval=(a, b), breaks=tuple(s * length for s in scene.breaks), **new)
+
+
+def differences(scene: Scene, length: float, force: float) -> list[str]:
+    """What differs between the diagrams of a scene in its own and in other units, in words."""
+    one, other = (golden_cases.trace(s, error_bars=False) for s in (scene, rescaled(scene, length, force)))
+    out = [f"warning: {sentence}" for sentence in other.warnings if sentence not in one.warnings]
+    if [b.name for b in one] != [b.name for b in other]:
+        out.append(f"branches {[b.name for b in one]} and {[b.name for b in other]}")
+    for a, b in zip(one, other, strict=False):
+        indices = [[index for index, _ in groupby(p.negative for p in branch.points)] for branch in (a, b)]
+        if indices[0] != indices[1]:
+            out.append(f"{a.name}: indices {indices[0]} and {indices[1]}")
+        kinds = [[(str(s.kind), s.negative_before, s.negative_after) for s in x.special] for x in (a, b)]
+        if kinds[0] != kinds[1]:
+            out.append(f"{a.name}: special points {kinds[0]} and {kinds[1]}")
+            continue
+        for s, t in zip(a.special, b.special, strict=True):
+            if abs(s.point.load - t.point.load) > 1e-9 * max(1.0, abs(s.point.load)):
+                out.append(f"{a.name}: {s.kind} at {s.point.load:.12g} and {t.point.load:.12g}")
+    return out
+
+
+def main() -> None:
+    """Compare all recorded scenes, or those whose names hold a word given."""
+    for name, make in golden_cases.cases().items():
+        if not sys.argv[1:] or any(word in name for word in sys.argv[1:]):
+            print(name, "; ".join(differences(make(), *DNA)) or "the same", flush=True)
+
+
+if __name__ == "__main__":
+    main()
