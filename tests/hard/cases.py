@@ -82,7 +82,7 @@ BIFURCATIONS = (
         "Euler, pi^2/4", "half width", ranges.about, (1e-6, 1e-9), (1e-12, 1e-9, 1e-6, 1e-3, 1.0),
     ),
     Case(
-        "the same, downwards", "", SAID, "Euler, pi^2/4", "half width", ranges.back, (1e-6, 1e-9),
+        "the same, downwards", "the same", SAID, "Euler, pi^2/4", "half width", ranges.back, (1e-6, 1e-9),
         (1e-9, 1e-6, 1e-3, 1.0),
     ),
     Case(
