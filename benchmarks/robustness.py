@@ -1,7 +1,7 @@
 """Hard cases, what is promised of each and what is measured: writes ``docs/robustness.md``.
 
 Run by ``make bench``.  The cases are those of ``tests/hard``, which tests a few values of each; here all are measured,
-each value in a process of its own.  What is measured is kept in results/robustness/measured.json as it comes: --resume
+each case in a process of its own.  What is measured is kept in results/robustness/measured.json as it comes: --resume
 goes on where a run was interrupted.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path
 from time import strftime
@@ -23,8 +24,8 @@ sys.path.append(str(ROOT / "tests"))
 from hard.case import Case
 from hard.cases import CASES
 
-LIMIT = 150.0
-"""Seconds after which a process that measures is stopped."""
+LIMIT = 280.0
+"""Seconds after which a process that measures a case is stopped."""
 TITLES = {
     "stiffness": "Stiffness, meshes, rotations",
     "bifurcations": "Bifurcations",
@@ -32,29 +33,25 @@ TITLES = {
 }
 
 
-def measure(group: str, number: int, place: int) -> dict[str, Any]:
-    """Verdict on one value of a case, the error over its bar, and what was said."""
+def measure(group: str, number: int) -> Iterator[dict[str, Any]]:
+    """Verdict on each value of a case, the error over its bar, and what was said."""
     case = CASES[group][number]
-    found = case.measure(case.all[place])
-    ratio = found.error / found.bar
-    return {
-        "verdict": found.verdict,
-        "ratio": ratio if isfinite(ratio) else None,
-        "said": found.said,
-        "why": found.wrong,
-    }
+    for value in case.all:
+        found = case.measure(value)
+        ratio = found.error / found.bar
+        row = {"verdict": found.verdict, "ratio": ratio if isfinite(ratio) else None}
+        yield row | {"said": found.said, "why": found.wrong}
 
 
 def results(store: Store, group: str, number: int, case: Case) -> list[dict[str, Any]]:
-    """Those of all values of a case."""
-    found = []
-    for place, value in enumerate(case.all):
+    """Those of all values of a case; where its process is stopped, of the rest why."""
 
-        def work(place: int = place) -> list[dict[str, Any]]:
-            return list(measured("benchmarks.robustness", "--measure", group, number, place, limit=LIMIT))
+    def work() -> list[dict[str, Any]]:
+        found = list(measured("benchmarks.robustness", "--measure", group, number, limit=LIMIT))
+        return (found + found[-1:] * len(case.all))[: len(case.all)]
 
-        found.append(store.measure(f"{group}/{case.name}/{value}", work)[0])
-    return found
+    rows: list[dict[str, Any]] = store.measure(f"{group}/{case.name}", work)
+    return rows
 
 
 def summary(case: Case, found: list[dict[str, Any]]) -> list[str]:
@@ -85,8 +82,9 @@ def page(store: Store) -> str:
         parts.append(f"## {TITLES[group]}\n\n{table(head, rows)}")
     counts: dict[str, int] = {}
     for piece in store.pieces.values():
-        verdict = piece["data"][0].get("verdict", "stopped")
-        counts[verdict] = counts.get(verdict, 0) + 1
+        for row in piece["data"]:
+            verdict = row.get("verdict", "stopped")
+            counts[verdict] = counts.get(verdict, 0) + 1
     total = ", ".join(f"{number} {verdict}" for verdict, number in sorted(counts.items()))
     return f"""# Hard cases
 
@@ -105,13 +103,13 @@ decide. **wrong**: neither; there should be none. In all: {total}.
 def main() -> None:
     """Write the page, or measure one value in this process."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--measure", nargs=3, metavar=("GROUP", "NUMBER", "PLACE"))
+    parser.add_argument("--measure", nargs=2, metavar=("GROUP", "NUMBER"))
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "robustness.md")
     parser.add_argument("--resume", action="store_true", help="keep what an interrupted run has measured")
     given = parser.parse_args()
     if given.measure:
-        group, number, place = given.measure
-        print(json.dumps(measure(group, int(number), int(place))))
+        for row in measure(given.measure[0], int(given.measure[1])):
+            print(json.dumps(row), flush=True)
     else:
         given.output.write_text(page(Store(ROOT / "results" / "robustness" / "measured.json", given.resume)))
 

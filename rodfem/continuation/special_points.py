@@ -134,9 +134,9 @@ def find_special(
     still = solver.inertia.modes_near_zero(a.x, persistent) if rest and persistent else []
     while rest:
         special = _special(solver, a, b, rest[0], "mu", still)
-        if (known := _same(solver, special, found)) is not None:
+        if (known := same_point(solver, special, found)) is not None:
             special = _another(solver, a, b, known, still)
-            if _same(solver, special, found) is not None:
+            if same_point(solver, special, found) is not None:
                 raise ConvergenceError(
                     f"Beside load {known.point.load:.8g} another eigenvalue vanishes, where none was found",
                     SMALLER_STEPS,
@@ -148,7 +148,7 @@ def find_special(
     return found
 
 
-def _same(solver: BranchSolver, special: SpecialPoint, found: Sequence[SpecialPoint]) -> SpecialPoint | None:
+def same_point(solver: BranchSolver, special: SpecialPoint, found: Sequence[SpecialPoint]) -> SpecialPoint | None:
     """Special point among those found at which the same eigenvalues vanish at the same place, if there is one."""
     for known in found:
         near = abs(special.point.arclength - known.point.arclength) < APART

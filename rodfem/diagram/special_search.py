@@ -14,7 +14,7 @@ from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.index_chain import Row, chained
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.special_points import COUPLED, find_special, midpoint
+from rodfem.continuation.special_points import COUPLED, find_special, midpoint, same_point
 from rodfem.continuation.touching import Touching
 from rodfem.errors import ConvergenceError
 from rodfem.stability.round_off import resolve
@@ -149,6 +149,10 @@ class SpecialSearch:
             found += specials
             if not ended and not chained(p.low, p.high, specials, q.low, q.high):
                 self._shorten(p.point, q.point)
+        for i, special in enumerate(found):
+            if same_point(self.solver, special, found[:i]) is not None:
+                load = special.point.load
+                why.append(f"Near load {load:.8g} one special point was found twice, and another may be missing.")
         near = [p for p in points[1:-1] if p.zero > self.level]
         if near and not found and points[-1].zero <= self.level:
             why.append(

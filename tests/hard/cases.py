@@ -29,8 +29,8 @@ STIFFNESS = (
     ),
     Case(
         "graded meshes", "round-off grows with the inverse square of the smallest element", SAID,
-        "Euler, pi^2/4", "smallest of 12 elements of degree 6", stiffness.graded, (1e-3, 1e-6, 1e-8),
-        (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
+        "Euler, pi^2/4", "smallest of 12 elements of degree 6", stiffness.graded, (1e-3, 1e-5),
+        (1e-2, 1e-3, 1e-4, 1e-5, 1e-6),
     ),
     Case(
         "rotations past 2 pi and 4 pi", "a double point at ends turned by several radian", EXACT,
@@ -41,11 +41,11 @@ STIFFNESS = (
 BIFURCATIONS = (
     Case(
         "two branch points near each other", "one point, or two, within the tolerance of a zero eigenvalue", EXACT,
-        "Euler, B pi^2/4", "relative distance", bifurcations.neighbours, (1e-4, 1e-8, 0.0), (*POWERS, 0.0),
+        "Euler, B pi^2/4", "relative distance", bifurcations.neighbours, (1e-4, 1e-8, 0.0), (*POWERS[::2], 0.0),
     ),
     Case(
         "a fold pair", "two folds in one step, of a rod that stretches and does not turn", EXACT,
-        "u^3 - a u = P", "distance in load", bifurcations.folds, (1e-2, 1e-6), POWERS[:5],
+        "u^3 - a u = P", "distance in load", bifurcations.folds, (1e-2, 1e-6), POWERS[:5:2],
     ),
     Case(
         "a cusp", "a tangent that is nearly vertical, and no fold", EXACT,
@@ -57,32 +57,32 @@ BIFURCATIONS = (
     ),
     Case(
         "two eigenvalues that cross in opposite directions", "the index is 1 on either side, 0 between", SAID,
-        "d - P and d + P", "distance in load", bifurcations.opposite, (1e-4, 1e-6, 1e-8), POWERS[:8],
+        "d - P and d + P", "distance in load", bifurcations.opposite, (1e-4, 1e-6, 1e-8), POWERS[:8:2],
     ),
     Case(
         "the same, the index 2 between", "neither end of the step shows them", SAID,
-        "-d - P and P - d", "distance in load", bifurcations.opposite_other, (1e-4, 1e-8), POWERS[:8],
+        "-d - P and P - d", "distance in load", bifurcations.opposite_other, (1e-4, 1e-8), POWERS[:8:2],
     ),
     Case(
         "a transcritical point", "the load changes along the null vector", EXACT,
-        "u (u - a P)", "a", bifurcations.transcritical, (0.1, 1.0), (0.1, 0.5, 1.0, 3.0),
+        "u (u - a P)", "a", bifurcations.transcritical, (0.1, 1.0), (0.1, 1.0, 3.0),
     ),
     Case(
         "a fold beside a branch point", "eigenvalues exchange their numbers next to zero", EXACT,
         "P = -u^2 and u = g", "g", bifurcations.fold_with_branch_point, (1e-3, 0.0, -1e-3),
-        (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 0.0, -1e-6, -1e-3, -1e-1),
+        (1e-1, 1e-3, 1e-6, 0.0, -1e-6, -1e-3),
     ),
     Case(
         "an imperfection", "a broken pitchfork, sharper than a step", SAID,
         "elastica by elliptic integrals", "lateral load", bifurcations.imperfect, (1e-9,),
-        (1e-3, 1e-4, 1e-6, 1e-9, 1e-12, 1e-13),
+        (1e-3, 1e-6, 1e-9, 1e-12, 1e-13),
     ),
     Case(
         "a range about a branch point", "every row has a zero eigenvalue to the tolerance", SAID,
         "Euler, pi^2/4", "half width", ranges.about, (1e-6, 1e-9), (1e-12, 1e-9, 1e-6, 1e-3, 1.0),
     ),
     Case(
-        "the same, downwards", "", SAID, "Euler, pi^2/4", "half width", ranges.back, (1e-6, 1e-9),
+        "the same, downwards", "the same", SAID, "Euler, pi^2/4", "half width", ranges.back, (1e-6, 1e-9),
         (1e-9, 1e-6, 1e-3, 1.0),
     ),
     Case(
@@ -91,14 +91,14 @@ BIFURCATIONS = (
     ),
     Case(
         "a load asked for at a branch point", "its equations are singular, or nearly", EXACT,
-        "Euler, pi^2/4", "distance from it", ranges.asked, (0.0, -1e-9), (0.0, 1e-12, -1e-12, 1e-9, -1e-9, 1e-6),
+        "Euler, pi^2/4", "distance from it", ranges.asked, (0.0, -1e-9), (0.0, 1e-12, -1e-12, 1e-9, -1e-9),
     ),
 )  # fmt: skip
 PUBLISHED = (
     Case(
         "helical springs between hinges", "two critical loads that meet where the spring is 2.6202694 diameters long",
         EXACT, "Haringx 1948, E/G = 2.6", "part by which the length exceeds that", published.spring, (1e-3, -1e-3),
-        (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, -1e-5, -1e-3),
+        (1e-1, 1e-3, 1e-5, -1e-5),
     ),
     Case(
         "helical springs between clamps", "the same at 5.2405388 diameters", EXACT, "Haringx 1948, E/G = 2.6",
@@ -107,7 +107,7 @@ PUBLISHED = (
     Case(
         "pressed rings", "loads of equal first variation and different second ones; double points, motions that are "
         "free", EXACT, "n^2 - 1, n^2, (n^2 - 1)^2/(n^2 - 2) for n = 2 to 5 (Boresi 1955, Bodner 1958)", "load",
-        published.ring, ("central",), tuple(published.RINGS),
+        published.ring, ("dead",), tuple(published.RINGS),
     ),
     Case(
         "rolled up by an end moment", "rotations of ten turns", "the end within 1e-7 of the circle; stable",
@@ -124,12 +124,12 @@ PUBLISHED = (
     ),
     Case(
         "cords of many turns", "critical tensions 40 apart at a thousand times that", EXACT,
-        "(2 pi N)^2 - w^2, w = 2 pi n or tan(w/2) = w/2", "turns N", published.cord, (2, 50), (2, 5, 10, 20, 50),
+        "(2 pi N)^2 - w^2, w = 2 pi n or tan(w/2) = w/2", "turns N", published.cord, (2, 50), (2, 10, 50),
     ),
     Case(
         "localised helical buckling", "27 turns, a helix that fades away, and can slide at hardly any energy", EXACT,
         "van der Heijden & Thompson 2000; tension 2900.993205792131 at a slack of 0.03", "elements of degree 6",
-        published.localised, (40,), (32, 40, 64),
+        published.localised, (40,), (32, 40),
     ),
     Case(
         "a deep arch of 215 degrees", "a fold far from the undeformed state", EXACT,
