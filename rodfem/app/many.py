@@ -13,11 +13,11 @@ from typing import Any
 
 from mpi4py import MPI
 
-from rodfem.app.run import on_first, writable
 from rodfem.diagram.solver import RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.file_format import RESULT
 from rodfem.output.files import save_json
+from rodfem.output.folder import on_first, writable
 from rodfem.problem.arguments import checked, each, function, path
 from rodfem.problem.scene import Scene
 
@@ -30,7 +30,9 @@ def key_of(scene: Scene) -> dict[str, Any]:
     return {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants}
 
 
-@checked(scenes=each(SCENE), work=function("work"), folder=path("results/map"), comm=RANKS, progress=function("print"))
+@checked(
+    scenes=each(SCENE), work=function("work"), folder=path("results/map"), comm=RANKS, progress=function("print", 2)
+)
 def many(
     scenes: Sequence[Scene],
     work: Work,
@@ -42,26 +44,41 @@ def many(
 
     ``work`` gets no communicator but must use ``MPI.COMM_SELF``, and returns what JSON can hold.  Where it raises
     :class:`InputError` or :class:`ConvergenceError` the result is ``{"error": sentence}``, and the others go on.
-    ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`InputError` where ``folder``
-    cannot be written, or has a result in another or a newer format.  ``scenes`` are shared among the ranks of ``comm``.
+    ``progress(done, all)`` is called on rank 0 after each of its rods.  ``scenes`` are shared among the ranks of
+    ``comm``.  Raises :class:`InputError` where ``folder`` cannot be written or has a result in another or a newer
+    format, and where ``work`` returns anything else.
     """
     folder = Path(folder)
     on_first(comm, lambda: writable(folder))
     files = [folder / f"rod-{i:05d}.json" for i in range(len(scenes))]
     on_first(comm, lambda: _check(files))
+    refused = ""
     mine = range(comm.rank, len(scenes), comm.size)
     for done, i in enumerate(mine, start=1):
         if _saved(files[i], key_of(scenes[i])) is None:
             try:
                 result = work(scenes[i])
+                refused = _not_kept(result)
             except (InputError, ConvergenceError) as trouble:
                 result = {"error": str(trouble)}
+            if refused:
+                break
             save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
         if comm.rank == 0:
             progress(min(done * comm.size, len(scenes)), len(scenes))
-    comm.barrier()
+    if troubles := list(filter(None, comm.allgather(refused))):
+        raise InputError(troubles[0])
     found = [_saved(file, key_of(scene)) for file, scene in zip(files, scenes, strict=True)] if comm.rank == 0 else []
     return comm.bcast([{} if result is None else result for result in found])
+
+
+def _not_kept(result: Any) -> str:
+    """Sentence on a result that a file cannot hold, empty for one that it can."""
+    try:
+        json.dumps(result, allow_nan=False)
+    except (TypeError, ValueError) as trouble:
+        return f"The work returns what no file can hold ({trouble}): return numbers, texts and lists, None for nan."
+    return "" if isinstance(result, dict) else f"The work returns {result!r}: return a dictionary."
 
 
 def _check(files: Sequence[Path]) -> None:

@@ -17,12 +17,13 @@ from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE
 from rodfem.diagram.trace import PLAN, trace
-from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.output.files import save_json, save_states
+from rodfem.output.folder import on_first, writable
 from rodfem.output.typical import typical_state
-from rodfem.problem.arguments import checked, function, path
+from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
 
 atexit.register(gc.freeze)  # what there is at the end goes with the process: a search for garbage in it takes 0.15 s
@@ -30,40 +31,15 @@ atexit.register(gc.freeze)  # what there is at the end goes with the process: a 
 GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
 """Plain text for TeX names in the caption of a picture."""
 
-ANOTHER_FOLDER = Remedy("choose another one with {}", Argument("run", "output"))
-
-
-def on_first(comm: MPI.Comm, check: Callable[[], object]) -> None:
-    """Do a check on the first rank, and raise its :class:`InputError` on every rank."""
-    trouble: InputError | None = None
-    if comm.rank == 0:
-        try:
-            check()
-        except InputError as error:
-            trouble = error
-    trouble = comm.bcast(trouble)
-    if trouble is not None:
-        raise trouble
-
-
-def writable(folder: Path) -> None:
-    """Make ``folder``; raises :class:`InputError` where it cannot be written."""
-    probe = folder / f".probe-{os.getpid()}"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe.write_text("")
-        probe.unlink()
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(f"The output folder {folder} cannot be written ({reason})", ANOTHER_FOLDER) from error
-
 
 @checked(
     scene=SCENE,
     discretization=MESH,
     plan=PLAN,
     output=path("results/column"),
+    figures=yes_or_no,
     comm=RANKS,
+    quiet=yes_or_no,
     words=function("str"),
 )
 def run(

@@ -8,7 +8,7 @@ from rodfem.adaptivity.mesh_sequence import check_accuracy
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import Argument, InputError, Remedy
 from rodfem.problem.events import Event
-from rodfem.problem.kinds import real, reals, whole
+from rodfem.problem.kinds import flag, real, reals, whole
 from rodfem.problem.local_state import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import check_load
@@ -88,7 +88,8 @@ class Plan:
             methods.find(self.method)
         if self.accuracy is not None:
             real("accuracy", self.accuracy, ACCURACY)
-        if not all(isinstance(event, Event) for event in self.events):
+        flag("error_bars", self.error_bars)
+        if not isinstance(self.events, (tuple, list)) or not all(isinstance(event, Event) for event in self.events):
             raise InputError(f"events is {self.events!r}: give Events, as in events=(Event('ends meet', of=f),).")
         if self.locus is not None:
             parts = tuple(self.locus) if isinstance(self.locus, (tuple, list)) else ()
@@ -105,6 +106,8 @@ class Plan:
         span = self.over(scene)
         scene.check_span(span)
         check_load(scene)
+        for event in self.events:
+            event.check(scene.length)
         if self.accuracy is not None:
             check_accuracy(self.accuracy)
         low, high = sorted(span)

@@ -25,14 +25,22 @@ from rodfem.linalg.compiled import compile_ahead
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
-from rodfem.problem.arguments import Check, a, checked, count, number, path, text
+from rodfem.problem.arguments import Check, a, checked, count, each, number, path, text
 from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Verdict, assess
 from rodfem.timing import Clock
 
+
+def ranks(name: str, value: object) -> MPI.Comm:
+    """Check for a communicator that has ranks; raises :class:`InputError` for anything else."""
+    if not isinstance(value, MPI.Comm) or value == MPI.COMM_NULL:
+        raise InputError(f"{name} is {value!r}: give a communicator of mpi4py, as in {name}=MPI.COMM_SELF.")
+    return value
+
+
 SCENE: Check = a(Scene, "a rodfem.Scene")
 MESH: Check = a(Discretization, "a Discretization, as in Discretization(elements=8, degree=6)")
-RANKS: Check = a(MPI.Comm, "a communicator of mpi4py, as in comm=MPI.COMM_SELF")
+RANKS: Check = ranks
 POINT: Check = a((Point, SpecialPoint), "a point of a branch, as in diagram['branch 1'].points[0]")
 STATE: Check = a((Point, SpecialPoint, PETSc.Vec), "a point of a branch or a vector of the solver's system")
 METHOD: Check = text("auto")
@@ -113,6 +121,14 @@ class Solver:
     def _sweep(self) -> Sweep:
         return Sweep(self.equilibria, Plan(self.scene.span), Observer(), lambda: None)
 
+    def _state(self, point: Point | SpecialPoint | PETSc.Vec) -> PETSc.Vec:
+        """Return the state of a point; raises :class:`InputError` for one of another mesh, as far as sizes tell."""
+        x, size = state_of(point), self.equilibria.system.fields.unknowns
+        if x.size != size:
+            raise InputError(f"The state has {x.size} unknowns, and this mesh {size}: give a state of the same mesh.")
+        return x
+
+    @checked(x=a(PETSc.Vec, "a state, as in point.x"))
     def point(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of the equilibrium ``x``: ordinate, energy, index; frequencies without a potential."""
         if not isinstance(self.equilibria, BranchSolver):
@@ -120,7 +136,7 @@ class Solver:
         return self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True))
 
     @checked(load=number(1.0), guess=STATE)
-    def equilibrium(self, load: float, guess: Point | PETSc.Vec | None = None) -> Point:
+    def equilibrium(self, load: float, guess: Point | SpecialPoint | PETSc.Vec | None = None) -> Point:
         """Equilibrium at exactly ``load``.
 
         Parameters
@@ -139,8 +155,7 @@ class Solver:
         if guess is None:
             x, outcome = found.first(load)
         else:
-            known = guess.x if isinstance(guess, Point) else guess
-            x, outcome = found.at_load(known, load)
+            x, outcome = found.at_load(self._state(guess), load)
         if not outcome.converged:
             raise ConvergenceError(
                 f"No equilibrium was found at {scene.load} = {load:g}: go there in steps of the load, each from the "
@@ -164,7 +179,7 @@ class Solver:
         Raises :class:`~rodfem.errors.InputError` for a method that does not exist or apply, and
         :class:`~rodfem.errors.ConvergenceError` where an eigensolver fails.
         """
-        return assess(self.equilibria, state_of(point), method, number)
+        return assess(self.equilibria, self._state(point), method, number)
 
     @checked(point=STATE, number=count(3, 1), method=METHOD)
     def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
@@ -172,7 +187,7 @@ class Solver:
 
         There are ``number`` of them.  Raises :class:`~rodfem.errors.InputError` for fewer than one.
         """
-        return self._finder(state_of(point), number, method)[1]
+        return self._finder(self._state(point), number, method)[1]
 
     @checked(states=path("results/column/states.h5"), branch=text("branch 1"), row=count(0))
     def restore(self, states: Path | str, branch: str, row: int) -> Point:
@@ -183,7 +198,9 @@ class Solver:
         x = load_state(Path(states), branch, row, self.equilibria)
         return self.equilibrium(self.equilibria.system.scalar(x), x)
 
-    @checked(load=number(1.0), tries=count(24), seed=count(0))
+    @checked(
+        load=number(1.0), known=each(a(Point, "a point, as diagram.at(load) returns")), tries=count(24), seed=count(0)
+    )
     def search(self, load: float, known: Sequence[Point] = (), tries: int = 24, seed: int = 0) -> list[Point]:
         """Equilibria at ``load`` beside the ``known`` ones, by ``tries`` deflated Newton iterations.
 

@@ -27,11 +27,13 @@ from rodfem.problem.contribution import Block, Group, Unknown
 from rodfem.problem.kinds import reals, whole
 from rodfem.problem.local_state import Constants
 from rodfem.problem.scene import Scene
-from rodfem.tolerances import same_place
+from rodfem.tolerances import SAME_PLACE, same_place
 
 LOAD = "load"
 FACTORS = CHAIN, PETSC = "chain", "petsc"
 """What assembles and factors the matrices of a discretisation."""
+MOST = 50_000
+"""Largest number of elements: matrices of more exceed the memory of a machine."""
 HIGHEST = 12
 """Highest degree of elements."""
 
@@ -58,7 +60,8 @@ class Discretization:
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
         if self.vertices is not None:
             object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
-        if self.formulation not in (known := formulations.names()):
+        known = formulations.names()
+        if not isinstance(self.formulation, str) or self.formulation not in known:
             raise InputError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(known)}.")
         if self.factors not in FACTORS:
             raise InputError(f"Nothing factors matrices by the name {self.factors!r}: choose {' or '.join(FACTORS)}.")
@@ -66,12 +69,15 @@ class Discretization:
             raise InputError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
         if not 1 <= self.degree <= HIGHEST:
             raise InputError(f"Degree {self.degree} is not available: choose 1 to {HIGHEST}.")
+        if self.elements > MOST:
+            raise InputError(f"A mesh of {self.elements} elements is too large: choose at most {MOST}.")
         if self.vertices is not None:
             if len(self.vertices) != self.elements + 1:
                 raise InputError(
                     f"{len(self.vertices)} vertices do not bound {self.elements} elements: give {self.elements + 1}."
                 )
-            if not all(a < b for a, b in pairwise(self.vertices)):
+            width = SAME_PLACE * (self.vertices[-1] - self.vertices[0])
+            if not all(a + width < b for a, b in pairwise(self.vertices)):
                 raise InputError("The vertices of a mesh must ascend along the rod: sort them, each once.")
 
     def finer(self, factor: int, richer: int = 0) -> Discretization:

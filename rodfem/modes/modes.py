@@ -30,6 +30,8 @@ import numpy as np
 
 from rodfem.errors import Argument, InputError
 from rodfem.file_format import MODES
+from rodfem.problem.arguments import checked, count, text
+from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting, read
 
@@ -90,7 +92,10 @@ class Modes:
         return np.einsum("mji,kmj->kmi", frames, self.rotation)
 
     def amplitude(self, displacement: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-        """Amplitudes (K,) of the modes in a small motion (m, 3), (m, 3) of the rod."""
+        """Amplitudes (K,) of the modes in a small motion (m, 3), (m, 3) of the rod; :class:`InputError` without one."""
+        for name, given in (("displacement", displacement), ("rotation", rotation)):
+            if np.shape(given) != self.r.shape:
+                raise InputError(f"The {name} has the shape {np.shape(given)}: give one of the shape {self.r.shape}.")
         return np.asarray(
             np.tensordot(self.weight_displacement, displacement) + np.tensordot(self.weight_rotation, rotation)
         )
@@ -131,7 +136,8 @@ def save_modes(
             write(group, scene, [{name: getattr(modes, name) for name in ("load", "s", "r", "q")}])
 
 
-def load_modes(path: Path, branch: str, row: int) -> Modes:
+@checked(path=argument_path("results/column/modes.h5"), branch=text("straight"), row=count(0))
+def load_modes(path: Path | str, branch: str, row: int) -> Modes:
     """Modes of a saved state; raises :class:`InputError` where the file has none, or has another or a newer format."""
     try:
         with h5py.File(path, "r") as file:
@@ -163,7 +169,7 @@ def heading(path: Path) -> str:
         return f"{file.attrs['title']}, " if "title" in file.attrs else ""
 
 
-def _contents(path: Path) -> str:
+def _contents(path: Path | str) -> str:
     """Contents of a file of modes, in words."""
     try:
         with h5py.File(path, "r") as file:

@@ -25,6 +25,8 @@ from rodfem.fem.fields import Fields
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM, STATES, read_json
 from rodfem.modes.perturbation import Motions
+from rodfem.problem.arguments import checked
+from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.supports import write as write_supports
 from rodfem.problem.supports import write_section
 from rodfem.timing import Clock
@@ -163,9 +165,10 @@ def save_json(data: dict[str, Any], path: Path) -> None:
     os.replace(draft, path)
 
 
-def load_json(path: Path) -> dict[str, Any]:
+@checked(path=argument_path("results/column/diagram.json"))
+def load_json(path: Path | str) -> dict[str, Any]:
     """Read a diagram; raises :class:`InputError` where there is none, or one of a newer format."""
-    return read_json(path, DIAGRAM, ("scene", "parameter", "branches"))
+    return read_json(Path(path), DIAGRAM, ("scene", "parameter", "branches"))
 
 
 def save_states(branch: Branch, solvers: Sequence[StaticSolver], path: Path, first: bool) -> None:

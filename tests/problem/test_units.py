@@ -47,9 +47,7 @@ def test_dimensionless_diagram(length: float, stiffness: float, rod: str) -> Non
     Of a column whose loads are of order 1e6 no buckling was found: the weight of the load in the metric, one over the
     square of the span, was taken for the smallest mass of a perturbation.
     """
-    one, other = (
-        rodfem.trace(column(*units, rod), MESH, Plan(depth=1)) for units in ((1.0, 1.0), (length, stiffness))
-    )
+    one, other = (rodfem.trace(column(*units, rod), MESH, Plan(depth=1)) for units in ((1.0, 1.0), (length, stiffness)))
     assert [[(str(s.kind), s.negative_before, s.negative_after) for s in b.special] for b in one] == [
         [(str(s.kind), s.negative_before, s.negative_after) for s in b.special] for b in other
     ]
