@@ -80,7 +80,7 @@ def run(
     """
     plan = plan or Plan()
     output = Path(output or Path("results") / scene.name)
-    plan.check(scene)
+    plan.check(scene, discretization or Discretization())
     on_first(comm, lambda: writable(output))
     terminal = Terminal(plan, output, comm, quiet, words)
     diagram = trace(scene, discretization, plan, terminal, comm=comm)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from rodfem.adaptivity.mesh_sequence import check_accuracy
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import Argument, InputError, Remedy
+from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
 from rodfem.problem.events import Event
 from rodfem.problem.kinds import flag, real, reals, whole
 from rodfem.problem.local_state import asked_for
@@ -14,11 +15,12 @@ from rodfem.problem.scene import Scene
 from rodfem.problem.validation import check_load
 from rodfem.stability import methods
 
-MODES, METHOD = Argument("Plan", "modes"), Argument("Plan", "method")
+MODES, METHOD, SPECTRUM = Argument("Plan", "modes"), Argument("Plan", "method"), Argument("Plan", "spectrum")
+FEWER = "give less in {}, or use more elements"
 COUNTS = {
     Argument("Plan", "depth"): "depth",
     Argument("Plan", "tries"): "number of tries",
-    Argument("Plan", "spectrum"): "number of eigenvalues",
+    SPECTRUM: "number of eigenvalues",
     MODES: "number of modes",
 }
 """Arguments that are not negative, in words."""
@@ -101,8 +103,13 @@ class Plan:
         """Range of the load: that of the plan, or that of the scene."""
         return scene.span if self.span is None else self.span
 
-    def check(self, scene: Scene) -> None:
-        """Raise :class:`InputError` for a range that the scene does not admit, or a load outside the range."""
+    def check(self, scene: Scene, discretization: Discretization | None = None) -> None:
+        """Raise :class:`InputError` for a range that the scene does not admit, or a load outside the range.
+
+        Of a ``discretization``, too, if it is given: for one that does not fit, or has too few eigenvalues.
+        """
+        if discretization is not None:
+            self._check_mesh(scene, discretization)
         span = self.over(scene)
         scene.check_span(span)
         check_load(scene)
@@ -144,3 +151,12 @@ class Plan:
             raise InputError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at", GIVE_LOADS)
         if self.modes and self.method in methods.METHODS and not methods.find(self.method).finds_modes:
             raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))
+
+    def _check_mesh(self, scene: Scene, discretization: Discretization) -> None:
+        if self.accuracy is not None and discretization.vertices is None:
+            return  # meshes are chosen on the way
+        check_mesh(scene, discretization)
+        most = most_eigenvalues(scene, discretization)
+        for argument in (SPECTRUM, MODES):
+            if (asked := getattr(self, argument.name)) > most:
+                raise InputError(f"The mesh has no more than {most} eigenvalues, not {asked}", Remedy(FEWER, argument))

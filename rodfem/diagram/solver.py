@@ -16,7 +16,7 @@ from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.deflation.search import find_equilibria
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
-from rodfem.errors import ConvergenceError, InputError
+from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
 from rodfem.fem import assembly, compiled_newton
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
@@ -45,6 +45,19 @@ POINT: Check = a((Point, SpecialPoint), "a point of a branch, as in diagram['bra
 STATE: Check = a((Point, SpecialPoint, PETSc.Vec), "a point of a branch or a vector of the solver's system")
 METHOD: Check = text("auto")
 """Checks of arguments that several functions have."""
+
+
+HOPELESS = 0.9
+"""Index over the number of nodes above which it is that of the mesh, not of the rod."""
+
+
+def too_many(scene: Scene, load: float, index: int, nodes: int) -> InputError:
+    """Error for an equilibrium whose index a mesh of so many nodes cannot hold."""
+    return InputError(
+        f"At {scene.load} = {load:g} the rod has more half-waves than a mesh of {nodes} nodes can hold (its index is "
+        f"{index} there)",
+        Remedy("use smaller loads, or more elements ({})", Argument("Discretization", "elements")),
+    )
 
 
 class Solver:
@@ -84,6 +97,7 @@ class Solver:
 
         Raises :class:`~rodfem.errors.InputError` for a discretisation that does not fit the scene.
         """
+        Plan(scene.span, spectrum=spectrum).check(scene, discretization or Discretization())
         if scene.conservative:
             compat.require_real_petsc()
         if compat.ALONE:
@@ -147,8 +161,8 @@ class Solver:
             A state nearby to start Newton's method from: on the same mesh, at another load perhaps.  Without one the
             scene's own start is taken, as for the first state of a diagram.
 
-        Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, and
-        :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found.
+        Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, or whose index the mesh cannot
+        hold, and :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found.
         """
         scene, found = self.scene, self.equilibria
         scene.parameters[scene.load].check(scene.load, load)
@@ -161,7 +175,10 @@ class Solver:
                 f"No equilibrium was found at {scene.load} = {load:g}: go there in steps of the load, each from the "
                 "state before."
             )
-        return self.point(x)
+        point, mesh = self.point(x), self.equilibria.system.fields.discretization
+        if isinstance(found, BranchSolver) and point.index > HOPELESS * mesh.elements * mesh.degree:
+            raise too_many(scene, load, point.index, mesh.elements * mesh.degree)
+        return point
 
     @checked(point=STATE, method=METHOD, number=count(4, 1))
     def assess(self, point: Point | SpecialPoint | PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:

@@ -116,6 +116,34 @@ def scalars_of(scene: Scene, formulation: Formulation) -> list[Unknown]:
     return list(dict.fromkeys(out))
 
 
+def check_mesh(scene: Scene, discretization: Discretization, ranks: int = 1) -> None:
+    """Raise :class:`InputError` where a scene or a number of ranks does not allow a discretisation."""
+    formulations.chosen(discretization.formulation, scene)
+    elements, given, pieces = discretization.elements, discretization.vertices, len(scene.joints) + 1
+    if ranks > elements:
+        raise InputError(f"{elements} elements cannot be shared by {ranks} ranks: use more elements or fewer ranks.")
+    if given is not None:
+        ends = (given[0], given[-1]) == tuple(scene.interval)
+        if not ends or any(not same_place(given, s, scene.length).any() for s in scene.joints):
+            raise InputError(
+                f"The vertices of the mesh must begin and end at {scene.interval[0]:g} and {scene.interval[1]:g} "
+                "and hold every joint of the scene: add what is missing."
+            )
+    elif elements < pieces:
+        raise InputError(
+            f"The rod has {pieces} pieces between joints, and needs an element for each: use more than {elements} "
+            "elements."
+        )
+
+
+def most_eigenvalues(scene: Scene, discretization: Discretization) -> int:
+    """Bound of the number of finite eigenvalues of the discrete rod: what can turn, and what moves with a mass."""
+    planar = scene.normal is not None
+    turning, moving = (1, 2) if planar else (3, 3)
+    at_a_node = turning + (moving if scene.has_inertia or not scene.conservative else 0)
+    return at_a_node * (discretization.elements * discretization.degree + 1)
+
+
 class Fields:
     """Mesh, mixed space, the unknown ``u`` of all forms as a dolfinx Function, and the numbering of free unknowns.
 
@@ -142,11 +170,7 @@ class Fields:
 
         A ``mesh`` of dolfinx may be given instead.  Raises :class:`InputError` for more ranks than elements.
         """
-        if comm.size > discretization.elements:
-            raise InputError(
-                f"{discretization.elements} elements cannot be shared by {comm.size} ranks: "
-                "use more elements or fewer ranks."
-            )
+        check_mesh(scene, discretization, comm.size)
         self.formulation = formulations.chosen(discretization.formulation, scene)
         self.discretization = replace(discretization, formulation=self.formulation.name)
         self.scene, self.comm = scene, comm
@@ -174,19 +198,8 @@ class Fields:
         mesh = compat.interval_mesh(self.comm, elements, *scene.interval)
         uniform = np.linspace(*scene.interval, elements + 1)
         if given is not None:
-            ends = (given[0], given[-1]) == tuple(scene.interval)
-            if not ends or any(not same_place(given, s, scene.length).any() for s in scene.joints):
-                raise InputError(
-                    f"The vertices of the mesh must begin and end at {scene.interval[0]:g} and {scene.interval[1]:g} "
-                    "and hold every joint of the scene: add what is missing."
-                )
             compat.move_vertices(mesh, uniform, np.array(given))
             return mesh
-        if elements < len(pieces) - 1:
-            raise InputError(
-                f"The rod has {len(pieces) - 1} pieces between joints, and needs an element for each: use more than "
-                f"{elements} elements."
-            )
         shares = np.diff(pieces) / scene.length * elements
         counts = np.maximum(np.floor(shares).astype(int), 1)
         while counts.sum() > elements:

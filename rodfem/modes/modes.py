@@ -29,7 +29,7 @@ import h5py
 import numpy as np
 
 from rodfem.errors import Argument, InputError
-from rodfem.file_format import MODES
+from rodfem.file_format import MODES, UNREADABLE
 from rodfem.problem.arguments import checked, count, text
 from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.quaternions import directors
@@ -151,10 +151,28 @@ def load_modes(path: Path | str, branch: str, row: int) -> Modes:
                 )
             arrays = {name: group[name][()] for name in Modes.__dataclass_fields__ if name != "motion"}
             motion = tuple(group["motion"].asstr()[()])
-    except (OSError, KeyError) as trouble:
+    except UNREADABLE as trouble:
+        if isinstance(trouble, InputError):
+            raise
         raise InputError(f"{path} has no modes of row {row} of a branch {branch!r}: {_contents(path)}.") from trouble
+    _check_arrays(arrays, motion, path)
     arrays["load"] = float(arrays["load"])
     return Modes(motion=motion, **arrays)
+
+
+def _check_arrays(arrays: Mapping[str, Any], motion: tuple[str, ...], path: Path | str) -> None:
+    """Raise :class:`InputError` where arrays of a file are not of the shapes of :class:`Modes`."""
+    m, k = len(np.atleast_1d(arrays["s"])), len(motion)
+    shapes = {"load": (), "s": (m,), "r": (m, 3), "q": (m, 4), **dict.fromkeys(("value", "residual", "error"), (k,))}
+    for name, array in arrays.items():
+        wanted = shapes.get(name, (k, m, 3))
+        if np.shape(array) != wanted or np.asarray(array).dtype.kind not in "fciu":
+            raise InputError(
+                f"{path} has the {name} of the shape {np.shape(array)}, where numbers of the shape {wanted} were "
+                "expected: run the scene again."
+            )
+        if name not in ("residual", "error") and not np.isfinite(array).all():
+            raise InputError(f"{path} has a {name} that is not finite: run the scene again.")
 
 
 def load_setting(path: Path, branch: str, row: int) -> Setting:
@@ -174,5 +192,5 @@ def _contents(path: Path | str) -> str:
     try:
         with h5py.File(path, "r") as file:
             return "it has " + "; ".join(f"{name}, row {', '.join(rows)}" for name, rows in file["branches"].items())
-    except (OSError, KeyError):
+    except UNREADABLE:
         return f"run a scene with {Argument('Plan', 'modes')} and {Argument('Plan', 'at')}"

@@ -23,8 +23,9 @@ from rodfem.continuation.solvers import StaticSolver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Fields
 from rodfem.fem.system import System
-from rodfem.file_format import DIAGRAM, STATES, read_json
+from rodfem.file_format import DIAGRAM, STATES, UNREADABLE
 from rodfem.modes.perturbation import Motions
+from rodfem.output.contents import read_diagram
 from rodfem.problem.arguments import checked
 from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.supports import write as write_supports
@@ -168,7 +169,7 @@ def save_json(data: dict[str, Any], path: Path) -> None:
 @checked(path=argument_path("results/column/diagram.json"))
 def load_json(path: Path | str) -> dict[str, Any]:
     """Read a diagram; raises :class:`InputError` where there is none, or one of a newer format."""
-    return read_json(Path(path), DIAGRAM, ("scene", "parameter", "branches"))
+    return read_diagram(Path(path), ("scene", "parameter", "branches"))
 
 
 def save_states(branch: Branch, solvers: Sequence[StaticSolver], path: Path, first: bool) -> None:
@@ -254,7 +255,7 @@ def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc
                 )
             group = file[f"branches/{branch}"]
             sample = {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
-    except (OSError, KeyError, IndexError, ValueError) as trouble:
+    except UNREADABLE as trouble:
         if isinstance(trouble, InputError):
             raise
         raise InputError(
@@ -268,4 +269,14 @@ def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc
             f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
             "another scene, or by another version of rodfem; run the scene again."
         )
-    return solver.shape.restore(sample)
+    try:
+        if not all(np.isrealobj(values) and np.isfinite(values).all() for values in sample.values()):
+            raise ValueError("numbers that are not real and finite")
+        if sample["elements"] < 1 or ("q" in sample and not np.linalg.norm(sample["q"], axis=-1).all()):
+            raise ValueError("no elements, or no rotation somewhere")
+        return solver.shape.restore(sample)
+    except UNREADABLE as trouble:
+        raise InputError(
+            f"Row {row} of the branch {branch!r} in {path} is no state of the scene {system.scene.name!r} ({trouble}): "
+            "run the scene again."
+        ) from trouble

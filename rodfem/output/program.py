@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
+
+
+class Program(argparse.ArgumentParser):
+    """Parser whose complaints are one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one sentence and leave with status 2."""
+        self.exit(2, f"error: {message[:1].upper()}{message[1:]}; see {self.prog} --help.\n")
 
 
 def status_of(draw: Callable[[], Path], what: Path) -> int:
@@ -14,7 +24,9 @@ def status_of(draw: Callable[[], Path], what: Path) -> int:
     except KeyError as error:
         print(f"cannot draw {what}: it has no {error}; give the file that a run has written", file=sys.stderr)
     except (ImportError, OSError, RuntimeError, ValueError) as error:
-        print(error, file=sys.stderr)
+        print(str(error).split("\n", 1)[0], file=sys.stderr)
+    except (AttributeError, IndexError, TypeError) as error:  # of matplotlib, h5py or numpy, for what is no picture's
+        print(f"cannot draw {what} ({error}): give the file that a run has written", file=sys.stderr)
     else:
         return 0
     return 2

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from math import isfinite, nan
+from reprlib import Repr
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
 from ufl.classes import ComplexValue, ScalarValue
+from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_pre_traversal
 
 from rodfem.errors import SceneError
@@ -23,6 +25,9 @@ from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
+
+
+SHORT = Repr()
 
 
 def check_results(scene: Scene) -> None:
@@ -49,8 +54,8 @@ def check_same(what: str, first: Any, second: Any) -> None:
     """Raise :class:`SceneError` where a function has returned different numbers for the same arguments."""
     if not np.array_equal(first, second, equal_nan=True):
         raise SceneError(
-            f"The {what} returns other values each time it is called, {first} and {second}: let them depend on its "
-            "arguments alone, not on random numbers or a clock."
+            f"The {what} returns other values each time it is called, {SHORT.repr(first)} and "
+            f"{SHORT.repr(second)}: let them depend on its arguments alone, not on random numbers or a clock."
         )
 
 
@@ -85,8 +90,7 @@ def _numbers(role: Role, values: Any) -> list[float]:
 def _number(value: Any) -> float:
     """Number that an expression without unknowns stands for; nan where it has none, or a complex one."""
     try:
-        found = value if isinstance(value, (str, np.ndarray)) else ufl.as_ufl(value)(())
-        return plain(found)
+        return plain(value(()) if isinstance(value, Expr) else value)
     except Exception:  # of UFL's own, too, which differ from release to release
         return nan
 

@@ -323,7 +323,7 @@ class Scene(Contribution):
         found, places = [], self.samples() if self.depends_on_s() else self.samples()[:1]
         for i in stiff:
             pairs = [
-                [self._energy_at(free + d * v[i] * np.eye(3)[i], k, self.constants(s=s)) for d in (0.0, -1.0, 1.0)]
+                [self.energy_at(free + d * v[i] * np.eye(3)[i], k, self.constants(s=s)) for d in (0.0, -1.0, 1.0)]
                 for s in places
             ]
             if any(abs(b - a) > NEGLIGIBLE * max(abs(a), abs(b)) for a, *others in pairs for b in others):
@@ -377,10 +377,11 @@ class Scene(Contribution):
     def depends_on_s(self) -> bool:
         """Whether the stored energy is a function of the arclength too."""
         c, asked = watched(self.constants())
-        self._energy_at(np.zeros(3), np.zeros(3), c)
+        self.energy_at(np.zeros(3), np.zeros(3), c)
         return "s" in asked
 
-    def _energy_at(self, v: np.ndarray, k: np.ndarray, c: Constants) -> float:
+    def energy_at(self, v: np.ndarray, k: np.ndarray, c: Constants) -> float:
+        """Stored energy per length where the strains (3,) differ by ``v`` and ``k`` from the undeformed ones."""
         strains = [UNDEFORMED[i] + float(v[i]) for i in range(3)]
         W = self.energy(ufl.as_vector(strains), ufl.as_vector([float(x) for x in k]), c)
         return float(ufl.as_ufl(W)(()))
@@ -391,7 +392,7 @@ class Scene(Contribution):
         free = np.isin(np.arange(3), self.free_strains)
         for _ in range(2):
             v, k = 0.05 * rng.uniform(-1, 1, size=(2, 3))
-            values = [self._energy_at(t * v * free, t * k, self.constants()) for t in (0.0, 1.0, 2.0, 3.0)]
+            values = [self.energy_at(t * v * free, t * k, self.constants()) for t in (0.0, 1.0, 2.0, 3.0)]
             if abs(np.diff(values, 3)[0]) > QUADRATIC * max(map(abs, values)):
                 return False
         return True

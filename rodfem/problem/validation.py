@@ -203,6 +203,9 @@ def check_inertia(scene: Scene) -> None:
     rotary += [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
     if min(masses + rotary) < 0:
         raise SceneError(f"A mass or rotary inertia of {min(masses + rotary):g} is negative: give zero or more.")
+    beyond = [x for x in masses + rotary if x and not TINIEST < x < LARGEST]
+    if beyond:
+        raise SceneError(f"A mass or rotary inertia of {beyond[0]:g} has powers that are no floats: use other units.")
     if not scene.conservative and max(masses) == 0 and scene.inertia == type(scene.inertia)():
         raise SceneError(
             f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter of "
@@ -245,13 +248,20 @@ def check_convexity(scene: Scene) -> None:
                 f"The stiffness of {abs(stiffness).max():.3g}{where} is so far from one that its powers are no floats: "
                 "choose other units."
             )
-        units = np.where(np.arange(len(stiffness)) < len(stiffness) - 3, 1.0, 1.0 / scene.length)  # curvature: 1/length
-        balanced = units[:, None] * stiffness * units
-        lowest = np.linalg.eigvalsh(balanced)[0] if stiffness.size else 1.0
-        if lowest <= NEGLIGIBLE * abs(balanced).max(initial=0.0):
+        diagonal = np.sqrt(np.maximum(np.diag(stiffness), 0.0))
+        unitless = stiffness / np.outer(diagonal, diagonal) if diagonal.all() else stiffness
+        if np.linalg.eigvalsh(unitless)[0] <= NEGLIGIBLE * abs(unitless).max():
             raise SceneError(
                 f"The stored energy is not convex{where}: its second derivative at the undeformed state has the "
-                f"eigenvalue {lowest:.3g}; choose constants for which all are positive."
+                f"eigenvalue {np.linalg.eigvalsh(stiffness)[0]:.3g}; choose constants for which all are positive."
+            )
+        units = np.where(np.arange(len(stiffness)) < len(stiffness) - 3, 1.0, 1.0 / scene.length)  # curvature: 1/length
+        values = np.linalg.eigvalsh(units[:, None] * stiffness * units)
+        if values[0] <= NEGLIGIBLE * values[-1]:
+            raise SceneError(
+                f"The stored energy is convex, but for round-off{where}: with the rod's length as unit its second "
+                f"derivative at the undeformed state has eigenvalues from {values[0]:.3g} to {values[-1]:.3g}; choose "
+                "constants that are nearer to each other, or a kind of rod without the stiff strains."
             )
 
 
