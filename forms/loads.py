@@ -32,7 +32,8 @@ def spring(r: Expr, stiffness: Any, anchor: Sequence[Any] = (0.0, 0.0, 0.0)) -> 
 
 def _three(stiffness: Any) -> Sequence[Any]:
     """Stiffness in three directions; raises :class:`ValueError` for another number of them."""
-    k = list(stiffness) if hasattr(stiffness, "__len__") else [stiffness] * 3
+    one = isinstance(stiffness, Expr) or not hasattr(stiffness, "__len__")
+    k = [stiffness] * 3 if one else list(stiffness)
     if len(k) != 3:
         raise ValueError(f"a stiffness is one number or three, not {len(k)}")
     return k

@@ -127,7 +127,9 @@ def check_diagram(data: Mapping[str, Any], where: Path | str) -> None:
     for branch in data.get("branches", []):
         here = f"{where}, branch {SHORT.repr(branch.get('name'))},"
         _check(branch, BRANCH, here)
-        rows = _rows(branch.get("columns", {}), len(meshes), here)
+        if "columns" not in branch:
+            continue
+        rows = _rows(branch["columns"], len(meshes), here)
         for i, special in enumerate(branch.get("special", [])):
             _check(special, SPECIAL, f"{here} special point {i},")
             _check(special.get("law") or {}, LAW, f"{here} special point {i},")

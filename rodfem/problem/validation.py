@@ -243,7 +243,7 @@ def check_convexity(scene: Scene) -> None:
                 f"The second derivative of the stored energy at the undeformed state is not finite{where}: choose "
                 "constants for which it is."
             )
-        if not TINIEST < abs(stiffness).max() * scene.length**2 < LARGEST:
+        if not TINIEST / scene.length**2 < abs(stiffness).max() < LARGEST / scene.length**2:
             raise SceneError(
                 f"The stiffness of {abs(stiffness).max():.3g}{where} is so far from one that its powers are no floats: "
                 "choose other units."
