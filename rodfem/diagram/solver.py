@@ -51,13 +51,17 @@ HOPELESS = 0.9
 """Index over the number of nodes above which it is that of the mesh, not of the rod."""
 
 
-def too_many(scene: Scene, load: float, index: int, nodes: int) -> InputError:
-    """Error for an equilibrium whose index a mesh of so many nodes cannot hold."""
-    return InputError(
-        f"At {scene.load} = {load:g} the rod has more half-waves than a mesh of {nodes} nodes can hold (its index is "
-        f"{index} there)",
-        Remedy("use smaller loads, or more elements ({})", Argument("Discretization", "elements")),
-    )
+def check_index(scene: Scene, load: float, index: int, nodes: int) -> None:
+    """Raise :class:`InputError` for an equilibrium of a ``scene`` at a ``load`` whose ``index`` no mesh can hold.
+
+    The mesh has so many ``nodes``.
+    """
+    if index > HOPELESS * nodes:
+        raise InputError(
+            f"At {scene.load} = {load:g} the rod has more half-waves than a mesh of {nodes} nodes can hold (its index "
+            f"is {index} there)",
+            Remedy("use smaller loads, or more elements ({})", Argument("Discretization", "elements")),
+        )
 
 
 class Solver:
@@ -176,8 +180,8 @@ class Solver:
                 "state before."
             )
         point, mesh = self.point(x), self.equilibria.system.fields.discretization
-        if isinstance(found, BranchSolver) and point.index > HOPELESS * mesh.elements * mesh.degree:
-            raise too_many(scene, load, point.index, mesh.elements * mesh.degree)
+        if isinstance(found, BranchSolver):
+            check_index(scene, load, point.index, mesh.elements * mesh.degree)
         return point
 
     @checked(point=STATE, method=METHOD, number=count(4, 1))

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rodfem.continuation.solvers import BranchSolver
-from rodfem.diagram.solver import HOPELESS, Solver, too_many
+from rodfem.diagram.solver import Solver, check_index
 from rodfem.fem.fields import Discretization
 from rodfem.problem.roles import functions_of
 from rodfem.problem.scene import Scene
@@ -27,7 +27,7 @@ SMALL = 1e-6
 def check_waves(scene: Scene, discretization: Discretization, span: tuple[float, float], comm: MPI.Comm) -> None:
     """Raise :class:`InputError` where a mesh cannot hold the half-waves at an end of a range of loads; collective.
 
-    ``discretization`` is that of the ``scene``, ``comm`` has the ranks that share it.
+    ``discretization`` is that of the ``scene``, ``span`` the range, and ``comm`` has the ranks that share the rod.
     """
     nodes = discretization.elements * discretization.degree
     loads = [load for load in span if FEW * half_waves(scene, load) > nodes] if scene.conservative else []
@@ -37,9 +37,7 @@ def check_waves(scene: Scene, discretization: Discretization, span: tuple[float,
     for load in loads:
         x, outcome = found.at_load(found.start(load), load)
         if outcome.converged:
-            index = found.inertia.at(x).count().negative
-            if index > HOPELESS * nodes:
-                raise too_many(scene, load, index, nodes)
+            check_index(scene, load, found.inertia.at(x).count().negative, nodes)
 
 
 def half_waves(scene: Scene, load: float) -> float:

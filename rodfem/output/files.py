@@ -270,13 +270,22 @@ def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc
             "another scene, or by another version of rodfem; run the scene again."
         )
     try:
-        if not all(np.isrealobj(values) and np.isfinite(values).all() for values in sample.values()):
-            raise ValueError("numbers that are not real and finite")
-        if sample["elements"] < 1 or ("q" in sample and not np.linalg.norm(sample["q"], axis=-1).all()):
-            raise ValueError("no elements, or no rotation somewhere")
+        _check_sound(sample, path)
         return solver.shape.restore(sample)
     except UNREADABLE as trouble:
+        if isinstance(trouble, InputError):
+            raise
         raise InputError(
             f"Row {row} of the branch {branch!r} in {path} is no state of the scene {system.scene.name!r} ({trouble}): "
             "run the scene again."
         ) from trouble
+
+
+def _check_sound(sample: dict[str, Any], path: Path) -> None:
+    """Raise :class:`InputError` for a state of a file with numbers that no state has."""
+    real = all(np.isrealobj(values) and np.isfinite(values).all() for values in sample.values())
+    if not real or sample["elements"] < 1 or not np.linalg.norm(sample.get("q", np.ones(4)), axis=-1).all():
+        raise InputError(
+            f"{path} has a state with numbers that are not real and finite, no elements, or no rotation somewhere: run "
+            "the scene again."
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 import sys
 from collections.abc import Mapping, Sequence
@@ -21,7 +22,7 @@ from rodfem.continuation.kinds import IMPERFECT, KINDS
 from rodfem.file_format import DIAGRAM
 from rodfem.output.contents import read_diagram
 from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
-from rodfem.output.program import Program, status_of
+from rodfem.output.program import status_of, terse
 from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, save, tex
 from rodfem.output.view import POINT
 
@@ -239,7 +240,9 @@ def _place_labels(axes: Axes, pieces: list[Piece], legend: Bbox, obstacles: Floa
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the diagram named on the command line, that of the process by default; returns 0, or 2 after a sentence."""
-    parser = Program(prog="python -m rodfem.output.plot_diagram", description="Draw a bifurcation diagram.")
+    parser = terse(
+        argparse.ArgumentParser(prog="python -m rodfem.output.plot_diagram", description="Draw a bifurcation diagram.")
+    )
     parser.add_argument("diagram", type=Path, help="diagram.json of a scene")
     parser.add_argument("--output", type=Path, help="picture to write (default: the same name with .png)")
     given = parser.parse_args(arguments)

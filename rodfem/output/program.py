@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 
-class Program(argparse.ArgumentParser):
-    """Parser whose complaints are one sentence."""
+def terse(parser: Any) -> Any:
+    """Return a parser of argparse whose complaints are one sentence, with status 2."""
 
-    def error(self, message: str) -> NoReturn:
-        """Print one sentence and leave with status 2."""
-        self.exit(2, f"error: {message[:1].upper()}{message[1:]}; see {self.prog} --help.\n")
+    def error(message: str) -> NoReturn:
+        sys.stderr.write(f"error: {message[:1].upper()}{message[1:]}; see {parser.prog} --help.\n")
+        sys.exit(2)
+
+    parser.error = error
+    return parser
 
 
 def status_of(draw: Callable[[], Path], what: Path) -> int:

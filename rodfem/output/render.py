@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.glyphs import DARK, LOAD, glyphs_of
-from rodfem.output.program import Program, status_of
+from rodfem.output.program import status_of, terse
 from rodfem.output.solids import Solid, curve_of, profile_of, rod, straight_arrow
 from rodfem.output.view import POINT, view_of
 from rodfem.problem.setting import Setting
@@ -303,7 +304,7 @@ def draw_shape_safely(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the shape named on the command line, that of the process by default; returns 0, or 2 after a sentence."""
-    parser = Program(prog="python -m rodfem.output.render", description="Draw a rod in space.")
+    parser = terse(argparse.ArgumentParser(prog="python -m rodfem.output.render", description="Draw a rod in space."))
     parser.add_argument("states", type=Path, help="states.h5 of a scene")
     parser.add_argument("--branch", required=True, help="name of the branch")
     parser.add_argument("--row", required=True, type=int, help="row of the state, counted from 0")
