@@ -12,7 +12,7 @@ def terse(parser: Any) -> Any:
     """Return a parser of argparse whose complaints are one sentence, with status 2."""
 
     def error(message: str) -> NoReturn:
-        sys.stderr.write(f"error: {message[:1].upper()}{message[1:]}; see {parser.prog} --help.\n")
+        sys.stderr.write(f"error: {message[:1].upper()}{message[1:]}.\n")
         sys.exit(2)
 
     parser.error = error

@@ -17,7 +17,6 @@ from rodfem.diagram import solver
 from rodfem.errors import InputError
 from rodfem.output import plot_diagram, plot_modes, render
 
-pytestmark = pytest.mark.short
 HOME = Path(__file__).parents[2]
 
 LINES = {
@@ -81,6 +80,7 @@ AFTER_SET_UP = ("--half-length 1e3", "--bending 1e-5")
 """What is found with the discrete rod, in a folder that has been made."""
 
 
+@pytest.mark.short
 @pytest.mark.parametrize("line", LINES)
 def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     def compute(*_: object, **__: object) -> None:
@@ -105,6 +105,7 @@ def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, cap
         assert out == err == ""
 
 
+@pytest.mark.short
 def test_options_of_petsc_that_are_read() -> None:
     petsc_options.check(["-log_view", ":file", "-rodfem_eps_tol", "-1e-9", "-mat_type", "aij", "-help"])
     for words in (["x"], ["-"], ["--"], ["-log_view", ":a", "b"], ["-st_type", "sinvert"]):
@@ -113,6 +114,7 @@ def test_options_of_petsc_that_are_read() -> None:
     assert petsc_options.unread(["-rodfem_nothing", "3", "-log_view"]) == ["-rodfem_nothing"]
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     ("main", "line", "words"),
     [
