@@ -22,6 +22,9 @@ from forms.energy import bending_and_twist
 from rodfem.problem.ends import clamped, sliding
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 
+MOST = 1e6
+"""Turns beyond which defaults stay as they are: no mesh holds them."""
+
 
 def scene(options: Namespace) -> Scene:
     """State the problem: what the rod is made of, how its ends are held, and what to look at."""
@@ -51,7 +54,7 @@ def scene(options: Namespace) -> Scene:
 
 def defaults(options: Namespace) -> dict:
     """Six elements a turn, of higher degree where many turns make tight loops; a first tension that is stable."""
-    turns = abs(options.turns) if isfinite(options.turns) else 0.0
+    turns = min(abs(options.turns), MOST) if isfinite(options.turns) else 0.0
     return {
         "elements": min(max(ceil(6 * turns), 6), 600),
         "degree": 8 if turns > 2 else 6,

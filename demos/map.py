@@ -75,26 +75,36 @@ def draw(couplings: np.ndarray, loads: np.ndarray, results: list[dict], path: Pa
         figure.savefig(draft)
 
 
-if __name__ == "__main__":
-    parser = cli.Parser(prog="map.py", description=__doc__)
-    parser.add_argument("--couplings", type=int, default=40, metavar="N", help="number of couplings A (default 40)")
-    parser.add_argument("--loads", type=int, default=40, metavar="N", help="number of compressions (default 40)")
-    parser.add_argument("--output", type=Path, default=Path("results/map"), metavar="DIR", help="(default results/map)")
-    options = parser.parse_args()
-    if min(options.couplings, options.loads) < 2:
-        cli.complain("A map needs two couplings and two loads at least.")
-    couplings, loads = np.linspace(-3.1, 3.1, options.couplings), np.linspace(0.01, 0.6, options.loads)
+def main(parser: cli.Parser, couplings: np.ndarray, loads: np.ndarray, output: Path) -> None:
+    """Compute what is missing in the folder ``output``, and draw it; ``parser`` words what is refused."""
     report = Report()
-    rods = [scene(float(A), 0.6) for A in couplings]
-    results = many(
-        rods,
-        lambda rod: read(rod, loads),
-        options.output,
-        progress=lambda done, count: report.say(f"  {done} of {count} rods"),
-    )
+    with cli.sentences(parser):
+        rods = [scene(float(A), 0.6) for A in couplings]
+        results = many(
+            rods,
+            lambda rod: read(rod, loads),
+            output,
+            progress=lambda done, count: report.say(f"  {done} of {count} rods"),
+        )
     failed = [r["error"] for r in results if "error" in r]
     for sentence in failed:
         report.warn(sentence)
     if MPI.COMM_WORLD.rank == 0 and not failed:
-        draw(couplings, loads, results, options.output / "map.png")
-    report.say(f"Results in {options.output}: rod-00000.json ..., map.png")
+        draw(couplings, loads, results, output / "map.png")
+    report.say(f"Results in {output}: rod-00000.json ..., map.png")
+
+
+MOST = 10_000
+"""Couplings, or loads, of a map."""
+
+if __name__ == "__main__":
+    parser = cli.Parser(prog="map.py", description=__doc__)
+    parser.add_argument("--couplings", type=int, default=40, metavar="N", help="number of couplings A (default 40)")
+    parser.add_argument("--loads", type=int, default=40, metavar="N", help="number of compressions (default 40)")
+    words = "(default results/map)"
+    parser.add_argument("--output", type=cli.folder, default=Path("results/map"), metavar="DIR", help=words)
+    options = parser.parse_args()
+    if not 2 <= min(options.couplings, options.loads) <= max(options.couplings, options.loads) <= MOST:
+        cli.complain(f"A map needs two couplings and two loads at least, and at most {MOST} of each.")
+    couplings, loads = np.linspace(-3.1, 3.1, options.couplings), np.linspace(0.01, 0.6, options.loads)
+    main(parser, couplings, loads, options.output)

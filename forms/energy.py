@@ -17,8 +17,10 @@ def bending_and_twist(k: Expr, stiffness: tuple[Expr, Expr, Expr]) -> Expr:
 
     ``k`` has shape (3,): bending about ``d1`` and ``d2``, then twist.  ``stiffness = (B1, B2, C)`` are the two bending
     stiffnesses and the torsional one, force times length squared.  A natural curvature or twist is subtracted first:
-    ``bending_and_twist((k[0], k[1], k[2] - c.t0), stiffness)``.
+    ``bending_and_twist((k[0], k[1], k[2] - c.t0), stiffness)``.  Raises :class:`ValueError` for another number of them.
     """
+    if len(stiffness) != 3:
+        raise ValueError(f"bending and twist have three stiffnesses, not {len(stiffness)}")
     return sum(0.5 * b * k[i] ** 2 for i, b in enumerate(stiffness))
 
 

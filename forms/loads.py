@@ -26,8 +26,17 @@ def dead(r: Expr, force: Sequence[Any]) -> Expr:
 
 def spring(r: Expr, stiffness: Any, anchor: Sequence[Any] = (0.0, 0.0, 0.0)) -> Expr:
     """Energy ``1/2 k |r - anchor|^2`` of a spring, or of an elastic foundation; ``stiffness`` one number or three."""
-    k = stiffness if isinstance(stiffness, (tuple, list)) else [stiffness] * 3
+    k = _three(stiffness)
     return sum(0.5 * k[i] * (r[i] - anchor[i]) ** 2 for i in range(3))
+
+
+def _three(stiffness: Any) -> Sequence[Any]:
+    """Stiffness in three directions; raises :class:`ValueError` for another number of them."""
+    one = isinstance(stiffness, Expr) or not hasattr(stiffness, "__len__")
+    k = [stiffness] * 3 if one else list(stiffness)
+    if len(k) != 3:
+        raise ValueError(f"a stiffness is one number or three, not {len(k)}")
+    return k
 
 
 def rotational_spring(q: Expr, stiffness: Any, rotation: Sequence[Any] = IDENTITY) -> Expr:
@@ -35,7 +44,7 @@ def rotational_spring(q: Expr, stiffness: Any, rotation: Sequence[Any] = IDENTIT
 
     ``p`` is the ``rotation`` without moment; ``stiffness`` one number, or three about the directors of ``p``.
     """
-    k = stiffness if isinstance(stiffness, (tuple, list)) else [stiffness] * 3
+    k = _three(stiffness)
     w = 2 * vector_part(product(conjugate(ufl.as_vector(list(rotation))), q))
     return sum(0.5 * k[i] * w[i] ** 2 for i in range(3)) / ufl.dot(q, q)
 

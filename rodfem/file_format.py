@@ -65,20 +65,23 @@ class Format:
         if MARK in file.attrs:
             mark = {key: file.attrs.get(name) for key, name in zip(KEYS, self.mark_attributes(), strict=True)}
         self._check(mark, {*file.attrs, *file}, file.filename, needs)
+        _check_links(file, file.filename, set())
 
     def _check(self, mark: Mapping[str, Any] | None, entries: Any, where: Path | str, needs: Sequence[str]) -> None:
-        if mark is None:
-            missing = [name for name in needs if name not in entries]
-            if missing:
-                raise InputError(
-                    f"{where} has no {', '.join(missing)}, so it is no {self.name}, or one of a version of rodfem that "
-                    f"wrote less: give {self.file}, or run the scene again."
-                )
-            return
+        if mark is not None:
+            self._check_mark(mark, where)
+        missing = [name for name in needs if name not in entries]
+        if missing:
+            raise InputError(
+                f"{where} has no {', '.join(missing)}, so it is no {self.name}, or one of a version of rodfem that "
+                f"wrote less: give {self.file}, or run the scene again."
+            )
+
+    def _check_mark(self, mark: Mapping[str, Any], where: Path | str) -> None:
         name, version, program = (mark.get(key) for key in KEYS)
-        if name != self.name:
+        if not isinstance(name, str) or name != self.name:
             raise InputError(f"{where} has the format {name!r}, not {self.name!r}: give {self.file}.")
-        if not isinstance(version, (int, np.integer)) or version < 1:
+        if not isinstance(version, (int, np.integer)) or isinstance(version, bool) or version < 1:
             raise InputError(
                 f"{where} has version {version!r} of the format {self.name!r}, where a whole number from 1 on was "
                 "expected: run the scene again."
@@ -100,11 +103,38 @@ RESULT = Format("rodfem result", 1, "a rod-00000.json, rod-00001.json ... of rod
 FORMATS = (DIAGRAM, STATES, MODES, LOCUS, RESULT)
 
 
+UNREADABLE = (OSError, KeyError, IndexError, ValueError, TypeError, AttributeError, RuntimeError)
+"""Errors of h5py and numpy for a file that holds something else than was expected."""
+
+
+def _check_links(group: Any, where: str, seen: set[Any]) -> None:
+    """Raise :class:`InputError` for an HDF5 group that leads to another file: rodfem writes none."""
+    import h5py
+
+    if group.id in seen:
+        return
+    seen.add(group.id)
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise InputError(f"{where} has a link instead of {name!r}: give a file that a run has written.")
+        entry = group[name]
+        if isinstance(entry, h5py.Dataset) and (entry.external or entry.is_virtual):
+            raise InputError(f"{where} takes {name!r} from another file: give one that a run has written.")
+        if isinstance(entry, h5py.Group):
+            _check_links(entry, where, seen)
+
+
+def _no_number(name: str) -> float:
+    """Refuse NaN and Infinity, which JSON has not: null stands for them."""
+    raise ValueError(f"{name} is no number of JSON")
+
+
 def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, Any]:
     """Contents of a JSON file; raises :class:`InputError` where it cannot be read, and as :meth:`Format.check` does."""
     try:
-        data: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as trouble:
+        text = Path(path).read_text(encoding="utf-8")
+        data: dict[str, Any] = json.loads(text, parse_constant=_no_number)
+    except (OSError, ValueError, RecursionError) as trouble:
         raise InputError(f"{path} is no {form.name} ({trouble}): give {form.file}.") from trouble
     form.check(data, path, needs)
     return data

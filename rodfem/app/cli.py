@@ -10,11 +10,14 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
+from rodfem.app import petsc_options
 from rodfem.app.interrupts import listen
 from rodfem.errors import ConvergenceError, InputError, SetupError
 from rodfem.stability.methods import AUTO, METHODS
@@ -41,11 +44,20 @@ ARGUMENT = re.compile(r"\b(?:Discretization|Plan|StepControl|run)\((\w+)=([^()]*
 """An :class:`~rodfem.errors.Argument` in a sentence: its name and its value."""
 
 
+NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$|-(inf|nan)$")
+"""A negative number, which is the value of an option and none itself; argparse knows those without exponent."""
+
+
 class Parser(argparse.ArgumentParser):
     """Argument parser whose complaints are one sentence, printed once under MPI.
 
     The destination of an option is the name of the argument that it is for.
     """
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        """As for any parser, with numbers like -1e6 as values."""
+        super().__init__(*arguments, **named)
+        self._negative_number_matcher = NEGATIVE
 
     def option(self, name: str) -> str:
         """Option for an argument."""
@@ -70,6 +82,39 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print ``message`` and leave with status 2."""
         complain(f"{message[:1].upper()}{message[1:]}; see {self.prog} --help.")
+
+
+def folder(text: str) -> Path:
+    """Value of an option that names a folder; raises :class:`argparse.ArgumentTypeError` for none."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("the name of the folder is empty: give one, as in results/rod")
+    return Path(text)
+
+
+@contextmanager
+def sentences(parser: Parser) -> Iterator[None]:
+    """Bad input, and what fails for a reason that is known, ends with one sentence and status 2."""
+    from petsc4py import PETSc
+
+    try:
+        yield
+    except (InputError, SetupError, ConvergenceError) as trouble:
+        complain(parser.in_options(str(trouble)))
+    except PETSc.Error as trouble:
+        complain(f"PETSc gave up ({str(trouble).splitlines()[0]}): try other constants or another discretisation.")
+
+
+def start_petsc(options: Sequence[str]) -> None:
+    """Load PETSc with its options, some of which it reads then; those that it refuses end with a sentence."""
+    try:
+        petsc_options.check(options)
+        petsc4py = import_module("petsc4py")
+        petsc4py.init(["rodfem", *options])
+    except InputError as trouble:
+        complain(str(trouble))
+    except Exception as trouble:  # petsc4py has no class of its own for errors until PETSc is loaded
+        words = str(trouble).splitlines()[0]
+        complain(f"PETSc does not start with the options {' '.join(options)} ({words}): see whether files are missing.")
 
 
 def complain(sentence: str) -> NoReturn:
@@ -155,7 +200,7 @@ def parser_for(
             "--locus": {"nargs": 3, "metavar": ("NAME", "LOW", "HIGH")},
         },
         "output": {
-            "--output": {"type": Path, "default": Path("results") / name, "metavar": "DIR"},
+            "--output": {"type": folder, "default": Path("results") / name, "metavar": "DIR"},
             "--no-figures": {"dest": "figures", "action": "store_false"},
         },
     }
@@ -196,51 +241,62 @@ def main(
     for name, value in defaults(options).items() if defaults else ():
         if not parser.gives(name, ours):
             setattr(options, name, value)
-    import petsc4py
-
-    petsc4py.init(["rodfem", *petsc])  # before PETSc is loaded, for options that it reads only then (-log_view)
-    from petsc4py import PETSc
-
+    start_petsc(petsc)
     try:
-        from rodfem.app.run import run
-        from rodfem.continuation.step_control import StepControl
-        from rodfem.diagram.plan import Plan
-        from rodfem.fem.fields import Discretization
-
-        if petsc:  # once more, for a PETSc that was running already
-            PETSc.Options().insertString(" ".join(petsc))
-        if options.accuracy is not None:
-            for name in ("elements", "degree"):
-                if parser.gives(name, ours):
-                    raise InputError(
-                        f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy."
-                    )
-        discretization = Discretization(options.formulation, options.elements, options.degree, factors=options.factors)
-        scene = scene_of(options)
-        span = tuple(options.span)
-        steps = StepControl(largest=options.largest)
-        at = tuple(options.at)
-        plan = Plan(
-            span,
-            at,
-            depth=options.depth,
-            spectrum=options.spectrum,
-            steps=steps,
-            tries=options.tries,
-            locus=pair(options.locus),
-            method=options.method,
-            modes=options.modes,
-            accuracy=options.accuracy,
-        )
-        run(scene, discretization, plan, options.output, figures=options.figures, words=parser.in_options)
+        with sentences(parser):
+            _run(parser, options, ours, scene_of, petsc)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; the branches that were finished are in {options.output}") from None
-    except (InputError, SetupError, ConvergenceError) as trouble:
-        complain(parser.in_options(str(trouble)))
     except MemoryError:
         complain(
             "Memory is exhausted: use fewer elements or a lower degree; the branches that were finished are in "
             f"{options.output}."
         )
-    except PETSc.Error as trouble:
-        complain(f"PETSc gave up ({str(trouble).splitlines()[0]}): try other constants or another discretisation.")
+
+
+def _run(
+    parser: Parser,
+    options: argparse.Namespace,
+    ours: Sequence[str],
+    scene_of: Callable[[argparse.Namespace], Any],
+    petsc: Sequence[str],
+) -> None:
+    """Build and run the scene.
+
+    ``parser``, ``scene_of`` and ``options`` are those of :func:`main`, ``ours`` and ``petsc`` the words before and
+    after the lone ``--``.
+    """
+    from petsc4py import PETSc
+
+    from rodfem.app.run import run
+    from rodfem.app.terminal import Report
+    from rodfem.continuation.step_control import StepControl
+    from rodfem.diagram.plan import Plan
+    from rodfem.fem.fields import Discretization
+
+    if petsc:  # once more, for a PETSc that was running already
+        PETSc.Options().insertString(" ".join(petsc))
+    if options.accuracy is not None:
+        for name in ("elements", "degree"):
+            if parser.gives(name, ours):
+                raise InputError(f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy.")
+    discretization = Discretization(options.formulation, options.elements, options.degree, factors=options.factors)
+    scene = scene_of(options)
+    span = tuple(options.span)
+    steps = StepControl(largest=options.largest)
+    at = tuple(options.at)
+    plan = Plan(
+        span,
+        at,
+        depth=options.depth,
+        spectrum=options.spectrum,
+        steps=steps,
+        tries=options.tries,
+        locus=pair(options.locus),
+        method=options.method,
+        modes=options.modes,
+        accuracy=options.accuracy,
+    )
+    run(scene, discretization, plan, options.output, figures=options.figures, words=parser.in_options)
+    if unread := petsc_options.unread(petsc):
+        Report().warn(f"PETSc did not read the option {', '.join(unread)}: see whether it is spelled right.")

@@ -33,7 +33,9 @@ def key_of(scene: Scene) -> dict[str, Any]:
     return {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants}
 
 
-@checked(scenes=each(SCENE), work=function("work"), folder=path("results/map"), comm=RANKS, progress=function("print"))
+@checked(
+    scenes=each(SCENE), work=function("work"), folder=path("results/map"), comm=RANKS, progress=function("print", 2)
+)
 def many(
     scenes: Sequence[Scene],
     work: Work,
@@ -45,10 +47,10 @@ def many(
 
     ``work`` gets no communicator but must use ``MPI.COMM_SELF``, and returns what JSON can hold.  Where it raises
     :class:`InputError` or :class:`ConvergenceError`, or a numerical library or memory gives up, the result is
-    ``{"error": sentence}``, and the others go on.
-    ``progress(done, all)`` is called on rank 0 after each of its rods.  Raises :class:`InputError` where ``folder``
-    cannot be written, is in use by another process, or has a result in another or a newer format.  ``scenes`` are
-    shared among the ranks of ``comm``.
+    ``{"error": sentence}``, and the others go on.  ``progress(done, all)`` is called on rank 0 after each of its rods.
+    ``scenes`` are shared among the ranks of ``comm``.  Raises :class:`InputError` where ``folder`` cannot be written,
+    is in use by another process, or has a result in another or a newer format, and where ``work`` returns anything
+    else.
     """
     folder = Path(folder)
     end_together()
@@ -74,7 +76,7 @@ def _shared(
                     save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
             if comm.rank == 0:
                 progress(min(done * comm.size, len(scenes)), len(scenes))
-    except InputError as error:  # a file cannot be written: the other ranks go on with theirs
+    except InputError as error:  # a result or a file cannot be written: the other ranks go on with theirs
         trouble = error
     for other in filter(None, comm.allgather(trouble)):
         raise other
@@ -83,12 +85,24 @@ def _shared(
 
 
 def _result(scene: Scene, work: Work) -> dict[str, Any]:
-    """What the work returns, or the sentence of its error."""
+    """What the work returns, or the sentence of its error; raises :class:`InputError` for what no file can hold."""
     try:
         with as_failure(MPI.COMM_SELF):
-            return work(scene)
+            result = work(scene)
     except (InputError, ConvergenceError) as trouble:
         return {"error": str(trouble)}
+    if refused := _not_kept(result):
+        raise InputError(refused)
+    return result
+
+
+def _not_kept(result: Any) -> str:
+    """Sentence on a result that a file cannot hold, empty for one that it can."""
+    try:
+        json.dumps(result, allow_nan=False)
+    except (TypeError, ValueError) as trouble:
+        return f"The work returns what no file can hold ({trouble}): return numbers, texts and lists, None for nan."
+    return "" if isinstance(result, dict) else f"The work returns {result!r}: return a dictionary."
 
 
 def _check(files: Sequence[Path]) -> None:

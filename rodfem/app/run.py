@@ -25,7 +25,7 @@ from rodfem.fem.system import System
 from rodfem.output.files import save_json, save_run
 from rodfem.output.folder import locked, remove_earlier
 from rodfem.output.typical import typical_state
-from rodfem.problem.arguments import checked, function, path
+from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
 
@@ -40,7 +40,9 @@ GREEK = {r"\lambda": "\N{GREEK SMALL LETTER LAMDA}"}
     discretization=MESH,
     plan=PLAN,
     output=path("results/column"),
+    figures=yes_or_no,
     comm=RANKS,
+    quiet=yes_or_no,
     words=function("str"),
 )
 def run(
@@ -83,7 +85,7 @@ def run(
     """
     plan = plan or Plan()
     output = Path(output or Path("results") / scene.name)
-    plan.check(scene)
+    plan.check(scene, discretization or Discretization())
     terminal = Terminal(plan, output, comm, quiet, words)
     with locked(output, comm):
         diagram = trace(scene, discretization, plan, terminal, comm=comm)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 
 from rodfem.continuation.branch import Point
 from rodfem.errors import InputError
-from rodfem.problem.kinds import real, whole
+from rodfem.problem.kinds import finite, real, whole
 
 SHRINK, GROW = 0.4, 1.6
 """Least and greatest ratio of a step to the one before."""
@@ -48,8 +49,10 @@ class StepControl:
             raise InputError(
                 f"A step of {self.largest:g} is out of bounds: choose more than {self.smallest:g}, at most 1."
             )
+        if 0 < self.first < self.smallest:
+            raise InputError(f"A first step of {self.first:g} is out of bounds: choose {self.smallest:g} or more.")
         for name in ("first", "smallest", "aim"):
-            if not getattr(self, name) > 0:
+            if not 0 < getattr(self, name) < inf:
                 raise InputError(f"StepControl with {name} = {getattr(self, name):g} lead nowhere: give more than 0.")
 
     def begin(self) -> float:
@@ -86,7 +89,8 @@ class IndexStepControl(StepControl):
         super().__post_init__()
         if whole("change", self.change, IndexStepControl.change) < 1:
             raise InputError(f"A change of the index of {self.change} leads nowhere: give change=1 or more.")
-        real("resolved", self.resolved, IndexStepControl.resolved)
+        if finite("resolved", self.resolved, IndexStepControl.resolved) < 0:
+            raise InputError(f"resolved is {self.resolved:g}: give zero or more, as in resolved=1e-4.")
 
     def accepts(self, before: Point, after: Point) -> bool:
         """Whether the index has changed by no more than the bound, or the step is as short as it needs be."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from html import escape
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.kinds import EVENT, KINDS
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.deflation.search import equilibria_at
@@ -19,9 +21,10 @@ from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
 from rodfem.output.files import as_data, save_run
-from rodfem.output.folder import locked
+from rodfem.output.folder import PICTURES, locked, picture_at
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.scene import Scene
+from rodfem.ranks import on_first
 from rodfem.stability.assessment import Verdict
 from rodfem.timing import Clock
 from rodfem.whole_files import draft_of
@@ -85,8 +88,8 @@ class Diagram:
 
     def __getitem__(self, key: str | int) -> Branch:
         """Branch by name or number; raises :class:`KeyError` or :class:`IndexError`."""
-        if isinstance(key, int):
-            return self.branches[key]
+        if isinstance(key, Integral):
+            return self.branches[int(key)]
         for branch in self.branches:
             if branch.name == key:
                 return branch
@@ -96,11 +99,17 @@ class Diagram:
     def special(self, kind: str | None = None, branch: str | None = None) -> list[SpecialPoint]:
         """Special points, of one kind ("fold", "branch point", "flutter", "divergence", ...) or one branch if named.
 
-        Without a kind those at which something happens: loads asked for and ends are left out.
+        Without a kind those at which something happens: loads asked for and ends are left out.  Events are found by
+        their names, too.  Raises :class:`~rodfem.errors.InputError` for a kind that does not exist.
         """
         chosen = self.branches if branch is None else [self[branch]]
         every = [s for b in chosen for s in b.special]
-        return [s for s in every if (s.kind == kind if kind is not None else not s.kind.given)]
+        if kind is None:
+            return [s for s in every if not s.kind.given]
+        events = {*(e.name for e in self.plan.events), *(s.note for s in every if s.kind == EVENT)}
+        if kind not in KINDS and kind not in events:
+            raise InputError(f"There is no kind {kind!r}: choose one of {', '.join([*KINDS, *sorted(events)])}.")
+        return [s for s in every if kind == s.kind or (s.kind == EVENT and kind == s.note)]
 
     @checked(load=number(1.0))
     def at(self, load: float) -> list[Point]:
@@ -188,10 +197,16 @@ class Diagram:
     def again(self, discretization: Discretization | None = None, **changes: Any) -> Diagram:
         """Trace once more with another discretisation or plan: ``again(span=(60, 4))``, ``again(accuracy=1e-8)``.
 
-        ``changes`` are fields of :class:`~rodfem.Plan`.  The mesh stays unless one is given.
+        ``changes`` are fields of :class:`~rodfem.Plan`.  The mesh stays unless one is given.  Raises
+        :class:`~rodfem.errors.InputError` for a change that a plan has not.
         """
         from rodfem.diagram.trace import trace
 
+        known = [f.name for f in fields(Plan)]
+        if unknown := [name for name in changes if name not in known]:
+            raise InputError(
+                f"A plan has no {unknown[0]!r}: choose one of {', '.join(known)}, or give a Discretization first."
+            )
         system = self.solvers[0].system
         mesh = discretization or system.fields.discretization
         return trace(self.scene, mesh, replace(self.plan, **changes), comm=system.comm)
@@ -228,7 +243,11 @@ class Diagram:
 
     @checked(path=path("diagram.png"))
     def plot(self, path: Path | str | None = None) -> Figure:
-        """Draw the diagram with stability and special points; also into a file, if a ``path`` is given."""
+        """Draw the diagram with stability and special points; also into a file, if a ``path`` is given.
+
+        Raises :class:`~rodfem.errors.InputError` where that cannot be written, or has a suffix of no picture.
+        """
+        self._can_write(path, PICTURES)
         if self.scene.conservative:
             from rodfem.output.plot_diagram import figure_of
         else:
@@ -243,12 +262,18 @@ class Diagram:
     def show(self, point: Point | SpecialPoint, path: Path | str | None = None, caption: str | None = None) -> Snapshot:
         """Draw the rod at a point, with its supports and loads; also into a file, if a ``path`` is given.
 
-        A notebook shows what is returned.  Raises :class:`ImportError` where PyVista is missing.
+        A notebook shows what is returned.  Raises :class:`ImportError` where PyVista is missing, and
+        :class:`~rodfem.errors.InputError` for a path that is no PNG's.
         """
         from rodfem.output.snapshot import snapshot
 
+        self._can_write(path, (".png",))
         shown = point.point if isinstance(point, SpecialPoint) else point
         return snapshot(self.branches, self.solvers, shown, path, caption)
+
+    def _can_write(self, path: Path | str | None, suffixes: Sequence[str]) -> None:
+        if path is not None:
+            on_first(self.solvers[0].system.comm, lambda: picture_at(Path(path), suffixes))
 
     def __repr__(self) -> str:
         """Scene, size and range."""

@@ -7,18 +7,20 @@ from dataclasses import dataclass, field
 from rodfem.adaptivity.mesh_sequence import check_accuracy
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import Argument, InputError, Remedy
+from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
 from rodfem.problem.events import Event
-from rodfem.problem.kinds import real, reals, whole
+from rodfem.problem.kinds import flag, real, reals, whole
 from rodfem.problem.local_state import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import check_load
 from rodfem.stability import methods
 
-MODES, METHOD = Argument("Plan", "modes"), Argument("Plan", "method")
+MODES, METHOD, SPECTRUM = Argument("Plan", "modes"), Argument("Plan", "method"), Argument("Plan", "spectrum")
+FEWER = "give less in {}, or use more elements"
 COUNTS = {
     Argument("Plan", "depth"): "depth",
     Argument("Plan", "tries"): "number of tries",
-    Argument("Plan", "spectrum"): "number of eigenvalues",
+    SPECTRUM: "number of eigenvalues",
     MODES: "number of modes",
 }
 """Arguments that are not negative, in words."""
@@ -88,7 +90,8 @@ class Plan:
             methods.find(self.method)
         if self.accuracy is not None:
             real("accuracy", self.accuracy, ACCURACY)
-        if not all(isinstance(event, Event) for event in self.events):
+        flag("error_bars", self.error_bars)
+        if not isinstance(self.events, (tuple, list)) or not all(isinstance(event, Event) for event in self.events):
             raise InputError(f"events is {self.events!r}: give Events, as in events=(Event('ends meet', of=f),).")
         if self.locus is not None:
             parts = tuple(self.locus) if isinstance(self.locus, (tuple, list)) else ()
@@ -100,11 +103,18 @@ class Plan:
         """Range of the load: that of the plan, or that of the scene."""
         return scene.span if self.span is None else self.span
 
-    def check(self, scene: Scene) -> None:
-        """Raise :class:`InputError` for a range that the scene does not admit, or a load outside the range."""
+    def check(self, scene: Scene, discretization: Discretization | None = None) -> None:
+        """Raise :class:`InputError` for a range that the scene does not admit, or a load outside the range.
+
+        Of a ``discretization``, too, if it is given: for one that does not fit, or has too few eigenvalues.
+        """
+        if discretization is not None:
+            self._check_mesh(scene, discretization)
         span = self.over(scene)
         scene.check_span(span)
         check_load(scene)
+        for event in self.events:
+            event.check(scene.length)
         if self.accuracy is not None:
             check_accuracy(self.accuracy)
         low, high = sorted(span)
@@ -141,3 +151,12 @@ class Plan:
             raise InputError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at", GIVE_LOADS)
         if self.modes and self.method in methods.METHODS and not methods.find(self.method).finds_modes:
             raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))
+
+    def _check_mesh(self, scene: Scene, discretization: Discretization) -> None:
+        if self.accuracy is not None and discretization.vertices is None:
+            return  # meshes are chosen on the way
+        check_mesh(scene, discretization)
+        most = most_eigenvalues(scene, discretization)
+        for argument in (SPECTRUM, MODES):
+            if (asked := getattr(self, argument.name)) > most:
+                raise InputError(f"The mesh has no more than {most} eigenvalues, not {asked}", Remedy(FEWER, argument))

@@ -21,9 +21,9 @@ from rodfem.file_format import DIAGRAM
 from rodfem.output.files import COLUMNS, OPTIONAL, SPECIAL, check_run, load_json, load_state
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
-from rodfem.tolerances import NEGLIGIBLE
+from rodfem.tolerances import NEGLIGIBLE, unit
 
-NEEDED = ("range", "accuracy", "constants", "discretization", "meshes")
+NEEDED = ("scene", "parameter", "branches", "range", "accuracy", "constants", "discretization", "meshes")
 """Entries of a diagram, beside those that all of its readers need."""
 OF_BRANCH = ("name", "parent", "ended", "columns", "special")
 OF_SPECIAL = ("kind", "multiplicity", "meets", "law", *SPECIAL)
@@ -115,7 +115,14 @@ def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[Sta
     values = {name: _number(columns[name][row]) for name in COLUMNS}
     given = {name: columns[name][row] for name in OPTIONAL if name in columns}
     values |= {name: value for name, value in given.items() if value is not None}
-    return Point(x=load_state(states, branch, row, solvers[values["mesh"]]), tangent=None, **values)
+    solver = solvers[values["mesh"]]
+    x, load = load_state(states, branch, row, solver), values["load"]
+    if abs(solver.system.scalar(x) - load) > NEGLIGIBLE * unit(load, one=solver.units.load):
+        raise InputError(
+            f"{states} has another load in row {row} of the branch {branch!r} than diagram.json beside it: give the "
+            "two files of one run."
+        )
+    return Point(x=x, tangent=None, **values)
 
 
 def _special(entry: dict[str, Any], points: Sequence[Point], solvers: Sequence[StaticSolver]) -> SpecialPoint:

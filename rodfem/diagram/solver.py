@@ -16,7 +16,7 @@ from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.deflation.search import find_equilibria
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
-from rodfem.errors import ConvergenceError, InputError
+from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
 from rodfem.fem import assembly, compiled_newton
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
@@ -25,18 +25,43 @@ from rodfem.linalg.compiled import compile_ahead
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
-from rodfem.problem.arguments import Check, a, checked, count, number, path, text
+from rodfem.problem.arguments import Check, a, checked, count, each, number, path, text
 from rodfem.problem.scene import Scene
 from rodfem.stability.assessment import Verdict, assess
 from rodfem.timing import Clock
 
+
+def ranks(name: str, value: object) -> MPI.Comm:
+    """Check for a communicator that has ranks; raises :class:`InputError` for anything else."""
+    if not isinstance(value, MPI.Comm) or value == MPI.COMM_NULL:
+        raise InputError(f"{name} is {value!r}: give a communicator of mpi4py, as in {name}=MPI.COMM_SELF.")
+    return value
+
+
 SCENE: Check = a(Scene, "a rodfem.Scene")
 MESH: Check = a(Discretization, "a Discretization, as in Discretization(elements=8, degree=6)")
-RANKS: Check = a(MPI.Comm, "a communicator of mpi4py, as in comm=MPI.COMM_SELF")
+RANKS: Check = ranks
 POINT: Check = a((Point, SpecialPoint), "a point of a branch, as in diagram['branch 1'].points[0]")
 STATE: Check = a((Point, SpecialPoint, PETSc.Vec), "a point of a branch or a vector of the solver's system")
 METHOD: Check = text("auto")
 """Checks of arguments that several functions have."""
+
+
+HOPELESS = 0.9
+"""Index over the number of nodes above which it is that of the mesh, not of the rod."""
+
+
+def check_index(scene: Scene, load: float, index: int, nodes: int) -> None:
+    """Raise :class:`InputError` for an equilibrium of a ``scene`` at a ``load`` whose ``index`` no mesh can hold.
+
+    The mesh has so many ``nodes``.
+    """
+    if index > HOPELESS * nodes:
+        raise InputError(
+            f"At {scene.load} = {load:g} the rod has more half-waves than a mesh of {nodes} nodes can hold (its index "
+            f"is {index} there)",
+            Remedy("use smaller loads, or more elements ({})", Argument("Discretization", "elements")),
+        )
 
 
 class Solver:
@@ -76,6 +101,7 @@ class Solver:
 
         Raises :class:`~rodfem.errors.InputError` for a discretisation that does not fit the scene.
         """
+        Plan(scene.span, spectrum=spectrum).check(scene, discretization or Discretization())
         if scene.conservative:
             compat.require_real_petsc()
         if compat.ALONE:
@@ -113,6 +139,14 @@ class Solver:
     def _sweep(self) -> Sweep:
         return Sweep(self.equilibria, Plan(self.scene.span), Observer(), lambda: None)
 
+    def _state(self, point: Point | SpecialPoint | PETSc.Vec) -> PETSc.Vec:
+        """Return the state of a point; raises :class:`InputError` for one of another mesh, as far as sizes tell."""
+        x, size = state_of(point), self.equilibria.system.fields.unknowns
+        if x.size != size:
+            raise InputError(f"The state has {x.size} unknowns, and this mesh {size}: give a state of the same mesh.")
+        return x
+
+    @checked(x=a(PETSc.Vec, "a state, as in point.x"))
     def point(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of the equilibrium ``x``: ordinate, energy, index; frequencies without a potential."""
         if not isinstance(self.equilibria, BranchSolver):
@@ -120,7 +154,7 @@ class Solver:
         return self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True))
 
     @checked(load=number(1.0), guess=STATE)
-    def equilibrium(self, load: float, guess: Point | PETSc.Vec | None = None) -> Point:
+    def equilibrium(self, load: float, guess: Point | SpecialPoint | PETSc.Vec | None = None) -> Point:
         """Equilibrium at exactly ``load``.
 
         Parameters
@@ -131,22 +165,24 @@ class Solver:
             A state nearby to start Newton's method from: on the same mesh, at another load perhaps.  Without one the
             scene's own start is taken, as for the first state of a diagram.
 
-        Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, and
-        :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found.
+        Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, or whose index the mesh cannot
+        hold, and :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found.
         """
         scene, found = self.scene, self.equilibria
         scene.parameters[scene.load].check(scene.load, load)
         if guess is None:
             x, outcome = found.first(load)
         else:
-            known = guess.x if isinstance(guess, Point) else guess
-            x, outcome = found.at_load(known, load)
+            x, outcome = found.at_load(self._state(guess), load)
         if not outcome.converged:
             raise ConvergenceError(
                 f"No equilibrium was found at {scene.load} = {load:g}: go there in steps of the load, each from the "
                 "state before."
             )
-        return self.point(x)
+        point, mesh = self.point(x), self.equilibria.system.fields.discretization
+        if isinstance(found, BranchSolver):
+            check_index(scene, load, point.index, mesh.elements * mesh.degree)
+        return point
 
     @checked(point=STATE, method=METHOD, number=count(4, 1))
     def assess(self, point: Point | SpecialPoint | PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
@@ -164,7 +200,7 @@ class Solver:
         Raises :class:`~rodfem.errors.InputError` for a method that does not exist or apply, and
         :class:`~rodfem.errors.ConvergenceError` where an eigensolver fails.
         """
-        return assess(self.equilibria, state_of(point), method, number)
+        return assess(self.equilibria, self._state(point), method, number)
 
     @checked(point=STATE, number=count(3, 1), method=METHOD)
     def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
@@ -172,7 +208,7 @@ class Solver:
 
         There are ``number`` of them.  Raises :class:`~rodfem.errors.InputError` for fewer than one.
         """
-        return self._finder(state_of(point), number, method)[1]
+        return self._finder(self._state(point), number, method)[1]
 
     @checked(states=path("results/column/states.h5"), branch=text("branch 1"), row=count(0))
     def restore(self, states: Path | str, branch: str, row: int) -> Point:
@@ -183,7 +219,9 @@ class Solver:
         x = load_state(Path(states), branch, row, self.equilibria)
         return self.equilibrium(self.equilibria.system.scalar(x), x)
 
-    @checked(load=number(1.0), tries=count(24), seed=count(0))
+    @checked(
+        load=number(1.0), known=each(a(Point, "a point, as diagram.at(load) returns")), tries=count(24), seed=count(0)
+    )
     def search(self, load: float, known: Sequence[Point] = (), tries: int = 24, seed: int = 0) -> list[Point]:
         """Equilibria at ``load`` beside the ``known`` ones, by ``tries`` deflated Newton iterations.
 

@@ -16,6 +16,7 @@ from rodfem.diagram.frequency_mesh import frequency_mesh
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
 from rodfem.diagram.sweep import FREQUENCIES, Sweep
+from rodfem.diagram.waves import check_waves
 from rodfem.fem.fields import Discretization
 from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
@@ -71,12 +72,14 @@ def trace(
     does the end of what started them (:func:`rodfem.ranks.end_together`).
     """
     plan = plan or Plan()
-    plan.check(scene)
+    plan.check(scene, discretization or Discretization())
     end_together()
     recorder, clock = Recorder(observer or Observer()), Clock()
     with compat.announce_compilation(recorder.compiling) as compiled:
         with clock("setup"):
             mesh = _mesh(scene, discretization or Discretization(), plan, recorder, comm)
+            if plan.accuracy is None:
+                check_waves(scene, mesh, plan.over(scene), comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
         recorder.system(found.system, plan.accuracy)
         if compiled and plan.error_bars and compat.ALONE:

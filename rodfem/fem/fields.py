@@ -27,11 +27,13 @@ from rodfem.problem.contribution import Block, Group, Unknown
 from rodfem.problem.kinds import reals, whole
 from rodfem.problem.local_state import Constants
 from rodfem.problem.scene import Scene
-from rodfem.tolerances import same_place
+from rodfem.tolerances import SAME_PLACE, same_place
 
 LOAD = "load"
 FACTORS = CHAIN, PETSC = "chain", "petsc"
 """What assembles and factors the matrices of a discretisation."""
+MOST = 50_000
+"""Largest number of elements: matrices of more exceed the memory of a machine."""
 HIGHEST = 12
 """Highest degree of elements."""
 
@@ -58,7 +60,8 @@ class Discretization:
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
         if self.vertices is not None:
             object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
-        if self.formulation not in (known := formulations.names()):
+        known = formulations.names()
+        if not isinstance(self.formulation, str) or self.formulation not in known:
             raise InputError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(known)}.")
         if self.factors not in FACTORS:
             raise InputError(f"Nothing factors matrices by the name {self.factors!r}: choose {' or '.join(FACTORS)}.")
@@ -66,12 +69,15 @@ class Discretization:
             raise InputError(f"A mesh of {self.elements} elements cannot hold a rod: give at least 1.")
         if not 1 <= self.degree <= HIGHEST:
             raise InputError(f"Degree {self.degree} is not available: choose 1 to {HIGHEST}.")
+        if self.elements > MOST:
+            raise InputError(f"A mesh of {self.elements} elements is too large: choose at most {MOST}.")
         if self.vertices is not None:
             if len(self.vertices) != self.elements + 1:
                 raise InputError(
                     f"{len(self.vertices)} vertices do not bound {self.elements} elements: give {self.elements + 1}."
                 )
-            if not all(a < b for a, b in pairwise(self.vertices)):
+            width = SAME_PLACE * (self.vertices[-1] - self.vertices[0])
+            if not all(a + width < b for a, b in pairwise(self.vertices)):
                 raise InputError("The vertices of a mesh must ascend along the rod: sort them, each once.")
 
     def finer(self, factor: int, richer: int = 0) -> Discretization:
@@ -110,6 +116,34 @@ def scalars_of(scene: Scene, formulation: Formulation) -> list[Unknown]:
     return list(dict.fromkeys(out))
 
 
+def check_mesh(scene: Scene, discretization: Discretization, ranks: int = 1) -> None:
+    """Raise :class:`InputError` where a scene or a number of ranks does not allow a discretisation."""
+    formulations.chosen(discretization.formulation, scene)
+    elements, given, pieces = discretization.elements, discretization.vertices, len(scene.joints) + 1
+    if ranks > elements:
+        raise InputError(f"{elements} elements cannot be shared by {ranks} ranks: use more elements or fewer ranks.")
+    if given is not None:
+        ends = (given[0], given[-1]) == tuple(scene.interval)
+        if not ends or any(not same_place(given, s, scene.length).any() for s in scene.joints):
+            raise InputError(
+                f"The vertices of the mesh must begin and end at {scene.interval[0]:g} and {scene.interval[1]:g} "
+                "and hold every joint of the scene: add what is missing."
+            )
+    elif elements < pieces:
+        raise InputError(
+            f"The rod has {pieces} pieces between joints, and needs an element for each: use more than {elements} "
+            "elements."
+        )
+
+
+def most_eigenvalues(scene: Scene, discretization: Discretization) -> int:
+    """Bound of the number of finite eigenvalues of the discrete rod: what can turn, and what moves with a mass."""
+    planar = scene.normal is not None
+    turning, moving = (1, 2) if planar else (3, 3)
+    at_a_node = turning + (moving if scene.has_inertia or not scene.conservative else 0)
+    return at_a_node * (discretization.elements * discretization.degree + 1)
+
+
 class Fields:
     """Mesh, mixed space, the unknown ``u`` of all forms as a dolfinx Function, and the numbering of free unknowns.
 
@@ -136,11 +170,7 @@ class Fields:
 
         A ``mesh`` of dolfinx may be given instead.  Raises :class:`InputError` for more ranks than elements.
         """
-        if comm.size > discretization.elements:
-            raise InputError(
-                f"{discretization.elements} elements cannot be shared by {comm.size} ranks: "
-                "use more elements or fewer ranks."
-            )
+        check_mesh(scene, discretization, comm.size)
         self.formulation = formulations.chosen(discretization.formulation, scene)
         self.discretization = replace(discretization, formulation=self.formulation.name)
         self.scene, self.comm = scene, comm
@@ -168,19 +198,8 @@ class Fields:
         mesh = compat.interval_mesh(self.comm, elements, *scene.interval)
         uniform = np.linspace(*scene.interval, elements + 1)
         if given is not None:
-            ends = (given[0], given[-1]) == tuple(scene.interval)
-            if not ends or any(not same_place(given, s, scene.length).any() for s in scene.joints):
-                raise InputError(
-                    f"The vertices of the mesh must begin and end at {scene.interval[0]:g} and {scene.interval[1]:g} "
-                    "and hold every joint of the scene: add what is missing."
-                )
             compat.move_vertices(mesh, uniform, np.array(given))
             return mesh
-        if elements < len(pieces) - 1:
-            raise InputError(
-                f"The rod has {len(pieces) - 1} pieces between joints, and needs an element for each: use more than "
-                f"{elements} elements."
-            )
         shares = np.diff(pieces) / scene.length * elements
         counts = np.maximum(np.floor(shares).astype(int), 1)
         while counts.sum() > elements:

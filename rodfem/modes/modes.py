@@ -29,7 +29,9 @@ import h5py
 import numpy as np
 
 from rodfem.errors import Argument, InputError
-from rodfem.file_format import MODES
+from rodfem.file_format import MODES, UNREADABLE
+from rodfem.problem.arguments import checked, count, text
+from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import Setting, read
 from rodfem.whole_files import with_added, write_whole
@@ -91,7 +93,10 @@ class Modes:
         return np.einsum("mji,kmj->kmi", frames, self.rotation)
 
     def amplitude(self, displacement: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-        """Amplitudes (K,) of the modes in a small motion (m, 3), (m, 3) of the rod."""
+        """Amplitudes (K,) of the modes in a small motion (m, 3), (m, 3) of the rod; :class:`InputError` without one."""
+        for name, given in (("displacement", displacement), ("rotation", rotation)):
+            if np.shape(given) != self.r.shape:
+                raise InputError(f"The {name} has the shape {np.shape(given)}: give one of the shape {self.r.shape}.")
         return np.asarray(
             np.tensordot(self.weight_displacement, displacement) + np.tensordot(self.weight_rotation, rotation)
         )
@@ -135,7 +140,8 @@ def save_modes(
     write_whole({path: with_added(path, add, first=first)})
 
 
-def load_modes(path: Path, branch: str, row: int) -> Modes:
+@checked(path=argument_path("results/column/modes.h5"), branch=text("straight"), row=count(0))
+def load_modes(path: Path | str, branch: str, row: int) -> Modes:
     """Modes of a saved state; raises :class:`InputError` where the file has none, or has another or a newer format."""
     try:
         with h5py.File(path, "r") as file:
@@ -149,10 +155,28 @@ def load_modes(path: Path, branch: str, row: int) -> Modes:
                 )
             arrays = {name: group[name][()] for name in Modes.__dataclass_fields__ if name != "motion"}
             motion = tuple(group["motion"].asstr()[()])
-    except (OSError, KeyError) as trouble:
+    except UNREADABLE as trouble:
+        if isinstance(trouble, InputError):
+            raise
         raise InputError(f"{path} has no modes of row {row} of a branch {branch!r}: {_contents(path)}.") from trouble
+    _check_arrays(arrays, motion, path)
     arrays["load"] = float(arrays["load"])
     return Modes(motion=motion, **arrays)
+
+
+def _check_arrays(arrays: Mapping[str, Any], motion: tuple[str, ...], path: Path | str) -> None:
+    """Raise :class:`InputError` where arrays of a file are not of the shapes of :class:`Modes`."""
+    m, k = len(np.atleast_1d(arrays["s"])), len(motion)
+    shapes = {"load": (), "s": (m,), "r": (m, 3), "q": (m, 4), **dict.fromkeys(("value", "residual", "error"), (k,))}
+    for name, array in arrays.items():
+        wanted = shapes.get(name, (k, m, 3))
+        if np.shape(array) != wanted or np.asarray(array).dtype.kind not in "fciu":
+            raise InputError(
+                f"{path} has the {name} of the shape {np.shape(array)}, where numbers of the shape {wanted} were "
+                "expected: run the scene again."
+            )
+        if name not in ("residual", "error") and not np.isfinite(array).all():
+            raise InputError(f"{path} has a {name} that is not finite: run the scene again.")
 
 
 def load_setting(path: Path, branch: str, row: int) -> Setting:
@@ -167,10 +191,10 @@ def heading(path: Path) -> str:
         return f"{file.attrs['title']}, " if "title" in file.attrs else ""
 
 
-def _contents(path: Path) -> str:
+def _contents(path: Path | str) -> str:
     """Contents of a file of modes, in words."""
     try:
         with h5py.File(path, "r") as file:
             return "it has " + "; ".join(f"{name}, row {', '.join(rows)}" for name, rows in file["branches"].items())
-    except (OSError, KeyError):
+    except UNREADABLE:
         return f"run a scene with {Argument('Plan', 'modes')} and {Argument('Plan', 'at')}"

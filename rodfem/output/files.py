@@ -22,8 +22,11 @@ from rodfem.continuation.solvers import StaticSolver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Fields
 from rodfem.fem.system import System
-from rodfem.file_format import DIAGRAM, STATES, read_json
+from rodfem.file_format import DIAGRAM, STATES, UNREADABLE
 from rodfem.modes.perturbation import Motion, Motions
+from rodfem.output.contents import read_diagram
+from rodfem.problem.arguments import checked
+from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.supports import write as write_supports
 from rodfem.problem.supports import write_section
 from rodfem.ranks import on_first
@@ -170,9 +173,10 @@ def save_json(data: dict[str, Any], path: Path) -> None:
     write_whole({path: as_json(data)})
 
 
-def load_json(path: Path) -> dict[str, Any]:
+@checked(path=argument_path("results/column/diagram.json"))
+def load_json(path: Path | str) -> dict[str, Any]:
     """Read a diagram; raises :class:`InputError` where there is none, or one of a newer format."""
-    return read_json(path, DIAGRAM, ("scene", "parameter", "branches"))
+    return read_diagram(Path(path), ("scene", "parameter", "branches"))
 
 
 def save_run(
@@ -314,7 +318,7 @@ def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc
                 )
             group = file[f"branches/{branch}"]
             sample = {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
-    except (OSError, KeyError, IndexError, ValueError) as trouble:
+    except UNREADABLE as trouble:
         if isinstance(trouble, InputError):
             raise
         raise InputError(
@@ -328,4 +332,23 @@ def load_state(path: Path, branch: str, row: int, solver: StaticSolver) -> PETSc
             f"{path} has no {', '.join(missing)}, needed for the scene {system.scene.name!r}: it was written for "
             "another scene, or by another version of rodfem; run the scene again."
         )
-    return solver.shape.restore(sample)
+    try:
+        _check_sound(sample, path)
+        return solver.shape.restore(sample)
+    except UNREADABLE as trouble:
+        if isinstance(trouble, InputError):
+            raise
+        raise InputError(
+            f"Row {row} of the branch {branch!r} in {path} is no state of the scene {system.scene.name!r} ({trouble}): "
+            "run the scene again."
+        ) from trouble
+
+
+def _check_sound(sample: dict[str, Any], path: Path) -> None:
+    """Raise :class:`InputError` for a state of a file with numbers that no state has."""
+    real = all(np.isrealobj(values) and np.isfinite(values).all() for values in sample.values())
+    if not real or sample["elements"] < 1 or not np.linalg.norm(sample.get("q", np.ones(4)), axis=-1).all():
+        raise InputError(
+            f"{path} has a state with numbers that are not real and finite, no elements, or no rotation somewhere: run "
+            "the scene again."
+        )

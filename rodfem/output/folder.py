@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -21,6 +21,8 @@ MOST = 300
 """Bytes of the lock that are read."""
 OF_A_RUN = ("modes.h5", "locus*.json", "locus.png", "diagram.png", "shape.png", "modes-*.png", "modes-*.gif")
 """Files that a run may leave beside its diagram and states."""
+PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".eps", ".ps", "")
+"""Suffixes of pictures of diagrams; without one it is PNG."""
 HELD: set[Path] = set()
 """Folders that this process holds."""
 
@@ -86,3 +88,23 @@ def remove_earlier(folder: Path) -> None:
         for pattern in OF_A_RUN:
             for file in folder.glob(pattern):
                 file.unlink()
+
+
+def writable(folder: Path) -> None:
+    """Make ``folder``; raises :class:`InputError` where it cannot be written."""
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".probe-{os.getpid()}"
+        probe.write_text("")
+        probe.unlink()
+
+
+def picture_at(path: Path, suffixes: Sequence[str]) -> None:
+    """Make the folder of a picture; raises :class:`InputError` where it cannot be written, or has another suffix."""
+    if path.suffix.lower() not in suffixes:
+        raise InputError(
+            f"The picture {path} has an unknown format: choose one of {', '.join(filter(None, suffixes))}."
+        )
+    if path.is_dir():
+        raise InputError(f"The picture {path} is a folder: give a name in it, as in {path / 'picture.png'}.")
+    writable(path.parent)

@@ -19,9 +19,10 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import IMPERFECT, KINDS
-from rodfem.file_format import DIAGRAM, read_json
+from rodfem.file_format import DIAGRAM
+from rodfem.output.contents import read_diagram
 from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
-from rodfem.output.program import status_of
+from rodfem.output.program import status_of, terse
 from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, save, tex
 from rodfem.output.view import POINT
 
@@ -239,15 +240,15 @@ def _place_labels(axes: Axes, pieces: list[Piece], legend: Bbox, obstacles: Floa
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the diagram named on the command line, that of the process by default; returns 0, or 2 after a sentence."""
-    parser = argparse.ArgumentParser(
-        prog="python -m rodfem.output.plot_diagram", description="Draw a bifurcation diagram."
+    parser = terse(
+        argparse.ArgumentParser(prog="python -m rodfem.output.plot_diagram", description="Draw a bifurcation diagram.")
     )
     parser.add_argument("diagram", type=Path, help="diagram.json of a scene")
     parser.add_argument("--output", type=Path, help="picture to write (default: the same name with .png)")
     given = parser.parse_args(arguments)
 
     def draw() -> Path:
-        diagram = read_json(given.diagram, DIAGRAM, ("title", "parameter_label", "ordinate", "branches"))
+        diagram = read_diagram(given.diagram, ("title", "parameter_label", "ordinate", "branches"))
         return draw_diagram(diagram, given.output or given.diagram.with_suffix(".png"))
 
     return status_of(draw, given.diagram)

@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from rodfem.errors import InputError
 from rodfem.modes.modes import SYMMETRY, Modes, heading, load_modes, load_setting
 from rodfem.output.glyphs import glyphs_of
-from rodfem.output.program import status_of
+from rodfem.output.program import status_of, terse
 from rodfem.output.sheet import DPI, STYLE
 from rodfem.output.solids import Solid, curve_of, profile_of
 from rodfem.output.view import POINT, view_of
@@ -270,8 +270,8 @@ class _Panel:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the modes named on the command line; returns 0, or 2 after one sentence on standard error."""
-    parser = argparse.ArgumentParser(
-        prog="python -m rodfem.output.plot_modes", description="Draw the modes of a state."
+    parser = terse(
+        argparse.ArgumentParser(prog="python -m rodfem.output.plot_modes", description="Draw the modes of a state.")
     )
     parser.add_argument("modes", type=Path, help="modes.h5 of a run with --modes")
     parser.add_argument("--branch", required=True, help="name of the branch")

@@ -15,9 +15,9 @@ import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
-from rodfem.file_format import STATES
+from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.glyphs import DARK, LOAD, glyphs_of
-from rodfem.output.program import status_of
+from rodfem.output.program import status_of, terse
 from rodfem.output.solids import Solid, curve_of, profile_of, rod, straight_arrow
 from rodfem.output.view import POINT, view_of
 from rodfem.problem.setting import Setting
@@ -76,7 +76,7 @@ def draw_shape(
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
         raise ValueError(f"picture {path} has an unknown format: expected one of {FORMATS}, try shape.png")
-    if radius is not None and not radius > 0.0:
+    if radius is not None and not 0.0 < radius < float("inf"):
         raise ValueError(f"radius={radius} is not positive: expected a length, try 0.01 or leave it out")
     state = _read(Path(states), branch, row)
     length = np.linalg.norm(np.diff(state.centres, axis=0), axis=1).sum()
@@ -174,7 +174,9 @@ def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
             s, centres, directors = _curve(branches[branch], row, count)
             reference = _curve(branches[first], left, count)[1]
             setting = read_setting(branches[branch], row)
-    except (KeyError, OSError) as error:
+    except UNREADABLE as error:
+        if isinstance(error, ValueError) and str(error).startswith((str(states), "row ")):
+            raise
         reason = "expected HDF5 with s and branches" if states.exists() else "no such file"
         raise ValueError(f"cannot read {states}, {reason}: try the states.h5 of a scene") from error
     return State(s, centres, directors, reference, setting, caption)
@@ -185,6 +187,8 @@ def _curve(group: Any, row: int, count: int) -> tuple[Floats, Floats, Floats]:
     s, r, q = (group[key][row] for key in ("s", "r", "q"))
     s, r, q = (values[np.isfinite(s)] for values in (s, r, q))
     at = np.linspace(s[0], s[-1], count)
+    if not np.isfinite(r).all() or not np.ptp(r, axis=0).any():
+        raise ValueError("the centreline is a point, or not finite")
     return at, *curve_of(s, r, q, at)
 
 
@@ -302,7 +306,7 @@ def draw_shape_safely(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the shape named on the command line, that of the process by default; returns 0, or 2 after a sentence."""
-    parser = argparse.ArgumentParser(prog="python -m rodfem.output.render", description="Draw a rod in space.")
+    parser = terse(argparse.ArgumentParser(prog="python -m rodfem.output.render", description="Draw a rod in space."))
     parser.add_argument("states", type=Path, help="states.h5 of a scene")
     parser.add_argument("--branch", required=True, help="name of the branch")
     parser.add_argument("--row", required=True, type=int, help="row of the state, counted from 0")

@@ -10,6 +10,9 @@ from tempfile import TemporaryDirectory
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.output.files import save_states
+from rodfem.output.folder import picture_at
+from rodfem.problem.arguments import checked
+from rodfem.problem.arguments import path as argument_path
 from rodfem.whole_files import write_whole
 
 
@@ -26,10 +29,11 @@ class Snapshot:
         """Size."""
         return f"<Snapshot: PNG of {len(self.png)} bytes>"
 
+    @checked(path=argument_path("shape.png"))
     def save(self, path: Path | str) -> Path:
-        """Write it; its folder is made."""
+        """Write it; its folder is made.  Raises :class:`InputError` where it cannot be written."""
         path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
+        picture_at(path, (".png",))
         write_whole({path: self.png})
         return path
 

@@ -17,7 +17,8 @@ from reprlib import Repr
 from typing import Any, ParamSpec, TypeVar
 
 from rodfem.errors import InputError
-from rodfem.problem.kinds import real, reals, whole
+from rodfem.problem import kinds
+from rodfem.problem.kinds import finite, reals, whole
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -73,10 +74,7 @@ def number(example: float) -> Check:
     """Check for a finite real number; raises :class:`InputError` for anything else."""
 
     def check(name: str, value: Any) -> float:
-        found = real(name, value, example)
-        if not isfinite(found):
-            raise InputError(f"{name} is {found:g}: give a finite number, as in {name}={example:g}.")
-        return found
+        return finite(name, value, example)
 
     return check
 
@@ -108,11 +106,16 @@ def path(example: str) -> Check:
     """Check for a path, or the name of one; raises :class:`InputError` for anything else."""
 
     def check(name: str, value: Any) -> Path:
-        if not isinstance(value, (str, os.PathLike)) or not str(value):
+        if not isinstance(value, (str, os.PathLike)) or not str(value) or not encodes(str(value)):
             raise InputError(f"{name} is {SHORT.repr(value)}: give a path, as in {name}={example!r}.")
         return Path(value)
 
     return check
+
+
+def encodes(name: str) -> bool:
+    """Whether a name can be that of a file: no zero byte, no half of a surrogate pair."""
+    return "\0" not in name and not any("\ud800" <= c <= "\udc7f" for c in name)
 
 
 def text(example: str) -> Check:
@@ -120,12 +123,11 @@ def text(example: str) -> Check:
     return a(str, f"a text, as in {example!r}")
 
 
-def function(example: str) -> Check:
-    """Check for a function; raises :class:`InputError` for anything else."""
+def function(example: str, arguments: int = 1) -> Check:
+    """Check for a function of so many arguments; raises :class:`InputError` for anything else."""
+    return lambda name, value: kinds.function(name, value, arguments, example)
 
-    def check(name: str, value: Any) -> Any:
-        if not callable(value):
-            raise InputError(f"{name} is {SHORT.repr(value)}: give a function, as in {name}={example}.")
-        return value
 
-    return check
+def yes_or_no(name: str, value: Any) -> bool:
+    """Check for True or False; raises :class:`InputError` for anything else."""
+    return kinds.flag(name, value)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rodfem.problem.contribution import Block, Contribution, Group, Motion, Site, Unknown
+from rodfem.problem.kinds import flag
 from rodfem.problem.roles import Role, role_field
 
 if TYPE_CHECKING:
@@ -86,4 +87,4 @@ def at(s: float, of: OfPlace) -> Constraint:
 
 def everywhere(of: OfPlace, *, strain: bool) -> Constraint:
     """Constrain ``of(x, c) = 0`` all along the rod; ``strain`` says whether it is one of strains or of positions."""
-    return Everywhere(of, nodal=not strain)
+    return Everywhere(of, nodal=not flag("strain", strain))

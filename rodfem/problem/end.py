@@ -12,7 +12,7 @@ import ufl
 from forms import loads
 from rodfem.errors import SceneError
 from rodfem.problem.contribution import UNIT, Block, Contribution, Direction, Group, Motion, Site, Unknown
-from rodfem.problem.kinds import check_vector
+from rodfem.problem.kinds import check_vector, plain
 from rodfem.problem.load import DEAD_AT_END, FOLLOWER, FOLLOWER_MOMENT, MOMENT, POTENTIAL
 from rodfem.problem.roles import Role, role_field
 from rodfem.problem.setting import AXIS, HELD, TURNS
@@ -55,8 +55,8 @@ class End(Contribution):
         Conservative.
     """
 
-    position: OfConstants | None = role_field(Role("position of the {} end", "f(c)"))
-    rotation: Quaternion | OfConstants | None = role_field(Role("rotation of the {} end", "f(c)", or_value=True))
+    position: OfConstants | None = role_field(Role("position of the {} end", "f(c)", 3, gaps=True))
+    rotation: Quaternion | OfConstants | None = role_field(Role("rotation of the {} end", "f(c)", 4, or_value=True))
     force: OfConstants | None = role_field(Role("force on the {} end", "f(c)", 3, load=DEAD_AT_END))
     follower: OfConstants | None = role_field(Role("follower force on the {} end", "f(c)", 3, load=FOLLOWER))
     hinge: tuple[float, float, float] | None = None
@@ -148,15 +148,12 @@ class End(Contribution):
     def check(self, side: str, scene: Scene) -> None:
         """Check shapes, and that nothing acts on what is held; raises :class:`SceneError`."""
         for load in scene.span:
-            c = scene.constants(load)
-            if self.position is not None:
-                check_vector(f"position of the {side} end", self.position(c), 3)
-            self._check_rotation(side, scene, c)
+            self._check_rotation(side, scene, scene.constants(load))
         if self.hinge is not None:
             if self.rotation is None:
                 raise SceneError(f"The {side} end has a hinge but no rotation: say which directors the hinge holds.")
             check_vector(f"hinge of the {side} end", self.hinge, 3)
-            if not np.linalg.norm(self.hinge) > 0:
+            if not 0 < np.linalg.norm(_numbers(f"hinge of the {side} end", self.hinge)) < np.inf:
                 raise SceneError(f"The hinge of the {side} end has no axis: give three components, not all zero.")
         if len(self.fixed(scene.constants())) == 3:
             if self.follower is not None:
@@ -178,12 +175,22 @@ class End(Contribution):
         if rotation is None:
             return
         check_vector(f"rotation of the {side} end", rotation, 4)
+        size = np.linalg.norm(_numbers(f"rotation of the {side} end", rotation))
         if scene.normal is not None and any(rotation[i + 1] != 0 for i in range(3) if i != scene.normal):
             raise SceneError(
                 f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about that axis only."
             )
-        if not sum(float(x) ** 2 for x in rotation) > 0:
-            raise SceneError(f"The rotation of the {side} end is the zero quaternion: give one of unit norm.")
+        if not 0 < size < np.inf:
+            words = "the zero quaternion" if size == 0 else f"{rotation}"
+            raise SceneError(f"The rotation of the {side} end is {words}: give one of unit norm.")
+
+
+def _numbers(what: str, values: Any) -> list[float]:
+    """Components as numbers; raises :class:`SceneError` for one that is none."""
+    try:
+        return [plain(x) for x in values]
+    except (TypeError, ValueError):
+        raise SceneError(f"The {what} is {values!r}: give finite numbers.") from None
 
 
 def across(axis: tuple[float, float, float] | None, normal: int | None = None) -> list[Direction]:

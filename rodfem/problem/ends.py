@@ -17,9 +17,11 @@ from typing import Any
 
 from forms import loads
 from forms.rotation import IDENTITY
+from rodfem.errors import InputError
 from rodfem.problem.attachment import Attachment
 from rodfem.problem.constraint import Constraint, Integral, at, everywhere, integral
 from rodfem.problem.end import End
+from rodfem.problem.kinds import function, reals
 from rodfem.problem.local_state import Constants, OfConstants, OfPlace, Place, Quaternion
 from rodfem.problem.ring import Ring
 from rodfem.problem.sliding_hinge import SlidingHinge, sliding_hinge
@@ -94,8 +96,14 @@ def elastic(
     :func:`forms.loads.spring` and :func:`forms.loads.rotational_spring` (linear in the angle while it is small).
 
     ``translation(c)`` is in force per length, ``rotation(c)`` in moment per radian; None is no spring.  ``force(c)``
-    (3,) is a dead force.
+    (3,) is a dead force.  Raises :class:`InputError` for an anchor or directors that are none.
     """
+    for name, given in (("translation", translation), ("rotation", rotation)):
+        if given is not None:
+            function(name, given, 1, "lambda c: 1.0")
+    reals("anchor", anchor, (0.0, 0.0, 1.0), 3)
+    if not any(reals("directors", directors, IDENTITY, 4)):
+        raise InputError("The directors of an elastic end are the zero quaternion: give one of unit norm.")
 
     def energy(x: Place, c: Constants) -> Any:
         out = 0 if translation is None else loads.spring(x.r, translation(c), anchor)

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import isfinite
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
+from rodfem.errors import InputError, SceneError
+from rodfem.problem.kinds import function, plain, text
 from rodfem.problem.roles import Role, guarded
 
 ROLE = Role(
     "event {}",
     "of(state)",
     hint="it receives a state with arrays s (m,), r (m, 3) and q (m, 4), and returns a number",
-    returns=float,
+    returns=plain,
 )
 
 
@@ -34,7 +39,34 @@ class Event:
     name: str
     of: Callable[[Any], float]
 
+    def __post_init__(self) -> None:
+        """Check name and function; raises :class:`InputError`."""
+        if not text("name", self.name, "ends meet"):
+            raise InputError("An event has no name: give one, as in Event('ends meet', of=f).")
+        function("of", self.of, 1, "lambda state: state.r[-1, 0]")
+
     def __call__(self, state: Mapping[str, Any]) -> float:
         """Value at a state, given by its arrays; raises :class:`SceneError` for what the function raises."""
         value = guarded(ROLE.words.format(repr(self.name)), self.of, ROLE)(SimpleNamespace(**state))
+        if not isfinite(value):
+            raise SceneError(f"The event {self.name!r} is {value}: return a finite number at every state.")
         return float(value)
+
+    def check(self, length: float) -> None:
+        """Call the function at an undeformed rod of a length; raises :class:`SceneError` where that fails.
+
+        What a function may have at other states (further fields, more nodes, a finite value) is told at the first one.
+        """
+        s = np.linspace(0.0, length, 5)
+        r, q = np.outer(s, (0.0, 0.0, 1.0)), np.tile((1.0, 0.0, 0.0, 0.0), (5, 1))
+        try:
+            first, second = (self({"s": s, "r": r, "q": q}) for _ in range(2))
+        except SceneError as trouble:
+            if isinstance(trouble.__cause__, (TypeError, NameError)):
+                raise
+            return
+        if first != second:
+            raise SceneError(
+                f"The event {self.name!r} returns {first:g}, and then {second:g} for the same state: leave random "
+                "numbers out."
+            )

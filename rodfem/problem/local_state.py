@@ -113,6 +113,17 @@ def asks_where(function: OfPlace, c: Constants) -> bool:
     return False
 
 
+STATES = (
+    ((0.5, 0.1, 0.7, 0.5), (0.2, 0.3, 0.4), (0.01, 0.02, 1.01), (0.1, 0.2, 0.3)),
+    ((0.7, -0.1, 0.1, 0.7), (-0.2, 0.1, 0.9), (-0.02, 0.01, 0.97), (-0.3, 0.1, 0.2)),
+    (IDENTITY, (0.0, 0.0, 0.5), UNDEFORMED, (0.0, 0.0, 0.0)),
+)
+"""Quaternion, centreline, strain and curvature at which functions of a place are tried; the last is undeformed.
+
+Lengths are relative to the rod's.
+"""
+
+
 def functions_of_places(scene: Scene) -> Iterator[tuple[str, OfPlace, Place]]:
     """Functions of a place in the equations, each with a place of the kind that it will be given."""
     point, rod = some_places(scene)
@@ -121,14 +132,14 @@ def functions_of_places(scene: Scene) -> Iterator[tuple[str, OfPlace, Place]]:
             yield what, function, rod if role.along else point
 
 
-def some_places(scene: Scene) -> tuple[Place, Place]:
-    """Return a point and a place along the rod: some rotation, strains, position."""
-    q = ufl.as_vector([0.5, 0.1, 0.7, 0.5])
+def some_places(scene: Scene, state: int = 0, wrap: Callable[[Any], Any] = lambda x: x) -> tuple[Place, Place]:
+    """Return a point and a place along the rod, in one of :data:`STATES`; vectors pass through ``wrap``."""
+    s, length = scene.interval[0], scene.length
+    units = (1.0, length, 1.0, 1.0 / length)
+    numbers = ([float(unit * x) for x in values] for unit, values in zip(units, STATES[state], strict=True))
+    q, r, v, k = (wrap(ufl.as_vector(values)) for values in numbers)
     R = rotation(q)
-    r, strains = ufl.as_vector([0.2, 0.3, 0.4]), (ufl.as_vector([0.01, 0.02, 1.01]), ufl.as_vector([0.1, 0.2, 0.3]))
-    point = place(q, R, scene.interval[0], r, length=scene.length)
-    rod = place(q, R, scene.interval[0], r, dr=ufl.dot(R, strains[0]), v=strains[0], k=strains[1], length=scene.length)
-    return point, rod
+    return place(q, R, s, r, length=length), place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
 
 
 def asked_for(scene: Scene) -> set[str]:

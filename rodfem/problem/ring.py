@@ -12,6 +12,7 @@ import ufl
 from rodfem.errors import SceneError
 from rodfem.problem.contribution import UNIT, Block, Group, Motion, Site, Unknown
 from rodfem.problem.end import End
+from rodfem.problem.kinds import flag
 
 if TYPE_CHECKING:
     from rodfem.problem.local_state import Constants
@@ -33,6 +34,10 @@ class Ring:
     """
 
     odd: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the kind; raises :class:`InputError`."""
+        flag("odd", self.odd)
 
     def __iter__(self) -> Iterator[End]:
         """Yield the left and the right end."""
@@ -79,7 +84,7 @@ class JoinedEnd(End):
         """Check that the start of the ring closes; raises :class:`SceneError`."""
         if scene.start is None:
             raise SceneError("A ring has no straight start: give its rotation as a function start(s).")
-        first, last = np.asarray(scene.start(np.array(scene.interval)), dtype=float)
+        first, last = scene.start(np.array(scene.interval))
         if self.sign * (first @ last) <= 0:
             raise SceneError(
                 f"The start of the ring does not end as it begins: make q(l) = {self.sign:+g} q(0), or choose "

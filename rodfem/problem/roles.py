@@ -18,6 +18,7 @@ from rodfem.errors import SceneError
 if TYPE_CHECKING:
     from rodfem.problem.load import Load
 
+Conversion = Callable[[Any], Any]
 UFL = "write it with UFL (ufl.cosh, ufl.conditional), without math, numpy and if"
 
 
@@ -34,13 +35,15 @@ class Role:
     size
         Number of components that it returns, 0 for a scalar, None where that is checked elsewhere.
     along
-        Whether its place is the whole rod.
+        Whether its place is the whole rod; of a function of the constants, whether it is one of the arclength.
     or_value
         Whether a constant value may stand in its place.
     load
         Kind of load that it is, None where it is none.
     hint, returns
-        How it is to be written, for where it fails; type of what it returns, where it is converted.
+        How it is to be written, for where it fails; what converts the value that it returns.
+    gaps
+        Whether a component may be None.
     """
 
     words: str
@@ -50,7 +53,8 @@ class Role:
     or_value: bool = False
     load: Load | None = None
     hint: str = UFL
-    returns: type | None = None
+    returns: Conversion | None = None
+    gaps: bool = False
 
     @property
     def arguments(self) -> int:
@@ -78,7 +82,7 @@ def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[...
             return value if role.returns is None else role.returns(value)
         except SceneError:
             raise
-        except Exception as trouble:  # whatever a person's function may raise
+        except (Exception, SystemExit) as trouble:  # whatever a person's function may raise
             first = str(trouble).split("\n", 1)[0].rstrip(".")
             raise SceneError(f"The {what} fails with {type(trouble).__name__}, {first!r}: {role.hint}.") from trouble
 
@@ -116,14 +120,14 @@ def changes(owner: Any, visit: Visit, place: str = "", *, nested: bool = True) -
 
 def _visited(owner: Any, declared: Any, value: Any, visit: Visit, place: str) -> Any:
     role = declared.get("role")
-    if _is_object(value):
+    if is_object(value):
         return _changed(value, visit, place)
     if role is not None:
         role = role if isinstance(role, Role) else role(owner)
         if role.or_value and not callable(value):
             return value
         return visit(role.words.format(place), value, role)
-    if isinstance(value, (tuple, list)) and any(map(_is_object, value)):
+    if isinstance(value, (tuple, list)) and any(map(is_object, value)):
         places = declared.get("places") or ("",) * len(value)
         found = tuple(_changed(x, visit, where) for x, where in zip(value, places, strict=True))
         return found if any(a is not b for a, b in zip(found, value, strict=True)) else value
@@ -135,5 +139,6 @@ def _changed(owner: Any, visit: Visit, place: str) -> Any:
     return replace(owner, **new) if new else owner
 
 
-def _is_object(value: Any) -> bool:
+def is_object(value: Any) -> bool:
+    """Whether a value is an object of a dataclass."""
     return is_dataclass(value) and not isinstance(value, type)

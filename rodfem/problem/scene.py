@@ -21,17 +21,21 @@ from ufl.utils.stacks import StackDict
 from forms.kinematics import RODS, UNDEFORMED
 from rodfem.errors import SceneError
 from rodfem.problem.contribution import Contribution
+from rodfem.problem.kinds import plain
 from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
 from rodfem.problem.local_state import Constants, watched
 from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
 from rodfem.problem.units import Units, units_of
-from rodfem.problem.validation import check_kinds, check_scene
+from rodfem.problem.validation import LARGEST, TINIEST, check_kinds, check_scene, two_numbers
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
 
 ASIDE = 1e-6
 """Distance beside an end or a break at which the material is asked, relative to the rod's length."""
 QUADRATIC = 1e-9
 """Third differences of the stored energy, relative to its values, below which it is quadratic in the strains."""
+
+FARTHEST = 1e9
+"""Arclength, over the rod's length, beyond which round-off of arclengths is seen."""
 
 if TYPE_CHECKING:
     from rodfem.problem.attachment import Attachment
@@ -71,9 +75,9 @@ class Inertia:
     Only frequencies need them, and the stability of states under loads without a potential.
     """
 
-    rho_A: Callable[[Constants], Any] = role_field(Role("mass per length", "f(c)", 0), lambda c: 0.0)
+    rho_A: Callable[[Constants], Any] = role_field(Role("mass per length", "f(c)", 0, along=True), lambda c: 0.0)
     rho_I: Callable[[Constants], Vector] = role_field(
-        Role("rotary inertia per length", "f(c)", 3), lambda c: (1.0, 1.0, 1.0)
+        Role("rotary inertia per length", "f(c)", 3, along=True), lambda c: (1.0, 1.0, 1.0)
     )
 
 
@@ -81,7 +85,7 @@ def _role_of_ordinate(ordinate: Ordinate) -> Role:
     """Role of an ordinate's function: of numbers at a point, of UFL expressions along the rod."""
     if ordinate.places:
         hint = "it receives arrays r (3,) and q (4,), and returns a number"
-        return Role("ordinate", "of(r, q)", hint=hint, returns=float)
+        return Role("ordinate", "of(r, q)", hint=hint, returns=plain)
     return Role("ordinate along the rod", "of(x, c)", along=True)
 
 
@@ -113,6 +117,13 @@ class Ordinate:
     def places(self) -> tuple[float, ...]:
         """Arclengths at which the state is evaluated for it."""
         return () if self.s is None else (self.s,)
+
+
+def real_array(values: Any) -> np.ndarray:
+    """Array of floats; raises :class:`TypeError` or :class:`ValueError` for what is none."""
+    if np.iscomplexobj(values):
+        raise TypeError("complex numbers")
+    return np.asarray(values, dtype=float)
 
 
 START = "it receives an array of arclengths (m,), and returns one (m, 4)"
@@ -182,14 +193,16 @@ class Scene(Contribution):
     span: tuple[float, float]
     title: str = ""
     inertia: Inertia = Inertia()
-    distributed: OfConstants | None = role_field(Role("distributed force", "f(c)", 3, load=DEAD))
-    follower: OfConstants | None = role_field(Role("distributed follower force", "f(c)", 3, load=FOLLOWER))
+    distributed: OfConstants | None = role_field(Role("distributed force", "f(c)", 3, along=True, load=DEAD))
+    follower: OfConstants | None = role_field(Role("distributed follower force", "f(c)", 3, along=True, load=FOLLOWER))
     potential: OfPlace | None = role_field(Role("potential along the rod", "f(x, c)", 0, along=True, load=POTENTIAL))
     attachments: tuple[Attachment, ...] = ()
     constraints: tuple[Constraint, ...] = ()
     breaks: tuple[float, ...] = ()
     planar: str | None = None
-    start: Callable[[np.ndarray], np.ndarray] | None = role_field(Role("start", "start(s)", hint=START))
+    start: Callable[[np.ndarray], np.ndarray] | None = role_field(
+        Role("start", "start(s)", hint=START, returns=real_array)
+    )
     states: str = field(default="straight")
 
     def __post_init__(self) -> None:
@@ -197,6 +210,8 @@ class Scene(Contribution):
         check_kinds(self)
         for field_name, value in changes(self, guarded).items():
             object.__setattr__(self, field_name, value)
+        for pair in ("interval", "span"):
+            object.__setattr__(self, pair, two_numbers(f"The {pair}", getattr(self, pair)))
         named = {n: p if isinstance(p, Parameter) else Parameter(float(p)) for n, p in self.parameters.items()}
         object.__setattr__(self, "parameters", named)
         a, b = self.interval
@@ -204,9 +219,14 @@ class Scene(Contribution):
             raise SceneError(
                 f"The rod's interval ({a:g}, {b:g}) is empty: give two finite ends with the left one first."
             )
-        if self.rod not in RODS:
+        if not max(TINIEST, max(abs(a), abs(b)) / FARTHEST) < b - a < LARGEST:
+            raise SceneError(
+                f"A rod from {a:g} to {b:g} is beyond the range of floats, or short beside its arclengths' round-off: "
+                "choose other units, or let the arclength begin at zero."
+            )
+        if not isinstance(self.rod, str) or self.rod not in RODS:
             raise SceneError(f"Unknown kind of rod {self.rod!r}: choose one of {', '.join(map(repr, RODS))}.")
-        if self.load not in self.parameters:
+        if not isinstance(self.load, str) or self.load not in self.parameters:
             raise SceneError(f"The load {self.load!r} is not a parameter: choose one of {', '.join(self.parameters)}.")
         for name, parameter in self.parameters.items():
             parameter.check(name, parameter.value)
@@ -304,7 +324,7 @@ class Scene(Contribution):
         found, places = [], self.samples() if self.depends_on_s() else self.samples()[:1]
         for i in stiff:
             pairs = [
-                [self._energy_at(free + d * v[i] * np.eye(3)[i], k, self.constants(s=s)) for d in (0.0, -1.0, 1.0)]
+                [self.energy_at(free + d * v[i] * np.eye(3)[i], k, self.constants(s=s)) for d in (0.0, -1.0, 1.0)]
                 for s in places
             ]
             if any(abs(b - a) > NEGLIGIBLE * max(abs(a), abs(b)) for a, *others in pairs for b in others):
@@ -336,6 +356,12 @@ class Scene(Contribution):
             raise SceneError(
                 f"The range of {self.load} from {span[0]:g} to {span[1]:g} is empty: give two different loads."
             )
+        width = abs(span[1] - span[0])
+        if not max(TINIEST, NEGLIGIBLE * max(map(abs, span))) < width < LARGEST:
+            raise SceneError(
+                f"The range of {self.load} from {span[0]:.17g} to {span[1]:.17g} is as narrow as round-off, or beyond "
+                "the range of floats: give loads that differ by more, or choose other units."
+            )
 
     def plain(self, side: int) -> bool:
         """Whether dead forces are all that loads an end (0: left, 1: right): they are the contact force there."""
@@ -357,10 +383,11 @@ class Scene(Contribution):
     def depends_on_s(self) -> bool:
         """Whether the stored energy is a function of the arclength too."""
         c, asked = watched(self.constants())
-        self._energy_at(np.zeros(3), np.zeros(3), c)
+        self.energy_at(np.zeros(3), np.zeros(3), c)
         return "s" in asked
 
-    def _energy_at(self, v: np.ndarray, k: np.ndarray, c: Constants) -> float:
+    def energy_at(self, v: np.ndarray, k: np.ndarray, c: Constants) -> float:
+        """Stored energy per length where the strains (3,) differ by ``v`` and ``k`` from the undeformed ones."""
         strains = [UNDEFORMED[i] + float(v[i]) for i in range(3)]
         W = self.energy(ufl.as_vector(strains), ufl.as_vector([float(x) for x in k]), c)
         return float(ufl.as_ufl(W)(()))
@@ -371,7 +398,7 @@ class Scene(Contribution):
         free = np.isin(np.arange(3), self.free_strains)
         for _ in range(2):
             v, k = 0.05 * rng.uniform(-1, 1, size=(2, 3))
-            values = [self._energy_at(t * v * free, t * k, self.constants()) for t in (0.0, 1.0, 2.0, 3.0)]
+            values = [self.energy_at(t * v * free, t * k, self.constants()) for t in (0.0, 1.0, 2.0, 3.0)]
             if abs(np.diff(values, 3)[0]) > QUADRATIC * max(map(abs, values)):
                 return False
         return True

@@ -12,7 +12,7 @@ from forms.rotation import IDENTITY
 from rodfem.errors import SceneError
 from rodfem.problem.contribution import Direction, Group, Motion, Site, Unknown
 from rodfem.problem.end import LETTERS, SIDES, End, across
-from rodfem.problem.kinds import reals
+from rodfem.problem.kinds import function, reals
 
 if TYPE_CHECKING:
     from rodfem.problem.local_state import Constants, OfConstants, Quaternion
@@ -94,9 +94,14 @@ def sliding_hinge(
     point of the guide, ``force(c)`` a dead force along it.  Raises :class:`SceneError` for a direction that is none.
     """
     direction = np.array(reals("along", along, (0.6, 0.0, 0.8), 3))
-    if not direction.any():
-        raise SceneError("The direction in which a hinge slides is zero: give one, as in along=(0.6, 0.0, 0.8).")
-    direction = direction / np.linalg.norm(direction)
+    largest = abs(direction).max()
+    if not 0 < largest < np.inf:
+        what = "zero" if largest == 0 else f"{tuple(direction.tolist())}"
+        raise SceneError(f"The direction in which a hinge slides is {what}: give one, as in along=(0.6, 0.0, 0.8).")
+    direction = direction / largest
+    direction /= np.linalg.norm(direction)
     unit = tuple(np.where(abs(direction) > SLIGHT, direction, 0.0).tolist())
+    if force is not None:
+        function("force", force, 1, "lambda c: -c.P")
     push = None if force is None else lambda c: tuple(t * force(c) for t in unit)
     return SlidingHinge(position, rotation, push, hinge=axis, along=unit)

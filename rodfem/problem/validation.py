@@ -3,30 +3,36 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Mapping, Sequence
-from math import isfinite, nan
+from collections.abc import Iterable, Iterator, Mapping
+from keyword import iskeyword
+from math import isfinite
 from numbers import Real
+from reprlib import Repr
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
 
 from forms.kinematics import UNDEFORMED
-from rodfem.errors import SceneError
+from rodfem.errors import InputError, SceneError
 from rodfem.problem.attachment import Attachment
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End
-from rodfem.problem.kinds import check_scalar, check_vector
-from rodfem.problem.local_state import asked_for, asks_where, functions_of_places, some_places
-from rodfem.problem.roles import functions_of
+from rodfem.problem.kinds import check_scalar, real, reals
+from rodfem.problem.local_state import STATES, asked_for, asks_where, functions_of_places, some_places
+from rodfem.problem.results import check_expression, check_results, check_same
+from rodfem.problem.roles import functions_of, is_object
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
 EPS = float(np.finfo(float).eps)
-STRAIGHT = (0.0, 0.0, 0.5), (1.0, 0.0, 0.0, 0.0)
-"""Centreline, in units of the rod's length, and quaternion at the middle of a straight rod."""
+SHORT = Repr()
+LARGEST, TINIEST = 1e60, 1e-60
+"""Lengths, widths of ranges and stiffnesses whose powers are floats."""
+STIFFEST = 1e-15
+"""Least stiffness over the greatest one, with the rod's length as unit, that arithmetic tells from none."""
 
 
 def check_kinds(scene: Scene) -> None:
@@ -35,7 +41,11 @@ def check_kinds(scene: Scene) -> None:
         check_file_name(words, name)
     if not isinstance(scene.title, str):
         raise SceneError(f"The title is {scene.title!r}: give a text.")
-    if not isinstance(scene.ends, Iterable) or [isinstance(end, End) for end in scene.ends] != [True, True]:
+    if (
+        not isinstance(scene.ends, Iterable)
+        or isinstance(scene.ends, Iterator)
+        or [isinstance(end, End) for end in scene.ends] != [True, True]
+    ):
         raise SceneError("The ends are not two of the kind End: give them as in (clamped(), free()), or a Ring().")
     for what, given, kind, example in (
         ("attachments", scene.attachments, Attachment, "(Attachment(0.5, force=...),)"),
@@ -46,34 +56,61 @@ def check_kinds(scene: Scene) -> None:
             raise SceneError(f"The {what} are {given!r}: give a tuple of them, as in {what}={example}.")
     if not isinstance(scene.parameters, Mapping):
         raise SceneError(f"The parameters are {scene.parameters!r}: give a dictionary, as in {{'P': Parameter(0.0)}}.")
-    for what, pair in (("interval", scene.interval), ("span", scene.span)):
-        if not (isinstance(pair, Sequence) and len(pair) == 2 and all(isinstance(x, Real) for x in pair)):
-            raise SceneError(f"The {what} is {pair!r}: give two numbers.")
     for name, parameter in scene.parameters.items():
-        if not str(name).isidentifier() or name == "s":
-            raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
-        if not isinstance(getattr(parameter, "value", parameter), Real):
-            raise SceneError(f"The parameter {name} is {parameter!r}: give a number or a Parameter.")
-    check_places_are_numbers(scene)
-    if not (hasattr(scene.inertia, "rho_A") and hasattr(scene.inertia, "rho_I")):
+        check_parameter(name, parameter)
+    if not (is_object(scene.inertia) and hasattr(scene.inertia, "rho_A") and hasattr(scene.inertia, "rho_I")):
         raise SceneError(f"The inertia is {scene.inertia!r}: give one, as in Inertia(rho_A=lambda c: 1.0).")
-    if not hasattr(scene.ordinate, "places"):
+    if not (is_object(scene.ordinate) and hasattr(scene.ordinate, "places")):
         raise SceneError(f"The ordinate is {scene.ordinate!r}: give an Ordinate(name, s, of).")
+    for what, words in (("name", scene.ordinate.name), ("label", scene.ordinate.label)):
+        if not isinstance(words, str):
+            raise SceneError(f"The {what} of the ordinate is {words!r}: give a text.")
+    check_places_are_numbers(scene)
     for what, function, role in functions_of(scene):
         if not callable(function):
             raise SceneError(f"The {what} is {function!r}: give a function {role.call}.")
         try:
             inspect.signature(function).bind(*range(role.arguments))
-        except TypeError:
+        except (TypeError, ValueError):  # ValueError for classes of Python's own, which have no signature
             raise SceneError(f"The {what} is no function of {role.arguments} argument(s): give {role.call}.") from None
+
+
+def check_parameter(name: object, parameter: Any) -> None:
+    """Raise :class:`SceneError` for a parameter whose name, value, label or bounds make no sense."""
+    if not isinstance(name, str) or not name.isidentifier() or iskeyword(name) or name == "s" or name.startswith("__"):
+        raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
+    value, label = getattr(parameter, "value", parameter), getattr(parameter, "label", "")
+    try:
+        real(name, value, 0.0)
+        bounds = reals(name, getattr(parameter, "admissible", (0.0, 1.0)), (0.0, 1.0), 2)
+    except InputError:
+        bounds = ()
+    if not bounds or not isinstance(label, str):
+        raise SceneError(
+            f"The parameter {name} is {SHORT.repr(parameter)}: give a number or a Parameter, as in Parameter(1.0, 'P')."
+        )
+
+
+def two_numbers(what: str, pair: Any) -> tuple[float, float]:
+    """Return a pair as floats; raises :class:`SceneError` for anything but two numbers."""
+    try:
+        low, high = reals(what, pair, (0.0, 1.0), 2)
+    except InputError:
+        raise SceneError(f"{what} is {SHORT.repr(pair)}: give two numbers, as in (0.0, 1.0).") from None
+    return low, high
 
 
 def check_file_name(whose: str, name: object) -> None:
     """Raise :class:`SceneError` for a name that cannot be that of a folder, or of an entry of a file."""
-    if not isinstance(name, str) or name in ("", ".", "..") or any(c in name for c in "/\\\0\n"):
+    if not isinstance(name, str) or name in ("", ".", "..") or not writes(name):
         raise SceneError(
             f"The {whose} has the name {name!r}: give a text without slashes, as it names folders and entries of files."
         )
+
+
+def writes(name: str) -> bool:
+    """Whether a name can be written as that of a file."""
+    return not any(c in name for c in "/\\\0\n") and not any("\ud800" <= c <= "\udfff" for c in name)
 
 
 def check_places_are_numbers(scene: Scene) -> None:
@@ -81,33 +118,8 @@ def check_places_are_numbers(scene: Scene) -> None:
     places = [("ordinate", s) for s in getattr(scene.ordinate, "places", ())]
     places += [("attachment", x.s) for x in scene.attachments] + [("break", s) for s in scene.breaks]
     for what, s in [*places, *(("constraint", x.s) for x in scene.constraints if x.s is not None)]:
-        if not isinstance(s, Real) or not isfinite(s):
+        if not isinstance(s, Real) or isinstance(s, bool) or not isfinite(s):
             raise SceneError(f"The {what} is at s = {s!r}: give an arclength, one number.")
-
-
-def check_finite(what: str, value: Any) -> None:
-    """Raise :class:`SceneError` unless a ``value`` of the constants alone is a finite real number."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = nan
-    if not isfinite(number):
-        raise SceneError(f"The {what} is {value}: return a finite real number.")
-
-
-def check_shapes(scene: Scene) -> None:
-    """Check that forces and moments are vectors, and energies and constraints scalars."""
-    c = scene.constants()
-    for what, function, role in functions_of(scene):
-        if role.call == "f(c)" and role.size:
-            check_vector(what, function(c), role.size)
-            for i, value in enumerate(function(c)):
-                check_finite(f"component {i + 1} of the {what}", value)
-        elif role.call == "f(c)" and role.size == 0:
-            check_scalar(what, function(c))
-            check_finite(what, function(c))
-    for what, function, known in functions_of_places(scene):
-        check_scalar(what, function(known, c))
 
 
 def check_plane(scene: Scene) -> None:
@@ -147,17 +159,20 @@ def check_load(scene: Scene) -> None:
 def check_ordinate(scene: Scene) -> None:
     """Raise :class:`SceneError` where the ordinate is no number, at states where it need not be defined."""
     if not scene.ordinate.places:
-        check_scalar("ordinate along the rod", scene.ordinate.of(some_places(scene)[1], scene.constants()))
+        along = some_places(scene, wrap=ufl.variable)[True]
+        check_expression("ordinate along the rod", scene.ordinate.of(along, scene.constants()))
         return
     values = []
-    for r, q in (((0.2, 0.3, 0.4), (0.5, 0.1, 0.7, 0.5)), ((-0.2, 0.1, 0.9), (0.7, -0.1, 0.1, 0.7)), STRAIGHT):
+    for q, r, *_ in STATES:
         try:
-            values.append(scene.ordinate.of(np.array(r) * scene.length, np.array(q)))
+            values.append([scene.ordinate.of(np.array(r) * scene.length, np.array(q, dtype=float)) for _ in range(2)])
         except SceneError as trouble:
             if isinstance(trouble.__cause__, (TypeError, LookupError, AttributeError, NameError)):
                 raise
-    if values and not any(map(isfinite, values)):
-        raise SceneError(f"The ordinate is {values[0]} whatever the state: return a finite number.")
+    for first, second in values:
+        check_same("ordinate", first, second)
+    if values and not any(isfinite(first) for first, _ in values):
+        raise SceneError(f"The ordinate is {values[0][0]} whatever the state: return a finite number.")
 
 
 def check_start(scene: Scene) -> None:
@@ -165,7 +180,8 @@ def check_start(scene: Scene) -> None:
     if scene.start is None:
         return
     s = np.linspace(*scene.interval, 5)
-    q = np.asarray(scene.start(s), dtype=float)
+    q = scene.start(s)
+    check_same("start", q, scene.start(s))
     if q.shape != (5, 4):
         raise SceneError(f"The start has the shape {q.shape} at 5 arclengths: return a quaternion for each, (5, 4).")
     if not (np.linalg.norm(q, axis=1) > 0).all():
@@ -183,11 +199,16 @@ def check_energy(scene: Scene) -> None:
 def check_inertia(scene: Scene) -> None:
     """Raise :class:`SceneError` for a negative inertia, or none where stability is a matter of motion."""
     c = scene.constants()
-    masses = [float(scene.inertia.rho_A(c)), *(float(x.mass(c)) for x in scene.attachments if x.mass)]
-    rotary = [float(x) for x in scene.inertia.rho_I(c)]
+    along = [scene.constants(s=s) for s in scene.samples()]
+    masses = [*(float(scene.inertia.rho_A(there)) for there in along)]
+    masses += [float(x.mass(c)) for x in scene.attachments if x.mass]
+    rotary = [float(x) for there in along for x in scene.inertia.rho_I(there)]
     rotary += [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
     if min(masses + rotary) < 0:
         raise SceneError(f"A mass or rotary inertia of {min(masses + rotary):g} is negative: give zero or more.")
+    beyond = [x for x in masses + rotary if x and not TINIEST < x < LARGEST]
+    if beyond:
+        raise SceneError(f"A mass or rotary inertia of {beyond[0]:g} has powers that are no floats: use other units.")
     if not scene.conservative and max(masses) == 0 and scene.inertia == type(scene.inertia)():
         raise SceneError(
             f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter of "
@@ -201,7 +222,7 @@ def check_scene(scene: Scene) -> None:
         raise SceneError(f"A rod cannot be planar across {scene.planar!r}: choose 'e1' or 'e2', or None for space.")
     check_energy(scene)
     check_places(scene)
-    check_shapes(scene)
+    check_results(scene)
     check_start(scene)
     check_supports(scene)
     check_plane(scene)
@@ -216,6 +237,8 @@ def check_convexity(scene: Scene) -> None:
         where = "" if s is None else f" at s = {s:g}"
         try:
             stiffness = scene.stiffness(s)
+        except (ArithmeticError, ValueError):  # of a root or a logarithm whose derivative has a pole there
+            stiffness = np.full((3, 3), np.nan)
         except TypeError as trouble:  # of float(), for a complex number
             raise SceneError(f"The stored energy is no real number{where}: leave complex numbers out.") from trouble
         if not np.isfinite(stiffness).all():
@@ -223,13 +246,23 @@ def check_convexity(scene: Scene) -> None:
                 f"The second derivative of the stored energy at the undeformed state is not finite{where}: choose "
                 "constants for which it is."
             )
-        units = np.where(np.arange(len(stiffness)) < len(stiffness) - 3, 1.0, 1.0 / scene.length)  # curvature: 1/length
-        balanced = units[:, None] * stiffness * units
-        if not is_definite(balanced):
-            lowest = np.linalg.eigvalsh(balanced)[0]
+        if not TINIEST / scene.length**2 < abs(stiffness).max() < LARGEST / scene.length**2:
+            raise SceneError(
+                f"The stiffness of {abs(stiffness).max():.3g}{where} is so far from one that its powers are no floats: "
+                "choose other units."
+            )
+        if not is_definite(stiffness):
             raise SceneError(
                 f"The stored energy is not convex{where}: its second derivative at the undeformed state has the "
-                f"eigenvalue {lowest:.3g}; choose constants for which all are positive."
+                f"eigenvalue {np.linalg.eigvalsh(stiffness)[0]:.3g}; choose constants for which all are positive."
+            )
+        units = np.where(np.arange(len(stiffness)) < len(stiffness) - 3, 1.0, 1.0 / scene.length)  # curvature: 1/length
+        values = np.linalg.eigvalsh(units[:, None] * stiffness * units)
+        if values[0] <= STIFFEST * values[-1]:
+            raise SceneError(
+                f"The stored energy is convex, but for round-off{where}: with the rod's length as unit its second "
+                f"derivative at the undeformed state has eigenvalues from {values[0]:.3g} to {values[-1]:.3g}; choose "
+                "constants that are nearer to each other, or a kind of rod without the stiff strains."
             )
 
 

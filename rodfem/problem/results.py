@@ -1,0 +1,117 @@
+"""Results of the functions of a scene: of the declared size, finite, real, and the same whenever they are called.
+
+A function of the constants is called at the scene's own load and at both ends of its range, one along the rod at
+several arclengths too; a function of a place at some states, of which it may be undefined at one or another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from math import isfinite, nan
+from reprlib import Repr
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import ufl
+from ufl.classes import ComplexValue, ScalarValue
+from ufl.core.expr import Expr
+from ufl.corealg.traversal import unique_pre_traversal
+
+from rodfem.errors import SceneError
+from rodfem.problem.kinds import check_scalar, check_vector, plain
+from rodfem.problem.local_state import STATES, Constants, Place, some_places
+from rodfem.problem.roles import Role, functions_of
+from rodfem.tolerances import NEGLIGIBLE
+
+if TYPE_CHECKING:
+    from rodfem.problem.scene import Scene
+
+
+SHORT = Repr()
+
+
+def check_results(scene: Scene) -> None:
+    """Check what functions of the constants and of a place return, and the energy; raises :class:`SceneError`."""
+    c = scene.constants()
+    for what, function, role in functions_of(scene):
+        if role.call == "f(c)" and role.size is not None:
+            for there in _constants(scene, role):
+                values = function(there)
+                _check_numbers(what, role, values)
+                check_same(what, _numbers(role, values), _numbers(role, function(there)))
+        elif role.call == "f(x, c)":
+            check_expression(what, function(some_places(scene, wrap=ufl.variable)[role.along], c))
+            places = [some_places(scene, i)[role.along] for i in range(len(STATES))]
+            numbers = [_at(function, x, c) for x in places]
+            check_same(what, numbers, [_at(function, x, c) for x in places])
+            if role.load is None:
+                _check_equation(what, numbers)
+    x = some_places(scene)[True]
+    check_same("stored energy", *([_number(scene.energy(x.v, x.k, c))] for _ in range(2)))
+
+
+def check_same(what: str, first: Any, second: Any) -> None:
+    """Raise :class:`SceneError` where a function has returned different numbers for the same arguments."""
+    if not np.array_equal(first, second, equal_nan=True):
+        raise SceneError(
+            f"The {what} returns other values each time it is called, {SHORT.repr(first)} and "
+            f"{SHORT.repr(second)}: let them depend on its arguments alone, not on random numbers or a clock."
+        )
+
+
+def check_finite(what: str, value: Any) -> None:
+    """Raise :class:`SceneError` unless a ``value`` of the constants alone is a finite real number."""
+    if not isfinite(_number(value)):
+        raise SceneError(f"The {what} is {value}: return a finite real number.")
+
+
+def _constants(scene: Scene, role: Role) -> Iterator[Constants]:
+    """Constants at the load of the scene and at the ends of its range, of what acts along the rod at arclengths."""
+    yield scene.constants()
+    yield from (scene.constants(load) for load in scene.span)
+    yield from (scene.constants(s=s) for s in scene.samples() if role.along)
+
+
+def _check_numbers(what: str, role: Role, values: Any) -> None:
+    if not role.size:
+        check_scalar(what, values)
+        check_finite(what, values)
+        return
+    check_vector(what, values, role.size)
+    for i, value in enumerate(values):
+        if value is not None or not role.gaps:
+            check_finite(f"component {i + 1} of the {what}", value)
+
+
+def _numbers(role: Role, values: Any) -> list[float]:
+    return [nan if x is None else _number(x) for x in (values if role.size else [values])]
+
+
+def _number(value: Any) -> float:
+    """Number that an expression without unknowns stands for; nan where it has none, or a complex one."""
+    try:
+        return plain(value(()) if isinstance(value, Expr) else value)
+    except Exception:  # of UFL's own, too, which differ from release to release
+        return nan
+
+
+def _at(function: Callable[..., Any], x: Place, c: Constants) -> float:
+    """Value of a function of a place, nan where it is undefined: at a state that the rod need not take."""
+    try:
+        return _number(function(x, c))
+    except SceneError:
+        return nan
+
+
+def check_expression(what: str, expression: Any) -> None:
+    """Raise :class:`SceneError` for what is no scalar, or has a number in it that is not finite, or complex."""
+    check_scalar(what, expression)
+    for part in unique_pre_traversal(ufl.as_ufl(expression)):
+        if isinstance(part, ComplexValue) or (isinstance(part, ScalarValue) and not isfinite(part)):
+            raise SceneError(f"The {what} has {part} in it: return an expression of finite real numbers.")
+
+
+def _check_equation(what: str, values: Sequence[float]) -> None:
+    """Raise :class:`SceneError` for an equation that says nothing of the state, by its values at some of them."""
+    if max(values) - min(values) <= NEGLIGIBLE * max(map(abs, values)):
+        raise SceneError(f"The {what} is {values[0]:g} whatever the state: let it depend on x, the place.")

@@ -1,0 +1,162 @@
+"""Command lines with mistakes: status 2 and one sentence, before a folder is made or anything is computed."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hemitropic_cases import run_demo
+from mpi4py import MPI
+
+from rodfem.app import petsc_options
+from rodfem.diagram import solver
+from rodfem.errors import InputError
+from rodfem.output import plot_diagram, plot_modes, render
+
+HOME = Path(__file__).parents[2]
+
+LINES = {
+    # numbers out of their range
+    "--elements 1000000000": "too large: choose at most",
+    "--elements 99999999999999999999999": "too large",
+    "--elements nan": "invalid int value",
+    "--degree 99999999999999999999": "is not available",
+    "--accuracy 0": "not attainable",
+    "--accuracy nan": "not attainable",
+    "--accuracy 1e-320": "not attainable",
+    "--accuracy 1e-6 --elements 8": "leave out --elements, or --accuracy",
+    "--range 0 1e-320": "as narrow as round-off",
+    "--range 0.1 0.1000000000000001": "as narrow as round-off",
+    "--range 0 1e308": "outside its admissible range",
+    "--range 0 -1e308": "beyond the range of floats",
+    "--range -inf 0": "lam = -inf is not a finite number",
+    "--at 1e308": "outside the range",
+    "--at -1e-320": "outside the range",
+    "--step 0": "out of bounds",
+    "--step nan": "out of bounds",
+    "--step 1e-320": "out of bounds",
+    "--depth -1": "is not a depth",
+    "--spectrum 10000000000": "no more than 147 eigenvalues, not 10000000000: give less in --spectrum",
+    "--modes 10000000000 --at 0.1": "give less in --modes",
+    "--modes 2": "give them in --at",
+    "--modes 2 --method count --at 0.1": "Counting alone",
+    "--method foo": "Unknown method",
+    "--search 3": "give them in --at",
+    "--search -3 --at 0.1": "is not a number of tries",
+    "--locus A 0": "expected 3 arguments",
+    "--locus A x y": "is no interval",
+    "--locus A nan 0": "does not hold its value",
+    "--locus Q 0 1": "is no second parameter",
+    "--locus lam 0 1": "is no second parameter",
+    "--locus A -3 -3": "does not hold its value",
+    "--locus A -3 1e308": "cannot reach A = 1e.308",
+    # constants
+    "--half-length 1e-320": "beyond the range of floats",
+    "--half-length 1e308": "beyond the range",
+    "--half-length 1e10": "convex, but for round-off",
+    "--half-length 1e-10": "convex, but for round-off",
+    "--half-length 1e3": "more half-waves than a mesh of 48 nodes",
+    "--bending 1e-10": "convex, but for round-off",
+    "--bending 1e-5": "more half-waves .*use smaller loads, or more elements \\(--elements",
+    "--twisting 0.9000000001": "convex, but for round-off",
+    "--twisting 1e308": "powers are no floats",
+    "--coupling 1e308": "powers are no floats",
+    # words
+    "--output ''": "name of the folder is empty",
+    "--output /etc/passwd/x": "cannot be written",
+    "--foo": "Unrecognized",
+    # options of PETSc
+    "-- -foo": "PETSc does not know the option -foo",
+    "-- -eps_tol 1e-9": "-rodfem_eps_tol",
+    "-- foo": "'foo' after the lone -- is no option",
+    "-- --elements 8": "put options of the rod before it",
+    "-- -log_view -options_file /nonexistent": "no file /nonexistent",
+}
+AFTER_SET_UP = ("--half-length 1e3", "--bending 1e-5")
+"""What is found with the discrete rod, in a folder that has been made."""
+
+
+@pytest.mark.short
+@pytest.mark.parametrize("line", LINES)
+def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    def compute(*_: object, **__: object) -> None:
+        raise AssertionError("set up a system for bad input")
+
+    if line not in AFTER_SET_UP:
+        monkeypatch.setattr(solver, "System", compute)
+    output, words = folder / "a b \N{GREEK SMALL LETTER LAMDA}", shlex.split(line)
+    ours = [] if "--output" in words else ["--output", str(output), "--no-figures"]
+    with pytest.raises(SystemExit) as ended:
+        run_demo(*ours, *words)
+    out, err = capfd.readouterr()
+    assert ended.value.code == 2
+    if line not in AFTER_SET_UP:
+        assert not output.exists()
+    if MPI.COMM_WORLD.rank == 0:
+        assert err.startswith("error: ")
+        assert err.count("\n") == 1
+        assert re.search(LINES[line], err)
+        assert out == ""
+    else:
+        assert out == err == ""
+
+
+@pytest.mark.short
+def test_options_of_petsc_that_are_read() -> None:
+    petsc_options.check(["-log_view", ":file", "-rodfem_eps_tol", "-1e-9", "-mat_type", "aij", "-help"])
+    for words in (["x"], ["-"], ["--"], ["-log_view", ":a", "b"], ["-st_type", "sinvert"]):
+        with pytest.raises(InputError):
+            petsc_options.check(words)
+    assert petsc_options.unread(["-rodfem_nothing", "3", "-log_view"]) == ["-rodfem_nothing"]
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize(
+    ("main", "line", "words"),
+    [
+        (plot_diagram.main, "", "required"),
+        (plot_diagram.main, "a b", "Unrecognized"),
+        (plot_diagram.main, "/nonexistent", "is no rodfem diagram"),
+        (plot_diagram.main, "/tmp", "is no rodfem diagram"),
+        (plot_modes.main, "/nonexistent", "required"),
+        (plot_modes.main, "/nonexistent --branch a --row x", "invalid int"),
+        (plot_modes.main, "/nonexistent --branch a --row 0", "has no modes"),
+        (render.main, "/nonexistent --branch a", "required"),
+        (render.main, "/nonexistent --branch a --row 0 --radius inf", "is not positive"),
+        (render.main, "/nonexistent --branch a --row 0 --output a.foo", "unknown format"),
+        (render.main, "/etc/passwd --branch a --row 0", "cannot read"),
+    ],
+)
+def test_programs_that_draw(main, line: str, words: str, capfd: pytest.CaptureFixture[str]) -> None:
+    try:
+        status = main(shlex.split(line))
+    except SystemExit as ended:
+        status = ended.code
+    out, err = capfd.readouterr()
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert words in err
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize(
+    ("program", "line", "words"),
+    [
+        ("map", "--couplings 99999999999999", "at most 10000"),
+        ("map", "--couplings 2 --loads 2 --output /proc/x", "cannot be written"),
+        ("map", "--couplings 2 --loads 2 --output ''", "name of the folder is empty"),
+        ("cord", "--turns 1e308", "k0 = inf is not a finite number"),
+        ("follower", "--formulation reduced", "use --formulation pointwise"),
+        ("follower", "--mass 1e-320", "no floats"),
+        ("ring", "--range 0 1e-320", "as narrow as round-off"),
+    ],
+)
+def test_other_demos(program: str, line: str, words: str, folder: Path) -> None:
+    command = [sys.executable, str(HOME / "demos" / f"{program}.py"), *shlex.split(line)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=folder)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr
+    assert words in done.stderr
+    assert not list(folder.iterdir())

@@ -1,0 +1,266 @@
+"""Mistakes in Python: each is refused in one sentence that names it, before anything is computed."""
+
+from __future__ import annotations
+
+import math
+import random
+import time
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+
+import rodfem
+from forms import loads
+from forms.energy import bending_and_twist
+from rodfem import (
+    Attachment,
+    Discretization,
+    End,
+    Event,
+    IndexStepControl,
+    Inertia,
+    Ordinate,
+    Parameter,
+    Plan,
+    Ring,
+    Scene,
+    StepControl,
+    at,
+    clamped,
+    elastic,
+    everywhere,
+    free,
+    hinged,
+    integral,
+    sliding_hinge,
+)
+from rodfem.diagram import solver
+from rodfem.errors import InputError
+
+NAN, INF, HUGE, TINY = math.nan, math.inf, 1e308, 1e-320
+TIP = free(force=lambda c: (0, 0, -c.P))
+
+
+class Computed(Exception):
+    """The system of a scene was about to be set up."""
+
+
+@pytest.fixture(autouse=True)
+def stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    def compute(*_: object, **__: object) -> None:
+        raise Computed
+
+    monkeypatch.setattr(solver, "System", compute)
+
+
+def scene(**changes: Any) -> Scene:
+    """A column that is right but for the changes."""
+    good: dict[str, Any] = {
+        "name": "column",
+        "interval": (0.0, 1.0),
+        "rod": "unshearable and inextensible",
+        "energy": lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 0.5)),
+        "parameters": {"P": Parameter(0.0)},
+        "load": "P",
+        "ends": (clamped(), TIP),
+        "ordinate": Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
+        "span": (0.0, 3.0),
+    }
+    return Scene(**(good | changes))
+
+
+def right(**named: Any) -> tuple[End, End]:
+    return clamped(), End(**({"force": lambda c: (0, 0, -c.P)} | named))
+
+
+def left(position: Any = (0, 0, 0), rotation: Any = (1, 0, 0, 0)) -> tuple[End, End]:
+    return clamped(lambda c: position, rotation), TIP
+
+
+def numbers(**named: Any) -> dict[str, Any]:
+    return {"parameters": {"P": 0.0} | named}
+
+
+def tip(of: Any, s: Any = 1.0, name: Any = "tip", label: Any = "") -> dict[str, Any]:
+    return {"ordinate": Ordinate(name, s, of, label)}
+
+
+def stiff(b: Any, k: Any) -> Any:
+    return bending_and_twist(k, (b, b, b))
+
+
+SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
+    # names, numbers, pairs
+    ({"name": "\ud800"}, "has the name"),
+    ({"title": 3}, "title is 3"),
+    *(({"interval": x}, "interval is") for x in (None, (1.0,), "01", (False, True), {0.0, 1.0}, (0, 1j), (0, 10**400))),
+    ({"interval": (0.0, 1e200)}, "A rod from 0 to 1e.200"),
+    ({"interval": (1e16, 1e16 + 2), "ordinate": Ordinate("tip", 1e16, lambda r, q: 0.0)}, "short beside"),
+    *(({"span": x}, "span is") for x in (None, (1.0,), "03", (True, False), (0, 1j), {0: 1, 1: 2}, (0, 10**400))),
+    *(
+        ({"span": x}, "range of P from .* round-off")
+        for x in ((0, TINY), (1.0, 1.0 + 3e-16), (0, 1e300), (-HUGE, HUGE))
+    ),
+    ({"rod": ["unshearable"]}, "kind of rod"),
+    ({"load": ["P"]}, "is not a parameter"),
+    ({"load": None}, "is not a parameter"),
+    *((numbers(**{name: 1.0}), "cannot have the name") for name in ("lambda", "__class__", "a/b")),
+    *(
+        (numbers(B=x), "parameter B is")
+        for x in (True, 10**400, 1j, "1", Parameter(1.0, label=3), Parameter(1.0, "", None), Parameter(1.0, "", (0,)))  # type: ignore[arg-type]
+    ),
+    (numbers(B=HUGE) | {"energy": lambda v, k, c: stiff(c.B, k)}, "stiffness of 1e.308"),
+    (numbers(B=TINY) | {"energy": lambda v, k, c: stiff(c.B, k)}, "stiffness of"),
+    ({"ends": iter(())}, "not two of the kind End"),
+    ({"breaks": (True,)}, "break is at s = True"),
+    ({"attachments": (Attachment(True, mass=lambda c: 1.0),)}, "attachment is at s = True"),  # type: ignore[arg-type]
+    ({"inertia": Inertia}, "inertia is"),
+    # what functions of the constants return
+    *(
+        ({"ends": left((x, 0, 0))}, "component 1 of the position")
+        for x in (NAN, INF, "a", 1j, False, (0,), np.zeros(1))
+    ),
+    *(({"ends": left(x)}, "position of the left end") for x in ("abc", {0: 0, 1: 0, 2: 0}, {1, 2, 3}, 3)),
+    *(({"ends": left(rotation=x)}, "rotation of the left end") for x in ("1000", (1j, 0, 0, 0), (INF, 0, 0, 0))),
+    ({"ends": left(rotation=(1e200, 0, 0, 0))}, "rotation of the left end"),
+    ({"ends": left(rotation=lambda c: (1j, 0, 0, 0))}, "component 1 of the rotation"),
+    *(({"ends": right(force=lambda c, x=x: (0, 0, x))}, "component 3 of the force") for x in (NAN, INF, 1j, None, "1")),
+    ({"ends": right(force=lambda c: (0, 0, 1 / (c.P - 3)))}, "force on the right end fails with ZeroDivision"),
+    ({"ends": right(force=lambda c: exit(3))}, "force on the right end fails with SystemExit"),
+    ({"ends": right(force=lambda c: (0, 0, -c.P * random.random()))}, "returns other values each time"),
+    *(
+        (
+            {"ends": (clamped(), hinged(x, lambda c: (0, 0, None), force=lambda c: (0, 0, -c.P)))},
+            "hinge of the right end",
+        )
+        for x in ("abc", (INF, 0, 0), (1j, 0, 0))
+    ),
+    ({"distributed": lambda c: (0, 0, 1 / (c.s - 1e-6))}, "distributed force fails"),
+    ({"inertia": Inertia(rho_A=lambda c: c.s - 0.2)}, "is negative"),
+    ({"inertia": Inertia(rho_A=lambda c: TINY)}, "no floats"),
+    # what functions of a place return
+    *(({"potential": lambda x, c, z=z: z * x.r[0]}, "potential along the rod has .* in it") for z in (NAN, INF, 1j)),
+    ({"potential": lambda x, c: x.r[0] > 0}, "is true or false"),
+    ({"ends": right(energy=lambda x, c: x.r[0] * time.perf_counter_ns())}, "returns other values each time"),
+    ({"constraints": (at(0.5, lambda x, c: 1.0),)}, "constraint is 1 whatever the state"),
+    ({"constraints": (at(0.5, lambda x, c: c.P),)}, "constraint is 0 whatever the state"),
+    ({"constraints": (integral(lambda x, c: 0 * x.k[2]),)}, "constraint is 0 whatever the state"),
+    ({"constraints": (everywhere(lambda x, c: 0.0, strain=True),)}, "constraint is 0 whatever the state"),
+    ({"constraints": (at(0.5, lambda x, c: NAN * x.r[0]),)}, "has nan in it"),
+    (lambda: {"constraints": (everywhere(lambda x, c: x.k[0], strain="no"),)}, "strain is 'no'"),  # type: ignore[arg-type]
+    (lambda: {"ends": Ring("no")}, "odd is 'no'"),  # type: ignore[arg-type]
+    # energies
+    ({"energy": lambda v, k, c: stiff(1 + random.random(), k)}, "stored energy returns other values"),
+    ({"energy": lambda v, k, c: ufl.sqrt(ufl.dot(k, k))}, "not finite"),
+    ({"energy": dict}, "no function of 3 argument"),
+    ({"energy": lambda v, k, c: bending_and_twist(k, (1, 1))}, "three stiffnesses, not 2"),
+    ({"energy": lambda v, k, c: bending_and_twist(k, (1, 1e-13, 1))}, "convex, but for round-off"),
+    ({"potential": lambda x, c: loads.spring(x.r, (1, 2))}, "one number or three, not 2"),
+    # ordinate, start, springs
+    *((tip(lambda r, q, x=x: x), "ordinate fails with TypeError") for x in ("a", "1", True, None, 1j, np.zeros(1))),
+    (tip(lambda r, q: random.random()), "ordinate returns other values"),
+    (tip(lambda r, q: r[0], name=3), "name of the ordinate is 3"),
+    (tip(lambda r, q: r[0], label=None), "label of the ordinate is None"),
+    (tip(lambda r, q: r[0], s=True), "ordinate is at s = True"),
+    (tip(lambda x, c: NAN * x.k[0], s=None), "has nan in it"),
+    *(({"start": lambda s, x=x: x}, "start fails with") for x in ("a", [[1, 0], [1]], np.full((5, 4), 1j))),
+    ({"start": lambda s: np.random.rand(len(s), 4)}, "start returns other values"),
+    (lambda: {"ends": (clamped(), elastic(3.0))}, "translation is 3.0: give a function"),  # type: ignore[arg-type]
+    (lambda: {"ends": (clamped(), elastic(lambda c: 1.0, anchor=(0, 0)))}, "anchor is"),  # type: ignore[arg-type]
+    (lambda: {"ends": (clamped(), elastic(None, lambda c: 1.0, directors=(0, 0, 0, 0)))}, "zero quaternion"),
+    ({"ends": (clamped(), elastic(lambda c: (1, 2, 3, 4)))}, "one number or three, not 4"),
+    ({"ends": (clamped(), elastic(lambda c: NAN, force=lambda c: (0, 0, -c.P)))}, "nan in it"),
+    (lambda: {"ends": (clamped(), sliding_hinge((1, 0, 0), (NAN, 0, 1)))}, "direction in which a hinge slides"),
+    (lambda: {"ends": (clamped(), sliding_hinge((1, 0, 0), (0, 0, 1), force=3))}, "force is 3: give a function"),  # type: ignore[arg-type]
+]
+
+
+@pytest.mark.parametrize(("changes", "words"), SCENES)
+def test_scenes(changes: Any, words: str) -> None:
+    with pytest.raises(InputError, match=words) as raised:
+        scene(**(changes() if callable(changes) else changes))
+    assert "\n" not in str(raised.value)
+
+
+def event(of: Any, name: Any = "ends meet") -> Plan:
+    return Plan(events=(Event(name, of),))
+
+
+def control(**named: Any) -> Plan:
+    return Plan(steps=StepControl(**named))
+
+
+PLANS: list[tuple[Callable[[], Any], str]] = [
+    (lambda: Plan((0, TINY)), "as narrow as round-off"),
+    (lambda: Plan((0, 1e300)), "beyond the range of floats"),
+    (lambda: Plan((0, 1e10)), "more half-waves than a mesh of 48 nodes"),
+    (lambda: Plan(error_bars="no"), "error_bars is 'no'"),  # type: ignore[arg-type]
+    (lambda: Plan(spectrum=10**10), "no more than 147 eigenvalues"),
+    (lambda: Plan(modes=10**10, at=(1.0,)), "no more than 147 eigenvalues"),
+    *((lambda x=x: Plan(events=x), "events is") for x in (None, Event("a", lambda s: 1.0), {1})),
+    (lambda: event(lambda s: 1.0, 3), "name is 3"),
+    (lambda: event(lambda s: 1.0, ""), "event has no name"),
+    *((lambda x=x: event(x), "of is .*: give a function of 1") for x in (3, lambda: 1.0, lambda s, c: 1.0)),
+    *((lambda x=x: event(lambda s: x), "event 'ends meet' fails") for x in (None, "1", True, 1j, np.zeros(3))),
+    (lambda: event(lambda s: random.random()), "numbers out"),
+    (lambda: control(first=INF), "first = inf lead"),
+    (lambda: control(first=1e-7), "first step of 1e-07 is out of bounds"),
+    (lambda: control(aim=INF), "aim = inf lead"),
+    *((lambda x=x: Plan(steps=IndexStepControl(resolved=x)), "resolved is") for x in (NAN, INF, -1.0, "a")),
+    (lambda: Discretization(elements=10**9), "too large"),
+    (lambda: Discretization(elements=2, vertices=(0.0, 1e-300, 1.0)), "must ascend"),
+    (lambda: Discretization(elements=2, vertices={0.0, 0.5, 1.0}), "vertices is"),  # type: ignore[arg-type]
+    (lambda: Discretization(["reduced"]), "Unknown formulation"),  # type: ignore[arg-type]
+    (lambda: Discretization(elements=2, vertices=(0.0, 0.5, 2.0)), "must begin and end at 0 and 1"),
+]
+
+
+@pytest.mark.parametrize(("make", "words"), PLANS)
+def test_plans(make: Callable[[], Any], words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if "half-waves" in words:
+        monkeypatch.undo()
+    with pytest.raises(InputError, match=words):
+        found = make()
+        rodfem.trace(scene(), *((None, found) if isinstance(found, Plan) else (found,)))
+
+
+def test_arguments_of_functions(tmp_path: Path) -> None:
+    ours = scene()
+    cases: list[tuple[Callable[[], Any], str]] = [
+        (lambda: rodfem.run(ours, output="a\0b"), "output is"),
+        (lambda: rodfem.run(ours, output=tmp_path, figures="no"), "figures is 'no'"),  # type: ignore[arg-type]
+        (lambda: rodfem.run(ours, output=tmp_path, words=lambda: ""), "words is"),  # type: ignore[arg-type]
+        (lambda: rodfem.many([ours], lambda: {}, tmp_path), "work is .*: give a function of 1"),  # type: ignore[arg-type]
+        (lambda: rodfem.many([ours], lambda rod: {1}, tmp_path), "what no file can hold"),  # type: ignore[arg-type]
+        (lambda: rodfem.many([ours], lambda rod: {"a": NAN}, tmp_path), "what no file can hold"),
+        (lambda: rodfem.many([ours], lambda rod: [1], tmp_path), "return a dictionary"),  # type: ignore[arg-type]
+        (lambda: rodfem.load_json(None), "path is None"),  # type: ignore[arg-type]
+        (lambda: rodfem.load_json(True), "path is True"),  # type: ignore[arg-type]
+        (lambda: rodfem.load_modes("a", "b", 0.5), "row is 0.5"),  # type: ignore[arg-type]
+        (lambda: rodfem.Solver(ours, spectrum=10**10), "no more than 147"),
+    ]
+    for call, words in cases:
+        with pytest.raises(InputError, match=words):
+            call()
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"name": "a b \N{GREEK SMALL LETTER LAMDA}"},
+        {"interval": [0, np.int64(1)], "span": np.array([0.0, 3.0])},
+        {"interval": (0, Fraction(1, 1))},
+        {"ends": right(energy=lambda x, c: ufl.ln(x.d3[2] + 2))},
+        {"ends": left(np.zeros(3), np.array([2.0, 0, 0, 0]))},
+        {"potential": lambda x, c: loads.spring(x.r, np.ones(3))},
+    ],
+)
+def test_what_is_no_mistake(changes: dict[str, Any]) -> None:
+    with pytest.raises(Computed):
+        rodfem.trace(scene(**changes), Discretization(elements=np.int64(4)), Plan(depth=np.int64(1)))
