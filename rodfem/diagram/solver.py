@@ -49,6 +49,8 @@ METHOD: Check = text("auto")
 
 HOPELESS = 0.9
 """Index over the number of nodes above which it is that of the mesh, not of the rod."""
+A_FEW = 4
+"""Half-waves that a mesh of any size is allowed."""
 
 
 def check_index(scene: Scene, load: float, index: int, nodes: int) -> None:
@@ -56,7 +58,7 @@ def check_index(scene: Scene, load: float, index: int, nodes: int) -> None:
 
     The mesh has so many ``nodes``.
     """
-    if index > HOPELESS * nodes:
+    if index > max(HOPELESS * nodes, A_FEW):
         raise InputError(
             f"At {scene.load} = {load:g} the rod has more half-waves than a mesh of {nodes} nodes can hold (its index "
             f"is {index} there)",

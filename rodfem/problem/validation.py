@@ -27,12 +27,11 @@ from rodfem.tolerances import NEGLIGIBLE
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
-EPS = float(np.finfo(float).eps)
 SHORT = Repr()
 LARGEST, TINIEST = 1e60, 1e-60
 """Lengths, widths of ranges and stiffnesses whose powers are floats."""
-STIFFEST = 1e-15
-"""Least stiffness over the greatest one, with the rod's length as unit, that arithmetic tells from none."""
+SOFTEST, STIFFEST = 1e-8, 1e-15
+"""Least stiffness over the greatest one, of bending and twist, and of all strains with the rod's length as unit."""
 
 
 def check_kinds(scene: Scene) -> None:
@@ -251,19 +250,23 @@ def check_convexity(scene: Scene) -> None:
                 f"The stiffness of {abs(stiffness).max():.3g}{where} is so far from one that its powers are no floats: "
                 "choose other units."
             )
-        if not is_definite(stiffness):
+        units = np.where(np.arange(len(stiffness)) < len(stiffness) - 3, 1.0, 1.0 / scene.length)  # curvature: 1/length
+        balanced = units[:, None] * stiffness * units
+        if not is_definite(balanced):
             raise SceneError(
                 f"The stored energy is not convex{where}: its second derivative at the undeformed state has the "
                 f"eigenvalue {np.linalg.eigvalsh(stiffness)[0]:.3g}; choose constants for which all are positive."
             )
-        units = np.where(np.arange(len(stiffness)) < len(stiffness) - 3, 1.0, 1.0 / scene.length)  # curvature: 1/length
-        values = np.linalg.eigvalsh(units[:, None] * stiffness * units)
-        if values[0] <= STIFFEST * values[-1]:
-            raise SceneError(
-                f"The stored energy is convex, but for round-off{where}: with the rod's length as unit its second "
-                f"derivative at the undeformed state has eigenvalues from {values[0]:.3g} to {values[-1]:.3g}; choose "
-                "constants that are nearer to each other, or a kind of rod without the stiff strains."
-            )
+        strains, coupling = balanced[:-3, :-3], balanced[:-3, -3:]
+        # stiff strains hide no bending, but bending and twist, with the strains that go with them, must be comparable
+        relaxed = balanced[-3:, -3:] - coupling.T @ np.linalg.solve(strains, coupling)
+        for values, least in ((np.linalg.eigvalsh(relaxed), SOFTEST), (np.linalg.eigvalsh(balanced), STIFFEST)):
+            if values[0] <= least * values[-1]:
+                raise SceneError(
+                    f"The stored energy is convex, but for round-off{where}: with the rod's length as unit its second "
+                    f"derivative at the undeformed state has eigenvalues from {values[0]:.3g} to {values[-1]:.3g}; "
+                    "choose constants that are nearer to each other, or a kind of rod without the stiff strains."
+                )
 
 
 def is_definite(matrix: np.ndarray) -> bool:
@@ -272,7 +275,7 @@ def is_definite(matrix: np.ndarray) -> bool:
     So stiffnesses may differ by any factor: a stretch 1e14 times as stiff as bending hides no eigenvalue of bending.
     """
     diagonal = matrix.diagonal()
-    if not (diagonal > EPS * abs(matrix).max(initial=0.0)).all():
+    if not (diagonal > 0.0).all():
         return False
     roots = np.sqrt(diagonal)
     return bool(matrix.size == 0 or np.linalg.eigvalsh(matrix / roots[:, None] / roots)[0] > NEGLIGIBLE)
