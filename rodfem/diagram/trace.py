@@ -21,6 +21,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
 from rodfem.problem.scene import Scene
+from rodfem.problem.validation import round_off_of_strains
 from rodfem.ranks import end_together
 from rodfem.timing import Clock
 
@@ -82,6 +83,8 @@ def trace(
                 check_waves(scene, mesh, plan.over(scene), comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
         recorder.system(found.system, plan.accuracy)
+        if doubt := round_off_of_strains(scene):
+            recorder.warn(doubt)
         if compiled and plan.error_bars and compat.ALONE:
             compile_richer(found.system)
 

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 SHORT = Repr()
 LARGEST, TINIEST = 1e60, 1e-60
 """Lengths, widths of ranges and stiffnesses whose powers are floats."""
+EPS, FELT = float(np.finfo(float).eps), 1e-3
+"""Round-off of a strain, and what of it is felt in bending, relative."""
 SOFTEST, STIFFEST = 1e-8, 1e-15
 """Least stiffness over the greatest one, of bending and twist, and of all strains with the rod's length as unit."""
 
@@ -250,8 +252,7 @@ def check_convexity(scene: Scene) -> None:
                 f"The stiffness of {abs(stiffness).max():.3g}{where} is so far from one that its powers are no floats: "
                 "choose other units."
             )
-        units = np.where(np.arange(len(stiffness)) < len(stiffness) - 3, 1.0, 1.0 / scene.length)  # curvature: 1/length
-        balanced = units[:, None] * stiffness * units
+        balanced = in_lengths(stiffness, scene)
         if not is_definite(balanced):
             raise SceneError(
                 f"The stored energy is not convex{where}: its second derivative at the undeformed state has the "
@@ -259,7 +260,7 @@ def check_convexity(scene: Scene) -> None:
             )
         strains, coupling = balanced[:-3, :-3], balanced[:-3, -3:]
         # stiff strains hide no bending, but bending and twist, with the strains that go with them, must be comparable
-        relaxed = balanced[-3:, -3:] - coupling.T @ np.linalg.solve(strains, coupling)
+        relaxed: np.ndarray = balanced[-3:, -3:] - coupling.T @ np.linalg.solve(strains, coupling)
         for values, least in ((np.linalg.eigvalsh(relaxed), SOFTEST), (np.linalg.eigvalsh(balanced), STIFFEST)):
             if values[0] <= least * values[-1]:
                 raise SceneError(
@@ -267,6 +268,24 @@ def check_convexity(scene: Scene) -> None:
                     f"derivative at the undeformed state has eigenvalues from {values[0]:.3g} to {values[-1]:.3g}; "
                     "choose constants that are nearer to each other, or a kind of rod without the stiff strains."
                 )
+
+
+def in_lengths(stiffness: np.ndarray, scene: Scene) -> np.ndarray:
+    """Stiffness with the rod's length as unit: that of bending is beside that of strains, which have no unit."""
+    units = np.where(np.arange(len(stiffness)) < len(stiffness) - 3, 1.0, 1.0 / scene.length)
+    return np.asarray(units[:, None] * stiffness * units)
+
+
+def round_off_of_strains(scene: Scene) -> str:
+    """Sentence for a rod whose stiff strains have a round-off that is felt in bending, which no error bar holds."""
+    values = np.linalg.eigvalsh(in_lengths(scene.stiffness(), scene))
+    ratio = values[-1] / values[0]
+    if ratio * EPS < FELT:
+        return ""
+    return (
+        f"Shear or stretch is {ratio:.0e} times as stiff as bending, and its round-off {ratio * EPS:.0e} of bending: "
+        "no error bar holds that; choose a kind of rod without the stiff strains."
+    )
 
 
 def is_definite(matrix: np.ndarray) -> bool:
