@@ -50,6 +50,7 @@ def locked(folder: Path, comm: MPI.Comm) -> Iterator[None]:
             with suppress(OSError):  # the folder is gone
                 (folder / LOCK).unlink()
             os.close(file)
+    comm.barrier()  # nobody sees the lock any more
 
 
 def _acquired(folder: Path) -> int:
