@@ -13,7 +13,7 @@ from mpi4py import MPI
 from rodfem.errors import INTERRUPTED, InputError
 from rodfem.launcher import end_with_launcher
 
-PATIENCE, PAUSE = 10.0, 0.01
+PATIENCE, PAUSE = 30.0, 0.01
 """Seconds after which a rank that others do not join has failed alone, and between two looks for them."""
 
 
