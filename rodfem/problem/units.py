@@ -14,7 +14,7 @@ import numpy as np
 import ufl
 
 from rodfem.errors import SceneError
-from rodfem.problem.local_state import some_places
+from rodfem.problem.local_state import STATES, some_places
 
 if TYPE_CHECKING:
     from rodfem.problem.contribution import Block, Unknown
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 ORDINARY = 1e3
 """Sizes between this and its inverse count as one."""
-SOME_ROTATIONS = ((0.5, 0.1, 0.7, 0.5), (0.7, -0.1, 0.1, 0.7), (1.0, 0.0, 0.0, 0.0))
-SOME_PLACES = ((0.2, 0.3, 0.4), (-0.2, 0.1, 0.9), (0.0, 0.0, 0.5))
-"""Rotations and places, in units of the rod's length, at which an ordinate shows its size."""
 
 
 class Units(NamedTuple):
@@ -89,8 +86,7 @@ def _of_ordinate(scene: Scene) -> float:
     """Largest size of the ordinate in some states; one where that cannot be told."""
     try:
         if scene.ordinate.places:
-            pairs = zip(SOME_PLACES, SOME_ROTATIONS, strict=True)
-            values = [scene.ordinate.of(np.array(r) * scene.length, np.array(q)) for r, q in pairs]
+            values = [scene.ordinate.of(np.array(r) * scene.length, np.array(q)) for q, r, *_ in STATES]
         else:
             integrand = ufl.as_ufl(scene.ordinate.of(some_places(scene)[1], scene.constants()))
             values = [float(integrand(())) * scene.length]

@@ -50,8 +50,8 @@ def column(length: float, stiffness: float, rod: str) -> Scene:
 def test_dimensionless_diagram(length: float, stiffness: float, rod: str) -> None:
     """Loads, ordinates and indices of all rows in units of the rod are those of the rod of unit length and stiffness.
 
-    Of a column whose loads are of order 1e6 no buckling was found: the weight of the load in the metric, one over the
-    square of the span, was taken for the smallest mass of a perturbation.
+    Loads of order 1e6 are the trap: the weight of the load in the metric, one over the square of the span, is no mass
+    of a perturbation, and as the smallest of them it would put every eigenvalue within round-off.
     """
     one, other = (rodfem.trace(column(*units, rod), MESH, Plan(depth=1)) for units in ((1.0, 1.0), (length, stiffness)))
     assert [[(str(s.kind), s.negative_before, s.negative_after) for s in b.special] for b in one] == [
@@ -131,6 +131,6 @@ def test_numbers_in_words() -> None:
 def test_recorded_scenes(name: str) -> None:
     """Ends, loads and constraints of all kinds in metres and newtons of a molecule: the same diagrams.
 
-    A fold was taken for a branch point, symmetries were lost, and others were found that are none.
+    What mixes units takes a fold for a branch point, loses symmetries, and finds others that are none.
     """
     assert not differences(golden_cases.cases()[name](), *METRES_AND_NEWTONS)
