@@ -1,0 +1,50 @@
+"""The program ``rodfem``, also ``python -m rodfem``: one of its commands, with the words after it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from difflib import get_close_matches
+from importlib import import_module
+from types import ModuleType
+
+import rodfem
+from rodfem.app.cli import Parser, complain
+from rodfem.app.commands import COMMANDS
+from rodfem.app.commands import __name__ as HOME
+from rodfem.errors import InputError
+
+HELP = """usage: rodfem COMMAND [ARGUMENTS]
+
+Equilibria of nonlinearly elastic rods: which are stable, and at which load stability is lost.
+
+{commands}
+
+rodfem COMMAND --help lists the arguments of a command.
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command that ``arguments``, by default those of the shell, name; bad input ends with one sentence."""
+    name, *words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    if name in ("-h", "--help", "help"):
+        print(HELP.format(commands="\n".join(f"  {each:<10}{_words(_module(each))}" for each in COMMANDS)), end="")
+    elif name == "--version":
+        print(f"rodfem {rodfem.__version__}")
+    elif name not in COMMANDS:
+        near = get_close_matches(name, COMMANDS, n=1) or [" or ".join(COMMANDS)]
+        Parser(prog="rodfem").error(f"unknown command {name!r}: choose {near[0]}")
+    else:
+        try:
+            _module(name).main(words)
+        except InputError as trouble:
+            complain(str(trouble))
+
+
+def _module(name: str) -> ModuleType:
+    return import_module(f"{HOME}.{name}")
+
+
+def _words(module: ModuleType) -> str:
+    """First line of a module's docstring."""
+    return (module.__doc__ or "").partition("\n")[0]
