@@ -23,7 +23,7 @@ export MPLBACKEND := Agg
 export PYVISTA_OFF_SCREEN := true
 export VTK_DEFAULT_OPENGL_WINDOW := vtkEGLRenderWindow
 
-.PHONY: help setup demo test lint figures bench clean
+.PHONY: help setup demo test lint figures notebooks bench clean
 
 help: ## list these commands
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 12
@@ -46,6 +46,13 @@ lint: setup ## check style and types
 
 figures: setup ## run all demos
 	@set -e; for demo in demos/*.py; do echo "$$demo"; $(PYTHON) "$$demo"; done
+
+notebooks: setup ## the lessons of the course as notebooks, in results/notebooks
+	@tools/setup.sh dev
+	@mkdir -p results/notebooks
+	@set -e; for lesson in docs/course/[0-9]*.py; do \
+		$(PYTHON) -m jupytext --quiet --to ipynb --output "results/notebooks/$$(basename "$$lesson" .py).ipynb" "$$lesson"; \
+	done; ls results/notebooks
 
 bench: setup ## measure speed, ways to judge a state, hard cases: docs/speed.md, stability.md, robustness.md (40 minutes)
 	$(PYTHON) -m benchmarks.speed
