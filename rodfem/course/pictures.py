@@ -15,19 +15,35 @@ from rodfem.output.sheet import DPI, PALETTE, STYLE, save
 
 FOLDER = Path("results") / "course"
 """Where a script's pictures are."""
-SIZE = (6.5, 4.0)
-"""Width and height in inches."""
+SIZES = {1: (6.5, 4.0), 2: (8.5, 4.0), 3: (9.5, 3.6)}
+"""Width and height in inches of figures with so many axes."""
+
+
+def panels(number: int, x: str, y: str, equal: bool = False) -> list[Axes]:
+    """Return so many axes side by side in a new figure.
+
+    Parameters
+    ----------
+    number
+        How many.
+    x, y
+        Labels; ``y`` is that of the first.
+    equal
+        Whether shapes are true to scale.
+    """
+    with matplotlib.rc_context(STYLE | {"axes.prop_cycle": matplotlib.cycler(color=PALETTE[1:])}):
+        drawn = Figure(figsize=SIZES[number], layout="constrained").subplots(1, number, sharey=True, squeeze=False)[0]
+        for one in drawn:
+            one.set(xlabel=x, ylabel=y if one is drawn[0] else "")
+            one.spines[["top", "right"]].set_visible(False)
+            if equal:
+                one.set_aspect("equal")
+    return list(drawn)
 
 
 def axes(x: str, y: str, equal: bool = False) -> Axes:
     """Axes of a new figure with labels ``x`` and ``y``; ``equal`` draws shapes true to scale."""
-    with matplotlib.rc_context(STYLE | {"axes.prop_cycle": matplotlib.cycler(color=PALETTE[1:])}):
-        drawn = Figure(figsize=SIZE, layout="constrained").subplots()
-        drawn.set(xlabel=x, ylabel=y)
-        drawn.spines[["top", "right"]].set_visible(False)
-        if equal:
-            drawn.set_aspect("equal")
-    return drawn
+    return panels(1, x, y, equal)[0]
 
 
 def show(figure: Figure, name: str) -> None:
