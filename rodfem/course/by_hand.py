@@ -20,13 +20,13 @@ ELEMENTS, DEGREE = 8, 4
 """Discretisation of an angle."""
 
 
-def angle(a: float = 0.0, b: float = 1.0) -> fem.Function:
+def angle(a: float = 0.0, b: float = 1.0, elements: int = ELEMENTS, degree: int = DEGREE) -> fem.Function:
     """Angle of a rod from arclength ``a`` to ``b``: a continuous field, zero to begin with.
 
-    Its nodal values are ``theta.x.array`` of shape (n,).
+    On so many ``elements`` of a ``degree``.  Its nodal values are ``theta.x.array`` of shape (n,).
     """
-    mesh = compat.interval_mesh(MPI.COMM_SELF, ELEMENTS, a, b)
-    space, _ = compat.mixed_space(mesh, [(True, DEGREE, 1)]).sub(0).collapse()
+    mesh = compat.interval_mesh(MPI.COMM_SELF, elements, a, b)
+    space, _ = compat.mixed_space(mesh, [(True, degree, 1)]).sub(0).collapse()
     return fem.Function(space, dtype=compat.REAL)
 
 
@@ -47,3 +47,37 @@ def assemble(form: ufl.Form) -> Any:
     if rank == 0:
         return float(fem.assemble_scalar(compiled))
     return np.array(fem.assemble_vector(compiled).array) if rank == 1 else compat.local_table(compiled).toarray()
+
+
+def fields(number: int, a: float = 0.0, b: float = 1.0) -> tuple[fem.Function, NDArray[np.int32]]:
+    """Several fields along a rod from ``a`` to ``b``, and the numbers of their nodal values: (number, n).
+
+    They are ``u[0]``, ``u[1]``, ... in forms. ``u.x.array[at[i]]`` has the values of field i at :func:`arclengths`.
+    """
+    mesh = compat.interval_mesh(MPI.COMM_SELF, ELEMENTS, a, b)
+    space = compat.mixed_space(mesh, [(True, DEGREE, number)])
+    at = []
+    for i in range(number):
+        part, inside = space.sub(0).sub(i).collapse()
+        s = np.asarray(part.tabulate_dof_coordinates())[:, 0]
+        at.append(np.asarray(inside, dtype=np.int32)[np.argsort(s)])
+    return fem.Function(space, dtype=compat.REAL), np.array(at)
+
+
+def arclengths(a: float = 0.0, b: float = 1.0) -> NDArray[np.float64]:
+    """Arclengths of the nodes of :func:`fields`, in the order of the rod: (n,)."""
+    return np.sort(nodes(angle(a, b)))
+
+
+def spins(q: fem.Function, at: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Changes ``theta q / 2`` of a field ``q`` of quaternions with the spins ``theta`` of its inner nodes, as columns.
+
+    ``at`` is that of :func:`fields`.  Shape (4 n, 3 (n - 2)): both ends are held.
+    """
+    a, b, c, d = q.x.array[at]
+    changes = np.array([[-b, a, -d, c], [-c, d, a, -b], [-d, -c, b, a]]) / 2
+    nodes = np.arange(at.shape[1])
+    T = np.zeros((at.size, 3, nodes.size))
+    for axis, change in enumerate(changes):
+        T[at, axis, nodes] = change
+    return T[:, :, 1:-1].reshape(at.size, -1)
