@@ -146,4 +146,5 @@ print(f"energy {followed.energy:.3f} along the path, {again.energy:.3f} from a n
 
 # %% [markdown]
 # After *two* turns the shaft, unstable by now, can even be moved into the one without twist with its ends held (Dirac's
-# belt trick). And a mesh fails on which the rod turns by $\pi$ in one element: the shorter way round is the other one.
+# belt trick). And a mesh of linear elements fails where the rod turns by $2\pi$ in one of them: it takes the shorter
+# way round.

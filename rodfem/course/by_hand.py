@@ -1,4 +1,4 @@
-"""Variational problems of one angle along a rod, by hand: UFL forms become small dense arrays of numpy.
+"""Variational problems of one field or a few along a rod, by hand: UFL forms become small dense arrays of numpy.
 
 Each rank has the whole rod.  A lesson states an energy, differentiates it with :func:`ufl.derivative`, and does the
 linear algebra itself.
