@@ -3,9 +3,9 @@ r"""Cross-sections of a homogeneous, isotropic material: stiffnesses and inertia
     wire = section.circle(0.5e-3, E=70e9, nu=0.33, density=6450.0)  # metres, pascals, kilograms per cubic metre
     rod = Scene(..., rod="unshearable", energy=wire.energy("unshearable"), inertia=wire.inertia())
 
-Dimensions are along the directors ``d1`` and ``d2``; bending about ``d1`` has the stiffness ``E I1``, where ``I1`` is the
-integral of ``y2^2``.  Torsion is Saint-Venant's, ``G J`` with ``G = E / (2 (1 + nu))``: Timoshenko & Goodier, *Theory of
-Elasticity*, 3rd ed. (1970), chapter 10.  Shear factors are those of G. R. Cowper, J. Appl. Mech. 33 (1966) 335-340.
+Dimensions are along the directors ``d1`` and ``d2``.  Bending about ``d1`` has the stiffness ``E I1``; ``I1`` is the
+integral of ``y2^2``.  Torsion is Saint-Venant's, ``G J`` with ``G = E / (2 (1 + nu))``: Timoshenko & Goodier, *Theory
+of Elasticity*, 3rd ed. (1970), chapter 10.  Shear factors are those of G. R. Cowper, J. Appl. Mech. 33 (1966) 335-340.
 """
 
 from __future__ import annotations
