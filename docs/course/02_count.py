@@ -32,7 +32,7 @@ drawn = panels(3, "$a_1$", "$a_2$", equal=True)
 for ax, load, index in zip(drawn, (0.5, 5.0, 14.0), range(3), strict=True):
     energy = (slope**2 / 2 + load * EULER * (np.cos(shape) - 1)) @ w / 2
     ax.contourf(a1, a2, energy, levels=np.linspace(-abs(energy).max(), abs(energy).max(), 16), cmap="RdBu_r")
-    if energy.min() < -1e-9:
+    if index == 1:
         ax.contour(a1, a2, energy, levels=[0.0], colors="0.3", linewidths=1)
     ax.plot(0, 0, "k.", ms=9)
     ax.set_title(f"$P = {load:g}\\,\\pi^2/4$: index {index}", fontsize=11)
@@ -125,18 +125,18 @@ print(f"P = {answer:.12f} +- {first.error_estimate:.0e}, exact {EULER:.12f}")
 # %% [markdown]
 # ## Exercises
 #
-# **2.1** Pin both ends of the rod (`pinned()`, `pinned(lambda c: (0, 0, None), force)`). Find the critical load by counts
-# only: bisect on `Solver(scene).equilibrium(P).index`.
+# **2.1** Pin both ends of the rod (`pinned()`, `pinned(lambda c: (0, 0, None), force)`). Find the critical load by
+# counts only: bisect on `Solver(scene).equilibrium(P).index`.
 #
-# **2.2** A column under its own weight $q$ per length: $\Pi = \int \frac12\theta'^2 + q\,(1-s)\cos\theta\,ds$. Why $1-s$?
-# How large may $q$ be? (Greenhill 1881: how tall may a tree grow?)
+# **2.2** A column under its own weight $q$ per length: $\Pi = \int \frac12\theta'^2 + q\,(1-s)\cos\theta\,ds$. Why
+# $1-s$? How large may $q$ be? (Greenhill 1881: how tall may a tree grow?)
 #
 # **2.3** Let the column of this lesson leave its plane: leave out `planar`. What is its index at $P = 100$?
 
 # %% [markdown]
 # ## Where it breaks
 #
-# *At* a critical load the count is not defined: an eigenvalue is zero up to round-off, and its sign is noise. rodfem counts
-# such eigenvalues apart, as `zero`, and locates the load from both sides. A coarse mesh has few unknowns and cannot have
-# a large index. A count says nothing of how *far* one may push before the rod leaves. And it rests on an energy: a load
-# that follows the tip has none, and there a rod of index 0 can flutter (lesson 9).
+# *At* a critical load the count is not defined: an eigenvalue is zero up to round-off, and its sign is noise. rodfem
+# counts such eigenvalues apart, as `zero`, and locates the load from both sides. A coarse mesh has few unknowns and
+# cannot have a large index. A count says nothing of how *far* one may push before the rod leaves. And it rests on an
+# energy: a load that follows the tip has none, and there a rod of index 0 can flutter (lesson 9).

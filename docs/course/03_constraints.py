@@ -14,9 +14,9 @@
 # %% [markdown]
 # ## Picture
 #
-# A rod between clamps, $\theta = a_1\sin\pi s + a_3\sin 3\pi s$, held on the axis at both ends: $\int\theta\,ds = 0$ is the
-# line $3a_1 + a_3 = 0$. The quadratic energy is a saddle at both loads (grey: where it is zero). On the line it has a
-# minimum, then a maximum.
+# A rod between clamps, $\theta = a_1\sin\pi s + a_3\sin 3\pi s$, held on the axis at both ends: $\int\theta\,ds = 0$ is
+# the line $3a_1 + a_3 = 0$. The quadratic energy is a saddle at both loads (grey: where it is zero). On the line it has
+# a minimum, then a maximum.
 
 # %%
 import numpy as np
@@ -40,14 +40,14 @@ show(drawn[0].figure, "03_line")
 # %% [markdown]
 # ## Form
 #
-# Both ends clamped, the right one free to slide along the axis: $\theta(0) = \theta(1) = 0$ and $\int\sin\theta\,ds = 0$.
-# With the multiplier $N$, the force of the guide, the Lagrangian is
+# Both ends clamped, the right one free to slide along the axis: $\theta(0) = \theta(1) = 0$ and $\int\sin\theta\,ds =
+# 0$. With the multiplier $N$, the force of the guide, the Lagrangian is
 #
 # $$L[\theta, N] = \int_0^1 \tfrac12\theta'^2 + P\cos\theta + N\sin\theta\; ds .$$
 #
 # Its second derivative in $(\theta, N)$ is the *saddle matrix* $S$, where $c$ is the gradient of the constraint:
 #
-# $$S = \begin{pmatrix} K & c \\ c^t & 0 \end{pmatrix}, \qquad K \sim \int \eta'^2 - P\,\eta^2, \quad c \sim \int\eta .$$
+# $$S = \begin{pmatrix} K & c \\ c^t & 0 \end{pmatrix}, \quad K \sim \int \eta'^2 - P\,\eta^2, \quad c \sim \int\eta .$$
 #
 # *Index = negative eigenvalues of $S$ less the number of constraints.* Why: write $\eta = \eta_0 + \alpha c$ with
 # $\eta_0$ admissible. The pair $(\alpha, N)$ is a block with a zero on its diagonal: one positive and one negative
@@ -89,8 +89,8 @@ print(f"critical: {critical():.6f} without, {euler:.6f} with, {held:.6f} with th
 # %% [markdown]
 # ## Program
 #
-# In rodfem a constraint is an equation: `at(0.5, ...)` holds the middle on the axis. Multipliers, gradients, and what is
-# subtracted from the count follow from it.
+# In rodfem a constraint is an equation: `at(0.5, ...)` holds the middle on the axis. Multipliers, gradients, and what
+# is subtracted from the count follow from it.
 
 # %%
 import rodfem
@@ -130,8 +130,8 @@ print(f"P = {answer:.10f} +- {first.error_estimate:.0e}, exact {4 * w**2:.10f}")
 # %% [markdown]
 # ## Exercises
 #
-# **3.1** Clamp the left end only, and hold the right one on the axis, free to turn. What is natural? What is the critical
-# load?
+# **3.1** Clamp the left end only, and hold the right one on the axis, free to turn. What is natural? What is the
+# critical load?
 #
 # **3.2** Pin both ends, and hold the middle. How does the load compare with $\pi^2$, and why?
 #
@@ -142,7 +142,8 @@ print(f"P = {answer:.10f} +- {first.error_estimate:.0e}, exact {4 * w**2:.10f}")
 # %% [markdown]
 # ## Where it breaks
 #
-# Two constraints that say the same make $S$ singular: the gradients must be independent. A constraint can remove at most
-# one direction, so the index with it is the one without, or one less: holding a rod never makes it less stable. But the
-# *equilibrium* must be the same; held elsewhere the rod is bent, and another story begins. And the answer depends on how
-# the load is applied: under a dead load and in a rigid machine the same shape may be unstable and stable (lesson 4).
+# Two constraints that say the same make $S$ singular: the gradients must be independent. A constraint can remove at
+# most one direction, so the index with it is the one without, or one less: holding a rod never makes it less stable.
+# But the *equilibrium* must be the same; held elsewhere the rod is bent, and another story begins. And the answer
+# depends on how the load is applied: under a dead load and in a rigid machine the same shape may be unstable and stable
+# (lesson 4).

@@ -6,6 +6,7 @@ linear algebra itself.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from rodfem import compat
 
 ELEMENTS, DEGREE = 8, 4
 """Discretisation of an angle."""
+LATEST = 32
+"""Number of forms whose compiled code is kept."""
 
 
 def angle(a: float = 0.0, b: float = 1.0, elements: int = ELEMENTS, degree: int = DEGREE) -> fem.Function:
@@ -42,11 +45,16 @@ def nodes(theta: fem.Function) -> NDArray[np.float64]:
 
 def assemble(form: ufl.Form) -> Any:
     """Numbers of a form: a float for an energy, (n,) for its first variation, (n, n) for its second."""
-    (compiled,) = compat.compile_forms([form])
-    rank = len(form.arguments())
+    compiled, rank = _compiled(form), len(form.arguments())
     if rank == 0:
         return float(fem.assemble_scalar(compiled))
     return np.array(fem.assemble_vector(compiled).array) if rank == 1 else compat.local_table(compiled).toarray()
+
+
+@lru_cache(maxsize=LATEST)
+def _compiled(form: ufl.Form) -> Any:
+    """Compiled form, which reads its functions and constants when it is assembled."""
+    return compat.compile_forms([form])[0]
 
 
 def fields(number: int, a: float = 0.0, b: float = 1.0) -> tuple[fem.Function, NDArray[np.int32]]:

@@ -26,7 +26,7 @@ ANSWERS = (
         7.837347438943,
         "Greenhill 1881, exact 9/4 j^2 with the first zero j of the Bessel function of order -1/3",
         1e-6,
-        "The section at s carries the weight q (1 - s) above it: there the second variation has q (1 - s) in place of P.",
+        "The section at s carries what is above it: the second variation has q (1 - s) in place of P.",
         ((3.476619007997635, "There the weight above s is taken as q s: measure it from the tip."),),
     ),
     Answer(
