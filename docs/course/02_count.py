@@ -7,9 +7,9 @@
 # one direction lowers the energy, it leaves. Near an equilibrium the first variation vanishes, so that the *second* one
 # decides: a quadratic form, positive on all variations or not.
 #
-# The number of independent directions in which it is negative is the *index*. Stable is index 0. A direction is lost
-# only when an eigenvalue passes through zero. So we need not compute eigenvalues at every load: it is enough to count
-# the negative ones, and a count is an integer, which round-off cannot blur except very close to zero.
+# The number of independent directions in which it is negative is the *index*. Stable is index 0. The index changes only
+# when an eigenvalue passes through zero. So we need not compute eigenvalues at every load: it is enough to count the
+# negative ones, and a count is an integer, which round-off cannot blur except very close to zero.
 
 # %% [markdown]
 # ## Picture

@@ -117,7 +117,7 @@ show(diagram.plot(), "03_diagram")
 # ## Number
 #
 # Between clamps Euler's load is $4\pi^2 = 39.4784$. With the middle held each half is clamped and pinned: $\tan w = w$,
-# $P = (2w)^2 = 80.7629$ (Timoshenko & Gere, *Theory of Elastic Stability*, §2). One point held, twice the load.
+# $P = (2w)^2 = 80.7629$ (Timoshenko & Gere, *Theory of Elastic Stability*, chapter 2). One point held, twice the load.
 
 # %%
 first = diagram.special("branch point")[0]

@@ -146,5 +146,5 @@ print(f"P = {answer:.9f} +- {first.error_estimate:.0e}, index {first.negative_be
 # %% [markdown]
 # ## Where it breaks
 #
-# A step too long jumps to another curve. A fold gives no warning from afar: the index is 0 up to the last moment. And
-# an imperfect arch may leave by a branch point before it reaches its fold: the load of a fold is an upper bound.
+# A step too long jumps to another curve. A fold gives no warning from afar: the index is 0 up to the last moment. And a
+# symmetric arch may leave by a branch point before it reaches its fold (lesson 5).

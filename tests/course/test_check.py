@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from math import pi
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from rodfem.app import console
 from rodfem.course.answer import Answer
 from rodfem.course.answers import answers
+from rodfem.course.pictures import axes, show
 from rodfem.errors import InputError
 
 pytestmark = pytest.mark.alone
@@ -79,3 +82,14 @@ def test_mistakes_and_questions(tmp_path: Path, capsys: pytest.CaptureFixture[st
         with pytest.raises(SystemExit):
             console.main(["check", *words])
         assert sentence in capsys.readouterr().err
+
+
+def test_a_notebook_displays_pictures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    shown: list[bytes] = []
+    stand_in = SimpleNamespace(Image=lambda png: png, display=shown.append)
+    monkeypatch.setitem(sys.modules, "ipykernel", SimpleNamespace())
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(display=stand_in, get_ipython=lambda: None))
+    monkeypatch.setitem(sys.modules, "IPython.display", stand_in)
+    monkeypatch.chdir(tmp_path)
+    show(axes("x", "y").figure, "empty")
+    assert shown[0].startswith(b"\x89PNG") and not list(tmp_path.iterdir())
