@@ -13,7 +13,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +21,12 @@ import matplotlib
 import matplotlib.image
 import numpy as np
 from matplotlib.figure import Figure
+from panels import draw
 
 from rodfem.output.plot_diagram import draw_diagram
 from rodfem.output.plot_frequencies import draw_frequencies
 from rodfem.output.render import draw_shape
-from rodfem.output.sheet import HALO, PALETTE, STYLE, tex
+from rodfem.output.sheet import STYLE
 
 HOME = Path(__file__).parents[1]
 RESULTS, PICTURES = HOME / "results" / "paper", HOME / "docs" / "paper"
@@ -62,26 +62,12 @@ def diagram(name: str) -> dict[str, Any]:
 
 
 def both_signs(found: dict[str, Any], label: str, path: Path) -> None:
-    """Draw a diagram with both signs of its ordinate, which is ``label``: solid where the index, a number, is zero."""
+    """Draw a diagram with both signs of its ordinate, which is ``label``."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(7.5, 5.0), dpi=DPI, layout="constrained")
         axes = figure.subplots()
-        for branch, colour in zip(found["branches"], PALETTE, strict=False):
-            load, ordinate, index = (np.array(branch["columns"][x]) for x in ("load", "ordinate", "negative"))
-            kept = [*(s["row"] for s in branch["special"] if s["kind"] != "user"), len(load) - 1]
-            for first, last in pairwise(sorted({0, *kept})):
-                piece, n = slice(first, last + 1), int(index[(first + last) // 2])
-                for sign in (1, -1) if np.ptp(ordinate) else (1,):
-                    style = "-" if n == 0 else ":"
-                    axes.plot(load[piece], sign * ordinate[piece], style, color=colour, linewidth=2.4)
-                place = (load[(first + last) // 2], ordinate[(first + last) // 2])
-                axes.annotate(f"{n}", place, (7, 8), textcoords="offset points", color=colour, path_effects=HALO)
-        for special in (s for branch in found["branches"] for s in branch["special"]):
-            marker = {"branch point": "o", "fold": "D"}.get(special["kind"])
-            for sign in (1, -1) if marker else ():
-                face = "white" if marker == "o" else "black"
-                axes.plot(special["load"], sign * special["ordinate"], marker, mfc=face, mec="black", mew=1.6, ms=7)
-        axes.set(xlabel=tex(found["parameter_label"], always=True), ylabel=label, title=found["title"])
+        draw(axes, found, signs=(1, -1))
+        axes.set(ylabel=label, title=found["title"])
         path.parent.mkdir(exist_ok=True)
         figure.savefig(path)
 
