@@ -44,6 +44,7 @@ nb_execution_mode = os.environ.get("RODFEM_LESSONS", "force")
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_merge_streams = True
+suppress_warnings = ["myst-nb.lexer"]  # lessons that are not executed name no language
 
 autodoc_typehints = "none"
 autodoc_preserve_defaults = True
@@ -88,7 +89,8 @@ def _mended(link: re.Match[str], folder: Path) -> str:
         return f"{{py:obj}}{link['text']}"
     if target.is_dir():
         target /= "README.md"
-    if target.is_relative_to(PAGES) and target.exists() and (target.suffix == ".md" or link["image"]):
+    lesson = target.parent == PAGES / "course" and target.suffix == ".py"
+    if target.is_relative_to(PAGES) and target.exists() and (target.suffix == ".md" or link["image"] or lesson):
         inside = os.path.relpath(target, PAGES if folder == HOME else folder)
         return f"{link['image']}[{link['text']}]({inside}{link['anchor'] or ''})"
     return link["text"]
