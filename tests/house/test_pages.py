@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+import rodfem
+
 HOME = Path(__file__).parents[2]
 links = runpy.run_path(str(HOME / "docs" / "links.py"))
 TARGET = re.compile(r"\]\((?!https?:|mailto:)([^)\s#]*)(?:#([^)\s]+))?\)")
@@ -38,6 +40,16 @@ def test_links_lead_to_files_headings_and_lines(page: Path) -> None:
         if anchor and target.suffix == ".md":
             assert anchor in anchors(target), f"{page.name}: {file} has no heading {anchor}"
     assert page.read_text() == links["refreshed"](page), "lines have moved: python docs/links.py writes them anew"
+
+
+def test_every_public_name_is_described() -> None:
+    described = "\n".join(page.read_text() for page in (HOME / "docs" / "api").glob("*.md"))
+    missing = [
+        name
+        for name in dir(rodfem)
+        if not re.search(rf"auto\w+:: rodfem\.{name}$|auto\w+:: {name}$|`{name}`", described, re.M)
+    ]
+    assert not missing, f"docs/api lacks {', '.join(missing)}"
 
 
 def test_a_wrong_line_and_a_wrong_name_are_found(tmp_path: Path) -> None:
