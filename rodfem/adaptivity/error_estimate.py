@@ -2,8 +2,8 @@ r"""Error bars: every special point is computed again on a richer discretisation
 
 Elements half as long, of one degree more.  With errors ``e`` of the first and ``e'`` of the richer result their
 difference is ``d = e - e'``, so that ``|e| <= |d| / (1 - rho)`` with ``rho >= |e' / e|``.  Halving alone leaves
-``2^-(k+1)`` of what elements of degree k miss of a smooth state, and about the square of that of loads, and of
-positions at vertices.  How smooth it is the states themselves tell: by the last Legendre coefficients of the strains on
+``2^-(degree+1)`` of what elements miss of a smooth state, and about the square of that of loads, and of positions at
+vertices.  How smooth it is the states themselves tell: by the last Legendre coefficients of the strains on
 the two meshes, whose ratio bounds that of loads and positions amply.  To that comes what location and arithmetic leave
 open of the richer result.
 
