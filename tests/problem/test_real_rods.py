@@ -21,7 +21,7 @@ def test_every_number_of_the_page(capsys: pytest.CaptureFixture[str]) -> None:
         assert len(block.splitlines()) < 30
         exec(block, names)
     said = capsys.readouterr().out
-    numbers = re.findall(r'"\)  # ([0-9.]+)', text)
+    numbers = re.findall(r'"\n?\)  # ([0-9.]+)', text)
     assert len(numbers) == 5
     for number in numbers:
         assert said.count(number) == 2, number  # computed, and by hand
