@@ -11,6 +11,7 @@ from math import isnan
 from rodfem.adaptivity.accuracy_control import AccuracyControl
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
+from rodfem.adaptivity.soft_rows import SoftRows
 from rodfem.adaptivity.zero_stretch import LOCATED, zero_stretch
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
@@ -63,6 +64,7 @@ class Tracer:
         self.warned = False
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
         self.events = Events(plan.events)
+        self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
 
     @property
     def solvers(self) -> Sequence[BranchSolver]:
@@ -451,11 +453,18 @@ class Tracer:
         if self.plan.error_bars or self.plan.accuracy:
             self._error_bars(branch)
             merge_doubles(branch)
+        self._soft_modes(branch)
         for unexplained in branch.unexplained:
             self.observer.warn(str(unexplained))
         self.observer.finished(branch)
         self.control.summary(branch, self.observer)
         self.finished()
+
+    def _soft_modes(self, branch: Branch) -> None:
+        with self.without(f"Soft modes of {branch.name} were not found"):
+            self.soft.examine(branch)
+        for sentence in self.soft.undecided(branch):
+            self.observer.warn(sentence)
 
     def _error_bars(self, branch: Branch) -> None:
         with self.solver.system.clock.scope("error bars"):
