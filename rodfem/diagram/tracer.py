@@ -15,6 +15,7 @@ from rodfem.adaptivity.soft_rows import SoftRows
 from rodfem.adaptivity.zero_stretch import LOCATED, zero_stretch
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
+from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.locate import solve_at
 from rodfem.continuation.observer import Observer
@@ -64,6 +65,7 @@ class Tracer:
         self.warned = False
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
         self.events = Events(plan.events)
+        self.invariants: dict[int, Invariants] = {}
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
 
     @property
@@ -173,6 +175,7 @@ class Tracer:
                 return
             previous = history[-1]
             self._check_symmetry(item)
+            self._check_invariants(item)
             self.control.row(item, self.solver)
             self._check_zeros(history, item)
             if item.stretch <= 0:
@@ -214,6 +217,7 @@ class Tracer:
     def _insert(self, branch: Branch, specials: list[SpecialPoint]) -> str:
         """Insert special points into a branch, up to one at which it ends: then the reason."""
         for special in specials:
+            self._check_invariants(special.point)
             self.control.special(special)
         for special in sorted(specials, key=lambda s: s.point.arclength):
             reason = self._meeting(branch, special) if special.kind.branches else ""
@@ -404,6 +408,11 @@ class Tracer:
                 f"{self.scene.load} = {point.load:.6g} where it should vanish; use more elements, or ask for an "
                 "accuracy."
             )
+
+    def _check_invariants(self, point: Point) -> None:
+        if point.mesh not in self.invariants:
+            self.invariants[point.mesh] = Invariants(self.meshes.solvers[point.mesh])
+        self.invariants[point.mesh](point)
 
     def _check_zeros(self, history: list[Point], point: Point) -> None:
         """Say once where eigenvalues stay zero without a symmetry: the state is one of a family at the same load."""
