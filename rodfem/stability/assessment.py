@@ -16,9 +16,10 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.stability.method import Method
 from rodfem.stability.methods import AUTO, METHODS, find
+from rodfem.stability.near_zero import judge, near_zero
 from rodfem.stability.rank import rank_of
 from rodfem.stability.round_off import Decision, decide
-from rodfem.stability.soft_mode import SoftMode, is_stable
+from rodfem.stability.soft_mode import Judgement, SoftMode, is_stable
 from rodfem.stability.workspace import Workspace
 
 SMALL = 12
@@ -138,9 +139,8 @@ class Assessor(Workspace):
             inside: tuple[float, np.ndarray, np.ndarray] = 0.0, nothing, nothing
             made = 0
         else:
-            decision = self._index(x)
-            index, zero = decision.index.negative, decision.index.zero
-            undecided = zero - self.system.phase.count
+            decision, judged = self._index(x)
+            index, zero, undecided = judged.negative, judged.zero, judged.undecided
             inside, made = (decision.band, decision.inside, decision.uncertainty), 2 - self.factorisations()
             found = self._method(name if number else "count").leftmost(x, number, interval)
             made += self.factorisations()
@@ -156,11 +156,17 @@ class Assessor(Workspace):
             self._methods[name] = find(name)(self)
         return self._methods[name]
 
-    def _index(self, x: PETSc.Vec) -> Decision:
-        """Count; where that breaks down, name the constraints that depend on each other."""
+    def _index(self, x: PETSc.Vec) -> tuple[Decision, Judgement]:
+        """Count, and judge what is near zero; where that breaks down, name the constraints that are dependent."""
         assert self.inertia is not None
         try:
-            return decide(self.inertia.at(x))
+            found = self.inertia.at(x)
+            decision = decide(found)
+            if decision.count.zero == found.drifts:
+                return decision, Judgement(decision.index.negative, decision.index.zero, 0, ())
+            near = near_zero(found, decision.count)
+            modes = [SoftMode("", *pair) for pair in zip(near.values.tolist(), near.uncertainty.tolist(), strict=True)]
+            return decision, judge(near, modes, self.inertia.tolerance)
         except ConvergenceError:
             rank_of(self.pencil(x, "full"))
             raise

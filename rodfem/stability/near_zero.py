@@ -64,7 +64,7 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
         values, vectors = found.nearest(number, NULL)
     inertia.vectors = kept
     chosen = np.flatnonzero((abs(values) < limit) | (np.arange(number) < least))
-    if len(chosen) < inside or number >= MANY:
+    if len(chosen) < inside or len(chosen) == number:
         raise ConvergenceError(
             f"{inside} or more eigenvalues are within {limit:.2g} of zero and are not told apart: use fewer elements "
             "of a higher degree."
