@@ -80,12 +80,12 @@ class SoftStates:
 
     def judgement(self, point: Point, near: NearZero, *, fixed_load: bool) -> Judgement:
         """Decide on the eigenvalues ``near`` zero of a point as far as can be; ``fixed_load`` as above."""
-        near = self._across_the_branch(point, near)
+        every, near = len(near.values), self._across_the_branch(point, near)
         names = self.names(point.x, near.vectors)
         modes = [SoftMode(*m) for m in zip(names, near.values.tolist(), near.uncertainty.tolist(), strict=True)]
         if modes and self._richer:
             with self.solver.system.clock.scope("error bars"):
-                modes = self._refined(point, modes, fixed_load)
+                modes = self._refined(point, modes, fixed_load, every - len(modes))
         return judge(near, modes, self.solver.inertia.tolerance)
 
     def _across_the_branch(self, point: Point, near: NearZero) -> NearZero:
@@ -103,14 +103,17 @@ class SoftStates:
             zero=near.zero + len(own),
         )  # fmt: skip
 
-    def _refined(self, point: Point, modes: list[SoftMode], fixed_load: bool) -> list[SoftMode]:
-        """The ``modes`` with values of richer meshes; of infinite uncertainty where those have no such state."""
+    def _refined(self, point: Point, modes: list[SoftMode], fixed_load: bool, own: int) -> list[SoftMode]:
+        """The ``modes`` with values of richer meshes; of infinite uncertainty where those have no such state.
+
+        ``own`` eigenvalues nearest zero are those of the branch itself.
+        """
         out, values = modes, np.array([m.value for m in modes])
         for level in range(REFINEMENTS):
             richer = self._companion(level)
             try:
                 point, rho = _on(richer, point, fixed_load)
-                finer, rounding = _nearest(richer.solver, point, len(modes))
+                finer, rounding = _nearest(richer.solver, point, len(modes), own)
             except ConvergenceError:
                 return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
             left = rho / (1 - rho) * abs(finer - values) + rounding
@@ -152,11 +155,14 @@ def _on(richer: Enriched, point: Point, fixed_load: bool) -> tuple[Point, float]
     return replace(point, x=again.x, tangent=tangent, load=again.load, ordinate=again.ordinate), again.rho
 
 
-def _nearest(solver: BranchSolver, point: Point, number: int) -> tuple[np.ndarray, np.ndarray]:
-    """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``."""
+def _nearest(solver: BranchSolver, point: Point, number: int, left_out: int) -> tuple[np.ndarray, np.ndarray]:
+    """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``.
+
+    The first ``left_out`` of them at the ``point`` are no part of that number.
+    """
     found = solver.inertia.at(point.x)
     found.count()
-    vectors = found.nearest(number + SPARE, NULL)[1][:number]
+    vectors = found.nearest(left_out + number + SPARE, NULL)[1][left_out : left_out + number]
     values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
     floor = TOLERANCE * solver.inertia.scale
     rounding = np.array([max(quotient_error(found.matrix, v), floor) for v in vectors])

@@ -166,7 +166,10 @@ class Solver:
     def examined(self, point: Point, *, compare: bool = False) -> Point:
         """Record the soft modes of a ``point`` of this mesh: see :meth:`SoftStates.examine`; returns the point."""
         if isinstance(self.equilibria, BranchSolver):
+            # by itself a state is on no branch: a tangent at a singular one is any null vector
+            tangent, point.tangent = point.tangent, None
             self._soft.examine(point, fixed_load=True, compare=compare)
+            point.tangent = tangent
         return point
 
     @checked(load=number(1.0), guess=STATE)

@@ -59,6 +59,7 @@ def test_an_end_too_free_to_tell() -> None:
         assert "undecided, index 0 to 2" in stream.getvalue() and "sign undecided" in stream.getvalue()
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("imperfection", [1e-9, -1e-9, 1e-6])
 def test_sections_that_are_nearly_round(imperfection: float) -> None:
     """A circle turns its sections inside out at the cost of (B1 - B2)/2 sin^2 in the curvature 1, over 2 pi."""
