@@ -162,7 +162,9 @@ def _nearest(solver: BranchSolver, point: Point, number: int, left_out: int) -> 
     """
     found = solver.inertia.at(point.x)
     found.count()
+    kept, solver.inertia.vectors = solver.inertia.vectors, []
     vectors = found.nearest(left_out + number + SPARE, NULL)[1][left_out : left_out + number]
+    solver.inertia.vectors = kept
     values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
     floor = TOLERANCE * solver.inertia.scale
     rounding = np.array([max(quotient_error(found.matrix, v), floor) for v in vectors])

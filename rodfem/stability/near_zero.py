@@ -53,7 +53,7 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
     """
     inertia = found.inertia
     index, kept, limit = index or found.count(), inertia.vectors, soft_limit(inertia)
-    inside = index.zero - found.drifts
+    inside, inertia.vectors = index.zero - found.drifts, []  # whatever was computed before, the same result
     number = max(inside, least) + SPARE
     if not inside + least and abs(found.nearest(1, ROUGH)[0][0]) > CLEAR * limit:
         inertia.vectors = kept
