@@ -51,13 +51,13 @@ def assess_all(
         finder = finders[mesh]
         try:
             if not plan.modes:
-                report.verdict(branch.name, where, finder.assessor(special.point.x, plan.method))
+                report.verdict(branch.name, where, finder.assessor(special.point.x, plan.method).at(special.point))
                 continue
             verdict, modes = finder(special.point.x, plan.modes, plan.method or "auto")
         except (InputError, ConvergenceError) as trouble:
             report.warn(str(trouble))
             continue
-        report.verdict(branch.name, where, verdict, modes)
+        report.verdict(branch.name, where, verdict.at(special.point), modes)
         keep = partial(save_modes, modes, output / "modes.h5", branch.name, special.row, about)
         on_first(system.comm, partial(keep, first=not saved, scene=scene))
         saved.append((branch.name, special.row))

@@ -22,6 +22,7 @@ from rodfem.output.digits import in_decimals, in_words, index_in_words, number, 
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
+from rodfem.stability.soft_mode import index_range
 from rodfem.timing import WORK, Clock
 
 INDEX, UNSTABLE = "index", "unstable"
@@ -191,6 +192,8 @@ class Report(Observer):
                 load, ordinate, index = in_words(s)
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
                 self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {index}{zero}")
+                for mode in s.point.soft:
+                    self.say(f"    {mode}")
                 if s.kind == FLUTTER:
                     self.say(f"    double eigenvalue omega^2 = {number(s.omega2, s.omega2_error)}")
                 if s.note:
@@ -248,13 +251,17 @@ class Report(Observer):
         ``name`` is that of the branch, ``load`` the load in words, ``found`` the verdict, ``modes`` the modes, if
         computed.
         """
-        many = "s"[: found.negative != 1]
-        unstable = f"unstable in {found.negative} direction{many}"
+        index, many = index_range(found.negative, found.undecided), "s"[: found.negative + found.undecided != 1]
+        unstable = f"unstable in {index} direction{many}"
         if self.count == UNSTABLE:
-            unstable = f"unstable, {found.negative} eigenvalue{many} negative or complex"
+            unstable = f"unstable, {index} eigenvalue{many} negative or complex"
+        if found.stable is None:
+            unstable = f"undecided, {INDEX} {index}"
         unstable = "stable" if found.stable else unstable
         zero = f", {found.zero} zero" if found.zero else ""
         self.say(f"  {name}, {load}: {unstable}{zero}")
+        for mode in found.soft:
+            self.say(f"    {mode}")
         motions = ("",) * len(found.values) if modes is None else modes.motion
         errors = np.full(len(found.values), np.nan) if modes is None else modes.error
         values, residuals = (found.values, found.errors) if modes is None else (modes.value, modes.residual)

@@ -10,6 +10,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.kinds import Kind
 from rodfem.errors import SMALLER_STEPS
+from rodfem.stability.soft_mode import SoftMode, index_range, is_stable
 from rodfem.tolerances import round_off
 
 if TYPE_CHECKING:
@@ -38,6 +39,9 @@ class Point:
         Smallest stretch ``v3`` along the rod.
     negative, zero
         Numbers of negative eigenvalues (the index) and of zero ones.
+    undecided
+        Number of eigenvalues whose sign is not decided: they are not among the negative ones, and the index is between
+        ``negative`` and ``negative + undecided``.  Symmetries, and what vanishes at a special point, are decided.
     slope
         The load's component of the tangent.
     drift, error
@@ -55,6 +59,10 @@ class Point:
         Error of the discretisation in load and ordinate, where an accuracy was asked for.
     determinant
         Logarithm of the size of the saddle matrix's determinant, at the state whose factors gave the index.
+    soft
+        Eigenvalues near zero, by name: :class:`~rodfem.stability.soft_mode.SoftMode`.
+    near_zero
+        Whether one factorisation does not tell the index: an eigenvalue may be soft.
     """
 
     x: PETSc.Vec
@@ -77,6 +85,9 @@ class Point:
     mesh: int = 0
     estimate: float = float("nan")
     determinant: float = float("nan")
+    undecided: int = 0
+    soft: list[SoftMode] = field(default_factory=list)
+    near_zero: bool = False
 
     @property
     def index(self) -> int:
@@ -84,13 +95,17 @@ class Point:
         return self.negative
 
     @property
-    def stable(self) -> bool:
-        """Whether no eigenvalue is negative: zero ones, which :attr:`zero` counts, leave it undecided beyond that."""
-        return self.negative == 0
+    def stable(self) -> bool | None:
+        """Whether no eigenvalue is negative; None where :attr:`undecided` ones may be, and no other is.
+
+        Zero ones, which :attr:`zero` counts, are those of symmetries, or leave it undecided beyond that.
+        """
+        return is_stable(self.negative, self.undecided)
 
     def __repr__(self) -> str:
         """Load, ordinate and stability."""
-        word = "stable" if self.stable else f"unstable, index {self.negative}"
+        words = {True: "stable", None: "undecided", False: "unstable"}[self.stable]
+        word = words if self.stable else f"{words}, index {index_range(self.negative, self.undecided)}"
         return f"<Point at load {self.load:.10g}: ordinate {self.ordinate:.6g}, {word}>"
 
 

@@ -230,7 +230,7 @@ class BranchSolver(StaticSolver):
         ``arclength`` and ``tangent`` are its place on the branch, ``outcome`` is the Newton iteration that led to it,
         ``index`` that of the factors, if they are those of ``x``.
         """
-        system = self.system
+        system, near_zero = self.system, index is None
         if index is None:
             index = decide(self.inertia.at(x)).index
         return Point(
@@ -250,6 +250,7 @@ class BranchSolver(StaticSolver):
             negative_in_space=None if self.space is None else self.space.count(x).negative,
             mesh=self.mesh,
             determinant=index.determinant,
+            near_zero=near_zero,
         )
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:

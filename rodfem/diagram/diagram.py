@@ -134,7 +134,8 @@ class Diagram:
         if not isinstance(solver, BranchSolver):
             guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
             return [self.solver(guess).equilibrium(load, guess)]
-        return equilibria_at(solver, self.branches, load, lambda p: self._on(p, finest))
+        found = equilibria_at(solver, self.branches, load, lambda p: self._on(p, finest))
+        return [self.solver(point).examined(point) for point in found]
 
     @checked(point=POINT)
     def solver(self, point: Point | SpecialPoint) -> Solver:

@@ -19,8 +19,9 @@ from rodfem.continuation.normal_form import Origin
 from rodfem.continuation.unfolding import Unfolded
 from rodfem.fem.natural_order import NaturalOrder
 from rodfem.problem.events import Event
+from rodfem.stability.soft_mode import SoftMode
 
-CLASSES = {c.__name__: c for c in (Branch, Point, SpecialPoint, NormalForm, Unexplained, Unfolded, Origin)}
+CLASSES = {c.__name__: c for c in (Branch, Point, SpecialPoint, NormalForm, SoftMode, Unexplained, Unfolded, Origin)}
 """Classes whose objects are recorded, field by field."""
 TAG = "is"
 """Entry of a dictionary that stands for something else: for what."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,10 @@ from rodfem.diagram.solver import RANKS, SCENE, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM
-from rodfem.output.files import COLUMNS, OPTIONAL, SPECIAL, check_run, load_json, load_state
+from rodfem.output.files import COLUMNS, OPTIONAL, SOFT, SPECIAL, UNDECIDED, check_run, load_json, load_state
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
+from rodfem.stability.soft_mode import SoftMode
 from rodfem.tolerances import NEGLIGIBLE, unit
 
 NEEDED = ("scene", "parameter", "branches", "range", "accuracy", "constants", "discretization", "meshes")
@@ -116,6 +118,9 @@ def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[Sta
     values = {name: _number(columns[name][row]) for name in COLUMNS}
     given = {name: columns[name][row] for name in OPTIONAL if name in columns}
     values |= {name: value for name, value in given.items() if value is not None}
+    values[UNDECIDED] = columns[UNDECIDED][row] if UNDECIDED in columns else 0
+    soft = zip(*(columns[name][row] if name in columns else [] for name in SOFT), strict=True)
+    values["soft"] = [SoftMode(name, mu, inf if bar is None else bar) for name, mu, bar in soft]
     solver = solvers[values["mesh"]]
     x, load = load_state(states, branch, row, solver), values["load"]
     if abs(solver.system.scalar(x) - load) > NEGLIGIBLE * unit(load, one=solver.units.load):

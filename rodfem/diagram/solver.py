@@ -10,6 +10,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
+from rodfem.adaptivity.error_estimate import Enriched
+from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
@@ -138,6 +140,12 @@ class Solver:
         return ModeFinder(self.equilibria)
 
     @cached_property
+    def _soft(self) -> SoftStates:
+        solver = self.equilibria
+        assert isinstance(solver, BranchSolver)
+        return SoftStates(solver, lambda: Enriched(solver))
+
+    @cached_property
     def _sweep(self) -> Sweep:
         return Sweep(self.equilibria, Plan(self.scene.span), Observer(), lambda: None)
 
@@ -153,7 +161,16 @@ class Solver:
         """Evaluate the records of the equilibrium ``x``: ordinate, energy, index; frequencies without a potential."""
         if not isinstance(self.equilibria, BranchSolver):
             return self._sweep.at(x)
-        return self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True))
+        return self.examined(self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True)))
+
+    def examined(self, point: Point, *, compare: bool = False) -> Point:
+        """Record the soft modes of a ``point`` of this mesh: see :meth:`SoftStates.examine`; returns the point."""
+        if isinstance(self.equilibria, BranchSolver):
+            # by itself a state is on no branch: a tangent at a singular one is any null vector
+            tangent, point.tangent = point.tangent, None
+            self._soft.examine(point, fixed_load=True, compare=compare)
+            point.tangent = tangent
+        return point
 
     @checked(load=number(1.0), guess=STATE)
     def equilibrium(self, load: float, guess: Point | SpecialPoint | PETSc.Vec | None = None) -> Point:
@@ -190,6 +207,8 @@ class Solver:
     def assess(self, point: Point | SpecialPoint | PETSc.Vec, method: str = "auto", number: int = 4) -> Verdict:
         """Decide the stability of an equilibrium on this mesh by a given method.
 
+        Eigenvalues near zero are computed again on richer meshes; those that have another sign there are undecided.
+
         Parameters
         ----------
         point
@@ -202,7 +221,11 @@ class Solver:
         Raises :class:`~rodfem.errors.InputError` for a method that does not exist or apply, and
         :class:`~rodfem.errors.ConvergenceError` where an eigensolver fails.
         """
-        return assess(self.equilibria, self._state(point), method, number)
+        x = self._state(point)
+        verdict = assess(self.equilibria, x, method, number)
+        if not isinstance(self.equilibria, BranchSolver):
+            return verdict
+        return verdict.at(self.examined(self.equilibria.point(x, 0.0, None), compare=True))
 
     @checked(point=STATE, number=count(3, 1), method=METHOD)
     def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
@@ -235,7 +258,7 @@ class Solver:
                 "A search by deflation needs a scene whose loads all have a potential: "
                 f"{', '.join(self.scene.without_potential())} has none."
             )
-        return find_equilibria(self.equilibria, load, known, tries, seed)
+        return [self.examined(p) for p in find_equilibria(self.equilibria, load, known, tries, seed)]
 
 
 def state_of(point: Point | SpecialPoint | PETSc.Vec) -> PETSc.Vec:

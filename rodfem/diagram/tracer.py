@@ -11,9 +11,11 @@ from math import isnan
 from rodfem.adaptivity.accuracy_control import AccuracyControl
 from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
+from rodfem.adaptivity.soft_rows import SoftRows
 from rodfem.adaptivity.zero_stretch import LOCATED, zero_stretch
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
+from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.locate import solve_at
 from rodfem.continuation.observer import Observer, Recorder
@@ -72,6 +74,8 @@ class Tracer:
         self.warned = False
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
         self.events = Events(plan.events)
+        self.invariants: dict[int, Invariants] = {}
+        self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
         said = observer if isinstance(observer, Recorder) else None
         self.book = Bookkeeper(journal or Journal(), self.meshes, self.gaps, self.branches, plan.events, said)
 
@@ -189,6 +193,7 @@ class Tracer:
                 return
             previous = history[-1]
             self._check_symmetry(item)
+            self._check_invariants(item)
             self.control.row(item, self.solver)
             self._check_zeros(history, item)
             if item.stretch <= 0:
@@ -230,6 +235,7 @@ class Tracer:
     def _insert(self, branch: Branch, specials: list[SpecialPoint]) -> str:
         """Insert special points into a branch, up to one at which it ends: then the reason."""
         for special in specials:
+            self._check_invariants(special.point)
             self.control.special(special)
         for special in sorted(specials, key=lambda s: s.point.arclength):
             reason = self._meeting(branch, special) if special.kind.branches else ""
@@ -421,6 +427,11 @@ class Tracer:
                 "accuracy."
             )
 
+    def _check_invariants(self, point: Point) -> None:
+        if point.mesh not in self.invariants:
+            self.invariants[point.mesh] = Invariants(self.meshes.solvers[point.mesh])
+        self.invariants[point.mesh](point)
+
     def _check_zeros(self, history: list[Point], point: Point) -> None:
         """Say once where eigenvalues stay zero without a symmetry: the state is one of a family at the same load."""
         extra = self._extra(point)
@@ -469,12 +480,19 @@ class Tracer:
         if self.plan.error_bars or self.plan.accuracy:
             self._error_bars(branch)
             merge_doubles(branch)
+        self._soft_modes(branch)
         for unexplained in branch.unexplained:
             self.observer.warn(str(unexplained))
         self.observer.finished(branch)
         self.control.summary(branch, self.observer)
         self.book.keep(branch.name, branch, {"warned": self.warned, "mesh": self.solver.mesh})
         self.finished()
+
+    def _soft_modes(self, branch: Branch) -> None:
+        with self.without(f"Soft modes of {branch.name} were not found"):
+            self.soft.examine(branch)
+        for sentence in self.soft.undecided(branch):
+            self.observer.warn(sentence)
 
     def _recalled(self, name: str) -> bool:
         """Whether the journal knows a branch of that name, which is then one of those that have been traced."""

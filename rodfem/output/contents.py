@@ -90,6 +90,10 @@ BRANCH: Kinds = {
 COLUMN: Kinds = {
     **dict.fromkeys(("negative", "zero", "mesh", "unstable"), COUNT),
     "load": NUMBER,
+    "undecided": COUNT,
+    "soft": (_all(_is_text), "a list of texts"),
+    "soft_value": (_all(_is_number), "a list of numbers"),
+    "soft_uncertainty": (_all(_or_none(_is_number)), "a list of numbers or null"),
     "negative_in_space": (_or_none(_is_count), "a whole number or null"),
     "spectrum": (_all(_is_number), "a list of numbers"),
     "omega2": (_all(_all(_is_number, 2)), "a list of pairs of numbers"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import ceil, floor, isfinite, log10
 
 from rodfem.continuation.branch import SpecialPoint
+from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import NEGLIGIBLE
 
 FINEST, LARGEST = 9e-15, 1e12
@@ -57,6 +58,7 @@ def in_words(special: SpecialPoint) -> tuple[str, str, str]:
 def index_in_words(special: SpecialPoint) -> str:
     """Index at a special point in words: before and after if it changes."""
     before, after = special.negative_before, special.negative_after
-    index = f"{before}->{after}" if before != after else f"{special.point.negative}"
-    space = special.point.negative_in_space
+    point = special.point
+    index = f"{before}->{after}" if before != after else index_range(point.negative, point.undecided)
+    space = point.negative_in_space
     return index if space is None else f"{index} (in space {space})"

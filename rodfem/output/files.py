@@ -50,10 +50,18 @@ MEANING = {
     "arclength": "length along the branch, in the metric of rotations and load",
     "error": "size of the last Newton correction",
     "mesh": "number of the discretisation in meshes",
+    "undecided": "number of eigenvalues whose sign is not decided: the index is negative, or greater by up to so many",
+    "soft": "eigenvalues near zero by name: what moves",
+    "soft_value": "their values, in the metric",
+    "soft_uncertainty": "bounds of the errors of these by round-off, and by the mesh where there are error bars",
 }
 """Columns in words, as they stand in the file."""
 OPTIONAL = ("estimate", "spectrum", "negative_in_space", "omega2", "motion", "curve")
 """Columns that a branch has where one of its rows has an entry."""
+UNDECIDED = "undecided"
+"""Column that a branch has where one of its rows has undecided eigenvalues."""
+SOFT = {"soft": "name", "soft_value": "value", "soft_uncertainty": "uncertainty"}
+"""Columns that a branch has where one of its rows has soft modes, and what they hold of each of them."""
 ALIKE = ("row", "negative_before", "negative_after", "located_to", "error_estimate", "coupling", "omega2", "unfolding")
 SPECIAL = {"ordinate_error_estimate": "ordinate_error", "followed": "switched", "note": "note"}
 SPECIAL |= {name: name for name in ALIKE}
@@ -128,6 +136,11 @@ def _branch_data(branch: Branch) -> dict[str, Any]:
         column = [_plain(getattr(p, name)) for p in branch.points]
         if any(value not in (None, []) for value in column):
             columns[name] = column
+    if any(p.undecided for p in branch.points):
+        columns[UNDECIDED] = [p.undecided for p in branch.points]
+    if any(p.soft for p in branch.points):
+        for name, attribute in SOFT.items():
+            columns[name] = [[_plain(getattr(mode, attribute)) for mode in p.soft] for p in branch.points]
     if "omega2" in columns:
         columns["unstable"] = columns["negative"]
     return {

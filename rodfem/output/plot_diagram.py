@@ -43,7 +43,8 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     """Draw every branch as ordinate against load, with its stability and its special points.
 
     Stable parts are solid, unstable ones dotted, each with the number of negative eigenvalues beside it; those of a
-    planar rod that are stable in its plane but not in space are dashed.  Where a stable and another part lie on each
+    planar rod that are stable in its plane but not in space are dashed, those whose stability is undecided dashes and
+    dots, with the least and the greatest index.  Where a stable and another part lie on each
     other, the other one is drawn inside the stable one.  A segment in which the index changes without a special point
     that says so has a mark of warning, and so has a first state that is singular.
 

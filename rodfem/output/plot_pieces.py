@@ -10,13 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rodfem.continuation.kinds import KINDS
+from rodfem.stability.soft_mode import index_range
 
 Floats = NDArray[np.float64]
 
 STABLE, PLANAR, UNSTABLE = "stable", "stable in the plane, unstable in space", "unstable"
+UNDECIDED = "stability undecided"
 STYLES: dict[str, dict[str, Any]] = {
     STABLE: {"linestyle": "-", "linewidth": 3.0, "solid_capstyle": "round"},
     PLANAR: {"linestyle": (0, (3.2, 1.0)), "linewidth": 2.4},
+    UNDECIDED: {"linestyle": (0, (4.0, 1.2, 1.0, 1.2)), "linewidth": 2.4},
     UNSTABLE: {"linestyle": (0, (1.0, 1.3)), "linewidth": 1.9},
 }
 COUNTED = {name for name, kind in KINDS.items() if kind.counted}
@@ -30,7 +33,8 @@ class Piece(NamedTuple):
     """Consecutive segments of a ``branch`` with one index, drawn in one ``colour``.
 
     ``curve`` (k, 2) has loads and ordinates, ``negative`` is the index, of a planar rod in its plane, ``in_space`` that
-    among all perturbations (None where it is not known).
+    among all perturbations (None where it is not known), ``undecided`` the number of eigenvalues that may be negative
+    besides.
     """
 
     branch: str
@@ -38,18 +42,22 @@ class Piece(NamedTuple):
     curve: Floats
     negative: int
     in_space: int | None
+    undecided: int = 0
 
     @property
     def kind(self) -> str:
-        """:data:`STABLE`, :data:`PLANAR` or :data:`UNSTABLE`."""
+        """:data:`STABLE`, :data:`PLANAR`, :data:`UNDECIDED` or :data:`UNSTABLE`."""
         if self.negative:
             return UNSTABLE
+        if self.undecided:
+            return UNDECIDED
         return PLANAR if self.in_space else STABLE
 
     @property
     def label(self) -> str:
-        """The index, followed by the index in space in parentheses."""
-        return str(self.negative) if self.in_space is None else f"{self.negative} ({self.in_space})"
+        """The index, or its least and greatest value, followed by the index in space in parentheses."""
+        index = index_range(self.negative, self.undecided)
+        return index if self.in_space is None else f"{index} ({self.in_space})"
 
 
 def pieces_of(branch: Mapping[str, Any], colour: str) -> Iterator[Piece]:
@@ -58,12 +66,13 @@ def pieces_of(branch: Mapping[str, Any], colour: str) -> Iterator[Piece]:
     if not len(columns["load"]) == len(columns["ordinate"]) == len(columns["negative"]):
         raise ValueError(f"columns of branch {name!r} differ in length: try to compute the diagram anew")
     curve = np.column_stack([np.asarray(columns[key], dtype=float) for key in ("load", "ordinate")])
-    indices = segment_indices(columns["negative"], special)
+    indices, undecided = segment_ranges(columns["negative"], columns.get("undecided"), special)
     space = _in_space(columns.get("negative_in_space"), indices, special)
-    changes = np.flatnonzero(np.diff(indices) | np.diff(space)) + 1
+    changes = np.flatnonzero(np.diff(indices) | np.diff(space) | np.diff(undecided)) + 1
     for a, b in pairwise([0, *changes, indices.size]):
         if b > a:
-            yield Piece(name, colour, curve[a : b + 1], int(indices[a]), int(space[a]) if space[a] >= 0 else None)
+            in_space = int(space[a]) if space[a] >= 0 else None
+            yield Piece(name, colour, curve[a : b + 1], int(indices[a]), in_space, int(undecided[a]))
 
 
 def segment_indices(negative: ArrayLike, special: Sequence[Mapping[str, Any]]) -> NDArray[np.int64]:
@@ -75,6 +84,26 @@ def segment_indices(negative: ArrayLike, special: Sequence[Mapping[str, Any]]) -
         if point["kind"] in COUNTED and point.get(key) is not None and 0 <= segment < indices.size:
             indices[segment] = point[key]
     return indices
+
+
+def segment_ranges(
+    negative: ArrayLike, undecided: ArrayLike | None, special: Sequence[Mapping[str, Any]]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the least index (n - 1,) between rows, and how many eigenvalues besides may be negative there.
+
+    Between rows of which one has ``undecided`` ones it is that of either row; beside singular rows their before and
+    after count as in :func:`segment_indices`.
+    """
+    indices, rows = segment_indices(negative, special), np.asarray(negative, dtype=np.int64)
+    more = np.zeros_like(rows) if undecided is None else np.asarray(undecided, dtype=np.int64)
+    ends = np.array([[rows[:-1], rows[1:]], [(rows + more)[:-1], (rows + more)[1:]]])  # least and most, left and right
+    for (key, side), point in product((("negative_after", 0), ("negative_before", 1)), special):
+        segment = int(point["row"]) - side
+        if point["kind"] in COUNTED and point.get(key) is not None and 0 <= segment < indices.size:
+            ends[:, side, segment] = point[key]
+    least, most = ends[0].min(axis=0), ends[1].max(axis=0)
+    undecided_there = (more[:-1] + more[1:]) > 0
+    return np.where(undecided_there, least, indices), np.where(undecided_there, most - least, 0)
 
 
 def _in_space(

@@ -8,6 +8,7 @@ from itertools import groupby
 from typing import Any
 
 from rodfem.errors import InputError
+from rodfem.stability.soft_mode import index_range, is_stable
 
 INSIDE = 0.6
 """Where on a piece of a branch the state is taken, as a share of the piece's length along the branch."""
@@ -18,7 +19,8 @@ class Stretch:
     """Consecutive rows of a branch that have one index, away from special points: places and numbers of the rows.
 
     ``branch`` is its name, which ``is_first`` or ``leaves_first``; ``negative`` and ``in_space`` are the index in the
-    plane and in space; ``places`` (n,) are arclengths of the branch, ``rows`` (n,) numbers.
+    plane and in space, ``undecided`` eigenvalues may be negative besides; ``places`` (n,) are arclengths of the branch,
+    ``rows`` (n,) numbers.
     """
 
     branch: str
@@ -26,6 +28,7 @@ class Stretch:
     is_first: bool
     negative: int
     in_space: int
+    undecided: int
     places: tuple[float, ...]
     rows: tuple[int, ...]
 
@@ -43,7 +46,7 @@ class Stretch:
     @property
     def rank(self) -> tuple[bool, bool, int, int, float]:
         """The greatest is drawn: stable, then on a branch that leaves the first one, then of least index, then long."""
-        stable = not (self.negative or self.in_space)
+        stable = not (self.negative or self.in_space or self.undecided)
         return stable and not self.is_first, self.leaves_first, -self.negative, -self.in_space, self.length
 
 
@@ -60,8 +63,11 @@ def typical_state(data: Mapping[str, Any]) -> tuple[str, int, str]:
         raise InputError("The diagram has no states to draw.")
     best = max(found, key=lambda stretch: stretch.rank)
     columns = next(b["columns"] for b in data["branches"] if b["name"] == best.branch)
-    words = "stable" if best.negative == 0 else f"unstable, index {best.negative}"
-    if best.negative == 0 and best.in_space:
+    index = index_range(best.negative, best.undecided)
+    words = {True: "stable", None: f"stability undecided, index {index}", False: f"unstable, index {index}"}[
+        is_stable(best.negative, best.undecided)
+    ]
+    if best.negative + best.undecided == 0 and best.in_space:
         words = f"stable in the plane, unstable in space, index {best.in_space}"
     return best.branch, best.row, f"{columns['load'][best.row]:.4g}, {words}"
 
@@ -71,21 +77,26 @@ def _stretches(branch: Mapping[str, Any], first: str) -> Iterator[Stretch]:
     rows = range(len(columns["load"]))
     singular = {s["row"] for s in branch["special"] if s["multiplicity"]} | ({0} if branch["parent"] else set())
     space = columns.get("negative_in_space") or [None] * len(rows)
+    undecided = columns.get("undecided") or [0] * len(rows)
 
-    def index(row: int) -> tuple[int, int] | None:
-        return None if row in singular else (columns["negative"][row], space[row] or 0)
+    def known(row: int) -> tuple[int, int, int]:
+        return columns["negative"][row], space[row] or 0, undecided[row]
+
+    def index(row: int) -> tuple[int, int, int] | None:
+        return None if row in singular else known(row)
 
     for key, group in groupby(rows, index):
         inside = tuple(group)
         if key is None and len(singular) < len(rows):
             continue
-        negative, in_space = key or (columns["negative"][inside[0]], space[inside[0]] or 0)
+        negative, in_space, open_signs = key or known(inside[0])
         yield Stretch(
             branch=branch["name"],
             leaves_first=branch["parent"] is not None and branch["parent"][0] == first,
             is_first=branch["name"] == first,
             negative=negative,
             in_space=in_space,
+            undecided=open_signs,
             places=tuple(columns["arclength"][row] for row in inside),
             rows=inside,
         )

@@ -6,7 +6,7 @@ Every verdict on a conservative state has its index by the count, decided within
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
@@ -16,8 +16,10 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.stability.method import Method
 from rodfem.stability.methods import AUTO, METHODS, find
+from rodfem.stability.near_zero import judge, near_zero
 from rodfem.stability.rank import rank_of
 from rodfem.stability.round_off import Decision, decide
+from rodfem.stability.soft_mode import Judgement, SoftMode, is_stable
 from rodfem.stability.workspace import Workspace
 
 SMALL = 12
@@ -32,8 +34,9 @@ class Verdict:
 
     Attributes
     ----------
-    negative, zero
-        Index and number of zero eigenvalues (symmetry modes included); under non-conservative loads the number of
+    negative, zero, undecided
+        Index, number of zero eigenvalues (symmetry modes included), and of those whose sign is not decided, which are
+        not among the negative ones; under non-conservative loads the number of
         eigenvalues found that have a negative real part or an imaginary part, and that of free motions.
     values, vectors, errors
         Left-most eigenvalues ``mu = omega^2`` without symmetry modes (under non-conservative loads those nearest zero),
@@ -49,6 +52,8 @@ class Verdict:
         Cost of the verdict.
     method, reason
         How it was done, and why so.
+    soft
+        Eigenvalues near zero in the metric, by name: those of :meth:`rodfem.Solver.assess`.
     """
 
     negative: int
@@ -64,19 +69,29 @@ class Verdict:
     factorisations: int
     method: str
     reason: str
+    undecided: int = 0
+    soft: tuple[SoftMode, ...] = ()
 
     @property
-    def stable(self) -> bool:
-        """Whether no direction is unstable."""
-        return self.negative == 0
+    def stable(self) -> bool | None:
+        """Whether no direction is unstable; None where that is not decided."""
+        return is_stable(self.negative, self.undecided)
+
+    def at(self, point: Any) -> Verdict:
+        """The same with the soft modes of a ``point`` of a branch, and the index as far as they are decided."""
+        if not point.soft:
+            return self
+        counts = replace(self, negative=point.negative, zero=point.zero, undecided=point.undecided)
+        return replace(counts, soft=tuple(point.soft))
 
     def __str__(self) -> str:
         """One line for the terminal."""
         values = ", ".join(f"{v:.10g}" for v in self.values) or "none computed"
         proof = ", none missing" if self.certified and len(self.values) else ""
         inside = f"; {len(self.inside)} inside the band {self.band:.1e} of the count" if len(self.inside) else ""
+        undecided = f", {self.undecided} undecided" if self.undecided else ""
         return (
-            f"{self.negative} negative, {self.zero} zero{inside}; left-most: {values}{proof} "
+            f"{self.negative} negative, {self.zero} zero{undecided}{inside}; left-most: {values}{proof} "
             f"({self.method}: {self.reason}; {self.factorisations} factorisations, {1e3 * self.seconds:.1f} ms)"
         )
 
@@ -115,7 +130,7 @@ class Assessor(Workspace):
         name, reason = self.choose(method, number)
         if number < 0:
             raise InputError(f"{number} eigenvalues cannot be computed: ask for none or more.")
-        started = perf_counter()
+        started, undecided = perf_counter(), 0
         if self.inertia is None:
             found = self._method(name).nearest(x, max(number, 1))
             scale = ZERO * self.system.stiffness_scale / self.system.scene.length
@@ -124,14 +139,15 @@ class Assessor(Workspace):
             inside: tuple[float, np.ndarray, np.ndarray] = 0.0, nothing, nothing
             made = 0
         else:
-            decision = self._index(x)
-            index, zero = decision.index.negative, decision.index.zero
+            decision, judged = self._index(x)
+            index, zero, undecided = judged.negative, judged.zero, judged.undecided
             inside, made = (decision.band, decision.inside, decision.uncertainty), 2 - self.factorisations()
             found = self._method(name if number else "count").leftmost(x, number, interval)
             made += self.factorisations()
         return Verdict(
             *(index, zero, found.values, found.vectors, found.errors, *inside, found.certified),
             *(perf_counter() - started, made + found.factorisations, name, reason + found.note),
+            undecided=undecided,
         )
 
     def _method(self, name: str) -> Method:
@@ -140,11 +156,17 @@ class Assessor(Workspace):
             self._methods[name] = find(name)(self)
         return self._methods[name]
 
-    def _index(self, x: PETSc.Vec) -> Decision:
-        """Count; where that breaks down, name the constraints that depend on each other."""
+    def _index(self, x: PETSc.Vec) -> tuple[Decision, Judgement]:
+        """Count, and judge what is near zero; where that breaks down, name the constraints that are dependent."""
         assert self.inertia is not None
         try:
-            return decide(self.inertia.at(x))
+            found = self.inertia.at(x)
+            decision = decide(found)
+            if decision.count.zero == found.drifts:
+                return decision, Judgement(decision.index.negative, decision.index.zero, 0, ())
+            near = near_zero(found, decision.count)
+            modes = [SoftMode("", *pair) for pair in zip(near.values.tolist(), near.uncertainty.tolist(), strict=True)]
+            return decision, judge(near, modes, self.inertia.tolerance)
         except ConvergenceError:
             rank_of(self.pencil(x, "full"))
             raise

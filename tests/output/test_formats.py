@@ -67,6 +67,12 @@ def guided() -> Scene:
     return replace(scenes()["euler"], ends=(spring, page()["guided"]), name="guided")
 
 
+def loose() -> Scene:
+    """Free to turn about its left end, but for a spring of stiffness 1e-10."""
+    joint = replace(rodfem.pinned(), energy=lambda x, c: page()["loads"].rotational_spring(x.q, 1e-10))
+    return replace(scenes()["euler"], ends=(joint, rodfem.free(page()["push"])), name="loose")
+
+
 QUICK = {"error_bars": False, "depth": 0}
 RUNS: dict[str, tuple[Callable[[], Scene], Discretization, Plan]] = {
     "pinned": (lambda: scenes()["euler"], MESH, Plan((0.0, 12.0), at=(11.0,), depth=1, spectrum=2, modes=2)),
@@ -80,6 +86,7 @@ RUNS: dict[str, tuple[Callable[[], Scene], Discretization, Plan]] = {
     "held": (held, MESH, Plan((0.0, 0.2), **QUICK)),
     "guided": (guided, MESH, Plan((0.0, 0.2), **QUICK)),
     "sprung": (sprung, MESH, Plan((0.0, 0.2), **QUICK)),
+    "loose": (loose, MESH, Plan((0.0, 0.2), **QUICK)),
 }
 
 

@@ -1,0 +1,71 @@
+"""Soft modes along a branch that has been traced: at which of its points the index is not decided, and by what.
+
+Rows that one factorisation decided have none.  A mesh may make an eigenvalue of its own of one that is exponentially
+small: it pins what slides along the rod.  At the loads asked for and at the ends of branches, and all along a branch
+with a special point that a richer mesh does not have, indices are therefore compared with those of a richer mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+from math import inf
+
+from rodfem.adaptivity.mesh_sequence import Meshes
+from rodfem.adaptivity.soft_states import SoftStates
+from rodfem.continuation.branch import Branch, Point
+from rodfem.continuation.kinds import EVENT
+from rodfem.fem.newton import TOLERANCE
+from rodfem.stability.soft_mode import index_range
+
+FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
+CLEARLY = 10.0
+"""Times the uncertainty by round-off above which one is that of the mesh."""
+
+
+class SoftRows:
+    """Examines branches of one run; with ``error_bars`` the error of its meshes is part of every uncertainty."""
+
+    def __init__(self, meshes: Meshes, *, error_bars: bool) -> None:
+        """Nothing is computed before a branch is given."""
+        self.meshes, self.error_bars = meshes, error_bars
+        self._states: dict[int, SoftStates] = {}
+
+    def examine(self, branch: Branch) -> None:
+        """Record soft modes, and undecided eigenvalues, at the points of a branch."""
+        special = {id(s.point): s for s in branch.special}
+        singular = {id(s.point) for s in branch.special if s.kind.counted or s.test_function == "stretch"}
+        given = [s for s in branch.special if (s.kind.given or s.kind == EVENT) and id(s.point) not in singular]
+        first = {id(branch.points[0])} if branch.parent else set()  # the branch point that it leaves
+        doubtful = any(s.kind.singular and s.error_estimate == inf for s in branch.special)
+        for s in given:
+            fixed = s.kind.given
+            before = s.point.negative
+            self._of(s.point).examine(s.point, fixed_load=fixed, compare=self.error_bars)
+            doubtful |= s.point.undecided > 0
+            if s.negative_before == s.negative_after == before:
+                s.negative_before = s.negative_after = s.point.negative
+        for point in branch.points:
+            if id(point) not in special and id(point) not in first:
+                self._of(point).examine(point, fixed_load=False, compare=self.error_bars and doubtful)
+
+    def undecided(self, branch: Branch) -> Iterator[str]:
+        """Yield a sentence on each piece of a branch whose index is not decided."""
+        for words, group in groupby(branch.points, lambda p: p.undecided and index_range(p.negative, p.undecided)):
+            if words:
+                points = list(group)
+                solver = self.meshes.solvers[points[0].mesh]
+                worst = max((m for p in points for m in p.soft if not m.decided), key=lambda m: m.uncertainty)
+                least = TOLERANCE * solver.inertia.scale
+                remedy = FINER if worst.uncertainty > CLEARLY * least else EXACT
+                low, high = (f"{p.load:.8g}" for p in (points[0], points[-1]))
+                load = solver.system.scene.load
+                where = f"At {load} = {low}" if len(points) == 1 else f"From {load} = {low} to {high}"
+                yield f"{branch.name}: {where} the index is {words} ({worst}): {remedy}."
+
+    def _of(self, point: Point) -> SoftStates:
+        """Soft states of the mesh of a point."""
+        if point.mesh not in self._states:
+            richer = (lambda mesh=point.mesh: self.meshes.richer(mesh)) if self.error_bars else None
+            self._states[point.mesh] = SoftStates(self.meshes.solvers[point.mesh], richer)
+        return self._states[point.mesh]

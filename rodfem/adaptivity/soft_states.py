@@ -1,0 +1,172 @@
+r"""Soft modes of states, with what the mesh adds to their uncertainty, and refined until their sign is decided.
+
+The state is solved for again on a mesh of half the elements' length and one degree more.  With eigenvalues ``mu`` on
+the mesh and ``mu'`` on the richer one the error of ``mu'`` is at most ``rho |mu' - mu| / (1 - rho)``
+(:mod:`rodfem.adaptivity.error_estimate`).  A mode that this leaves undecided is computed on a still richer mesh.  One
+whose sign is another one than on the mesh itself is undecided there, whatever richer meshes say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from rodfem.adaptivity.error_estimate import Enriched
+from rodfem.continuation.branch import Point
+from rodfem.continuation.solvers import BranchSolver
+from rodfem.errors import ConvergenceError
+from rodfem.fem.newton import TOLERANCE
+from rodfem.stability.inertia import NULL
+from rodfem.stability.motion_names import SHARE, MotionNames
+from rodfem.stability.near_zero import NearZero, judge, near_zero
+from rodfem.stability.round_off import SPARE, quotient_error
+from rodfem.stability.soft_mode import Judgement, SoftMode
+
+REFINEMENTS = 2
+"""Meshes that are tried beyond that of a state until the signs of its soft modes are decided."""
+FLAT = 1e-6
+"""Slope of the load along a branch, in spans, below which the branch is a family of equilibria at one load."""
+
+
+class SoftStates:
+    """Finds and names the soft modes of states of one solver.
+
+    With ``richer``, which makes a companion of its mesh, their uncertainty has the error of the mesh in it.
+    """
+
+    def __init__(self, solver: BranchSolver, richer: Callable[[], Enriched] | None) -> None:
+        """Nothing is computed before a state is given."""
+        self.solver, self.names = solver, MotionNames(solver.system, solver.inertia.metric)
+        self._richer = [richer] if richer is not None else []
+        self._companions: list[Enriched] = []
+
+    def examine(self, point: Point, *, fixed_load: bool, compare: bool = False) -> bool:
+        """Record the soft modes of a point, and its index as far as they are decided; whether there are any.
+
+        On a richer mesh the point is at the same load (``fixed_load``), or on the plane across the branch.  With
+        ``compare`` the index there is asked for; eigenvalues that have another sign are soft, too.
+        """
+        differing = self._differing(point, fixed_load) if compare and self._richer else 0
+        if not differing and self._is_clear(point):
+            return False
+        near = near_zero(self.solver.inertia.at(point.x), least=differing)
+        found = self.judgement(point, near, fixed_load=fixed_load)
+        point.negative, point.zero, point.undecided = found.negative, found.zero, found.undecided
+        point.soft = list(found.soft)
+        return bool(found.soft)
+
+    def _is_clear(self, point: Point) -> bool:
+        """Whether no eigenvalue is near zero, by one factorisation."""
+        regular = self.solver.corrector.factor(point.x) if point.near_zero else None
+        return not point.near_zero or (regular is not None and regular.index is not None)
+
+    def _differing(self, point: Point, fixed_load: bool) -> int:
+        """Number of eigenvalues that have another sign on the richer mesh, or are zero there and not on this one."""
+        with self.solver.system.clock.scope("error bars"):
+            richer = self._companion(0)
+            try:
+                there, _ = _on(richer, point, fixed_load)
+            except ConvergenceError:
+                return 0
+            found, inertia = richer.solver.inertia.at(there.x), richer.solver.inertia
+            below = found.below(-inertia.tolerance)
+            if below == point.negative:
+                return 0
+            index = found.count()
+        own = point.zero - self.solver.system.active_drifts(point.x)
+        return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
+
+    def judgement(self, point: Point, near: NearZero, *, fixed_load: bool) -> Judgement:
+        """Decide on the eigenvalues ``near`` zero of a point as far as can be; ``fixed_load`` as above."""
+        every, near = len(near.values), self._across_the_branch(point, near)
+        names = self.names(point.x, near.vectors)
+        modes = [SoftMode(*m) for m in zip(names, near.values.tolist(), near.uncertainty.tolist(), strict=True)]
+        if modes and self._richer:
+            with self.solver.system.clock.scope("error bars"):
+                modes = self._refined(point, modes, fixed_load, every - len(modes))
+        return judge(near, modes, self.solver.inertia.tolerance)
+
+    def _across_the_branch(self, point: Point, near: NearZero) -> NearZero:
+        """Eigenvalues without that of the branch itself, where it is a family of equilibria at one load."""
+        system, tangent = self.solver.system, point.tangent
+        span = abs(system.scene.span[1] - system.scene.span[0])
+        if tangent is None or not abs(point.slope) < FLAT * span:
+            return near
+        image = self.solver.inertia.metric * tangent
+        own = [i for i, v in enumerate(near.vectors) if v.dot(image).real ** 2 > SHARE]
+        kept = [i for i in range(len(near.vectors)) if i not in own]
+        vectors = [near.vectors[i] for i in kept]
+        return replace(
+            near, values=near.values[kept], vectors=vectors, uncertainty=near.uncertainty[kept],
+            zero=near.zero + len(own),
+        )  # fmt: skip
+
+    def _refined(self, point: Point, modes: list[SoftMode], fixed_load: bool, own: int) -> list[SoftMode]:
+        """The ``modes`` with values of richer meshes; of infinite uncertainty where those have no such state.
+
+        ``own`` eigenvalues nearest zero are those of the branch itself.
+        """
+        out, values = modes, np.array([m.value for m in modes])
+        for level in range(REFINEMENTS):
+            richer = self._companion(level)
+            try:
+                point, rho = _on(richer, point, fixed_load)
+                finer, rounding = _nearest(richer.solver, point, len(modes), own)
+            except ConvergenceError:
+                return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
+            left = rho / (1 - rho) * abs(finer - values) + rounding
+            values = finer
+            # a sign that is another one than the mesh's own is not decided there
+            contrary = np.sign(values) != np.sign([m.value for m in modes])
+            away = abs(values - [m.value for m in modes])
+            bars = np.where(contrary, left + away, left)
+            out = [replace(m, value=float(v), uncertainty=float(u))
+                   for m, v, u in zip(modes, values, bars, strict=True)]  # fmt: skip
+            if all(m.decided for m in out) or (contrary & (left < abs(values))).any():
+                return out
+        return out
+
+    def _companion(self, level: int) -> Enriched:
+        """Companion of the mesh, or of the companion before; made when it is first asked for."""
+        if level == len(self._companions):
+            self._companions.append(Enriched(self._companions[-1].solver) if level else self._richer[0]())
+        return self._companions[level]
+
+
+def _on(richer: Enriched, point: Point, fixed_load: bool) -> tuple[Point, float]:
+    """Point on a richer mesh, and the part of the errors that is left there.
+
+    Near a soft mode Newton's method may slide away: then with damping.  Raises :class:`ConvergenceError` where it has
+    no such point; ``fixed_load`` as in :meth:`SoftStates.examine`.
+    """
+    system = richer.system
+    given = system.damping
+    try:
+        try:
+            again = richer.again(point, fixed_load=fixed_load)
+        except ConvergenceError:
+            system.damping = richer.solver.inertia.tolerance
+            again = richer.again(point, fixed_load=fixed_load)
+    finally:
+        system.damping = given
+    tangent = None if point.tangent is None else richer.transfer(point.tangent, state=False)
+    return replace(point, x=again.x, tangent=tangent, load=again.load, ordinate=again.ordinate), again.rho
+
+
+def _nearest(solver: BranchSolver, point: Point, number: int, left_out: int) -> tuple[np.ndarray, np.ndarray]:
+    """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``.
+
+    The first ``left_out`` of them at the ``point`` are no part of that number.
+    """
+    found = solver.inertia.at(point.x)
+    found.count()
+    kept, solver.inertia.vectors = solver.inertia.vectors, []
+    vectors = found.nearest(left_out + number + SPARE, NULL)[1][left_out : left_out + number]
+    solver.inertia.vectors = kept
+    values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
+    floor = TOLERANCE * solver.inertia.scale
+    rounding = np.array([max(quotient_error(found.matrix, v), floor) for v in vectors])
+    order = np.argsort(values)
+    return values[order], rounding[order]

@@ -1,0 +1,99 @@
+r"""Names of soft modes: the motions of a rod that cost it little energy, as generators of its states.
+
+A vector ``v`` of metric norm 1 is named after the first group of generators ``g_j`` in whose span it lies, nearly: its
+share there is ``b . G^+ b`` with ``G_ij = g_i . M g_j`` and ``b_j = g_j . M v``.  Groups are, in this order, the rigid
+motions, turning of the cross-sections about one director, and the motion along the rod, whose generator is the
+derivative of the state in arclength; a rod that is twisted, or a helix, has to turn as it slides.  Any other vector is
+named after the directors about which the rod turns in it.  Symmetries of the state are no part of any generator here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from forms.symmetry import AXES, cross, left
+from rodfem.fem.state import State
+from rodfem.fem.symmetries import Elementary, Symmetry, elementary_generators
+from rodfem.fem.system import System
+from rodfem.stability import mode_type
+from rodfem.stability.pencil import symmetry_modes
+
+SHARE = 0.9
+"""Share of a vector in the span of a group above which it is named after it."""
+LARGEST_PART = 0.5
+"""Part of a rigid motion, relative to the largest one, above which it is named."""
+DEPENDENT = 1e-8
+"""Eigenvalue of a Gram matrix of unit vectors below which they are dependent; square of a negligible generator."""
+
+Group = list[tuple[str, PETSc.Vec]]
+
+
+class MotionNames:
+    """Names vectors of the states of one :class:`~rodfem.fem.system.System`; collective over its ranks."""
+
+    def __init__(self, system: System, metric: PETSc.Mat) -> None:
+        """Take the elementary generators together that are one motion of space; the load has no part in ``metric``."""
+        self.system, self.metric = system, metric
+        parts = elementary_generators(system.fields)
+        self._turning = {p.name: _sum(parts, [p is q for q in parts]) for p in parts if p.name.startswith("turning")}
+        self._rigid = {}
+        for i, axis in enumerate(AXES, start=1):
+            turn, move = f"rotation about e{i}", f"translation along e{i}"
+            self._rigid[turn] = _sum(parts, [p.matrix in (left(axis), cross(axis)) or p.name == turn for p in parts])
+            self._rigid[move] = _sum(parts, [p.name == move for p in parts])
+        self._along = Symmetry(np.zeros(len(parts)), parts, along=1.0)
+
+    def __call__(self, x: PETSc.Vec, vectors: list[PETSc.Vec]) -> list[str]:
+        """Name each of some ``vectors`` of metric norm 1 at the state ``x``."""
+        if not vectors:
+            return []
+        state = self.system.at(x)
+        turning, rigid = (self._generators(x, state, motions) for motions in (self._turning, self._rigid))
+        sliding = "slipping along itself" if self.system.scene.closed else "sliding along the rod"
+        along = self._generators(x, state, {sliding: self._along})
+        return [self._name(state, v, turning, rigid, along) for v in vectors]
+
+    def _name(self, state: State, v: PETSc.Vec, turning: Group, rigid: Group, along: Group) -> str:
+        share, weights = self._share(v, rigid)
+        if share > SHARE:
+            named = abs(weights) > LARGEST_PART * abs(weights).max()
+            return " with ".join(name for (name, _), chosen in zip(rigid, named, strict=True) if chosen)
+        for motion in turning:
+            if self._share(v, [motion])[0] > SHARE:
+                return motion[0]
+        if along and self._share(v, [*along, *turning, *rigid])[0] > SHARE:
+            return along[0][0]
+        return mode_type.name(mode_type.shares(self.system, state.turned, [v.array_r.real]))
+
+    def _generators(self, x: PETSc.Vec, state: State, motions: dict[str, Symmetry]) -> Group:
+        """Generators at a state ``x``, of metric norm 1 and across its symmetries, but for those that vanish."""
+        symmetries, found = list(symmetry_modes(self.system, x).values()), []
+        for name, motion in motions.items():
+            g = self.system.vector(motion.change(state), np.zeros(len(self.system.drifts)))
+            before = self._square(g)
+            for s in symmetries:
+                g.axpy(-s.dot(self.metric * g) / self._square(s), s)
+            after = self._square(g)
+            if after > DEPENDENT * max(before, DEPENDENT):
+                g.scale(after**-0.5)
+                found.append((name, g))
+        return found
+
+    def _square(self, g: PETSc.Vec) -> float:
+        return float(g.dot(self.metric * g).real)
+
+    def _share(self, v: PETSc.Vec, group: Group) -> tuple[float, np.ndarray]:
+        """Share of ``v`` in the span of a group, and the weights of the members in its projection."""
+        if not group:
+            return 0.0, np.zeros(0)
+        images = [self.metric * g for _, g in group]
+        gram = np.array([[g.dot(image).real for image in images] for _, g in group])
+        b = np.array([v.dot(image).real for image in images])
+        weights = np.linalg.pinv(gram, rcond=DEPENDENT, hermitian=True) @ b
+        return float(weights @ b), weights
+
+
+def _sum(parts: tuple[Elementary, ...], chosen: list[bool]) -> Symmetry:
+    """Sum of some of the elementary generators."""
+    return Symmetry(np.array(chosen, dtype=float), parts)

@@ -1,0 +1,86 @@
+r"""The eigenvalues near zero at a state, and what round-off leaves open of each.
+
+The uncertainty on one mesh is the larger of two numbers: the round-off of the Rayleigh quotient
+(:func:`~rodfem.stability.round_off.quotient_error`), and that of the state itself, which Newton's method solves for to
+:data:`~rodfem.fem.newton.TOLERANCE`.  What the mesh adds is known from a richer one
+(:mod:`rodfem.adaptivity.soft_states`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.errors import ConvergenceError
+from rodfem.fem.newton import TOLERANCE
+from rodfem.stability.inertia import NULL, ROUGH, Factored, Index, Inertia
+from rodfem.stability.round_off import MANY, SPARE, quotient_error
+from rodfem.stability.soft_mode import Judgement, SoftMode
+
+SOFT = 1e-4
+"""Eigenvalues nearer to zero than this, over the lowest bending eigenvalue, are soft."""
+CLEAR = 10.0
+"""Times that limit beyond which a rough estimate of the nearest eigenvalue says that none is soft."""
+
+
+@dataclass(frozen=True)
+class NearZero:
+    """Soft eigenvalues of a state, their ``values`` in ascending order, ``vectors``, and ``uncertainty`` on the mesh.
+
+    ``firm`` is the number of negative eigenvalues that are not among them, ``zero`` that of zeros that are not.
+    """
+
+    values: np.ndarray
+    vectors: list[PETSc.Vec]
+    uncertainty: np.ndarray
+    firm: int
+    zero: int
+
+
+def soft_limit(inertia: Inertia) -> float:
+    """Distance from zero within which an eigenvalue is soft."""
+    return max(SOFT * inertia.scale, inertia.tolerance)
+
+
+def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> NearZero:
+    """Soft eigenvalues at a state, symmetries left out; the vectors that the next state starts from stay.
+
+    ``index`` is the count that made the factors, None before it; the ``least`` number of eigenvalues nearest zero are
+    soft whatever their size.  Raises :class:`ConvergenceError` where there are too many of them.
+    """
+    inertia = found.inertia
+    index, kept, limit = index or found.count(), inertia.vectors, soft_limit(inertia)
+    inside, inertia.vectors = index.zero - found.drifts, []  # whatever was computed before, the same result
+    number = max(inside, least) + SPARE
+    if not inside + least and abs(found.nearest(1, ROUGH)[0][0]) > CLEAR * limit:
+        inertia.vectors = kept
+        return NearZero(np.zeros(0), [], np.zeros(0), index.negative, index.zero)
+    values, vectors = found.nearest(number, NULL)
+    while (abs(values) < limit).all() and number < MANY:
+        number *= 2
+        values, vectors = found.nearest(number, NULL)
+    inertia.vectors = kept
+    chosen = np.flatnonzero((abs(values) < limit) | (np.arange(number) < least))
+    if len(chosen) < inside or len(chosen) == number:
+        raise ConvergenceError(
+            f"{inside} or more eigenvalues are within {limit:.2g} of zero and are not told apart: use fewer elements "
+            "of a higher degree."
+        )
+    members = [vectors[i] for i in chosen]
+    quotients = np.array([v.dot(found.matrix * v).real for v in members]) + found.shift
+    floor = TOLERANCE * inertia.scale
+    uncertainty = np.array([max(quotient_error(found.matrix, v), floor) for v in members])
+    firm = index.negative - int((quotients < -inertia.tolerance).sum())  # the count has the others as zero
+    order = np.argsort(quotients)
+    return NearZero(quotients[order], [members[i] for i in order], uncertainty[order], firm, found.drifts)
+
+
+def judge(found: NearZero, modes: Sequence[SoftMode], tolerance: float) -> Judgement:
+    """Numbers of eigenvalues of a state with its ``modes``, decided or not; ``tolerance`` is that of a count."""
+    negative = found.firm + sum(m.decided and m.value < 0 for m in modes)
+    undecided = sum(not m.decided for m in modes)
+    within = sum(not m.decided and abs(v) <= tolerance for m, v in zip(modes, found.values.tolist(), strict=True))
+    return Judgement(negative, found.zero + within, undecided, tuple(modes))

@@ -1,0 +1,90 @@
+"""What is no equilibrium is never a point of a branch: states that are spoilt after Newton's method has ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import pytest
+from classics import column, euler
+from petsc4py import PETSc
+
+from rodfem import Discretization, Plan, Solver, clamped, free, trace
+from rodfem.continuation.branch import Point
+from rodfem.continuation.invariants import Invariants
+from rodfem.continuation.solvers import BranchSolver
+from rodfem.errors import ConvergenceError
+from rodfem.fem.system import System
+
+SMALL = 1e-6
+"""Size of the mutations, in the units of a rod of unit length and stiffness."""
+
+
+@cache
+def bent(formulation: str) -> tuple[BranchSolver, Point]:
+    """A cantilever bent by a force across its axis: no component of the contact force or the quaternion is zero."""
+    scene = column("bent", (clamped(), free(lambda c: (c.P, 0.5 * c.P, c.P))), (0.0, 4.0))
+    solver = Solver(scene, Discretization(formulation, 6, 4))
+    point = None
+    for load in (0.5, 1.0, 2.0):
+        point = solver.equilibrium(load, point)
+    equilibria = solver.equilibria
+    assert isinstance(equilibria, BranchSolver) and point is not None
+    return equilibria, point
+
+
+def spoilt(system: System, x: PETSc.Vec, field: str) -> PETSc.Vec:
+    """The state with the values of a field at one node inside an element changed a little."""
+    values = system.at(x).named
+    middle = len(values[field]) // 2
+    values[field] = values[field].copy()
+    values[field][middle, 2] += SMALL
+    return system.vector(system.fields.filled(values), [0.0] * len(system.drifts))
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
+def test_mutations_are_caught(formulation: str) -> None:
+    solver, point = bent(formulation)
+    system, check, kept = solver.system, Invariants(solver), point.x
+    check(point)
+    caught: dict[str, str] = {}
+    for field in (b.name for b in system.fields.blocks):
+        point.x = spoilt(system, kept, field)
+        with pytest.raises(ConvergenceError) as error:
+            check(point)
+        caught[field] = str(error.value)
+    point.x = kept.copy()
+    system.set_load(point.x, point.load * (1 + SMALL))
+    with pytest.raises(ConvergenceError, match="no equilibrium: the equation of"):
+        check(point)
+    point.x = kept
+    check(point)
+    assert "a quaternion has a squared norm that differs from one by" in caught.pop("q")
+    assert all("no equilibrium" in sentence for sentence in caught.values())
+    if formulation == "pointwise":
+        assert set(caught) >= {"r", "n", "eta"}
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("where", [0.0, 5.0])
+def test_a_violation_ends_the_branch_with_a_reason(where: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    correct: Callable[..., Any] = BranchSolver.correct
+
+    def spoiling(self: BranchSolver, x: PETSc.Vec, *given: Any) -> Any:
+        outcome = correct(self, x, *given)
+        if self.system.scalar(x) > where:
+            self.system.set_load(x, self.system.scalar(x) + SMALL)
+            f = self.system.fields
+            begin = f.number[f.dofs["q"]].max() // 2
+            x.setValue(int(begin), x.getValue(int(begin)) + SMALL)
+            x.assemble()
+        return outcome
+
+    monkeypatch.setattr(BranchSolver, "correct", spoiling)
+    diagram = trace(euler("clamped-pinned"), Discretization("reduced", 4, 4), Plan(depth=0, error_bars=False))
+    (branch,) = diagram
+    assert branch.ended.startswith("no convergence: At P = ")
+    assert max(p.load for p in branch.points) <= max(where, 0.0)
+    assert any(branch.ended.endswith(sentence) for sentence in diagram.warnings)

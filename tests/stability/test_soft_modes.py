@@ -1,0 +1,156 @@
+"""Soft modes by name, value and uncertainty, and an index that is undecided where a mesh cannot tell it."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from functools import cache
+from math import atan2, exp, log, pi, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from classics import ROUND, circle, column, push
+from continuation.test_index_chain import localised
+from mpi4py import MPI
+
+from forms import loads
+from rodfem import Diagram, Discretization, Plan, Ring, Scene, Solver, free, load, pinned, trace
+from rodfem.app.terminal import Report
+from rodfem.continuation.branch import Point
+from rodfem.output.plot_pieces import UNDECIDED, UNSTABLE, pieces_of
+from rodfem.output.typical import typical_state
+from rodfem.stability.soft_mode import SoftMode, index_range, is_stable
+
+SLIDING = "sliding along the rod"
+
+
+def nearly_free(k: float) -> Scene:
+    """A rod on a ball joint with a spring of stiffness k: it swings rigidly, at no load with the eigenvalue k."""
+    joint = replace(pinned(), energy=lambda x, c: loads.rotational_spring(x.q, c.k))
+    return column("nearly free", (joint, free(push)), (-1.0, 1.0), constants={"k": k})
+
+
+@pytest.mark.parametrize(("k", "stable", "index"), [(1e-4, True, 0), (1e-8, True, 0), (-1e-6, False, 3)])
+def test_an_end_nearly_free_to_turn(k: float, stable: bool, index: int) -> None:
+    solver = Solver(nearly_free(k), Discretization("reduced", 4, 4))
+    point = solver.equilibrium(0.0)
+    assert (point.stable, point.negative, point.zero, point.undecided) == (stable, index, 0, 0)
+    assert [m.value for m in point.soft] == pytest.approx([k] * 3, rel=1e-3)
+    assert all(m.decided and m.name.startswith("rotation about") for m in point.soft)
+    verdict = solver.assess(point)
+    assert (verdict.stable, verdict.negative, verdict.undecided) == (stable, index, 0)
+    assert [m.name for m in verdict.soft] == [m.name for m in point.soft]
+
+
+def test_an_end_too_free_to_tell() -> None:
+    """A spring of 1e-10 is below what a state is solved to: rotations about e1 and e2; about e3 it is a symmetry."""
+    solver = Solver(nearly_free(1e-10), Discretization("reduced", 4, 4))
+    point = solver.equilibrium(0.0)
+    assert (point.stable, point.negative, point.undecided) == (None, 0, 2)
+    assert "undecided, index 0 to 2" in repr(point)
+    assert all(abs(m.value - 1e-10) < m.uncertainty and "rotation about e" in m.name for m in point.soft)
+    verdict = solver.assess(point)
+    assert verdict.stable is None and "2 undecided" in str(verdict)
+    if MPI.COMM_WORLD.rank == 0:
+        stream = io.StringIO()
+        Report(MPI.COMM_SELF, stream).verdict("branch 1", "P = 0", verdict)
+        assert "undecided, index 0 to 2" in stream.getvalue() and "sign undecided" in stream.getvalue()
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("imperfection", [1e-9, -1e-9, 1e-6])
+def test_sections_that_are_nearly_round(imperfection: float) -> None:
+    """A circle turns its sections inside out at the cost of (B1 - B2)/2 sin^2 in the curvature 1, over 2 pi."""
+    scene = column(
+        "nearly round", Ring(), (0.0, 1.0), start=circle, constants={"B2": 1.0 + imperfection},
+        potential=lambda x, c: loads.pressure(x.r, x.dr, c.P), **ROUND,
+    )  # fmt: skip
+    point = Solver(scene, Discretization("pointwise", 8, 6)).equilibrium(0.0)
+    (mode,) = [m for m in point.soft if m.name == "turning of the cross-sections about d3"]
+    assert mode.decided and mode.value == pytest.approx(-2 * pi * imperfection, rel=1e-2)
+    assert point.negative == int(imperfection > 0)
+    turning = [m for m in point.soft if m is not mode]  # no pressure, no symmetry of the pressure
+    assert len(turning) == point.undecided == 2 and all("rotation about e" in m.name for m in turning)
+
+
+# --- a localised buckle ---------------------------------------------------------------------------------------------
+
+
+@cache
+def buckle(elements: int) -> Diagram:
+    return trace(localised(), Discretization("reduced", elements, 6), Plan(at=(2900.0,), depth=1))
+
+
+def decay(diagram: Diagram, point: Point) -> float:
+    """Rate at which the buckle fades away along the rod, sqrt(T - M^2/4), by the moment at the clamp."""
+    sample = diagram.solvers[0].shape.sample(point.x)
+    (w, *v), (w1, *v1) = sample["q"][:2]
+    turned = np.array([w * w1 + np.dot(v, v1), *(w * np.array(v1) - w1 * np.array(v) - np.cross(v, v1))])
+    twist = 2 * atan2(turned[3], turned[0]) / float(sample["s"][1] - sample["s"][0])
+    return sqrt(point.load - (0.789 / 1.345 * twist) ** 2 / 4)
+
+
+@pytest.mark.alone
+def test_sliding_costs_what_the_tails_of_a_buckle_tell() -> None:
+    """Its tails decay like exp(-delta s), and meet the clamps half a length away: mu ~ delta^2 exp(-delta)."""
+    diagram = buckle(40)
+    soft = [(decay(diagram, p), m) for p in diagram[1].points for m in p.soft]
+    assert len(soft) > 12 and {m.name for _, m in soft} == {SLIDING}
+    assert min(m.value for _, m in soft) < 2e-8
+    assert all(m.decided for _, m in soft) and {p.undecided for p in diagram[1].points} == {0}
+    constant = [log(m.value) + delta - 2 * log(delta) for delta, m in soft[:8]]
+    assert np.ptp(constant) < 5e-3  # over a factor of 300 in the eigenvalue
+    for delta, m in soft:
+        assert abs(m.value - exp(np.mean(constant) - delta) * delta**2) < m.uncertainty + 0.01 * m.value
+    (asked,) = diagram.special("user", "branch 1")
+    assert "sliding along the rod, mu = 2.8e-06 +- " in str(asked.point.soft[0])
+
+
+@pytest.mark.alone
+def test_a_mesh_that_pins_a_buckle_is_found_out(folder: Path) -> None:
+    """With 27 elements it is in the middle of one, unstable on this mesh: a second direction that no rod has."""
+    diagram = buckle(27)
+    branch = diagram[1]
+    undecided = [p for p in branch.points if p.undecided]
+    assert len(undecided) > 10 and {p.negative for p in branch.points[1:]} == {1}  # as the rod has
+    assert all(m.name == SLIDING and m.uncertainty > 1e-5 for p in undecided for m in p.soft)
+    assert any("the index is 1 or 2 (sliding along the rod" in sentence for sentence in diagram.warnings)
+    (asked,) = diagram.special("user", "branch 1")
+    assert (asked.negative_before, asked.negative_after, asked.point.undecided) == (1, 1, 1)
+    verdict = diagram.assess(asked)
+    assert (verdict.negative, verdict.undecided, verdict.stable) == (1, 1, False)
+    stream = io.StringIO()
+    Report(MPI.COMM_SELF, stream).table(diagram.branches, diagram.solvers[0].system)
+    assert " 1 or 2" in stream.getvalue() and "sliding along the rod, mu = " in stream.getvalue()
+    pieces = [p for p in pieces_of(diagram.data["branches"][1], "black") if p.undecided]
+    assert {(p.label, p.kind) for p in pieces} == {("1 or 2", UNSTABLE)}
+    again = load(diagram.save(folder / "pinned"), localised())
+    assert [p.undecided for p in again[1].points] == [p.undecided for p in branch.points]
+    assert [p.soft for p in again[1].points] == [p.soft for p in branch.points]
+
+
+# --- in words and pictures ------------------------------------------------------------------------------------------
+
+
+def test_words() -> None:
+    assert [index_range(*x) for x in ((2, 0), (0, 1), (0, 2), (1, 1))] == ["2", "0 or 1", "0 to 2", "1 or 2"]
+    assert [is_stable(*x) for x in ((0, 0), (0, 1), (1, 1))] == [True, None, False]
+    mode = SoftMode(SLIDING, 7.5e-6, 2e-5)
+    assert str(mode) == "sliding along the rod, mu = 7.5e-06 +- 2e-05, sign undecided"
+    assert str(replace(mode, uncertainty=2e-6)) == "sliding along the rod, mu = 7.5e-06 +- 2e-06"
+
+
+def test_undecided_pieces_have_a_style_of_their_own() -> None:
+    columns: dict[str, Any] = {"load": [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], "ordinate": [0.0] * 6}
+    columns |= {"negative": [0, 0, 0, 0, 1, 1], "undecided": [0, 0, 1, 1, 0, 0], "arclength": columns["load"]}
+    branch = {"name": "a", "parent": None, "columns": columns, "special": []}
+    found = [(p.kind, p.label, p.curve[:, 0].tolist()) for p in pieces_of(branch, "black")]
+    assert found == [
+        ("stable", "0", [0.0, 1.0]),
+        (UNDECIDED, "0 or 1", [1.0, 2.0, 3.0, 4.0]),
+        (UNSTABLE, "1", [4.0, 5.0]),
+    ]
+    columns["negative"], columns["undecided"] = [0] * 6, [1] * 6
+    assert typical_state({"branches": [branch]})[2].endswith("stability undecided, index 0 or 1")
