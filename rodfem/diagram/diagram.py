@@ -22,6 +22,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
 from rodfem.output.files import as_data, save_run
 from rodfem.output.folder import PICTURES, locked, picture_at
+from rodfem.output.origin import origin
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
@@ -56,6 +57,8 @@ class Diagram:
         Seconds by scope.
     run
         Name of this run on the first rank, which its files have in common.
+    origin
+        Command, date and versions of its libraries.
     """
 
     def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[StaticSolver]) -> None:
@@ -64,6 +67,7 @@ class Diagram:
         self.warnings: list[str] = []
         self.notes: list[str] = []
         self.run = uuid4().hex
+        self.origin = origin()
         self._asked: dict[int, Solver] = {}
 
     # --- what there is ---------------------------------------------------------------------------------------------
@@ -228,7 +232,10 @@ class Diagram:
     def data(self) -> dict[str, Any]:
         """Contents of ``diagram.json``: see docs/files.md."""
         systems = [solver.system for solver in self.solvers]
-        return as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy) | {"run": self.run}
+        return as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy) | {
+            "run": self.run,
+            "origin": self.origin,
+        }
 
     @checked(folder=path("results/column"))
     def save(self, folder: Path | str) -> Path:

@@ -18,7 +18,8 @@ from rodfem.diagram.solver import RANKS, SCENE, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM
-from rodfem.output.files import COLUMNS, OPTIONAL, SPECIAL, check_run, load_json, load_state
+from rodfem.output.contents import check_run
+from rodfem.output.files import COLUMNS, OPTIONAL, SPECIAL, load_json, load_state
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, unit
