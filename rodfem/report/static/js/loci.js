@@ -67,8 +67,8 @@ function atLoad(load) {
 function explain() {
   legend.append(
     item(lineIcon(BLUE, 7), "loads of this diagram with a stable state"),
-    item(lineIcon("#555", 4), "index 0 on one side"),
-    item(lineIcon("#555", 2), "greater index on both sides"),
+    ...(data.loci.some((locus) => locus.index.some(bounds)) ? [item(lineIcon("#555", 4), "index 0 on one side")] : []),
+    ...(data.loci.some((locus) => locus.index.some(([low]) => low > 0)) ? [item(lineIcon("#555", 2), "greater index on both sides")] : []),
     ...(data.loci.some((locus) => locus.marks.length) ? [item(symbol(MARK), "turning point, cusp, end")] : []),
   );
 }

@@ -91,14 +91,13 @@ function fit(points, { up, direction }) {
   stage.look(middle, direction, up, 8 * data.size);
 }
 
-// Whether a state leaves the picture.
+// Whether a state, or what holds and loads it, leaves the picture.
 function outside() {
-  const seen = shapeOf(branch(), state.row), point = new Vector3();
-  for (let i = 0; i < seen.length; i += 7) {
-    point.fromArray(seen, i).project(stage.camera);
-    if (Math.max(Math.abs(point.x), Math.abs(point.y)) > 1) return true;
-  }
-  return false;
+  stage.camera.updateMatrixWorld();
+  return [...pointsOf(shapeOf(branch(), state.row)), ...solids.corners].some((point) => {
+    point.project(stage.camera);
+    return Math.max(Math.abs(point.x), Math.abs(point.y)) > 1;
+  });
 }
 
 // The picture with axes and scale, as a canvas.

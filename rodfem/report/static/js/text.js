@@ -48,6 +48,7 @@ function about() {
   for (const [name, value] of Object.entries(data.constants)) line(list, name, digits(value, 17));
   line(list, "this page", `rodfem view ${data.folder}`, true);
   line(list, "shapes", "Rods and strains are splines through the nodes of the mesh; states between rows are interpolated for their pictures.");
+  line(list, "forces", "The files have no contact forces n and moments m along the rod, so that they are not shown.");
   line(list, "libraries", "plotly.js and three.js, both under the MIT licence; the page needs no network.");
   at("about-button").addEventListener("click", () => at("about").showModal());
 }
