@@ -14,20 +14,26 @@ No force acts along the rod, so the contact force is constant; n3 = lam is known
 Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section 5.1 and figures 2 and 3.
 """
 
-from argparse import Namespace
 from math import ceil, isfinite, pi
 
-import rodfem.app.cli as cli
+import rodfem
+import rodfem.app.main as program
 from forms.energy import bending_and_twist
 from rodfem.problem.ends import clamped, sliding
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 
 MOST = 1e6
-"""Turns beyond which defaults stay as they are: no mesh holds them."""
+"""Turns beyond which mesh and tension stay as they are: no mesh holds them."""
 
 
-def scene(options: Namespace) -> Scene:
-    """State the problem: what the rod is made of, how its ends are held, and what to look at."""
+def cord(turns: float = 1.5) -> Scene:
+    """State the problem: the rod's energy, how its ends are held, and the number to look at.
+
+    Parameters
+    ----------
+    turns
+        k0 = 2 pi N; more elements and tension for more.
+    """
 
     def energy(v, k, c):
         return bending_and_twist((k[0], k[1] - c.k0, k[2]), (1.0, 1.0, 1.0))
@@ -40,7 +46,7 @@ def scene(options: Namespace) -> Scene:
         energy=energy,
         parameters={
             "lam": Parameter(60.0, r"\lambda"),
-            "k0": Parameter(2 * pi * options.turns),
+            "k0": Parameter(2 * pi * turns),
         },
         load="lam",
         ends=(
@@ -48,28 +54,20 @@ def scene(options: Namespace) -> Scene:
             sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, c.lam)),
         ),
         ordinate=Ordinate("shortening 1 - r3(1)", s=1.0, of=lambda r, q: 1 - r[2], label="$1 - r_3(1)$"),
-        span=tuple(options.span),
+        span=(max(60.0, 10.0 * ceil(0.11 * (2 * pi) ** 2 * (within(turns) ** 2 - 1))), 0.0),  # stable at first
     )
 
 
-def defaults(options: Namespace) -> dict:
-    """Six elements a turn, of higher degree where many turns make tight loops; a first tension that is stable."""
-    turns = min(abs(options.turns), MOST) if isfinite(options.turns) else 0.0
-    return {
-        "elements": min(max(ceil(6 * turns), 6), 600),
-        "degree": 8 if turns > 2 else 6,
-        "span": (max(60.0, 10.0 * ceil(0.11 * (2 * pi) ** 2 * (turns**2 - 1))), 0.0),
-    }
+def mesh(turns: float = 1.5) -> rodfem.Discretization:
+    """Six elements a turn, of higher degree where many turns make tight loops."""
+    elements = min(max(ceil(6 * within(turns)), 6), 600)
+    return rodfem.Discretization(elements=elements, degree=8 if within(turns) > 2 else 6)
+
+
+def within(turns: float) -> float:
+    """Number of turns, within what a mesh holds."""
+    return min(abs(turns), MOST) if isfinite(turns) else 0.0
 
 
 if __name__ == "__main__":
-    parser = cli.parser_for("cord", __doc__, load="lam", span=(60.0, 0.0), elements=9, degree=6)
-    constants = parser.add_argument_group("constants of the rod")
-    constants.add_argument(
-        "--turns",
-        type=float,
-        default=1.5,
-        metavar="N",
-        help="k0 = 2 pi N, more elements and tension for more (default 1.5)",
-    )
-    cli.main(parser, scene, defaults)
+    program.main(cord, mesh)

@@ -14,20 +14,34 @@ and with it the centreline.
 Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section 5.4 and figure 11.
 """
 
-from argparse import Namespace
 from math import hypot, inf
 
-import rodfem.app.cli as cli
+import rodfem
+import rodfem.app.main as program
 from forms.energy import bending_and_twist
 from rodfem.errors import InputError
 from rodfem.problem.ends import clamped, free
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 
 
-def scene(options: Namespace) -> Scene:
-    """State the problem: what the rod is made of, how its ends are held, how it moves, and what to look at."""
-    b1, b2, b3 = options.stiffness
-    j1, j2, j3 = options.rotary_inertia
+def pushed_rod(
+    stiffness: tuple[float, float, float] = (1.0, 10.0, 1.0),
+    mass: float = 1.0,
+    rotary_inertia: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Scene:
+    """State the problem: the rod's energy, its ends, its inertia, and the number to look at.
+
+    Parameters
+    ----------
+    stiffness
+        B1, B2 and B3.
+    mass
+        Mass per unit length.
+    rotary_inertia
+        J1, J2 and J3.
+    """
+    b1, b2, b3 = stiffness
+    j1, j2, j3 = rotary_inertia
     if min(j1, j2, j3) < 0:
         raise InputError(f"A rotary inertia of {min(j1, j2, j3):g} is negative: give zero or more.")
 
@@ -45,7 +59,7 @@ def scene(options: Namespace) -> Scene:
             "B1": Parameter(b1),
             "B2": Parameter(b2),
             "B3": Parameter(b3),
-            "m": Parameter(options.mass, admissible=(0.0, inf)),
+            "m": Parameter(mass, admissible=(0.0, inf)),
             "J1": Parameter(j1),
             "J2": Parameter(j2),
             "J3": Parameter(j3),
@@ -54,18 +68,14 @@ def scene(options: Namespace) -> Scene:
         ends=(clamped(), free(follower=lambda c: (0.0, 0.0, -c.P))),
         inertia=Inertia(rho_A=lambda c: c.m, rho_I=lambda c: (c.J1, c.J2, c.J3)),
         ordinate=Ordinate("transverse displacement of the tip", s=1.0, of=lambda r, q: hypot(r[0], r[1])),
-        span=tuple(options.span),
+        span=(0.0, 25.0),
     )
+
+
+def mesh(**_: object) -> rodfem.Discretization:
+    """Four elements are enough for a straight rod."""
+    return rodfem.Discretization(elements=4)
 
 
 if __name__ == "__main__":
-    parser = cli.parser_for("follower", __doc__, load="P", span=(0.0, 25.0), elements=4, degree=6)
-    constants = parser.add_argument_group("constants of the rod")
-    constants.add_argument(
-        "--stiffness", type=float, nargs=3, default=(1.0, 10.0, 1.0), metavar="B", help="B1 B2 B3 (default 1 10 1)"
-    )
-    constants.add_argument("--mass", type=float, default=1.0, metavar="M", help="per unit length (default 1)")
-    constants.add_argument(
-        "--rotary-inertia", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar="J", help="J1 J2 J3 (default 0 0 0)"
-    )
-    cli.main(parser, scene)
+    program.main(pushed_rod, mesh)

@@ -17,17 +17,30 @@ states, its second variation has one zero eigenvalue, and at the straight state 
 Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section 5.2 and figures 5 and 6.
 """
 
-from argparse import Namespace
 from math import hypot, inf
 
-import rodfem.app.cli as cli
+import rodfem.app.main as program
 from forms.energy import hemitropic
 from rodfem.problem.ends import clamped
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 
 
-def scene(options: Namespace) -> Scene:
-    """State the problem: what the rod is made of, how its ends are held, and what to look at."""
+def hemitropic_rod(
+    coupling: float = -3.0, twisting: float = 1.0, bending: float = 1.0, half_length: float = 3.0
+) -> Scene:
+    """State the problem: the rod's energy, how its ends are held, and the number to look at.
+
+    Parameters
+    ----------
+    coupling
+        A, of stretch and twist.
+    twisting
+        Stiffness B.
+    bending
+        Stiffness C.
+    half_length
+        l, half the rod's length.
+    """
 
     def energy(v, k, c):
         return hemitropic(v, k, stretching=10.0, coupling=c.A, twisting=c.B, bending=c.C)
@@ -35,15 +48,15 @@ def scene(options: Namespace) -> Scene:
     return Scene(
         name="hemitropic",
         title="Compressed hemitropic rod",
-        interval=(-options.half_length, options.half_length),
+        interval=(-half_length, half_length),
         rod="unshearable",
         energy=energy,
         parameters={
             "lam": Parameter(0.0, r"\lambda", admissible=(-inf, 1.0)),
-            "A": Parameter(options.coupling),
-            "B": Parameter(options.twisting),
-            "C": Parameter(options.bending),
-            "l": Parameter(options.half_length),
+            "A": Parameter(coupling),
+            "B": Parameter(twisting),
+            "C": Parameter(bending),
+            "l": Parameter(half_length),
         },
         load="lam",
         ends=(
@@ -51,19 +64,9 @@ def scene(options: Namespace) -> Scene:
             clamped(lambda c: (0.0, 0.0, +c.l * (1 - c.lam))),
         ),
         ordinate=Ordinate("transverse displacement of the mid point", s=0.0, of=lambda r, q: hypot(r[0], r[1])),
-        span=tuple(options.span),
+        span=(0.0, 0.95),
     )
 
 
 if __name__ == "__main__":
-    parser = cli.parser_for("hemitropic", __doc__, load="lam", span=(0.0, 0.95), elements=8, degree=6)
-    constants = parser.add_argument_group("constants of the rod")
-    constants.add_argument(
-        "--coupling", type=float, default=-3.0, metavar="A", help="of stretch and twist (default -3)"
-    )
-    constants.add_argument("--twisting", type=float, default=1.0, metavar="B", help="stiffness (default 1)")
-    constants.add_argument("--bending", type=float, default=1.0, metavar="C", help="stiffness (default 1)")
-    constants.add_argument(
-        "--half-length", type=float, default=3.0, metavar="L", help="half the rod's length (default 3)"
-    )
-    cli.main(parser, scene)
+    program.main(hemitropic_rod)

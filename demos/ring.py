@@ -15,12 +15,11 @@ A ring may go anywhere: rotations, the turning of its cross-sections and the mot
 every state.  They are found from the equations, and counted apart.
 """
 
-from argparse import Namespace
 from math import inf, pi
 
 import numpy as np
 
-import rodfem.app.cli as cli
+import rodfem.app.main as program
 from forms.energy import bending_and_twist
 from rodfem.problem.ends import Ring
 from rodfem.problem.scene import Ordinate, Parameter, Scene
@@ -33,28 +32,29 @@ def circle(s):
     return np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1)
 
 
-def scene(options: Namespace) -> Scene:
-    """State the problem: what the rod is made of, that it is closed, and what to look at."""
+def ring(twisting: float = 1.5) -> Scene:
+    """State the problem: the rod's energy, that it is closed, and the number to look at.
+
+    Parameters
+    ----------
+    twisting
+        Stiffness C of twist over that of bending.
+    """
     return Scene(
         name="ring",
         title="Michell's ring",
         interval=(0.0, 2 * pi),
         rod="unshearable and inextensible",
         energy=lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t0), (1.0, 1.0, c.C)),
-        parameters={"t0": Parameter(0.0, "t_0"), "C": Parameter(options.twisting, admissible=(0.0, inf))},
+        parameters={"t0": Parameter(0.0, "t_0"), "C": Parameter(twisting, admissible=(0.0, inf))},
         load="t0",
         ends=Ring(),
         start=circle,
         states="circle",
         ordinate=Ordinate("twist in turns", s=None, of=lambda x, c: x.k[2] / (2 * pi), label=TWIST),
-        span=tuple(options.span),
+        span=(0.0, 1.6),
     )
 
 
 if __name__ == "__main__":
-    parser = cli.parser_for("ring", __doc__, load="t0", span=(0.0, 1.6), elements=8, degree=6)
-    constants = parser.add_argument_group("constants of the rod")
-    constants.add_argument(
-        "--twisting", type=float, default=1.5, metavar="C", help="stiffness of twist over that of bending (default 1.5)"
-    )
-    cli.main(parser, scene)
+    program.main(ring)

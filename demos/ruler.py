@@ -15,9 +15,7 @@ rotation.  What is left are the rotation q, its multiplier eta and the stretch v
 Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section 5.3 and figures 8 and 9.
 """
 
-from argparse import Namespace
-
-import rodfem.app.cli as cli
+import rodfem.app.main as program
 from forms.energy import bending_and_twist, logarithmic_stretch
 from rodfem.errors import InputError
 from rodfem.problem.ends import clamped, free
@@ -26,11 +24,28 @@ from rodfem.problem.scene import Ordinate, Parameter, Scene
 DIRECTIONS = {"e1": (1.0, 0.0), "e2": (0.0, 1.0)}
 
 
-def scene(options: Namespace) -> Scene:
-    """State the problem: what the rod is made of, how its ends are held, and what to look at."""
-    if options.direction not in DIRECTIONS:
-        raise InputError(f"Unknown direction {options.direction!r}: choose e1 or e2.")
-    x, y = DIRECTIONS[options.direction]
+def ruler(
+    direction: str = "e1",
+    stretching: float = 20.0,
+    bending: tuple[float, float] = (1.0, 10.0),
+    twisting: float = 1.0,
+) -> Scene:
+    """State the problem: the rod's energy, how its ends are held, and the number to look at.
+
+    Parameters
+    ----------
+    direction
+        Direction of the force, e1 or e2.
+    stretching
+        Stiffness E.
+    bending
+        Stiffnesses B1 and B2.
+    twisting
+        Stiffness B3.
+    """
+    if direction not in DIRECTIONS:
+        raise InputError(f"Unknown direction {direction!r}: choose e1 or e2.")
+    x, y = DIRECTIONS[direction]
 
     def energy(v, k, c):
         return logarithmic_stretch(v, c.E) + bending_and_twist(k, (c.B1, c.B2, c.B3))
@@ -44,25 +59,17 @@ def scene(options: Namespace) -> Scene:
         energy=energy,
         parameters={
             "lam": Parameter(0.0, r"\lambda"),
-            "E": Parameter(options.stretching, admissible=(0.0, float("inf"))),
-            "B1": Parameter(options.bending[0]),
-            "B2": Parameter(options.bending[1]),
-            "B3": Parameter(options.twisting),
+            "E": Parameter(stretching, admissible=(0.0, float("inf"))),
+            "B1": Parameter(bending[0]),
+            "B2": Parameter(bending[1]),
+            "B3": Parameter(twisting),
         },
         load="lam",
         ends=(clamped(), free(force=lambda c: (x * c.lam, y * c.lam, 0.0))),
         ordinate=Ordinate("tip displacement out of the plane", s=1.0, of=lambda r, q: abs(y * r[0] - x * r[1])),
-        span=tuple(options.span),
+        span=(0.0, 12.0),
     )
 
 
 if __name__ == "__main__":
-    parser = cli.parser_for("ruler", __doc__, load="lam", span=(0.0, 12.0), elements=8, degree=6)
-    constants = parser.add_argument_group("constants of the rod")
-    constants.add_argument("--direction", default="e1", metavar="{e1,e2}", help="of the force (default e1)")
-    constants.add_argument("--stretching", type=float, default=20.0, metavar="E", help="stiffness (default 20)")
-    constants.add_argument(
-        "--bending", type=float, nargs=2, default=(1.0, 10.0), metavar=("B1", "B2"), help="stiffnesses (default 1 10)"
-    )
-    constants.add_argument("--twisting", type=float, default=1.0, metavar="B3", help="stiffness (default 1)")
-    cli.main(parser, scene)
+    program.main(ruler)

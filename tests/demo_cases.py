@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
+from dataclasses import replace
 from functools import cache
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -18,18 +18,8 @@ from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.problem.scene import Scene
 
-DEFAULTS: dict[str, dict[str, Any]] = {
-    "cord": {"turns": 1.5, "span": (60.0, 0.0)},
-    "ruler": {
-        "direction": "e1",
-        "stretching": 20.0,
-        "bending": (1.0, 10.0),
-        "twisting": 1.0,
-        "span": (0.0, 12.0),
-    },
-    "ring": {"twisting": 1.5, "span": (0.0, 1.6)},
-    "follower": {"stiffness": (1.0, 10.0, 1.0), "mass": 1.0, "rotary_inertia": (0.0, 0.0, 0.0), "span": (0.0, 25.0)},
-}
+FUNCTIONS = {"cord": "cord", "ruler": "ruler", "ring": "ring", "follower": "pushed_rod"}
+"""Functions that state the demos' scenes."""
 
 
 @cache
@@ -43,8 +33,10 @@ def module(name: str) -> ModuleType:
 
 
 def scene(name: str, **constants: Any) -> Scene:
-    """The scene of a demo with its default constants, or others."""
-    return module(name).scene(Namespace(**DEFAULTS[name] | constants))
+    """The scene of a demo with its default constants, or others, over its own span or ``span``."""
+    span = constants.pop("span", None)
+    made: Scene = getattr(module(name), FUNCTIONS[name])(**constants)
+    return made if span is None else replace(made, span=span)
 
 
 class Found:

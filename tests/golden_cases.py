@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
 from collections.abc import Callable
 from itertools import groupby
 from typing import Any
@@ -25,7 +24,7 @@ DEMOS: dict[str, Callable[[], Scene]] = {
     "cord": lambda: demos.scene("cord", span=(60.0, 8.0)),
     "ruler": lambda: demos.scene("ruler"),
     "follower": lambda: demos.scene("follower"),
-    "ring": lambda: demos.module("ring").scene(Namespace(twisting=1.5, span=(0.0, 1.6))),
+    "ring": lambda: demos.scene("ring"),
 }
 OTHERS: dict[str, Callable[[], Scene]] = {
     "bow": classics.bow,

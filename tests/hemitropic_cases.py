@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import runpy
 import sys
-from argparse import Namespace
+from dataclasses import replace
 from functools import cache
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -54,7 +54,7 @@ def run_demo(*arguments: str) -> None:
 def scene(constants: Constants = DEFAULT, span: tuple[float, float] = SPAN) -> Scene:
     """The demo's scene with these constants."""
     coupling, twisting, bending, half = constants
-    return demo().scene(Namespace(coupling=coupling, twisting=twisting, bending=bending, half_length=half, span=span))
+    return replace(demo().hemitropic_rod(coupling, twisting, bending, half), span=span)
 
 
 @cache

@@ -1,4 +1,4 @@
-"""The command line that all demos share.
+"""Command lines: their parser, and how they end.
 
 Importing this module checks the installation first: a script gets one sentence, and leaves with status 2, where a
 module is missing.  From then on an interrupt is one sentence and status 130 (:mod:`rodfem.app.interrupts`).
@@ -7,10 +7,10 @@ module is missing.  From then on an interrupt is one sentence and status 130 (:m
 from __future__ import annotations
 
 import argparse
-import os
 import re
+import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -20,7 +20,6 @@ from typing import Any, NoReturn
 from rodfem.app import petsc_options
 from rodfem.app.interrupts import listen
 from rodfem.errors import ConvergenceError, InputError, SetupError
-from rodfem.stability.methods import AUTO, METHODS
 
 NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
 
@@ -110,6 +109,7 @@ def start_petsc(options: Sequence[str]) -> None:
         petsc_options.check(options)
         petsc4py = import_module("petsc4py")
         petsc4py.init(["rodfem", *options])
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # of PETSc is a page of errors where a reader, as head, has left
     except InputError as trouble:
         complain(str(trouble))
     except Exception as trouble:  # petsc4py has no class of its own for errors until PETSc is loaded
@@ -133,170 +133,3 @@ def complain(sentence: str) -> NoReturn:
             sys.stderr.flush()
         comm.Abort(2)
     sys.exit(2)
-
-
-def parser_for(
-    name: str,
-    description: str,
-    load: str,
-    span: tuple[float, float],
-    elements: int,
-    degree: int,
-    formulation: str = "auto",
-) -> Parser:
-    """Return the options that every demo has; a demo adds its own constants.
-
-    ``name`` and ``description`` head the help; ``load`` names the load, of range ``span``; ``elements``, ``degree`` and
-    ``formulation`` are the defaults of the discretisation.
-    """
-    from rodfem.fem import formulations
-
-    parser = Parser(
-        prog=f"{name}.py",
-        description=description,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="Options for PETSc and SLEPc go after a lone --, as in: -- -log_view",
-    )
-    words = {
-        "--elements": f"number of finite elements along the rod (default {elements})",
-        "--degree": f"polynomial degree; the error falls as h^(2K) (default {degree})",
-        "--formulation": "; ".join(f"{made.name}: {made.words}" for made in formulations.FORMULATIONS.values())
-        + f"; {formulations.AUTO}: the first that the scene allows (default {formulation})",
-        "--factors": "chain: compiled assembly and elimination along the rod; petsc: the same numbers, slower, by "
-        "dolfinx, PETSc and MUMPS (default chain)",
-        "--accuracy": "instead of elements and degree: choose meshes on the way such that loads and ordinates are in "
-        "error by less than EPS (relative to values greater than one)",
-        "--range": f"start at {load} = A, stay between A and B (default {span[0]:g} {span[1]:g})",
-        "--at": f"compute every branch also at exactly these values of {load}",
-        "--step": "largest step along a branch, in radian of rotation (root mean square; default 0.05)",
-        "--depth": "follow what leaves from branch points of branches of a depth less than D; the first branch has "
-        "depth 0, what leaves from it 1, and so on (default 2)",
-        "--spectrum": "also compute the K left-most eigenvalues of every state with SLEPc",
-        "--method": "judge the states at the loads of --at, and print all that is said, by "
-        f"{', '.join((AUTO, *METHODS))}",
-        "--modes": "find and draw the K left-most modes of the states at the loads of --at",
-        "--search": "at each load of --at also look for equilibria that no branch has reached, with that many tries",
-        "--locus": "follow every special point in the plane of the load and the constant NAME from LOW to HIGH",
-        "--output": f"folder for files and pictures (default results/{name})",
-        "--no-figures": "draw nothing",
-    }
-    groups: dict[str, dict[str, dict[str, Any]]] = {
-        "discretisation": {
-            "--elements": {"type": int, "default": elements, "metavar": "N"},
-            "--degree": {"type": int, "default": degree, "metavar": "K"},
-            "--formulation": {"default": formulation, "metavar": f"{{{','.join(formulations.names())}}}"},
-            "--factors": {"default": "chain", "metavar": "{chain,petsc}"},
-            "--accuracy": {"type": float, "metavar": "EPS"},
-        },
-        "what to compute": {
-            "--range": {"dest": "span", "type": float, "nargs": 2, "default": span, "metavar": ("A", "B")},
-            "--at": {"type": float, "nargs": "+", "default": [], "metavar": "LOAD"},
-            "--step": {"dest": "largest", "type": float, "default": 0.05, "metavar": "S"},
-            "--depth": {"type": int, "default": 2, "metavar": "D"},
-            "--spectrum": {"type": int, "default": 0, "metavar": "K"},
-            "--method": {"default": "", "metavar": "NAME"},
-            "--modes": {"type": int, "default": 0, "metavar": "K"},
-            "--search": {"dest": "tries", "type": int, "default": 0, "metavar": "TRIES"},
-            "--locus": {"nargs": 3, "metavar": ("NAME", "LOW", "HIGH")},
-        },
-        "output": {
-            "--output": {"type": folder, "default": Path("results") / name, "metavar": "DIR"},
-            "--no-figures": {"dest": "figures", "action": "store_false"},
-        },
-    }
-    for title, options in groups.items():
-        group = parser.add_argument_group(title)
-        for option, how in options.items():
-            group.add_argument(option, help=words[option], **how)
-    return parser
-
-
-def pair(words: Sequence[str] | None) -> tuple[str, float, float] | None:
-    """Name and interval of a second parameter; raises :class:`InputError` for what are no numbers."""
-    if words is None:
-        return None
-    try:
-        return words[0], float(words[1]), float(words[2])
-    except ValueError:
-        raise InputError(f"{words[1]} to {words[2]} is no interval: give two numbers after {words[0]}.") from None
-
-
-def main(
-    parser: Parser,
-    scene_of: Callable[[argparse.Namespace], Any],
-    defaults: Callable[[argparse.Namespace], Mapping[str, Any]] | None = None,
-    arguments: Sequence[str] | None = None,
-) -> None:
-    """Parse the command line, build the scene, run it; bad input ends with one sentence and status 2.
-
-    ``defaults`` gives values that the other options call for, by name, for options that the user does not give.
-    ``parser`` is that of :func:`parser_for`, ``scene_of`` makes the scene from the parsed options, and ``arguments``
-    replace those of the command line.  Bad input is an :class:`~rodfem.errors.InputError`; an interrupt is raised as
-    KeyboardInterrupt, with the sentence that the program ends with.
-    """
-    os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")  # Open MPI 4 starts a daemon otherwise, 0.2 s
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
-    options = parser.parse_args(ours)
-    for name, value in defaults(options).items() if defaults else ():
-        if not parser.gives(name, ours):
-            setattr(options, name, value)
-    start_petsc(petsc)
-    try:
-        with sentences(parser):
-            _run(parser, options, ours, scene_of, petsc)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; the branches that were finished are in {options.output}") from None
-    except MemoryError:
-        complain(
-            "Memory is exhausted: use fewer elements or a lower degree; the branches that were finished are in "
-            f"{options.output}."
-        )
-
-
-def _run(
-    parser: Parser,
-    options: argparse.Namespace,
-    ours: Sequence[str],
-    scene_of: Callable[[argparse.Namespace], Any],
-    petsc: Sequence[str],
-) -> None:
-    """Build and run the scene.
-
-    ``parser``, ``scene_of`` and ``options`` are those of :func:`main`, ``ours`` and ``petsc`` the words before and
-    after the lone ``--``.
-    """
-    from petsc4py import PETSc
-
-    from rodfem.app.run import run
-    from rodfem.app.terminal import Report
-    from rodfem.continuation.step_control import StepControl
-    from rodfem.diagram.plan import Plan
-    from rodfem.fem.fields import Discretization
-
-    if petsc:  # once more, for a PETSc that was running already
-        PETSc.Options().insertString(" ".join(petsc))
-    if options.accuracy is not None:
-        for name in ("elements", "degree"):
-            if parser.gives(name, ours):
-                raise InputError(f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy.")
-    discretization = Discretization(options.formulation, options.elements, options.degree, factors=options.factors)
-    scene = scene_of(options)
-    span = tuple(options.span)
-    steps = StepControl(largest=options.largest)
-    at = tuple(options.at)
-    plan = Plan(
-        span,
-        at,
-        depth=options.depth,
-        spectrum=options.spectrum,
-        steps=steps,
-        tries=options.tries,
-        locus=pair(options.locus),
-        method=options.method,
-        modes=options.modes,
-        accuracy=options.accuracy,
-    )
-    run(scene, discretization, plan, options.output, figures=options.figures, words=parser.in_options)
-    if unread := petsc_options.unread(petsc):
-        Report().warn(f"PETSc did not read the option {', '.join(unread)}: see whether it is spelled right.")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from argparse import Namespace
 from dataclasses import replace
 from math import cos, pi, sin
 from typing import Any
@@ -230,7 +229,7 @@ def test_a_pair_of_crossings_is_listed_once() -> None:
 
 @pytest.mark.alone
 def test_every_row_of_the_ring_demo() -> None:
-    scene = demo_cases.module("ring").scene(Namespace(twisting=1.5, span=(0.0, 1.6)))
+    scene = demo_cases.scene("ring")
     diagram = trace(scene, Discretization("auto", 8, 6), Plan(error_bars=False))
     verify(diagram.solvers[0], diagram.branches)
     assert [b.name for b in diagram] == ["circle", "branch 1", "branch 1.1", "branch 1.2"]

@@ -1,0 +1,122 @@
+"""Options that all rods have: discretisation, what to compute, output."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rodfem.app.cli import Parser, folder
+from rodfem.errors import InputError
+from rodfem.stability.methods import AUTO, METHODS
+
+if TYPE_CHECKING:
+    from rodfem.diagram.plan import Plan
+    from rodfem.fem.fields import Discretization
+
+STEP = 0.05
+"""Largest step along a branch, in radian, by default."""
+
+
+def add_options(parser: Parser, load: str, output: Path) -> None:
+    """Declare them; ``load`` is the name of the load, ``output`` the default folder."""
+    from rodfem.fem import formulations
+
+    words = {
+        "--elements": "number of finite elements along the rod (default: the scene's own, or 8)",
+        "--degree": "polynomial degree; the error falls as h^(2K) (default: the scene's own, or 6)",
+        "--formulation": "; ".join(f"{made.name}: {made.words}" for made in formulations.FORMULATIONS.values())
+        + f"; {formulations.AUTO}: the first that the scene allows (default {formulations.AUTO})",
+        "--factors": "chain: compiled assembly and elimination along the rod; petsc: the same numbers, slower, by "
+        "dolfinx, PETSc and MUMPS (default chain)",
+        "--accuracy": "instead of elements and degree: choose meshes on the way such that loads and ordinates are in "
+        "error by less than EPS (relative to values greater than one)",
+        "--range": f"start at {load} = A, stay between A and B (default: the scene's)",
+        "--at": f"compute every branch also at exactly these values of {load}",
+        "--step": f"largest step along a branch, in radian of rotation (root mean square; default {STEP})",
+        "--depth": "follow what leaves from branch points of branches of a depth less than D; the first branch has "
+        "depth 0, what leaves from it 1, and so on (default 2)",
+        "--spectrum": "also compute the K left-most eigenvalues of every state with SLEPc",
+        "--method": "judge the states at the loads of --at, and print all that is said, by "
+        f"{', '.join((AUTO, *METHODS))}",
+        "--modes": "find and draw the K left-most modes of the states at the loads of --at",
+        "--search": "at each load of --at also look for equilibria that no branch has reached, with that many tries",
+        "--locus": "follow every special point in the plane of the load and the constant NAME from LOW to HIGH",
+        "--output": f"folder for files and pictures (default {output})",
+        "--no-figures": "draw nothing",
+    }
+    groups: dict[str, dict[str, dict[str, Any]]] = {
+        "discretisation": {
+            "--elements": {"type": int, "metavar": "N"},
+            "--degree": {"type": int, "metavar": "K"},
+            "--formulation": {"metavar": f"{{{','.join(formulations.names())}}}"},
+            "--factors": {"default": "chain", "metavar": "{chain,petsc}"},
+            "--accuracy": {"type": float, "metavar": "EPS"},
+        },
+        "what to compute": {
+            "--range": {"dest": "span", "type": float, "nargs": 2, "metavar": ("A", "B")},
+            "--at": {"type": float, "nargs": "+", "default": [], "metavar": "LOAD"},
+            "--step": {"dest": "largest", "type": float, "default": STEP, "metavar": "S"},
+            "--depth": {"type": int, "default": 2, "metavar": "D"},
+            "--spectrum": {"type": int, "default": 0, "metavar": "K"},
+            "--method": {"default": "", "metavar": "NAME"},
+            "--modes": {"type": int, "default": 0, "metavar": "K"},
+            "--search": {"dest": "tries", "type": int, "default": 0, "metavar": "TRIES"},
+            "--locus": {"nargs": 3, "metavar": ("NAME", "LOW", "HIGH")},
+        },
+        "output": {
+            "--output": {"type": folder, "default": output, "metavar": "DIR"},
+            "--no-figures": {"dest": "figures", "action": "store_false"},
+        },
+    }
+    for title, options in groups.items():
+        group = parser.add_argument_group(title)
+        for option, how in options.items():
+            group.add_argument(option, help=words[option], **how)
+
+
+def mesh_of(options: argparse.Namespace, own: Discretization | None) -> Discretization:
+    """Discretisation that the options ask for, where they do not that of the scene's ``own``, if it has one.
+
+    Raises :class:`InputError` for elements or a degree beside an accuracy, and for what is no discretisation.
+    """
+    from rodfem.fem.fields import Discretization
+
+    chosen = {name: getattr(options, name) for name in ("formulation", "elements", "degree")}
+    given = {name: value for name, value in chosen.items() if value is not None}
+    for name in ("elements", "degree"):
+        if options.accuracy is not None and name in given:
+            raise InputError(f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy.")
+    own = own or Discretization()
+    return replace(own, factors=options.factors, **given)
+
+
+def plan_of(options: argparse.Namespace) -> Plan:
+    """Plan that the options ask for; raises :class:`InputError` for what is none."""
+    from rodfem.continuation.step_control import StepControl
+    from rodfem.diagram.plan import Plan
+
+    return Plan(
+        None if options.span is None else tuple(options.span),
+        tuple(options.at),
+        depth=options.depth,
+        spectrum=options.spectrum,
+        steps=StepControl(largest=options.largest),
+        tries=options.tries,
+        locus=_pair(options.locus),
+        method=options.method,
+        modes=options.modes,
+        accuracy=options.accuracy,
+    )
+
+
+def _pair(words: Sequence[str] | None) -> tuple[str, float, float] | None:
+    """Name and interval of a second parameter; raises :class:`InputError` for what are no numbers."""
+    if words is None:
+        return None
+    try:
+        return words[0], float(words[1]), float(words[2])
+    except ValueError:
+        raise InputError(f"{words[1]} to {words[2]} is no interval: give two numbers after {words[0]}.") from None

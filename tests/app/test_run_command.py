@@ -1,0 +1,92 @@
+"""The rod of a file, with its constants as options: ``rodfem run FILE.py``."""
+
+from __future__ import annotations
+
+from math import pi
+from pathlib import Path
+
+import demo_cases
+import pytest
+
+import rodfem
+from rodfem.app import console
+from rodfem.app.commands.run import load, mesh_of, rod_of
+from rodfem.app.constants import Statement
+from rodfem.errors import InputError
+
+pytestmark = pytest.mark.alone
+
+SCENE = """
+from forms.energy import bending_and_twist
+from rodfem import Discretization, Ordinate, Parameter, Scene, clamped, free
+
+column = Scene(
+    name="column",
+    interval=(0.0, 1.0),
+    rod="unshearable and inextensible",
+    energy=lambda v, k, c: bending_and_twist(k, (c.EI, 2 * c.EI, 1.0)),
+    parameters={"P": Parameter(0.0), "EI": Parameter(1.0)},
+    load="P",
+    ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
+    ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0] + r[1]),
+    span=(0.0, 10.0),
+)
+"""
+FUNCTION = SCENE.replace("column = Scene(", "def column(EI: float = 1) -> Scene:\n  return Scene(")
+FUNCTION = FUNCTION.replace("Parameter(1.0)", "Parameter(EI)")
+FUNCTION += "\ndef mesh(EI=1) -> Discretization:\n  return Discretization(elements=5)\n"
+
+
+@pytest.mark.parametrize("text", [SCENE, FUNCTION])
+def test_a_file_with_a_rod(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Euler's load is pi^2 EI / 4; the elements are those of the file's mesh where it has one."""
+    file = tmp_path / "mine.py"
+    file.write_text(text)
+    line = ["run", str(file), "--EI", "2", "--range", "0", "6", "--no-figures", "--output", str(tmp_path / "made")]
+    console.main(line)
+    said = capsys.readouterr().out
+    assert ("5 elements" if "mesh" in text else "8 elements") in said
+    data = rodfem.load_json(tmp_path / "made" / "diagram.json")
+    first = data["branches"][0]["special"][0]
+    assert abs(first["load"] - pi**2 / 2) < first["error_estimate"] < 1e-8
+    assert data["range"] == [0.0, 6.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x = 1 / 0", "line 1: ZeroDivisionError"),
+        ("x = (", "line 1: SyntaxError"),
+        ("import no_such_module", "line 1: ModuleNotFoundError"),
+        ("x = 1", "states no rod"),
+        (SCENE + "other = column", "has the scenes column, other"),
+        (SCENE.replace("span=(0.0, 10.0)", "span=(0.0, 0.0)"), "range"),
+        (FUNCTION.replace("EI: float = 1", "EI"), "The argument EI of column has no default"),
+        (FUNCTION.replace("EI: float = 1", "EI=None"), "The argument EI of column has the default None"),
+        (FUNCTION.replace("EI: float = 1", "degree=1, EI=1.0"), "has the name of an option of all rods"),
+        (FUNCTION.replace("return Scene(", "return (lambda **_: 3)("), "column returns 3"),
+    ],
+)
+def test_files_with_mistakes(text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(text)
+    with pytest.raises(SystemExit) as left:
+        console.main(["run", str(file)])
+    said = capsys.readouterr().err
+    assert left.value.code == 2
+    assert said.startswith("error: ") and said.count("\n") == 1 and words in said
+
+
+def test_a_named_scene(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(SCENE + "other = column")
+    module = load(file)
+    assert rod_of(module, "other") is module.other and mesh_of(module) is None
+    with pytest.raises(InputError, match="choose one of column, other"):
+        rod_of(module, "third")
+
+
+@pytest.mark.parametrize("name", demo_cases.FUNCTIONS)
+def test_constants_of_the_demos_are_described(name: str) -> None:
+    statement = Statement(getattr(demo_cases.module(name), demo_cases.FUNCTIONS[name]))
+    assert statement.constants and all(constant.words for constant in statement.constants)
