@@ -20,6 +20,7 @@ from rodfem.app.commands import view
 from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
 from rodfem.errors import InputError
+from rodfem.output.folder import remove_earlier
 from rodfem.report.page import STATIC, page_of, write_report
 from rodfem.report.payload import payload_of
 
@@ -119,6 +120,12 @@ def test_a_hostile_scene_is_harmless_in_files(results: Path, tmp_path: Path) -> 
     (tmp_path / "diagram.json").write_text(json.dumps(data))
     text = write_report(tmp_path).read_text()
     assert "<img" not in text and Elements(text).names().count("script") == 4
+
+
+def test_the_next_run_removes_the_page(tmp_path: Path) -> None:
+    (tmp_path / "report.html").touch()
+    remove_earlier(tmp_path)
+    assert not any(tmp_path.iterdir())
 
 
 def test_libraries_have_their_licences() -> None:

@@ -21,7 +21,7 @@ function curve(locus) {
     x: locus.x,
     y: locus.load,
     customdata: locus.load,
-    text: locus.index.map((pair, i) => `${escaped(locus.kind)}, ${locus.file.replace(".json", "")}<br>${names}${digits(locus.load[i])}<br>${escaped(locus.parameter)} = ${digits(locus.x[i])}${pair[0] < 0 ? "" : `<br>index ${pair[0]} on one side, ${pair[1]} on the other`}`),
+    text: locus.index.map((pair, i) => `${escaped(locus.kind)}, ${escaped(locus.file.replace(".json", ""))}<br>${names}${digits(locus.load[i])}<br>${escaped(locus.parameter)} = ${digits(locus.x[i])}${pair[0] < 0 ? "" : `<br>index ${pair[0]} on one side, ${pair[1]} on the other`}`),
     hovertemplate: "%{text}<extra></extra>",
     mode: "lines",
     line: { color: locus.colour, width: locus.index.some(bounds) ? 4 : 2, dash: DASHES[locus.kind] ?? "solid" },
