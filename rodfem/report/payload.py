@@ -14,6 +14,7 @@ from rodfem.output.contents import check_run, read_diagram
 from rodfem.output.sheet import mesh_in_words
 from rodfem.report.branches import DERIVED, ordinates_of
 from rodfem.report.labels import html_of, plain_of
+from rodfem.report.loaded import Loaded
 from rodfem.report.loci import loci_of
 from rodfem.report.rods import rods_of
 
@@ -29,7 +30,7 @@ def payload_of(folder: Path) -> dict[str, Any]:
     try:
         with h5py.File(folder / "states.h5", "r") as file:
             STATES.check_hdf5(file, ("branches",))
-            return _about(data, folder) | rods_of(data, file["branches"], folder)
+            return _about(data, folder) | rods_of(data, Loaded(file["branches"]), folder)
     except UNREADABLE as trouble:
         if isinstance(trouble, InputError):
             raise

@@ -58,7 +58,7 @@ def shapes_of(group: Any, count: int) -> Shapes:
 
     Raises :class:`InputError` where one is not finite, or no curve.
     """
-    s, r, q = (group[name][()] for name in ("s", "r", "q"))
+    s, r, q = (np.asarray(group[name]) for name in ("s", "r", "q"))
     rows = []
     for row, at in enumerate(np.isfinite(s)):  # the rows of a mesh with fewer nodes end in nan
         rows.append(_state((s[row, at], r[row, at], q[row, at]), count, group))
