@@ -59,6 +59,10 @@ class Diagram:
         Name of this run on the first rank, which its files have in common.
     origin
         Command, date and versions of its libraries.
+    asked
+        Scene, discretisation and plan in numbers, as they were traced; None: unknown.
+    complete
+        Whether all that was asked for has been done.
     """
 
     def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[StaticSolver]) -> None:
@@ -68,6 +72,8 @@ class Diagram:
         self.notes: list[str] = []
         self.run = uuid4().hex
         self.origin = origin()
+        self.asked: dict[str, Any] | None = None
+        self.complete = False
         self._asked: dict[int, Solver] = {}
 
     # --- what there is ---------------------------------------------------------------------------------------------
@@ -232,10 +238,9 @@ class Diagram:
     def data(self) -> dict[str, Any]:
         """Contents of ``diagram.json``: see docs/files.md."""
         systems = [solver.system for solver in self.solvers]
-        return as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy) | {
-            "run": self.run,
-            "origin": self.origin,
-        }
+        data = as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy)
+        asked = {} if self.asked is None else {"asked": self.asked}
+        return data | asked | {"complete": self.complete, "run": self.run, "origin": self.origin}
 
     @checked(folder=path("results/column"))
     def save(self, folder: Path | str) -> Path:

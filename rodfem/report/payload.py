@@ -52,6 +52,7 @@ def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
             for key, name in ((key, names.get(key, key)) for key in ordinates_of(data))
         ],
         "constants": data["constants"],
+        "complete": data.get("complete", True),
         "meaning": data.get("meaning", {}),
         "mesh": mesh_in_words(data["discretization"]),
         "program": (data.get("format") or {}).get("program", "an earlier version of rodfem"),
