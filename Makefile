@@ -25,7 +25,7 @@ export MPLBACKEND := Agg
 export PYVISTA_OFF_SCREEN := true
 export VTK_DEFAULT_OPENGL_WINDOW := vtkEGLRenderWindow
 
-.PHONY: help setup demo test lint figures docs bench clean
+.PHONY: help setup demo test lint figures notebooks docs bench clean
 
 help: ## list these commands
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 12
@@ -53,6 +53,13 @@ docs: setup ## build the site in build/site; LESSONS=off does not execute the co
 	@tools/setup.sh docs
 	RODFEM_LESSONS=$(LESSONS) $(PYTHON) -m sphinx -q -W --keep-going -b html docs build/site
 	@echo "The site: build/site/index.html"
+
+notebooks: setup ## the lessons of the course as notebooks, in results/notebooks
+	@tools/setup.sh docs
+	@mkdir -p results/notebooks
+	@set -e; for lesson in docs/course/[0-9]*.py; do \
+		$(PYTHON) -m jupytext --quiet --to ipynb --output "results/notebooks/$$(basename "$$lesson" .py).ipynb" "$$lesson"; \
+	done; ls results/notebooks
 
 bench: setup ## measure speed, ways to judge a state, hard cases: docs/speed.md, stability.md, robustness.md (40 minutes)
 	$(PYTHON) -m benchmarks.speed
