@@ -186,7 +186,7 @@ FAULTS = {
         "rodfem/output/files.py", "_trimmed(value[row])", "_trimmed(value[row - 1])", f"{FILES} {DIAGRAM}"
     ),
     "files-of-two-runs": Fault(
-        "rodfem/output/files.py",
+        "rodfem/output/contents.py",
         'if run != data.get("run"):',
         "if False:",
         f"{FILES} {KILLS} tests/output/test_foreign_files.py",

@@ -22,6 +22,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
 from rodfem.output.files import as_data, save_run
 from rodfem.output.folder import PICTURES, locked, picture_at
+from rodfem.output.origin import origin
 from rodfem.problem.arguments import a, checked, count, interval, number, path, text
 from rodfem.problem.scene import Scene
 from rodfem.ranks import on_first
@@ -56,6 +57,8 @@ class Diagram:
         Seconds by scope.
     run
         Name of this run on the first rank, which its files have in common.
+    origin
+        Command, date and versions of its libraries.
     asked
         Scene, discretisation and plan in numbers, as they were traced; None: unknown.
     complete
@@ -68,6 +71,7 @@ class Diagram:
         self.warnings: list[str] = []
         self.notes: list[str] = []
         self.run = uuid4().hex
+        self.origin = origin()
         self.asked: dict[str, Any] | None = None
         self.complete = False
         self._asked: dict[int, Solver] = {}
@@ -237,7 +241,7 @@ class Diagram:
         systems = [solver.system for solver in self.solvers]
         data = as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy)
         asked = {} if self.asked is None else {"asked": self.asked}
-        return data | asked | {"complete": self.complete, "run": self.run}
+        return data | asked | {"complete": self.complete, "run": self.run, "origin": self.origin}
 
     @checked(folder=path("results/column"))
     def save(self, folder: Path | str) -> Path:

@@ -19,7 +19,8 @@ from rodfem.diagram.solver import RANKS, SCENE, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.file_format import DIAGRAM
-from rodfem.output.files import COLUMNS, OPTIONAL, SOFT, SPECIAL, UNDECIDED, check_run, load_json, load_state
+from rodfem.output.contents import check_run
+from rodfem.output.files import COLUMNS, OPTIONAL, SOFT, SPECIAL, UNDECIDED, load_json, load_state
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
 from rodfem.stability.soft_mode import SoftMode

@@ -14,7 +14,7 @@ from typing import Any
 
 from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
-from rodfem.file_format import DIAGRAM, read_json
+from rodfem.file_format import DIAGRAM, STATES, read_json
 
 Test = Callable[[Any], bool]
 SHORT = Repr()
@@ -74,6 +74,7 @@ TOP: Kinds = {
     "range": (_all(_is_number, 2), "two finite numbers"),
     "accuracy": MAYBE,
     "discretization": OBJECT,
+    "origin": OBJECT,
     "meshes": OBJECTS,
     "branches": OBJECTS,
 }
@@ -165,3 +166,20 @@ def _check(data: Mapping[str, Any], kinds: Kinds, where: Path | str) -> None:
             raise InputError(
                 f"{where} has the {name} {SHORT.repr(data[name])}, where {words} was expected: run the scene again."
             )
+
+
+def check_run(data: dict[str, Any], states: Path) -> None:
+    """Raise :class:`InputError` where ``states.h5`` is of another run than the ``data`` of a ``diagram.json``."""
+    import h5py
+
+    try:
+        with h5py.File(states, "r") as file:
+            STATES.check_hdf5(file)
+            run = file.attrs.get("run")
+    except OSError as trouble:
+        raise InputError(f"{states} is no {STATES.name} ({trouble}): give {STATES.file}.") from trouble
+    if run != data.get("run"):
+        raise InputError(
+            f"{states} and the diagram.json beside it are of different runs: keep the files of one run together, or "
+            "run the scene again."
+        )

@@ -288,23 +288,6 @@ def _trimmed(row: Any) -> Any:
     return row
 
 
-def check_run(data: dict[str, Any], states: Path) -> None:
-    """Raise :class:`InputError` where ``states.h5`` is of another run than the ``data`` of a ``diagram.json``."""
-    import h5py
-
-    try:
-        with h5py.File(states, "r") as file:
-            STATES.check_hdf5(file)
-            run = file.attrs.get("run")
-    except OSError as trouble:
-        raise InputError(f"{states} is no {STATES.name} ({trouble}): give {STATES.file}.") from trouble
-    if run != data.get("run"):
-        raise InputError(
-            f"{states} and the diagram.json beside it are of different runs: keep the files of one run together, or "
-            "run the scene again."
-        )
-
-
 def mesh_of(system: System) -> dict[str, Any]:
     """Discretisation, as files record it."""
     d = system.fields.discretization

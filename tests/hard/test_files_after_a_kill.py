@@ -22,7 +22,8 @@ import rodfem
 from rodfem.app.run import Terminal, run
 from rodfem.diagram.diagram import Diagram
 from rodfem.errors import InputError
-from rodfem.output.files import check_run, load_json
+from rodfem.output.contents import check_run
+from rodfem.output.files import load_json
 from rodfem.output.folder import LOCK, locked
 from rodfem.whole_files import DRAFTS
 

@@ -73,9 +73,9 @@ def interrupted_at(monkeypatch: pytest.MonkeyPatch, moment: int) -> None:
 
 
 def contents(folder: Path) -> dict[str, Any]:
-    """Diagram of a run, but for times and the name of the run."""
+    """Diagram of a run, but for times, origin and the name of the run."""
     data: dict[str, Any] = json.loads((folder / "diagram.json").read_text())
-    return {name: value for name, value in data.items() if name not in ("timing", "run")}
+    return {name: value for name, value in data.items() if name not in ("timing", "origin", "run")}
 
 
 def check_states(folder: Path, other: Path, close: float = 0.0) -> None:
@@ -269,12 +269,13 @@ def test_nothing_to_do(folder: Path, capfd: pytest.CaptureFixture[str], monkeypa
 
 @pytest.mark.alone
 def test_same_input_same_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Byte for byte, but for times and the name of the run."""
+    """Byte for byte, but for times, their date among them, and the name of the run."""
     monkeypatch.setattr("rodfem.app.run_terminal.uuid4", lambda: type("name", (), {"hex": "one"}))
     for name in ("first", "second"):
         run_of(*(x() if callable(x) else x for x in CASES["hemitropic"]), folder / name)  # type: ignore[arg-type]
     first, second = (json.loads((folder / name / "diagram.json").read_text()) for name in ("first", "second"))
-    assert json.dumps(first | {"timing": {}}) == json.dumps(second | {"timing": {}})
+    times = {"timing": {}, "origin": {}}
+    assert json.dumps(first | times) == json.dumps(second | times)
     assert (folder / "first" / "states.h5").read_bytes() == (folder / "second" / "states.h5").read_bytes()
 
 

@@ -1,0 +1,59 @@
+"""Saved diagrams below a folder: scene, date, size, first loss of stability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from rodfem.app.cli import Parser
+from rodfem.errors import InputError
+from rodfem.output.contents import read_diagram
+from rodfem.output.first_loss import first_loss
+
+NEEDED = ("scene", "parameter", "branches")
+DAY = len("2026-01-31")
+WIDTHS = (28, 16, DAY, 8, 7)
+HEADS = ("folder", "scene", "date", "branches", "special")
+
+
+def main(words: Sequence[str]) -> None:
+    """Print a line for each; raises :class:`~rodfem.errors.InputError` where there is none."""
+    parser = Parser(prog="rodfem list", description=__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("results"), help="default: results")
+    print("\n".join(lines(parser.parse_args(words).folder)))
+
+
+def lines(folder: Path) -> Iterator[str]:
+    """Head of the table and a line for each diagram; a file that is none has its reason in place of numbers.
+
+    Raises :class:`~rodfem.errors.InputError` where there is no file.
+    """
+    files = sorted(folder.rglob("diagram.json"))
+    if not files:
+        raise InputError(f"No folder in {folder} has a diagram.json: run a scene, or name a folder with results.")
+    yield _row(*HEADS, "first loss of stability")
+    for file in files:
+        name = str(file.parent)
+        try:
+            data = read_diagram(file, NEEDED)
+            yield _row(name, data["scene"], _date(data, file), *_sizes(data), first_loss(data))
+        except InputError as trouble:
+            yield f"{name:<{WIDTHS[0]}} {trouble}"
+
+
+def _row(*cells: str) -> str:
+    *others, last = cells
+    return " ".join([*(f"{cell:<{width}}" for cell, width in zip(others, WIDTHS, strict=True)), last])
+
+
+def _sizes(data: Mapping[str, Any]) -> tuple[str, str]:
+    """Numbers of branches and of special points."""
+    return str(len(data["branches"])), str(sum(len(branch["special"]) for branch in data["branches"]))
+
+
+def _date(data: Mapping[str, Any], file: Path) -> str:
+    """Day of the run, or of the file where that does not say."""
+    written = datetime.fromtimestamp(file.stat().st_mtime, UTC).isoformat()
+    return str((data.get("origin") or {}).get("date") or written)[:DAY]

@@ -1,0 +1,109 @@
+"""Branches of ``diagram.json`` as the page draws them: columns, pieces of one index, special points, words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from rodfem.continuation.kinds import KINDS
+from rodfem.output.digits import number
+from rodfem.output.plot_pieces import pieces_of
+from rodfem.report.packing import plain
+from rodfem.report.shapes import Shapes
+from rodfem.report.words import words_of
+from rodfem.report.writhe import writhe
+
+UNLISTED = ("load", "negative", "zero", "mesh", "unstable", "negative_in_space", "drift", "error")
+"""Columns that are no ordinates: the abscissa, counts, and residuals."""
+SHORTENING, WRITHE = "end shortening", "writhe"
+DERIVED = {
+    SHORTENING: "end shortening: length − distance of the ends",
+    WRITHE: "writhe: Gauss integral of the centreline",
+}
+"""Ordinates that follow from the shapes, in words."""
+
+
+def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str) -> dict[str, Any]:
+    """A branch as the page has it; ``shapes`` are those of its rows."""
+    columns = branch["columns"]
+    words = words_of(branch)
+    told = list(dict.fromkeys(words))
+    return {
+        "name": branch["name"],
+        "colour": colour,
+        "parent": branch["parent"],
+        "ended": branch["ended"],
+        "load": columns["load"],
+        "negative": columns["negative"],
+        "ordinates": {name: plain(np.array(columns[name], dtype=float)) for name in _listed(columns)}
+        | _derived(shapes),
+        "estimate": columns.get("estimate"),
+        "error": columns.get("error"),
+        "pieces": _pieces(branch, colour),
+        "special": [_special(x) for x in branch["special"]],
+        "words": [told.index(each) for each in words],
+        "told": [asdict(each) for each in told],
+        "spectrum": columns.get("spectrum"),
+        "omega2": columns.get("omega2"),
+        "motion": columns.get("motion"),
+        "unexplained": [change["row"] for change in branch.get("unexplained") or ()],
+    }
+
+
+def ordinates_of(data: Mapping[str, Any]) -> list[str]:
+    """Ordinates that all branches have, the scene's first."""
+    common = [name for name in _listed(data["branches"][0]["columns"])]
+    for branch in data["branches"]:
+        common = [name for name in common if name in branch["columns"]]
+    return [*common, *DERIVED]
+
+
+def _listed(columns: Mapping[str, Any]) -> Iterable[str]:
+    names = [name for name in columns if name not in UNLISTED]
+    return sorted((name for name in names if _numbers(columns[name])), key=lambda name: name != "ordinate")
+
+
+def _numbers(column: Iterable[Any]) -> bool:
+    return all(x is None or (isinstance(x, (int, float)) and not isinstance(x, bool)) for x in column)
+
+
+def _derived(shapes: Shapes) -> dict[str, list[float | None]]:
+    length = shapes.s[-1] - shapes.s[0]
+    ends = np.linalg.norm(shapes.r[:, -1] - shapes.r[:, 0], axis=1)
+    coarse = max(1, len(shapes.s) // 60)
+    return {
+        SHORTENING: plain(length - ends),
+        WRITHE: plain(np.array([writhe(r[::coarse]) for r in shapes.r])),
+    }
+
+
+def _pieces(branch: Mapping[str, Any], colour: str) -> list[dict[str, Any]]:
+    """First and last row, index and kind of each piece of one index."""
+    found, first = [], 0
+    for piece in pieces_of(branch, colour):
+        last = first + len(piece.curve) - 1
+        found.append({"rows": [first, last], "kind": piece.kind, "index": piece.label})
+        first = last
+    return found
+
+
+def _special(special: Mapping[str, Any]) -> dict[str, Any]:
+    kind = KINDS[special["kind"]]
+    bar = special.get("error_estimate")
+    load = f"{special['load']:.10g}"
+    if not kind.given:
+        load = number(special["load"], inf if bar is None else bar, special.get("resolved"))
+    before, after = special["negative_before"], special["negative_after"]
+    return {
+        "kind": special["kind"],
+        "row": special["row"],
+        "load": load,
+        "index": str(before) if before == after else f"{before}→{after}",
+        "law": (special.get("law") or {}).get("kind", ""),
+        "note": special.get("note") or "",
+        "drawn": bool(kind.marker),
+    }

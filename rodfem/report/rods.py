@@ -1,0 +1,113 @@
+"""Shapes, supports and modes of all states, as the page draws them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodfem.errors import InputError
+from rodfem.modes.modes import rows_with_modes
+from rodfem.output.glyphs import glyphs_of
+from rodfem.output.sheet import PALETTE
+from rodfem.output.solids import profile_of
+from rodfem.problem.setting import read as read_setting
+from rodfem.report.bodies import FLAT, Shelf
+from rodfem.report.branches import branch_data
+from rodfem.report.motions import motions_of
+from rodfem.report.packing import packed
+from rodfem.report.shapes import Shapes, shapes_of, stations
+from rodfem.report.stage import Stage, stage_of
+
+Floats = NDArray[np.float64]
+
+OUTLINE, STRIPE = np.linspace(-np.pi, np.pi, 29)[:-1], np.linspace(-0.3, 0.3, 5)
+"""Angles from d1 of the outline of a cross-section, and of the stripe that marks d1."""
+OVER = 1.02
+"""Distance of the stripe from the axis, relative to that of the surface."""
+UNIFORM = 1e-6
+"""Difference of outlines, in radii of the rod, up to which they are one."""
+
+
+def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any]:
+    """Branches with their shapes, and what they share; ``groups`` are those of ``states.h5`` in the ``folder``.
+
+    Raises :class:`InputError` where they are not of the diagram ``data``.
+    """
+    shapes = _shapes(data, groups, folder)
+    stage = stage_of(data, shapes, groups)
+    shelf, with_modes, branches = Shelf(stage.radius), rows_with_modes(folder / "modes.h5"), []
+    for branch, colour in zip(data["branches"], cycle(PALETTE), strict=False):
+        name = branch["name"]
+        here, group = shapes[name], groups[name]
+        rows = [row for other, row in with_modes if other == name and row < len(here.r)]
+        found = [_placed(here, row, group, stage, shelf) for row in range(len(here.r))]
+        modes = {}
+        for row in rows:
+            setting = read_setting(group, row)
+            modes[row] = motions_of(folder / "modes.h5", (name, row), here, setting, stage, shelf, found[row][0])
+        branches.append(branch_data(branch, here, colour) | _drawn(here, found) | {"modes": modes})
+    return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": _solids(shelf)}
+
+
+def _shapes(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Shapes]:
+    lengths = {branch["name"]: len(branch["columns"]["load"]) for branch in data["branches"]}
+    count = stations(max(groups[name]["s"].shape[1] for name in lengths), sum(lengths.values()))
+    shapes = {name: shapes_of(groups[name], count) for name in lengths}
+    for name, length in lengths.items():
+        if len(shapes[name].r) != length:
+            raise InputError(f"{folder / 'states.h5'} has other rows of {name!r} than diagram.json: run it again.")
+    return shapes
+
+
+def _placed(shapes: Shapes, row: int, group: Any, stage: Stage, shelf: Shelf) -> tuple[list[int], list[Floats]]:
+    """Bodies of the supports and loads of a state, and their maps."""
+    r, frames = shapes[row]
+    return shelf.place_all(glyphs_of(read_setting(group, row), shapes.s, r, frames, stage.radius, stage.axes))
+
+
+def _drawn(shapes: Shapes, found: list[tuple[list[int], list[Floats]]]) -> dict[str, Any]:
+    maps = [placed for _, each in found for placed in each]
+    return {
+        "shape": packed(np.concatenate([shapes.r, shapes.q], axis=2)),
+        "strain": packed(np.concatenate([shapes.v, shapes.k], axis=2)),
+        "bodies": [numbers for numbers, _ in found],
+        "maps": packed(np.array(maps).reshape(-1, 12)),
+    }
+
+
+def _common(stage: Stage, shapes: Shapes, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Cross-sections, size and direction of the pictures, and the state that is shown first."""
+    return {
+        "s": packed(shapes.s),
+        "outline": packed(_outline(shapes, stage, OUTLINE)),
+        "stripe": packed(OVER * _outline(shapes, stage, STRIPE)),
+        "radius": stage.radius,
+        "size": float(shapes.s[-1] - shapes.s[0]),
+        "axes": stage.axes.tolist(),
+        "loadDirection": None if stage.load is None else stage.load.tolist(),
+        "notes": list(stage.setting.notes),
+        "start": [[branch["name"] for branch in data["branches"]].index(stage.branch), stage.row],
+    }
+
+
+def _outline(shapes: Shapes, stage: Stage, angles: Floats) -> Floats:
+    """Outline of the cross-sections (1, k, 2), or (S, k, 2) at the stations where they differ."""
+    whole = stage.radius * profile_of(shapes.s, stage.setting.section, angles)
+    return whole[:1] if np.ptp(whole, axis=0).max() < UNIFORM * stage.radius else whole
+
+
+def _solids(shelf: Shelf) -> list[dict[str, Any]]:
+    return [
+        {
+            "points": packed(body.solid.points),
+            "triangles": body.solid.triangles.ravel().tolist(),
+            "colour": body.solid.color,
+            "flat": len(body.solid.points) <= FLAT,
+        }
+        for body in shelf.bodies
+    ]

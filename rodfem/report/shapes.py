@@ -1,0 +1,81 @@
+"""States of a branch at equal stations along the rod: centreline, directors and strains, from ``states.h5``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from rodfem.errors import InputError
+from rodfem.problem.quaternions import CONJUGATE, directors, product
+
+Floats = NDArray[np.float64]
+
+FEWEST, MOST = 49, 241
+"""Stations along a rod."""
+FEWEST_NODES = 4
+"""Nodes of a cubic spline, at least."""
+BUDGET = 400_000
+"""Stations of all states together above which each has fewer: about 20 MB of the page."""
+
+
+def stations(nodes: int, states: int) -> int:
+    """Number of stations for states with so many nodes, odd, so that the middle of the rod is one."""
+    wanted = min(2 * nodes - 1, MOST, BUDGET // max(states, 1))
+    return max(FEWEST, wanted) | 1
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """P states at S stations.
+
+    Attributes
+    ----------
+    s
+        Arclengths (S,).
+    r, q
+        Centreline (P, S, 3) and unit quaternions (P, S, 4), continuous along the rod.
+    v, k
+        Strains ``R^t r'`` and curvatures, the axial vector of ``R^t R'``, along the directors, (P, S, 3).
+    """
+
+    s: Floats
+    r: Floats
+    q: Floats
+    v: Floats
+    k: Floats
+
+    def __getitem__(self, row: int) -> tuple[Floats, Floats]:
+        """Centreline (S, 3) and directors (S, 3, 3), columns of each matrix, of a state."""
+        return self.r[row], directors(self.q[row])
+
+
+def shapes_of(group: Any, count: int) -> Shapes:
+    """Read the states below the group of a branch at ``count`` stations, by splines through the nodes.
+
+    Raises :class:`InputError` where one is not finite, or no curve.
+    """
+    s, r, q = (np.asarray(group[name]) for name in ("s", "r", "q"))
+    rows = []
+    for row, at in enumerate(np.isfinite(s)):  # the rows of a mesh with fewer nodes end in nan
+        rows.append(_state((s[row, at], r[row, at], q[row, at]), count, group))
+    at, *fields = (np.array(part) for part in zip(*rows, strict=True))
+    return Shapes(at[0], *fields)
+
+
+def _state(nodes: tuple[Floats, Floats, Floats], count: int, group: Any) -> tuple[Floats, ...]:
+    """Arclengths, centreline, quaternions, strains and curvatures at the stations."""
+    s, r, q = nodes
+    if len(s) < FEWEST_NODES or not np.isfinite(r).all() or not np.isfinite(q).all() or not (np.diff(s) > 0).all():
+        raise InputError(f"{group.file.filename} has a state that is no curve in {group.name}: run the scene again.")
+    opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
+    signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
+    at, centreline = np.linspace(s[0], s[-1], count), CubicSpline(s, r)
+    turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])
+    q, slope = turned(at), turned(at, 1)
+    v = np.einsum("nji,nj->ni", directors(q), centreline(at, 1))
+    k = 2.0 * product(q * CONJUGATE, slope)[:, 1:] / np.sum(q * q, axis=1, keepdims=True)
+    return at, centreline(at), q / np.linalg.norm(q, axis=1, keepdims=True), v, k

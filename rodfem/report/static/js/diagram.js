@@ -1,0 +1,115 @@
+// The bifurcation diagram: a trace for each piece of one index, special points, and the state that is shown.
+
+import { data, digits, escaped } from "report/data";
+import { select, state, subscribe } from "report/store";
+import { cursorOf } from "report/cursor";
+import { draw, layout } from "report/plotting";
+import { DASHES, SYMBOLS, UNEXPLAINED, WIDTHS } from "report/styles";
+
+const plot = document.getElementById("diagram");
+const choice = document.getElementById("ordinate");
+let ordinate = data.ordinates[0];
+let cursor = null;
+
+const heights = (branch) => branch.ordinates[ordinate.key];
+
+function hover(branch, row) {
+  const words = branch.told[branch.words[row]];
+  const special = branch.special.find((x) => x.row === row);
+  const error = branch.estimate?.[row];
+  const lines = [
+    `<b>${escaped(branch.name)}</b>, row ${row}`,
+    `${escaped(data.symbol)} = ${special ? escaped(special.load) : digits(branch.load[row], 8)}`,
+    `${escaped(ordinate.name)} = ${digits(heights(branch)[row], 8)}`,
+    `index ${escaped(words.index)}, ${words.verdict === "planar" ? "stable in the plane only" : words.verdict}`,
+    special ? `<b>${escaped(special.kind)}</b>${special.law ? `, ${escaped(special.law)}` : ""}` : "",
+    special ? "" : error === null || error === undefined ? "error not estimated at this row" : `error at most ${error.toExponential(0)}`,
+  ];
+  return lines.filter(Boolean).join("<br>");
+}
+
+function line(branch, number, piece) {
+  const [a, b] = piece.rows, rows = Array.from({ length: b - a + 1 }, (_, i) => a + i);
+  return {
+    x: rows.map((row) => branch.load[row]),
+    y: rows.map((row) => heights(branch)[row]),
+    customdata: rows.map((row) => [number, row]),
+    text: rows.map((row) => hover(branch, row)),
+    hovertemplate: "%{text}<extra></extra>",
+    mode: "lines",
+    line: { color: branch.colour, width: WIDTHS[piece.kind], dash: DASHES[piece.kind], simplify: false },
+  };
+}
+
+function marks(branch, number, kind) {
+  const rows = branch.special.filter((x) => x.drawn && x.kind === kind).map((x) => x.row);
+  return points(branch, number, rows, SYMBOLS[kind]);
+}
+
+function points(branch, number, rows, marker) {
+  return {
+    x: rows.map((row) => branch.load[row]),
+    y: rows.map((row) => heights(branch)[row]),
+    customdata: rows.map((row) => [number, row]),
+    text: rows.map((row) => hover(branch, row)),
+    hovertemplate: "%{text}<extra></extra>",
+    mode: "markers",
+    cliponaxis: false,
+    marker,
+  };
+}
+
+// The index beside the middle of each piece that is long enough for it.
+function labels() {
+  const all = data.branches.flatMap((b) => b.load.map((x, i) => [x, heights(b)[i]])).filter((p) => p[1] !== null);
+  const range = (k) => Math.max(...all.map((p) => p[k])) - Math.min(...all.map((p) => p[k])) || 1;
+  const [width, height] = [range(0), range(1)];
+  const found = [];
+  for (const b of data.branches)
+    for (const piece of b.pieces) {
+      const [first, last] = piece.rows, y = heights(b), at = (i) => [b.load[i] / width, y[i] / height];
+      let length = 0;
+      for (let i = first; i < last; i++) length += Math.hypot(at(i + 1)[0] - at(i)[0], at(i + 1)[1] - at(i)[1]);
+      const row = Math.round((first + last) / 2), [x, v] = at(row);
+      if (length > 0.07 && y[row] !== null && !found.some((o) => Math.hypot(o.x - x, o.v - v) < 0.045)) found.push({ x, v, row, b, text: piece.index });
+    }
+  return found.map(({ b, row, text }) => ({
+    x: b.load[row], y: heights(b)[row], text: `<b>${escaped(text)}</b>`, showarrow: false, yshift: 11, xshift: 7,
+    font: { color: b.colour, size: 14 }, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0, captureevents: false,
+  }));
+}
+
+function traces() {
+  const each = data.branches.map((branch, number) => [branch, number]);
+  const thick = (trace) => -trace.line.width;
+  const lines = each.flatMap(([b, i]) => b.pieces.map((piece) => line(b, i, piece))).sort((a, b) => thick(a) - thick(b));
+  const single = each.filter(([b]) => !b.pieces.length).map(([b, i]) => points(b, i, [0], { size: 7, color: b.colour }));
+  const special = Object.keys(SYMBOLS).flatMap((kind) => each.map(([b, i]) => marks(b, i, kind)));
+  const doubts = each.map(([b, i]) => points(b, i, b.unexplained, UNEXPLAINED));
+  return [...lines, ...single, ...[...special, ...doubts].filter((trace) => trace.x.length)];
+}
+
+function redraw() {
+  return draw(plot, traces(), layout(data.label, ordinate.label, { annotations: labels(), uirevision: ordinate.key }));
+}
+
+function moveCursor() {
+  const b = data.branches[state.branch];
+  cursor(b.load[state.row], heights(b)[state.row] ?? undefined);
+}
+
+export async function start() {
+  for (const [i, each] of data.ordinates.entries()) choice.add(new Option(each.name, i));
+  choice.addEventListener("change", async () => {
+    ordinate = data.ordinates[choice.value];
+    await redraw();
+    moveCursor();
+  });
+  await redraw();
+  cursor = cursorOf(plot);
+  plot.on("plotly_click", (event) => {
+    const place = event.points.find((point) => point.customdata)?.customdata;
+    if (place) select(place[0], place[1]);
+  });
+  subscribe(moveCursor);
+}

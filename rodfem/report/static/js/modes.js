@@ -1,0 +1,40 @@
+// Buttons of the modes that a state has, and of the states that have some.
+
+import { data, digits } from "report/data";
+import { branch, select, showMode, state, subscribe } from "report/store";
+
+const box = document.getElementById("modes");
+let shown = "";
+
+function button(text, pressed, action, kind = "") {
+  const made = document.createElement("button");
+  made.type = "button";
+  made.className = kind;
+  made.textContent = text;
+  if (pressed !== null) made.setAttribute("aria-pressed", pressed);
+  made.addEventListener("click", action);
+  return made;
+}
+
+const WORDS = { grows: "grows", swings: "swings", zero: "zero" };
+
+function words(mode) {
+  const [x, y] = mode.value;
+  const value = mode.kind === "zero" ? "0" : `${digits(x, 5)}${y ? ` ${y > 0 ? "+" : "−"} ${digits(Math.abs(y), 5)} i` : ""}`;
+  return `${mode.kind === "grows" ? "◌" : "●"} μ = ${value}: ${mode.motion}, ${WORDS[mode.kind]}`;
+}
+
+function redraw() {
+  const b = branch(), here = b.modes[state.row] ?? [];
+  const key = [state.branch, here.length ? state.row : -1, here.indexOf(state.mode)].join();
+  if (key === shown) return;
+  shown = key;
+  const buttons = here.map((mode) => button(words(mode), mode === state.mode, () => showMode(mode === state.mode ? null : mode), mode.kind));
+  const rows = Object.keys(b.modes).map(Number);
+  const others = here.length ? [] : rows.map((row) => button(`modes at ${data.symbol} = ${digits(b.load[row])}`, null, () => select(state.branch, row)));
+  box.replaceChildren(...buttons, ...others);
+}
+
+export function start() {
+  subscribe(redraw);
+}

@@ -1,0 +1,69 @@
+// Left-most eigenvalues along the branch, by sign: negative ones are triangles, positive ones circles.
+
+import { data, digits, escaped } from "report/data";
+import { branch, select, state, subscribe } from "report/store";
+import { cursorOf } from "report/cursor";
+import { draw, empty, layout } from "report/plotting";
+import { BLUE, VERMILION } from "report/styles";
+
+const plot = document.getElementById("spectrum");
+let shown = null, cursor = null;
+
+const KINDS = [
+  { name: "positive", test: ([x, y]) => !y && x > 0, marker: { symbol: "circle", size: 5, color: BLUE } },
+  { name: "zero", test: ([x, y]) => !y && x === 0, marker: { symbol: "circle-open", size: 5, color: "#555" } },
+  { name: "negative", test: ([x, y]) => !y && x < 0, marker: { symbol: "triangle-down", size: 7, color: VERMILION } },
+  { name: "complex", test: ([, y]) => y !== 0, marker: { symbol: "x-thin", size: 6, line: { color: VERMILION, width: 1.8 } } },
+];
+
+// (row, real part, imaginary part) of all eigenvalues that a branch has recorded.
+function recorded(b) {
+  const rows = b.spectrum?.map((each) => each.map((x) => [x, 0])) ?? b.omega2 ?? [];
+  return rows.flatMap((each, row) => each.map(([x, y]) => ({ row, value: [x, y] })));
+}
+
+// All eigenvalues; of squared frequencies the lowest two, which may meet.
+function range(b, all) {
+  const highest = b.omega2 ? b.omega2.map((each) => Math.max(...each.slice(0, 2).map((x) => x[0]))) : all.map((each) => each.value[0]);
+  const low = Math.min(0, ...all.map((each) => each.value[0])), high = Math.max(0, ...highest), room = 0.07 * (high - low) || 1;
+  return [low - room, high + room];
+}
+
+function redraw() {
+  const b = branch(), all = recorded(b);
+  shown = b;
+  if (!all.length) {
+    cursor = null;
+    empty(plot, "Eigenvalues are not recorded:\nrun the scene with --spectrum 4.");
+    return;
+  }
+  if (!cursor) plot.replaceChildren();
+  const words = ({ row, value: [x, y] }) => `row ${row}, ${escaped(data.symbol)} = ${digits(b.load[row])}<br>${b.omega2 ? "ω²" : "μ"} = ${digits(x)}${y ? ` ± ${digits(Math.abs(y))} i` : ""}`;
+  const traces = KINDS.map(({ name, test, marker }) => {
+    const found = all.filter((each) => test(each.value));
+    return {
+      x: found.map((each) => b.load[each.row]),
+      y: found.map((each) => each.value[0]),
+      customdata: found.map((each) => each.row),
+      text: found.map((each) => `${name}: ${words(each)}`),
+      hovertemplate: "%{text}<extra></extra>",
+      mode: "markers",
+      marker,
+    };
+  });
+  const title = b.omega2 ? "Re ω²" : "μ";
+  const how = layout(data.label, title, { margin: { l: 60, r: 8, t: 4, b: 34 }, uirevision: b.name });
+  how.yaxis.range = range(b, all);
+  draw(plot, traces, how);
+  if (!cursor) {
+    cursor = cursorOf(plot);
+    plot.on("plotly_click", (event) => select(state.branch, event.points[0].customdata));
+  }
+}
+
+export function start() {
+  subscribe(() => {
+    if (shown !== branch()) redraw();
+    cursor?.(branch().load[state.row], null);
+  });
+}

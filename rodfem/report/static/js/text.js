@@ -1,0 +1,62 @@
+// The state in words: titles, verdict, and where the report comes from.
+
+import { data, digits } from "report/data";
+import { branch, state, subscribe, words } from "report/store";
+
+const at = (id) => document.getElementById(id);
+const MOST = 4; // eigenvalues in words
+const NAMES = { stable: "STABLE", unstable: "UNSTABLE", planar: "STABLE IN PLANE", critical: "CRITICAL" };
+
+function redraw() {
+  const b = branch(), { verdict, index, sentence } = words(b, state.row), special = b.special.find((x) => x.row === state.row);
+  at("badge").className = `badge ${verdict}`;
+  at("badge").textContent = `${NAMES[verdict]} · index ${index}`;
+  const height = b.ordinates[data.ordinates[0].key][state.row];
+  at("state-load").textContent = `${data.symbol} = ${special ? special.load : digits(b.load[state.row], 6)}`;
+  at("state").textContent = `${b.name}, row ${state.row} of ${b.load.length}; ${data.ordinates[0].name} = ${digits(height, 5)}`;
+  values(b);
+  at("sentence").textContent = sentence + (special?.law ? ` ${special.law[0].toUpperCase()}${special.law.slice(1)}.` : "");
+}
+
+// Left-most eigenvalues of the state, those of the chart.
+function values(b) {
+  const found = b.spectrum?.[state.row]?.map((x) => [x, 0]) ?? b.omega2?.[state.row] ?? [];
+  const each = found.slice(0, MOST).map(([x, y]) => {
+    const span = document.createElement("span");
+    span.className = x < 0 || y ? "negative" : "positive";
+    span.textContent = `${y ? "×" : x < 0 ? "▼" : "●"} ${digits(x, 4)}${y ? ` ${y > 0 ? "+" : "−"} ${digits(Math.abs(y), 4)} i` : ""}`;
+    return span;
+  });
+  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω²:" : "μ:", ...each] : []));
+}
+
+function line(list, name, text, code = false) {
+  const [term, about] = [document.createElement("dt"), document.createElement("dd")];
+  const inner = code ? document.createElement("code") : about;
+  term.textContent = name;
+  inner.textContent = text;
+  if (code) about.append(inner);
+  list.append(term, about);
+}
+
+function about() {
+  const list = at("origin");
+  line(list, "scene", data.scene);
+  line(list, "computed by", data.program);
+  for (const [name, text] of data.origin) line(list, name, text, name === "command");
+  line(list, "discretisation", data.mesh);
+  for (const [name, value] of Object.entries(data.constants)) line(list, name, digits(value, 17));
+  line(list, "this page", `rodfem view ${data.folder}`, true);
+  line(list, "shapes", "Rods and strains are splines through the nodes of the mesh; states between rows are interpolated for their pictures.");
+  line(list, "forces", "The files have no contact forces n and moments m along the rod, so that they are not shown.");
+  line(list, "libraries", "plotly.js and three.js, both under the MIT licence; the page needs no network.");
+  at("about-button").addEventListener("click", () => at("about").showModal());
+}
+
+export function start() {
+  at("title").textContent = data.title;
+  at("constants").textContent = Object.entries(data.constants).map(([name, value]) => `${name} = ${digits(value)}`).join(", ") + (data.complete ? "" : " (the run is not complete)");
+  at("notes").textContent = data.notes.length ? `not drawn: ${data.notes.join(", ")}` : "";
+  about();
+  subscribe(redraw);
+}

@@ -1,0 +1,266 @@
+"""The page of a report in Chromium: what clicks, keys and the slider do, with an empty console.
+
+It needs Debian's ``chromium`` and ``chromium-driver``, and ``pip install "rodfem[browser]"``; without them it is
+skipped.  ``python -m pytest -s tests/report/test_browser.py`` prints the frame times.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from output.test_formats import MESH, RUNS
+from problem.test_docs import scenes
+
+from rodfem.app.run import run
+from rodfem.diagram.plan import Plan
+from rodfem.output.view import POINT
+from rodfem.report.packing import packed
+from rodfem.report.page import page_of
+from rodfem.report.payload import payload_of
+
+selenium = pytest.importorskip("selenium", reason='needs pip install "rodfem[browser]"')
+from selenium import webdriver  # noqa: E402
+from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
+from selenium.webdriver.common.by import By  # noqa: E402
+from selenium.webdriver.common.keys import Keys  # noqa: E402
+from selenium.webdriver.support.ui import WebDriverWait  # noqa: E402
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+OPTIONS = (
+    *("--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking"),
+    *("--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+)
+SIZES = [(1280, 720), (1920, 1080)]
+PATIENCE = 90.0
+"""Seconds that a page may take on a busy machine."""
+POINTS, FRAMES = 5000, 120
+"""States of the long branch, and how many of them the arrow key runs through."""
+FLUENT = 50.0
+"""Milliseconds of a processor in each frame up to which the page's own work leaves it fluent, drawing apart."""
+
+pytestmark = [
+    pytest.mark.alone,
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs apt-get install chromium chromium-driver"),
+]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for option in OPTIONS:
+        options.add_argument(option)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("browser")
+    for name in ("locus", "follower"):
+        scene, mesh, plan = RUNS[name]
+        run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
+    plan = Plan((0.0, 12.0), at=(11.0,), depth=1, spectrum=2, modes=2, error_bars=False)
+    run(scenes()["euler"], MESH, plan, folder / "pinned", figures=False, quiet=True)
+    return folder
+
+
+@pytest.fixture
+def opened(browser: Any, results: Path, tmp_path: Path) -> Iterator[Callable[..., Any]]:
+    """Opens the page of a run; at the end the console is empty."""
+
+    def open_page(name: str, size: tuple[int, int] = SIZES[0], change: Callable[[dict[str, Any]], Any] = dict) -> Any:
+        payload = payload_of(results / name)
+        path = tmp_path / "report.html"
+        path.write_text(page_of(change(payload)))
+        metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        browser.get(path.as_uri())
+        until(browser, lambda: browser.execute_script("return document.body.dataset.ready"))
+        return browser
+
+    browser.get_log("browser")
+    yield open_page
+    assert browser.get_log("browser") == []
+
+
+def until(browser: Any, condition: Callable[[], Any]) -> None:
+    WebDriverWait(browser, PATIENCE, poll_frequency=0.05).until(lambda _: condition())
+
+
+def shown(browser: Any) -> tuple[str, int]:
+    data = browser.execute_script("return {...document.body.dataset}")
+    return data["branch"], int(data["row"])
+
+
+def picture(browser: Any) -> str:
+    """The rod as it is drawn."""
+    script = "const done = arguments[0]; import('report/rod').then((rod) => done(rod.picture(1).toDataURL()))"
+    return str(browser.execute_async_script(script))
+
+
+def press(browser: Any, key: str) -> None:
+    ActionChains(browser).send_keys(key).perform()
+
+
+def click_at(browser: Any, branch: int, row: int) -> None:
+    """Click where the diagram draws a row."""
+    script = """const plot = document.getElementById("diagram"), { xaxis, yaxis } = plot._fullLayout;
+        const trace = plot.data.find((t) => t.customdata?.some((c) => c[0] === arguments[0] && c[1] === arguments[1]));
+        const i = trace.customdata.findIndex((c) => c[0] === arguments[0] && c[1] === arguments[1]);
+        const box = plot.getBoundingClientRect();
+        return [box.x + xaxis._offset + xaxis.l2p(trace.x[i]), box.y + yaxis._offset + yaxis.l2p(trace.y[i])]"""
+    x, y = browser.execute_script(script, branch, row)
+    for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+        given = {"type": kind, "x": x, "y": y, "button": "left", "clickCount": 1}
+        browser.execute_cdp_cmd("Input.dispatchMouseEvent", given)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("name", ["pinned", "locus", "follower"])
+def test_all_parts_fit_into_the_window(opened: Callable[..., Any], name: str, size: tuple[int, int]) -> None:
+    page = opened(name, size)
+    script = "return [document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+    assert page.execute_script(script) == list(size)
+    for card in page.find_elements(By.CSS_SELECTOR, ".card"):
+        box = card.rect
+        assert box["x"] >= 0 and box["x"] + box["width"] <= size[0] and box["y"] + box["height"] <= size[1]
+        assert box["width"] > 300 and box["height"] > 150
+    assert page.find_element(By.ID, "badge").text.startswith(("STABLE", "UNSTABLE"))
+
+
+def test_a_click_on_a_branch_changes_the_shape(opened: Callable[..., Any]) -> None:
+    page = opened("pinned")
+    click_at(page, 0, 2)
+    until(page, lambda: shown(page) == ("straight", 2))
+    straight = picture(page)
+    row = page.execute_script("return import('report/data').then(({ data }) => data.branches[1].load.length)") // 2
+    click_at(page, 1, row)
+    until(page, lambda: shown(page)[0] == "branch 1")
+    assert abs(shown(page)[1] - row) <= 1 and picture(page) != straight
+
+
+def test_keys_move_along_and_between_branches(opened: Callable[..., Any]) -> None:
+    page = opened("pinned")
+    branch, _ = shown(page)
+    press(page, Keys.HOME)
+    until(page, lambda: shown(page) == (branch, 0))
+    press(page, Keys.ARROW_RIGHT)
+    until(page, lambda: shown(page) == (branch, 1))
+    press(page, Keys.ARROW_LEFT)
+    press(page, Keys.ARROW_LEFT)
+    until(page, lambda: shown(page) == (branch, 0))
+    press(page, Keys.ARROW_DOWN)
+    until(page, lambda: shown(page)[0] != branch)
+    press(page, Keys.ARROW_UP)
+    until(page, lambda: shown(page)[0] == branch)
+
+
+def test_the_slider_shows_all_states_of_a_load(opened: Callable[..., Any]) -> None:
+    page = opened("pinned")
+    slide = """const slider = document.getElementById("load"); slider.value = arguments[0];
+        slider.dispatchEvent(new Event("input"))"""
+
+    def cards() -> list[str]:
+        script = "return [...document.querySelectorAll('#states button')].map((x) => x.innerText)"
+        return list(page.execute_script(script))
+
+    page.execute_script(slide, 500)
+    until(page, lambda: len(cards()) == 1)
+    assert "index 0" in cards()[0] and "straight" in cards()[0]
+    page.execute_script(slide, 920)
+    until(page, lambda: len(cards()) > 1)
+    assert any("index 1" in text for text in cards())
+
+
+def test_modes_move(opened: Callable[..., Any]) -> None:
+    page = opened("pinned")
+    page.execute_script("import('report/store').then((store) => store.select(0, 0))")
+    until(page, lambda: "modes at" in page.find_element(By.ID, "modes").text)
+    page.find_element(By.CSS_SELECTOR, "#modes button").click()
+    until(page, lambda: "grows" in page.find_element(By.ID, "modes").text)
+    page.find_element(By.CSS_SELECTOR, "#modes button").click()
+    first = picture(page)
+    until(page, lambda: picture(page) != first)
+    press(page, Keys.HOME)
+    until(page, lambda: shown(page)[1] == 0)
+
+
+def test_loci_ordinates_views_and_exports_work(opened: Callable[..., Any]) -> None:
+    page = opened("locus")
+    for select in ("ordinate", "view"):
+        options = page.find_elements(By.CSS_SELECTOR, f"#{select} option")
+        assert len(options) > 2
+        for option in options:
+            option.click()
+    page.find_elements(By.CSS_SELECTOR, "#diagram-tabs button")[1].click()
+    until(page, lambda: page.find_elements(By.CSS_SELECTOR, "#loci .scatterlayer .trace"))
+    assert not page.find_element(By.ID, "diagram").is_displayed()
+    for format in ("svg", "png"):
+        script = """const done = arguments[1], plot = document.getElementById("diagram");
+            Plotly.toImage({data: plot.data, layout: plot.layout}, {format: arguments[0], width: 600, height: 400})
+            .then(done)"""
+        url = page.execute_async_script(script, format)
+        assert url.startswith(f"data:image/{format}") and len(url) > 5000
+    page.find_element(By.ID, "about-button").click()
+    assert "dolfinx" in page.find_element(By.ID, "origin").text
+
+
+def long(payload: dict[str, Any]) -> dict[str, Any]:
+    """The same with a first branch of very many states."""
+    branch = dict(payload["branches"][0])
+    wave = np.linspace(0.0, 40.0, POINTS)
+    stations = payload["s"]["shape"][0]
+    shape, s = np.zeros((POINTS, stations, 7)), np.linspace(0.0, 1.0, stations)
+    shape[..., 0], shape[..., 2], shape[..., 3] = 0.2 * np.sin(wave[:, None]) * np.sin(np.pi * s), s, 1.0
+    numbers, maps = branch["bodies"][0], np.tile(np.eye(4)[:, :3].ravel(), (POINTS * len(branch["bodies"][0]), 1))
+    branch |= {
+        "load": (wave / 40.0).tolist(),
+        "negative": [0] * POINTS,
+        "ordinates": {name: np.sin(wave).tolist() for name in branch["ordinates"]},
+        "pieces": [{"rows": [0, POINTS - 1], "kind": "stable", "index": "0"}],
+        "words": [0] * POINTS,
+        "told": branch["told"][:1],
+        "shape": packed(shape),
+        "strain": packed(np.zeros((POINTS, stations, 6)) + POINT),
+        "bodies": [numbers] * POINTS,
+        "maps": packed(maps),
+        **dict.fromkeys(("estimate", "error", "spectrum", "omega2", "motion")),
+        **{"special": [], "unexplained": [], "modes": {}},
+    }
+    return payload | {"branches": [branch], "start": [0, 0], "loci": []}
+
+
+def seconds(page: Any) -> float:
+    """Processor time of the page's main thread."""
+    metrics = page.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
+    return float(next(metric["value"] for metric in metrics if metric["name"] == "TaskDuration"))
+
+
+def test_a_long_branch_stays_fluent(opened: Callable[..., Any]) -> None:
+    page = opened("pinned", change=long)
+    until(page, lambda: page.find_elements(By.CSS_SELECTOR, "#states canvas"))
+    script = """const done = arguments[1], times = [];
+        const step = (time) => {
+          times.push(time);
+          if (times.length > arguments[0]) return done(times);
+          document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true }));
+          requestAnimationFrame(step);
+        };
+        requestAnimationFrame(step)"""
+    page.set_script_timeout(PATIENCE)
+    page.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
+    before = seconds(page)
+    times = np.diff(page.execute_async_script(script, FRAMES))
+    work = 1000.0 * (seconds(page) - before) / FRAMES
+    text = ", ".join(f"{share} %: {np.percentile(times, share):.1f} ms" for share in (50, 90, 100))
+    print(f"\n{POINTS} points, frame times: {text}; {work:.1f} ms of work of the page in each")
+    assert shown(page)[1] >= FRAMES - 2
+    assert work < FLUENT, text

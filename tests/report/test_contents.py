@@ -1,0 +1,208 @@
+"""What a report says and shows, against closed forms: labels, words, writhe, strains, placed bodies, packed arrays."""
+
+from __future__ import annotations
+
+import base64
+import json
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rodfem.errors import InputError
+from rodfem.output.first_loss import first_loss
+from rodfem.output.solids import ball, box, coil
+from rodfem.report.bodies import CLOSE, Shelf
+from rodfem.report.labels import html_of, plain_of
+from rodfem.report.packing import packed, plain, script_json
+from rodfem.report.shapes import shapes_of, stations
+from rodfem.report.words import words_of
+from rodfem.report.writhe import writhe
+
+pytestmark = pytest.mark.alone
+
+
+def special(row: int, kind: str = "branch point", before: int = 0, after: int = 1, **more: Any) -> dict[str, Any]:
+    known = {"kind": kind, "row": row, "load": float(row), "negative_before": before, "negative_after": after}
+    return known | {"multiplicity": 1, "resolved": True, "error_estimate": 1e-6} | more
+
+
+def branch(negative: list[int], *specials: dict[str, Any], **columns: Any) -> dict[str, Any]:
+    given = {"load": [float(i) for i in range(len(negative))], "negative": negative, "zero": [0] * len(negative)}
+    return {"name": "first", "columns": given | columns, "special": list(specials), "parent": None}
+
+
+@pytest.mark.parametrize(
+    ("label", "always", "html"),
+    [
+        (r"\lambda", True, "λ"),
+        ("t_0", True, "t<sub>0</sub>"),
+        (r"twist $\int k_3\,ds/2\pi$", False, "twist ∫k<sub>3</sub> ds/2π"),
+        (r"$\frac{a}{b}^{2}$", False, "a/b<sup>2</sup>"),
+        ("a_b", False, "a_b"),
+        (r"\Omega_{max}", True, "Ω<sub>max</sub>"),
+        ("<img src=x onerror=alert(1)>", False, "&lt;img src=x onerror=alert(1)&gt;"),
+        ("$</script><b>_3$", False, "&lt;/script&gt;&lt;b&gt;<sub>3</sub>"),
+    ],
+)
+def test_labels(label: str, always: bool, html: str) -> None:
+    assert html_of(label, always) == html
+    assert "<sub>" not in plain_of(label, always)
+
+
+def test_plain_labels_are_what_was_written() -> None:
+    assert plain_of("a & <b> \"c\" 'd' &lt;") == "a & <b> \"c\" 'd' &lt;"
+
+
+def test_words_of_a_branch() -> None:
+    words = words_of(branch([0, 0, 1, 2], special(1), zero=[0, 1, 0, 0]))
+    assert [w.verdict for w in words] == ["stable", "critical", "unstable", "unstable"]
+    assert [w.index for w in words] == ["0", "0→1", "1", "2"]
+    assert "1 eigenvalue at zero" in words[1].sentence and words[3].sentence == "Unstable: 2 negative eigenvalues."
+
+
+def test_words_of_a_planar_rod_say_both_indices() -> None:
+    words = words_of(branch([0, 0, 1], negative_in_space=[0, 1, None]))
+    assert [w.verdict for w in words] == ["stable", "planar", "unstable"]
+    assert [w.index for w in words] == ["0 (0)", "0 (1)", "1"] and "unstable in space" in words[1].sentence
+
+
+def test_words_of_frequencies() -> None:
+    omega2 = [[[1.0, 0.0], [4.0, 0.0]], [[2.0, 1.0], [2.0, -1.0]], [[-1.0, 0.0], [2.0, 0.0]]]
+    words = words_of(branch([0, 2, 1], omega2=omega2))
+    assert "none" in words[0].sentence and "2 complex (flutter)" in words[1].sentence
+    assert "1 negative (divergence)" in words[2].sentence and "flutter" not in words[2].sentence
+
+
+def test_words_warn() -> None:
+    doubtful = branch([0, 1, 1], special(2, "fold", 1, 0, resolved=False)) | {"unexplained": [{"row": 0}]}
+    words = words_of(doubtful | {"singular_start": 1})
+    assert words[0].sentence.count("Warning") == 2 and "without a special point" in words[1].sentence
+    assert "does not resolve" in words[2].sentence
+    given = words_of(branch([0, 0], special(1, "user", 0, 0, multiplicity=0)))
+    assert given[1].verdict == "stable"
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [
+        (branch([0, 0, 1], special(1)), "branch point at P = 1.000000 (1e-06)"),
+        (branch([0, 0, 0]), "none: first is stable from 0 to 2"),
+        (branch([1, 1]), "unstable from the first state on"),
+        (branch([0, 1]), "unstable somewhere, without a special point"),
+        (branch([0, 1]) | {"unexplained": [{"row": 0}]}, "unknown: the index changes near P = 0 unexplained"),
+        (branch([0, 0]) | {"singular_start": 1}, "the first state is singular"),
+        (branch([0, 0, 2], special(1, "flutter", 0, 2)), "flutter at P = 1.000000 (1e-06)"),
+        (branch([0, 0], negative_in_space=[0, 0]), "none in the plane: first is stable from 0 to 1"),
+    ],
+)
+def test_first_loss_of_stability(data: dict[str, Any], text: str) -> None:
+    assert first_loss({"branches": [data], "parameter": "P"}) == text
+
+
+def gauss_integral(curve: np.ndarray, tangent: np.ndarray) -> float:
+    """Writhe of a closed curve given at equal parameters, by the rectangle rule; the diagonal's integrand vanishes."""
+    d = curve[:, None] - curve[None]
+    distance = np.linalg.norm(d, axis=2) + np.eye(len(curve))
+    density = np.einsum("ijk,ijk->ij", d, np.cross(tangent[:, None], tangent[None])) / distance**3
+    return float(density.sum() * (2 * np.pi / len(curve)) ** 2 / (4 * np.pi))
+
+
+def trefoil(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    curve = [np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)]
+    tangent = [np.cos(t) + 4 * np.cos(2 * t), -np.sin(t) + 4 * np.sin(2 * t), -3 * np.cos(3 * t)]
+    return np.array(curve).T, np.array(tangent).T
+
+
+def test_writhe() -> None:
+    exact = gauss_integral(*trefoil(np.linspace(0, 2 * np.pi, 1200, endpoint=False)))
+    knot = trefoil(np.linspace(0, 2 * np.pi, 401))[0]
+    assert abs(exact) > 3 and writhe(knot) == pytest.approx(exact, abs=5e-3)
+    assert writhe(knot * (1, 1, -1)) == pytest.approx(-writhe(knot)) and writhe(knot[::-1]) == pytest.approx(
+        writhe(knot)
+    )
+    assert writhe(knot * (1, 1, 0)) == pytest.approx(0.0, abs=1e-9)
+
+
+def group_of(**arrays: np.ndarray) -> Any:
+    class Group(dict[str, Any]):
+        file, name = SimpleNamespace(filename="states.h5"), "/branches/b"
+
+    return Group({name: np.asarray(value)[None] for name, value in arrays.items()})
+
+
+def helix(s: np.ndarray, radius: float, rise: float) -> tuple[np.ndarray, np.ndarray]:
+    """Helix with arclength: rotations about e3 of a frame with d3 along its tangent; constant curvature and torsion."""
+    size = np.hypot(radius, rise)
+    t = s / size
+    r = np.array([radius * np.cos(t), radius * np.sin(t), rise * t]).T
+    tilt = np.arctan2(radius, rise)  # first about e1, such that e3 goes to the tangent at s = 0
+    q0 = np.array([np.cos(-tilt / 2), np.sin(-tilt / 2), 0, 0])
+    about = np.array([np.cos(t / 2), 0 * t, 0 * t, np.sin(t / 2)]).T
+    a, d = about[:, 0], about[:, 3]
+    q = np.array([a * q0[0], a * q0[1], d * q0[1], d * q0[0]]).T
+    return r, q
+
+
+def test_strains_of_a_helix() -> None:
+    s, radius, rise = np.linspace(0, 7, 80), 0.7, 0.4
+    r, q = helix(s, radius, rise)
+    signs = np.where(np.arange(80) % 3, 1.0, -1.0)[:, None]  # q and -q are the same rotation
+    shapes = shapes_of(group_of(s=s, r=r, q=3.0 * signs * q), 49)
+    size2 = radius**2 + rise**2
+    assert np.allclose(shapes.v, [0, 0, 1], atol=3e-4)
+    assert np.allclose(shapes.k, [0, -radius / size2, rise / size2], atol=3e-4)
+    assert (
+        np.allclose(np.linalg.norm(shapes.q, axis=2), 1.0) and (np.sum(shapes.q[0, 1:] * shapes.q[0, :-1], 1) > 0).all()
+    )
+
+
+def test_rows_of_coarser_meshes_end_in_nan() -> None:
+    s = np.linspace(0, 1, 9)
+    q = np.tile([1.0, 0, 0, 0], (9, 1))
+    r = np.outer(s, [0, 0, 1.0])
+    cut = [np.concatenate([x, np.full((3, *x.shape[1:]), np.nan)]) for x in (s, r, q)]
+    shapes = shapes_of(group_of(s=cut[0], r=cut[1], q=cut[2]), 49)
+    assert np.isfinite(shapes.r).all() and shapes.s[-1] == 1.0
+    r[4, 1] = np.nan
+    with pytest.raises(InputError, match="no curve"):
+        shapes_of(group_of(s=s, r=r, q=q), 49)
+
+
+def test_stations_stay_within_their_budget() -> None:
+    assert (
+        stations(55, 100) == 109 and stations(5, 10) == 49 and stations(1000, 10) == 241 and stations(200, 5000) == 81
+    )
+
+
+def test_bodies_are_found_again_where_they_moved() -> None:
+    shelf, turn = Shelf(0.1), np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    first = box(np.zeros(3), np.eye(3), (1, 2, 3), "#111111")
+    moved = box(np.array([3.0, 1, 2]), turn * np.sign(np.linalg.det(turn)), (1, 2, 3), "#111111")
+    assert [shelf.place(x)[0] for x in (first, ball(np.ones(3), 1.0, "#111111"), moved)] == [0, 1, 0]
+    number, placed = shelf.place(moved)
+    corners = np.column_stack([shelf.bodies[number].solid.points, np.ones(10)]) @ placed
+    assert np.allclose(corners, moved.points)
+    assert shelf.place(box(np.zeros(3), np.eye(3), (1, 2, 3), "#222222"))[0] == 2
+
+
+def test_bodies_of_springs_are_near_enough() -> None:
+    shelf = Shelf(0.1)
+    for length in np.linspace(1.0, 1.6, 25):
+        spring = coil(np.zeros(3), np.array([0, 0, length]), 0.15, 0.02, 6, "#333333")
+        number, placed = shelf.place(spring)
+        body = shelf.bodies[number].solid.points
+        corners = np.column_stack([body, np.ones(len(body))]) @ placed
+        assert np.abs(corners - spring.points).max() <= CLOSE * 0.1
+    assert len(shelf.bodies) < 6
+
+
+def test_packed_arrays_and_texts() -> None:
+    array = np.array([[1.5, np.nan], [-2.0, 3e-8]])
+    data = packed(array)
+    back = np.frombuffer(base64.b64decode(data["f32"]), "<f4").reshape(data["shape"])
+    assert np.array_equal(back, array.astype("f4"), equal_nan=True) and plain(array[0]) == [1.5, None]
+    hostile = {"a": "</script><!-- <img src=x onerror=alert(1)> & \u2028"}
+    text = script_json(hostile)
+    assert json.loads(text) == hostile and not set(text) & set("<>&\u2028")

@@ -1,0 +1,187 @@
+"""The page of a report: made from files alone, whole, without network, and harmless whatever its texts are."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from output.test_formats import MESH, RUNS
+from problem.test_docs import scenes
+
+from rodfem.app import console
+from rodfem.app.commands import view
+from rodfem.app.run import run
+from rodfem.diagram.plan import Plan
+from rodfem.errors import InputError
+from rodfem.output.folder import remove_earlier
+from rodfem.report.page import STATIC, page_of, write_report
+from rodfem.report.payload import payload_of
+
+HOSTILE = "</script><img src=x onerror=alert(1)>{{payload}}"
+pytestmark = pytest.mark.alone
+
+
+class Elements(HTMLParser):
+    """Elements of a page with their attributes."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+
+    def names(self) -> list[str]:
+        return [tag for tag, _ in self.found]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folders of small runs of different kinds."""
+    folder = tmp_path_factory.mktemp("report")
+    for name in ("pinned", "locus", "planar", "follower", "ring", "foundation", "guided", "accurate"):
+        scene, mesh, plan = RUNS[name]
+        run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
+    run(
+        scenes()["euler"],
+        MESH,
+        Plan((0.0, 1.0), depth=0, error_bars=False),
+        folder / "short",
+        figures=False,
+        quiet=True,
+    )
+    return folder
+
+
+@pytest.mark.parametrize("name", ["pinned", "locus", "planar", "follower", "ring", "foundation", "guided", "accurate"])
+def test_every_kind_of_run_has_a_page(results: Path, name: str) -> None:
+    payload = payload_of(results / name)
+    text = page_of(payload)
+    data = json.loads(re.search(r'id="payload">(.*?)</script>', text, re.S)[1])  # type: ignore[index]
+    saved = json.loads((results / name / "diagram.json").read_text())
+    for shown, branch in zip(data["branches"], saved["branches"], strict=True):
+        rows = len(branch["columns"]["load"])
+        assert shown["load"] == branch["columns"]["load"] and len(shown["words"]) == rows
+        assert shown["shape"]["shape"][0] == rows == len(shown["bodies"])
+        assert shown["maps"]["shape"][0] == sum(map(len, shown["bodies"]))
+        assert shown["pieces"][0]["rows"][0] == 0 and shown["pieces"][-1]["rows"][1] == rows - 1
+        assert all(len(column) == rows for column in shown["ordinates"].values())
+    assert bool(data["loci"]) == (name == "locus")
+    assert any(branch["modes"] for branch in data["branches"]) == (name in ("pinned", "follower", "foundation"))
+    assert dict(data["origin"])["command"] and "dolfinx" in dict(data["origin"])["versions"]
+
+
+def test_end_shortening_and_modes_are_those_of_the_files(results: Path) -> None:
+    branches = payload_of(results / "pinned")["branches"]
+    shortening = np.array(branches[1]["ordinates"]["end shortening"])
+    assert shortening[0] == pytest.approx(0.0, abs=1e-6) and shortening.max() > 0.1
+    (row, modes), *_ = branches[0]["modes"].items()
+    assert branches[0]["load"][row] == 11.0 and modes[0]["kind"] == "grows" and modes[1]["kind"] == "swings"
+    assert modes[0]["value"][0] < 0 < modes[1]["value"][0]
+
+
+def test_the_page_needs_no_network_and_runs_no_text(results: Path) -> None:
+    clean = payload_of(results / "short")
+    plain = Elements(page_of(clean))
+    hostile: dict[str, Any] = clean | {
+        "title": HOSTILE,
+        "scene": HOSTILE,
+        "folder": HOSTILE,
+        "constants": {HOSTILE: 1.0},
+    }
+    hostile["branches"] = [branch | {"name": HOSTILE, "ended": HOSTILE} for branch in clean["branches"]]
+    text = page_of(hostile)
+    found = Elements(text)
+    assert found.names() == plain.names() and found.names().count("script") == 4 and "img" not in found.names()
+    assert "<img src=x" not in text
+    links = [value for _, attributes in found.found for key, value in attributes.items() if key in ("src", "href")]
+    assert links == ["data:,"]
+    policy = next(a["content"] for tag, a in found.found if "http-equiv" in a)
+    assert (
+        policy is not None and "default-src 'none'" in policy and "'unsafe-inline'" not in policy.split("style-src")[0]
+    )
+
+
+def test_a_hostile_scene_is_harmless_in_files(results: Path, tmp_path: Path) -> None:
+    for file in ("diagram.json", "states.h5"):
+        (tmp_path / file).write_bytes((results / "short" / file).read_bytes())
+    data = json.loads((tmp_path / "diagram.json").read_text())
+    words = ("title", "scene", "parameter_label", "ordinate", "ordinate_label")
+    data |= dict.fromkeys(words, HOSTILE) | {"origin": {"command": HOSTILE, "versions": {HOSTILE: HOSTILE}}}
+    data["branches"][0]["ended"] = HOSTILE
+    (tmp_path / "diagram.json").write_text(json.dumps(data))
+    text = write_report(tmp_path).read_text()
+    assert "<img" not in text and Elements(text).names().count("script") == 4
+
+
+def test_the_next_run_removes_the_page(tmp_path: Path) -> None:
+    (tmp_path / "report.html").touch()
+    remove_earlier(tmp_path)
+    assert not any(tmp_path.iterdir())
+
+
+def test_libraries_have_their_licences() -> None:
+    vendor = {file.name for file in (STATIC / "vendor").iterdir()}
+    assert {"LICENSE-plotly", "LICENSE-three"} <= vendor
+    assert sum(len(file.read_bytes()) for file in (STATIC / "vendor").iterdir()) < 2_500_000
+
+
+def test_modules_stand_in_small_files() -> None:
+    for file in (STATIC / "js").iterdir():
+        text = file.read_text()
+        assert text.startswith("// ") and text.count("\n") <= 200, file.name
+
+
+def test_unfit_folders_are_refused_in_a_sentence(results: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no rodfem diagram"):
+        payload_of(tmp_path)
+    (tmp_path / "diagram.json").write_bytes((results / "short" / "diagram.json").read_bytes())
+    with pytest.raises(InputError, match=r"states\.h5"):
+        payload_of(tmp_path)
+    (tmp_path / "states.h5").write_bytes((results / "pinned" / "states.h5").read_bytes())
+    with pytest.raises(InputError, match="different runs"):
+        payload_of(tmp_path)
+    for file in ("diagram.json", "states.h5"):
+        (tmp_path / file).write_bytes((results / "short" / file).read_bytes())
+    (tmp_path / "modes.h5").write_bytes(b"none")
+    with pytest.raises(InputError, match=r"modes\.h5"):
+        payload_of(tmp_path)
+    (tmp_path / "modes.h5").unlink()
+    (tmp_path / "locus-1.json").write_text("{}")
+    with pytest.raises(InputError, match="locus"):
+        payload_of(tmp_path)
+
+
+def test_commands(results: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(view.webbrowser, "open", opened.append)
+    monkeypatch.setattr(view, "WITHOUT", ())
+    for name in view.SCREENS:
+        monkeypatch.delenv(name, raising=False)
+    console.main(["view", str(results / "short")])
+    monkeypatch.setenv("DISPLAY", ":0")
+    console.main(["view", str(results / "short"), "--no-open"])
+    assert not opened and (results / "short" / "report.html").exists()
+    console.main(["view", str(results / "short"), "--output", str(results / "a.html")])
+    assert opened == [(results / "a.html").as_uri()]
+    assert capsys.readouterr().out.splitlines()[-1] == str(results / "a.html")
+    (results / "broken").mkdir()
+    (results / "broken" / "diagram.json").write_text("{}")
+    console.main(["list", str(results)])
+    listed = capsys.readouterr().out
+    assert "pinned" in listed and "flutter at" in listed and re.search(r"broken.* is no", listed)
+    assert re.search(r"short +pinned +20\d\d-\d\d-\d\d 1 +\d+ +none: ", listed)
+
+
+def test_it_needs_neither_dolfinx_nor_mpi() -> None:
+    program = "import sys, rodfem.report.page; print(*{'dolfinx', 'mpi4py'} & set(sys.modules))"
+    out = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert not out.strip()
