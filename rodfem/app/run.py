@@ -99,6 +99,7 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     branches, clock = diagram.branches, diagram.clock
     on_first(comm, lambda: save_json(diagram.data, output / "diagram.json"))
     terminal.table(branches, diagram.solvers[0].system)
+    terminal.summary(diagram.data)
     terminal.spectra(branches, scene)
     terminal.frequencies(branches, scene.load)
     terminal.timing(clock, sum(len(b.points) for b in branches))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
-from typing import TextIO
+from textwrap import fill
+from typing import Any, TextIO
 
 import numpy as np
 from mpi4py import MPI
@@ -19,6 +20,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.modes import Modes
 from rodfem.output.digits import in_decimals, in_words, index_in_words, number, rounded_up
+from rodfem.output.summary import in_sentences
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
@@ -26,6 +28,8 @@ from rodfem.timing import WORK, Clock
 
 INDEX, UNSTABLE = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
+WIDTH = 110
+"""Columns of a paragraph."""
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
 
 
@@ -210,6 +214,12 @@ class Report(Observer):
                 f"  {missed} branch point{'s were' if missed > 1 else ' was'} not followed, at the depth of switches: "
                 f"{Argument('Plan', 'depth', deepest + 1)} follows what leaves there"
             )
+
+    def summary(self, data: Mapping[str, Any]) -> None:
+        """Print a diagram, the contents of ``diagram.json``, in sentences."""
+        self.say("\nIn words (rodfem explain WORD has more)")
+        for sentence in in_sentences(data):
+            self.say(fill(sentence, WIDTH, initial_indent="  ", subsequent_indent="    "))
 
     def spectra(self, branches: Sequence[Branch], scene: Scene) -> None:
         """Print the left-most eigenvalues of the special points, if they were asked for."""

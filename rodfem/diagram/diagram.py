@@ -230,6 +230,12 @@ class Diagram:
         systems = [solver.system for solver in self.solvers]
         return as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy) | {"run": self.run}
 
+    def in_words(self) -> str:
+        """What the diagram says, a sentence a line: ranges of stability, how stability is lost, what is left open."""
+        from rodfem.output.summary import in_sentences
+
+        return "\n".join(in_sentences(self.data))
+
     @checked(folder=path("results/column"))
     def save(self, folder: Path | str) -> Path:
         """Write ``diagram.json`` and ``states.h5`` into a folder, which is made; returns it.

@@ -89,6 +89,7 @@ def as_data(
         "ordinate_label": scene.ordinate.label or scene.ordinate.name,
         "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
         "range": list(span),
+        "planar": scene.planar,
         "discretization": mesh_of(system),
         "accuracy": accuracy,
         "ignored_strains": [f"v{i + 1}" for i in scene.ignored_strains],
