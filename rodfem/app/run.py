@@ -98,7 +98,7 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     scene, plan, output, comm = diagram.scene, terminal.plan, terminal.output, diagram.solvers[0].system.comm
     branches, clock = diagram.branches, diagram.clock
     on_first(comm, lambda: save_json(diagram.data, output / "diagram.json"))
-    terminal.table(branches, diagram.solvers[0].system)
+    terminal.table(branches, diagram.solvers[0].system, plan.most_branches)
     terminal.summary(diagram.data)
     terminal.spectra(branches, scene)
     terminal.frequencies(branches, scene.load)

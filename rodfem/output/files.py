@@ -85,6 +85,7 @@ def as_data(
         "title": scene.title or scene.name,
         "parameter": scene.load,
         "parameter_label": scene.parameters[scene.load].label or scene.load,
+        "parameter_words": scene.parameters[scene.load].words,
         "ordinate": scene.ordinate.name,
         "ordinate_label": scene.ordinate.label or scene.ordinate.name,
         "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},

@@ -173,6 +173,13 @@ ENTRIES = {
     ),
     "diverged, growth rate": "An imaginary frequency: the motion grows as exp(b t) without oscillating.",
     "locus": "Curve of the loads of one special point as a second parameter varies: a boundary of stability.",
+    "range of flutter | range of divergence | range of instability": (
+        "Loads at which a complex pair, or an imaginary frequency, is among those found: shaded."
+    ),
+    "stable side": (
+        "Side of a locus of branch points on which the branch has the index 0; shaded next to the curve only, as far "
+        "as the index was counted."
+    ),
     "start": "Where a locus was started: the special point of the diagram.",
     "turning point | turns": "Where a locus turns back in the second parameter.",
     "cusp": "Where two folds meet and vanish: beyond it there is no hysteresis.",
