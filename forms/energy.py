@@ -24,6 +24,17 @@ def bending_and_twist(k: Expr, stiffness: tuple[Expr, Expr, Expr]) -> Expr:
     return sum(0.5 * b * k[i] ** 2 for i, b in enumerate(stiffness))
 
 
+def shear_and_stretch(v: Expr, stiffness: tuple[Expr, Expr, Expr]) -> Expr:
+    """Quadratic energy of shear and stretch, ``1/2 (G1 v1^2 + G2 v2^2 + E (v3 - 1)^2)``.
+
+    ``v`` has shape (3,).  ``stiffness = (G1, G2, E)`` are forces, those in shear along ``d1`` and ``d2`` first.  Raises
+    :class:`ValueError` for another number of them.
+    """
+    if len(stiffness) != 3:
+        raise ValueError(f"shear and stretch have three stiffnesses, not {len(stiffness)}")
+    return sum(0.5 * x * (v[i] - (1 if i == 2 else 0)) ** 2 for i, x in enumerate(stiffness))
+
+
 def hemitropic(v: Expr, k: Expr, *, stretching: Expr, coupling: Expr, twisting: Expr, bending: Expr) -> Expr:
     """Quadratic energy of a hemitropic rod, whose stretch and twist are coupled.
 

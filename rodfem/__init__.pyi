@@ -24,6 +24,7 @@ from rodfem.fem.fields import Discretization as Discretization
 from rodfem.modes.modes import Modes as Modes
 from rodfem.modes.modes import load_modes as load_modes
 from rodfem.output.files import load_json as load_json
+from rodfem.problem import section as section
 from rodfem.problem.ends import Attachment as Attachment
 from rodfem.problem.ends import Constraint as Constraint
 from rodfem.problem.ends import End as End

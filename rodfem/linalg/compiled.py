@@ -9,6 +9,7 @@ import platform
 import sys
 import tempfile
 from functools import cache
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +70,9 @@ def _named(name: str, declarations: str, beside: Path) -> tuple[str, str]:
 
 
 def _found(full: str) -> Path | None:
-    return next(_cache().glob(f"{full}*.so"), None)
+    """Compiled module in the cache, by its name: to list that folder takes long where it has thousands of files."""
+    files = (_cache() / f"{full}{suffix}" for suffix in EXTENSION_SUFFIXES)
+    return next((file for file in files if file.is_file()), None)
 
 
 def _compile(full: str, code: str, declarations: str) -> Path:

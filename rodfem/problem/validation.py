@@ -310,11 +310,16 @@ def check_supports(scene: Scene) -> None:
 
 
 def check_drift(scene: Scene) -> None:
-    """Raise :class:`SceneError` unless something holds the rod, or its loads balance whatever its shape."""
+    """Raise :class:`SceneError` where the rod is held, but not in all directions in which it can be moved.
+
+    One that nothing holds may float: whether its loads balance, the equations tell.
+    """
     c = scene.constants()
     if scene.closed or any(asks_where(f, c) for _, f, _ in functions_of_places(scene)):
         return
     held = np.vstack([np.zeros(3), *(end.fixed(c) for end in scene.sides)])
+    if not held.any():
+        return
     for i, direction in enumerate(np.eye(3)):
         if np.linalg.matrix_rank(np.vstack([held, direction])) > np.linalg.matrix_rank(held):
             raise SceneError(

@@ -135,5 +135,14 @@ PUBLISHED = (
         "a deep arch of 215 degrees", "a fold far from the undeformed state", EXACT,
         "DaDeppo & Schmidt 1975, 8.973089969728", "degree of 8 elements", published.arch, (6,), (4, 6, 8),
     ),
+    Case(
+        "the deep arch in space", "stable in its plane, and perhaps not across it", "the index of the rod in space",
+        "the same arch as a rod in space", "C/B", published.arch_in_space, (1.0,), (2.0, 1.0, 0.5, 0.2),
+    ),
+    Case(
+        "a ring deployed by 4 pi", "rotations of an end past 2 pi; the ends far from where they were",
+        "a third of the ring after 2 pi, the ring after 4 pi, stable throughout",
+        "Goto, Watanabe, Kasugai & Obata 1992", "B1/B2", published.deployed_ring, (9.0,), (100.0, 9.0, 4.0),
+    ),
 )  # fmt: skip
 CASES = {"stiffness": STIFFNESS, "bifurcations": BIFURCATIONS, "published": PUBLISHED}

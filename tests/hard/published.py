@@ -16,7 +16,7 @@ from hard.case import Change, Measured, compare, run, said, singular
 
 from forms import loads
 from forms.energy import bending_and_twist
-from rodfem import Discretization, Event, Parameter, Ring, Solver, clamped
+from rodfem import Discretization, Event, Ordinate, Parameter, Ring, Scene, Solver, clamped, sliding
 
 # --- Haringx' helical springs ---------------------------------------------------------------------------------------
 
@@ -189,3 +189,36 @@ def arch(degree: int) -> Measured:
     diagram = run(scene, Discretization("auto", 8, degree))
     folds = [s for s in singular(diagram[0])][:1]
     return compare(folds, [Change(8.973089969728, 0, 1)], said(diagram))
+
+
+def arch_in_space(C: float) -> Measured:
+    """Its index among all perturbations, while it bends in its plane: that of the same arch as a rod in space."""
+    loads_of, mesh = (1.0, 3.0, 5.0, 7.0, 8.5), Discretization("pointwise", 8, 6)
+    planar = classics.deep_arch()
+    planar = replace(planar, parameters={**planar.parameters, "C": Parameter(C)}, span=(0.0, 9.0))
+    flat, free = (run(scene, mesh, at=loads_of, error_bars=False) for scene in (planar, replace(planar, planar=None)))
+    for load in loads_of:
+        state = next(s.point for s in flat.special("user") if s.point.load == load)
+        same = next((s.point for s in free.special("user") if s.point.load == load), None)
+        if same is None or abs(same.ordinate - state.ordinate) > 1e-6 or same.negative != state.negative_in_space:
+            return Measured(inf, 1.0, said(flat) + said(free), f"{state!r} in the plane, {same!r} in space")
+    return Measured(0.0, 1.0, said(flat) + said(free))
+
+
+def deployed_ring(B1: float) -> Measured:
+    """A ring whose opposite cross-sections are turned about their radius: by 2 pi it is a ring a third as large.
+
+    By 4 pi it is the first one again.  Half of it is computed, that is symmetric to the other half.
+    """
+    scene = Scene(
+        "deployed ring", (0.0, pi), "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (B1, 1.0, 1.5)), {"t": Parameter(0.0)}, "t",
+        (clamped(), sliding(lambda c: (None, 0.0, 0.0), lambda c: (0.0, 0.0, ufl.cos(c.t / 2), ufl.sin(c.t / 2)))),
+        Ordinate("distance of the opposite points", s=pi, of=lambda r, q: r[0]), (0.0, 4 * pi), start=classics.circle,
+    )  # fmt: skip
+    diagram = run(scene, Discretization("auto", 12, 6), at=(2 * pi,), error_bars=False)
+    if [s.point.load for s in diagram[0].special] != [2 * pi, 4 * pi] or {p.negative for p in diagram[0].points} != {0}:
+        return Measured(inf, 1.0, said(diagram), f"{diagram[0].special}")
+    third, whole = (s.point for s in diagram[0].special)
+    errors = third.ordinate - 2 / 3, third.energy / (2 * pi) - 1, whole.ordinate - 2, whole.energy
+    return Measured(max(map(abs, errors)), 1e-9, said(diagram))

@@ -1,0 +1,100 @@
+"""Rods that nothing holds: rigid motions are their symmetries, and a thrust makes them flutter."""
+
+from __future__ import annotations
+
+from math import hypot, pi
+
+import numpy as np
+import pytest
+from numpy.polynomial import Legendre
+from scipy.optimize import brentq
+
+import rodfem
+from forms.energy import bending_and_twist
+from rodfem import Discretization, Inertia, Ordinate, Parameter, Plan, Scene, SceneError, Solver, free
+
+ROOTS = [brentq(lambda x: np.cos(x) - 1 / np.cosh(x), (n + 0.4) * pi, (n + 0.6) * pi, xtol=1e-14) for n in (1, 2, 3)]
+FREQUENCIES = np.square(ROOTS)
+"""Of a free beam, in units of sqrt(B/(m L^4)), cos x cosh x = 1: 22.3733, 61.6728, 120.9034."""
+MESH = Discretization("pointwise", 6, 6)
+
+
+def floating(ends: tuple, span: tuple[float, float], **loads) -> Scene:
+    return Scene(
+        name="floating",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
+        parameters={"P": Parameter(0.0)},
+        load="P",
+        ends=ends,
+        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0)),
+        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: hypot(r[0], r[1])),
+        span=span,
+        **loads,
+    )
+
+
+PRESSED = (free(lambda c: (0.0, 0.0, c.P)), free(lambda c: (0.0, 0.0, -c.P)))
+
+
+def test_frequencies_and_rigid_motions() -> None:
+    """Six zero eigenvalues, of three translations and three rotations, and pairs of frequencies in two planes."""
+    solver = Solver(floating(PRESSED, (0.0, 45.0)), MESH)
+    point = solver.equilibrium(0.0)
+    assert (point.negative, point.zero) == (0, 6)
+    modes = solver.modes(point, 8)
+    moving = np.sqrt(modes.value.real[modes.value.real > 1.0])
+    assert pytest.approx((22.3733, 61.6728, 120.9034), abs=1e-4) == FREQUENCIES
+    assert moving == pytest.approx(np.repeat(FREQUENCIES, 2), rel=1e-7)
+    verdict = solver.assess(point)
+    assert (verdict.negative, verdict.zero) == (0, 6) and verdict.certified
+
+
+def test_dead_forces_at_both_ends() -> None:
+    """Pressed, it turns round at once, in two directions; besides, it buckles as between pins.  Pulled it is stable."""
+    diagram = rodfem.trace(floating(PRESSED, (1.0, 45.0)), MESH, Plan(depth=0))
+    found = diagram.special("branch point")
+    assert [(s.negative_before, s.negative_after) for s in found] == [(2, 4), (4, 6)]
+    for n, special in enumerate(found, 1):
+        assert abs(special.point.load - (n * pi) ** 2) < special.error_estimate < 1e-7
+    pulled = rodfem.trace(floating(PRESSED, (-1.0, -45.0)), MESH, Plan(depth=0))
+    assert {p.negative for p in pulled[0].points} == {0} and not pulled.special()
+
+
+def beal(load: float) -> np.ndarray:
+    """Eigenvalues of a free beam under a thrust along its end, by Galerkin's method with Legendre polynomials.
+
+    ``int w'' v'' - P s w' v' ds + P w'(1) v(1) = mu int w v ds``: the compression is P s, and the thrust follows.
+    """
+    basis = [Legendre.basis(i, domain=(0.0, 1.0)) for i in range(18)]
+    x, weight = np.polynomial.legendre.leggauss(24)
+    s, weight = (x + 1) / 2, weight / 2
+    w, dw, d2w = (np.array([b.deriv(k)(s) if k else b(s) for b in basis]) for k in range(3))
+    at_end = np.outer([b(1.0) for b in basis], [b.deriv()(1.0) for b in basis])
+    K = (d2w * weight) @ d2w.T - load * (dw * weight * s) @ dw.T + load * at_end
+    return np.linalg.eigvals(np.linalg.solve((w * weight) @ w.T, K))
+
+
+def test_thrust_along_the_end() -> None:
+    """In the frame that moves with the rod the load is balanced by its inertia; Beal (AIAA J. 3, 1965): 109.69."""
+    low, high = 100.0, 120.0
+    while high - low > 1e-6:
+        middle = (low + high) / 2
+        flutters = (abs(beal(middle).imag) > 1.0).any()
+        low, high = (low, middle) if flutters else (middle, high)
+    ends = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
+    scene = floating(ends, (0.0, 130.0), distributed=lambda c: (0.0, 0.0, c.P))
+    diagram = rodfem.trace(scene, MESH, Plan(depth=0))
+    (found,) = diagram.special()
+    assert found.kind == "flutter" and (found.negative_before, found.negative_after) == (0, 4)
+    assert abs(found.point.load - low) < 1e-4 and found.error_estimate < 1e-6
+    assert found.point.load == pytest.approx(109.69, abs=5e-3)
+
+
+def test_forces_that_nothing_balances() -> None:
+    one_sided = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
+    with pytest.raises(SceneError, match="nothing holds the rod against"):
+        rodfem.trace(floating(one_sided, (0.0, 5.0)), MESH, Plan(depth=0))
+    with pytest.raises(SceneError, match="not the state that a small P leads on from"):
+        rodfem.trace(floating((free(), free(lambda c: (0.0, 0.0, -c.P))), (0.0, 5.0)), MESH, Plan(depth=0))

@@ -1,0 +1,260 @@
+"""Faults planted by hand, one at a time, each of which the tests must catch: ``python -m tests.mutations [NAME ...]``.
+
+A fault is a few characters changed in one file.  The tests named with it run on a copy of the tree, and must fail.
+``tests/house/test_mutations.py`` checks that every fault still has its place in the code.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+HOME = Path(__file__).parents[1]
+LIMIT = 1500
+"""Seconds of the tests of one fault."""
+
+
+class Fault(NamedTuple):
+    """In ``file`` the text ``old``, which occurs once, becomes ``new``; one of ``tests`` fails then."""
+
+    file: str
+    old: str
+    new: str
+    tests: str
+
+
+HEMITROPIC = "tests/literature/test_hemitropic_straight.py"
+BUCKLED = "tests/literature/test_hemitropic_buckled.py"
+CORD = "tests/literature/test_cord.py"
+CLASSICS = "tests/literature/test_classics.py"
+GOLDEN = "tests/diagram/test_golden.py"
+CHAIN = "tests/continuation/test_index_chain.py"
+FOLLOW = "tests/continuation/test_continuation.py"
+ERRORS = "tests/adaptivity/test_error_estimate.py"
+FILES = "tests/output/test_files.py tests/output/test_formats.py"
+KILLS = "tests/hard/test_files_after_a_kill.py"
+INERTIA = "tests/stability/test_inertia.py tests/stability/test_assessment.py"
+HARD = "tests/hard/test_hard_cases.py"
+DIAGRAM = "tests/diagram/test_diagram.py"
+
+CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
+
+FAULTS = {
+    # location
+    "location-is-blunt": Fault(f"{CONTINUATION}locate.py", "SHARP = 1e-11", "SHARP = 1e-4", f"{HEMITROPIC} {GOLDEN}"),
+    "location-at-another-zero": Fault(
+        f"{CONTINUATION}locate.py", "np.argmin(abs(real - guess))", "np.argmax(abs(real - guess))", f"{CORD} {GOLDEN}"
+    ),
+    "location-without-its-tail": Fault(
+        f"{CONTINUATION}locate.py", "max(tail - floor, 0.0) + arithmetic", "0.0", f"{FOLLOW} {HEMITROPIC} {ERRORS}"
+    ),
+    "state-beside-the-point": Fault(
+        f"{CONTINUATION}locate.py",
+        "x, tangent = combine(states, weights)",
+        "x, tangent = states[0]",
+        f"{CORD} {GOLDEN}",
+    ),
+    "fold-is-a-branch-point": Fault(
+        f"{CONTINUATION}special_points.py",
+        "kind = FOLD if turning and coupling > COUPLED",
+        "kind = FOLD if turning and coupling < COUPLED",
+        f"{CORD} {CLASSICS}",
+    ),
+    "crossing-at-a-fold-counts-twice": Fault(
+        f"{CONTINUATION}special_points.py", "if not own <= order < own +", "if own <= order < own +", f"{CORD} {GOLDEN}"
+    ),
+    "two-points-are-one": Fault(
+        f"{CONTINUATION}special_points.py",
+        "if near and not across(solver.system, special.null_vectors, known.null_vectors):",
+        "if near:",
+        f"{CHAIN} {HARD}",
+    ),
+    "pairs-are-not-looked-for": Fault(f"{CONTINUATION}touching.py", "LOWER = 0.5", "LOWER = 0.0", f"{CHAIN} {HARD}"),
+    "pair-beside-a-row": Fault(f"{CONTINUATION}touching.py", "DEEP = 0.05", "DEEP = 0.0", f"{CHAIN} {HARD}"),
+    "breaks-are-not-recorded": Fault(
+        f"{CONTINUATION}index_chain.py",
+        "if left[1] < right[0] or right[1] < left[0]:",
+        "if left[1] < right[0] and right[1] < left[0]:",
+        CHAIN,
+    ),
+    "stability-is-not-exchanged": Fault(
+        f"{CONTINUATION}special_points.py",
+        "return low if there == high else low + 1",
+        "return low",
+        f"{CHAIN} {GOLDEN}",
+    ),
+    "pitchfork-opens-the-other-way": Fault(
+        f"{CONTINUATION}normal_form.py",
+        'return NormalForm("pitchfork", best,',
+        'return NormalForm("pitchfork", -best,',
+        f"{CORD} {FOLLOW}",
+    ),
+    # index
+    "constraints-are-miscounted": Fault(
+        f"{STABILITY}inertia.py",
+        "below = negative - own.constraints - self.drifts",
+        "below = negative - own.constraints",
+        INERTIA,
+    ),
+    "symmetries-are-no-zeros": Fault(
+        f"{STABILITY}inertia.py",
+        "zero = self.below(own.tolerance) - negative + self.drifts",
+        "zero = self.below(own.tolerance) - negative",
+        f"{INERTIA} {BUCKLED}",
+    ),
+    "band-is-wide": Fault(
+        f"{STABILITY}inertia.py", "ZERO_BAND = 1e-7", "ZERO_BAND = 1e-2", f"{INERTIA} {CORD} {CHAIN}"
+    ),
+    "quotients-of-the-wrong-sign": Fault(
+        f"{STABILITY}round_off.py",
+        "negative = int((theta < -doubt).sum())",
+        "negative = int((theta > doubt).sum())",
+        INERTIA,
+    ),
+    "pivots-of-two-rows": Fault(
+        "rodfem/linalg/chain.c", "det < 0 ? 1 : 2 * (e < 0)", "det < 0 ? 1 : 0", "tests/linalg/test_chain.py"
+    ),
+    "pivots-of-one-row": Fault(
+        "rodfem/linalg/chain.c",
+        "c->negative += pivot < 0;",
+        "c->negative += pivot < 1e-3;",
+        "tests/linalg/test_chain.py",
+    ),
+    "index-in-space-of-the-plane": Fault(
+        f"{STABILITY}out_of_plane.py",
+        "return self.inertia.at(state).count()",
+        "return Inertia(self.planar).at(x).count()",
+        "tests/literature/test_rods.py tests/literature/test_ruler.py tests/literature/test_classics.py",
+    ),
+    "flutter-beside-the-collision": Fault(
+        f"{CONTINUATION}flutter.py",
+        "abs(root) < 1 and uncertainty < best.uncertainty",
+        "uncertainty < 10 * best.uncertainty",
+        "tests/literature/test_follower.py",
+    ),
+    "flutter-without-conjugates": Fault(
+        f"{CONTINUATION}flutter.py",
+        "others[others.imag > 0]",
+        "others[others.imag >= 0]",
+        "tests/literature/test_follower.py tests/diagram/test_sweep.py",
+    ),
+    # error bars
+    "bound-without-what-is-left": Fault(
+        "rodfem/adaptivity/error_estimate.py", "abs(richer - value) / (1 - rho) + left", "abs(richer - value)", ERRORS
+    ),
+    "bound-is-a-tenth": Fault(
+        "rodfem/adaptivity/error_estimate.py",
+        "abs(richer - value) / (1 - rho) + left",
+        "0.1 * abs(richer - value) + left",
+        ERRORS,
+    ),
+    "every-state-is-resolved": Fault(
+        "rodfem/adaptivity/error_estimate.py", "RESOLVED_TO = 0.1", "RESOLVED_TO = 1e9", f"{ERRORS} {HARD}"
+    ),
+    "bars-are-rounded": Fault(
+        "rodfem/output/digits.py",
+        "ceil(error / 10.0**power * (1 - NEGLIGIBLE))",
+        "round(error / 10.0**power)",
+        "tests/app/test_terminal.py tests/output",
+    ),
+    "bar-without-digits-left-out": Fault(
+        "rodfem/output/digits.py",
+        "error + abs(value - float(text))",
+        "error",
+        "tests/app/test_terminal.py tests/output",
+    ),
+    "end-of-a-branch-is-too-sharp": Fault(
+        "rodfem/adaptivity/zero_stretch.py", "else 0.25", "else 0.0025", f"{ERRORS} {HEMITROPIC} {BUCKLED}"
+    ),
+    # files
+    "no-drafts": Fault(
+        "rodfem/whole_files.py",
+        'draft = path.with_name(f".{path.stem}.part{path.suffix}")',
+        "draft = path",
+        f"{KILLS} {FILES}",
+    ),
+    "earlier-branches-are-lost": Fault(
+        "rodfem/app/run.py", "first = len(diagram) == 1", "first = True", f"{FILES} {KILLS} {DIAGRAM}"
+    ),
+    "another-row-is-restored": Fault(
+        "rodfem/output/files.py", "_trimmed(value[row])", "_trimmed(value[row - 1])", f"{FILES} {DIAGRAM}"
+    ),
+    "files-of-two-runs": Fault(
+        "rodfem/output/files.py",
+        'if run != data.get("run"):',
+        "if False:",
+        f"{FILES} {KILLS} tests/output/test_foreign_files.py",
+    ),
+    "not-finite-numbers-in-a-file": Fault(
+        "rodfem/output/files.py",
+        "return float(value) if np.isfinite(value) else None",
+        "return float(value)",
+        f"{FILES} tests/output/test_foreign_files.py",
+    ),
+    "folder-without-a-lock": Fault(
+        "rodfem/output/folder.py",
+        "if comm.bcast(place in HELD):",
+        "if comm.bcast(True):",
+        f"{KILLS} {FILES} tests/hard/test_numerical_faults.py",
+    ),
+    "scene-of-another-name": Fault(
+        "rodfem/diagram/saved.py", "if (name, load) != (scene.name, scene.load):", "if load != scene.load:", DIAGRAM
+    ),
+}
+
+
+def main(names: list[str]) -> int:
+    """Plant the faults named, or all, one after the other; returns the number of those that no test caught."""
+    missed = 0
+    for name in names or FAULTS:
+        began, caught = time.time(), caught_by(FAULTS[name])
+        missed += not caught
+        print(f"{name:<34} {caught or 'NOT CAUGHT'} ({time.time() - began:.0f} s)", flush=True)
+    print(f"{missed} not caught")
+    return missed
+
+
+def caught_by(fault: Fault) -> str:
+    """Name of the first test that fails with a fault planted; empty where all pass."""
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder) / "rodfem"
+        files = subprocess.run(["git", "ls-files", "-z"], cwd=HOME, capture_output=True, text=True, check=True).stdout
+        for file in filter(None, files.split("\0")):
+            (tree / file).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(HOME / file, tree / file)
+        place = tree / fault.file
+        place.write_text(planted(place.read_text(), fault))
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-x",
+            "-q",
+            "--no-header",
+            "-p",
+            "no:cacheprovider",
+            *fault.tests.split(),
+        ]
+        path = os.pathsep.join(map(str, (tree, tree / "tests")))
+        done = subprocess.run(
+            command, cwd=tree, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=LIMIT
+        )
+        failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+        return failed[0][:110] if done.returncode == 1 and failed else ""
+
+
+def planted(text: str, fault: Fault) -> str:
+    """Text with a fault; raises ValueError unless it has one place for it."""
+    if text.count(fault.old) != 1:
+        raise ValueError(f"{fault.file} has {text.count(fault.old)} times {fault.old!r}: give the fault another place")
+    return text.replace(fault.old, fault.new)
+
+
+if __name__ == "__main__":
+    sys.exit(min(main(sys.argv[1:]), 1))
