@@ -33,7 +33,7 @@ ENTRIES = {
         "leaves the state without oscillating."
     ),
     "event": "A load at which a number of the state that the plan names passes through zero.",
-    "user | requested load": "A load that was asked for (--at); every branch is computed at exactly this load.",
+    "user | requested load": "A load that was asked for; every branch is computed at exactly this load.",
     "end": "The first or the last state of a branch; `ended` says why no more follow.",
     # stability
     "index | negative | negative eigenvalues": (
@@ -61,7 +61,7 @@ ENTRIES = {
         "Eigenvalue of the second variation with the rod's inertia (unit rotary inertia where it has none): the "
         "square of a frequency. A negative one is a growing motion."
     ),
-    "spectrum | left-most eigenvalues": "The smallest eigenvalues mu of a state, on request (--spectrum).",
+    "spectrum | left-most eigenvalues": "The smallest eigenvalues mu of a state, on request.",
     "band | inside": (
         "Eigenvalues nearer to zero than the band have a sign that round-off of the factors hides; their Rayleigh "
         "quotients, each with an uncertainty, decide."
@@ -88,7 +88,7 @@ ENTRIES = {
         "is a zero eigenvalue, never part of the index; the drift scalar that fixes it vanishes but for round- "
         "off."
     ),
-    "mode": "An eigenvector of the second variation with the rod's inertia: how the rod moves (--modes).",
+    "mode": "An eigenvector of the second variation with the rod's inertia: how the rod moves.",
     # the local law
     "normal form | law": (
         "load = load_b + c x^p + ...: the load along the branch that leaves a branch point, in the change x of "
@@ -131,7 +131,7 @@ ENTRIES = {
     "located to | located_to": (
         "Uncertainty of the load of a special point on this mesh, without the error of the mesh."
     ),
-    "accuracy": "Error that every load and ordinate keeps below, by meshes chosen on the way (--accuracy).",
+    "accuracy": "Error that every load and ordinate keeps below, by meshes chosen on the way.",
     "error": "Of a row: size of the last Newton correction, in the metric.",
     "metric": "Measure of a change of state: root mean square of the rotation in radian, with centreline and load.",
     "arclength": "Length along a branch in the metric.",
@@ -147,9 +147,9 @@ ENTRIES = {
     # branches
     "branch": "A curve of equilibria, row by row along its arclength.",
     "detached": "A branch on the other side of a gap that an imperfection leaves: no step from the others reaches it.",
-    "found": "A branch through an equilibrium that deflation found (--search).",
+    "found": "A branch through an equilibrium that a search by deflation found.",
     "depth | branch_points_not_followed": (
-        "Number of switches from the first branch; --depth says how many are followed."
+        "Number of switches from the first branch; the plan says how many are followed."
     ),
     "meets": "This special point is one of another branch, too.",
     "followed": "Whether branches were sought from a branch point.",

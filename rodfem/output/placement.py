@@ -53,11 +53,12 @@ def place_words(
     points
         Loads and ordinates (k, 2) of special points by kind, which words do not cover.
     """
-    for handles in (others, branches + others):
-        box, obstacles = _place_legend(axes, handles, pieces, points, len(branches) <= MOST_INSIDE)
+    few = len(branches) <= MOST_INSIDE
+    for handles in (others, branches + others) if few else (branches + others,):
+        box, obstacles = _place_legend(axes, handles, pieces, points, few)
         words = _Words(axes, [box], obstacles)
         words.indices(pieces)
-        if handles is not others or (len(branches) <= MOST_INSIDE and words.names(pieces)):
+        if handles is not others or words.names(pieces):
             return
         words.remove()
 
