@@ -5,6 +5,8 @@ PYTHON := .venv/bin/python
 MPIRUN := /usr/bin/mpirun.openmpi --oversubscribe
 # Seconds after which one run of the tests or the demo is stopped: ranks that wait for each other never end.
 LIMIT := 1200
+# Whether `make docs` executes the lessons: force, or off where the tests have done so.
+LESSONS := force
 # More options for pytest, as in: make test ARGS="-k hemitropic"
 ARGS :=
 
@@ -23,7 +25,7 @@ export MPLBACKEND := Agg
 export PYVISTA_OFF_SCREEN := true
 export VTK_DEFAULT_OPENGL_WINDOW := vtkEGLRenderWindow
 
-.PHONY: help setup demo test lint figures bench clean
+.PHONY: help setup demo test lint figures notebooks docs bench clean
 
 help: ## list these commands
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 12
@@ -46,6 +48,18 @@ lint: setup ## check style and types
 
 figures: setup ## run all demos
 	@set -e; for demo in demos/*.py; do echo "$$demo"; $(PYTHON) "$$demo"; done
+
+docs: setup ## build the site in build/site; LESSONS=off does not execute the course
+	@tools/setup.sh docs
+	RODFEM_LESSONS=$(LESSONS) $(PYTHON) -m sphinx -q -W --keep-going -b html docs build/site
+	@echo "The site: build/site/index.html"
+
+notebooks: setup ## the lessons of the course as notebooks, in results/notebooks
+	@tools/setup.sh docs
+	@mkdir -p results/notebooks
+	@set -e; for lesson in docs/course/[0-9]*.py; do \
+		$(PYTHON) -m jupytext --quiet --to ipynb --output "results/notebooks/$$(basename "$$lesson" .py).ipynb" "$$lesson"; \
+	done; ls results/notebooks
 
 bench: setup ## measure speed, ways to judge a state, hard cases: docs/speed.md, stability.md, robustness.md (40 minutes)
 	$(PYTHON) -m benchmarks.speed

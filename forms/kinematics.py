@@ -25,7 +25,7 @@ RODS: dict[str, tuple[int, ...]] = {
     "inextensible": (0, 1),
     "unshearable and inextensible": (),
 }
-"""Which components of the strain ``v`` are free in each kind of rod (0, 1: shear; 2: stretch)."""
+"""Which components of the strain ``v`` are free in each kind of rod: 0 and 1 are shear, 2 is stretch."""
 
 
 def curvature(q: Expr, dq: Expr) -> Expr:

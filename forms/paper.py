@@ -52,7 +52,7 @@ In what sense UFL's second derivative agrees (``tests/forms/test_paper.py``):
   second derivative of the discrete energy along ``exp(eps theta_i / 2) q_i`` at all nodes i: that term's second
   derivative pays for the acceleration.
 * The discrete ``dq`` interpolates ``1/2 theta q`` at the nodes, :func:`second_variation` uses it everywhere.  For
-  smooth perturbations, elements of degree k and size h, the difference is O(h^{2k}).
+  smooth perturbations, elements of degree d and size h, the difference is O(h^{2d}).
 """
 
 from __future__ import annotations

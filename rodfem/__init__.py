@@ -39,7 +39,7 @@ finds and classifies the points where it is lost, follows what branches off, and
 * **Diagram**: :func:`trace` computes without files and returns a :class:`Diagram`: ``diagram["branch 1"]``,
   ``.special("fold")``, ``.at(40.0)``, ``.assess(point)``, ``.modes(point)``, ``.locus(special, "A", (-3, 0))``,
   ``.search(40.0)``, ``.show(point)``, ``.plot()``, ``.save(folder)``; :func:`load` reads a saved one.  :func:`run` is
-  the same with a terminal, files and pictures.
+  the same with a terminal, files and pictures, and :func:`resume` goes on with one that was interrupted.
 * **One state**: a :class:`Solver` is a scene on a mesh: equilibria at given loads, one by one.
 * **Is it stable?**: each point has its index; :meth:`Diagram.assess` decides by any of six methods, and says how far to
   trust it; :meth:`Diagram.modes` finds how the rod moves in its left-most modes, and what a controller needs to know.
@@ -85,6 +85,7 @@ _HOMES = {
     "Event": "problem.events",
     "IndexStepControl": "continuation.step_control",
     "run": "app.run",
+    "resume": "app.resume",
     "trace": "diagram.trace",
     "load": "diagram.saved",
     "Diagram": "diagram.diagram",

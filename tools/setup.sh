@@ -2,7 +2,7 @@
 # Makes rodfem runnable on Debian 12 or 13: system packages, .venv, and rodfem in it. Where nothing is missing
 # it does nothing, and needs neither network nor sudo.
 #
-#     tools/setup.sh EXTRAS        EXTRAS as in pyproject.toml: viz,test or dev
+#     tools/setup.sh EXTRAS        EXTRAS as in pyproject.toml: viz,test, dev or docs
 set -eu
 cd "$(dirname "$0")/.."
 extras=$1

@@ -2,8 +2,8 @@ r"""Error bars: every special point is computed again on a richer discretisation
 
 Elements half as long, of one degree more.  With errors ``e`` of the first and ``e'`` of the richer result their
 difference is ``d = e - e'``, so that ``|e| <= |d| / (1 - rho)`` with ``rho >= |e' / e|``.  Halving alone leaves
-``2^-(k+1)`` of what elements of degree k miss of a smooth state, and about the square of that of loads, and of
-positions at vertices.  How smooth it is the states themselves tell: by the last Legendre coefficients of the strains on
+``2^-(degree+1)`` of what elements miss of a smooth state, and about the square of that of loads, and of positions at
+vertices.  How smooth it is the states themselves tell: by the last Legendre coefficients of the strains on
 the two meshes, whose ratio bounds that of loads and positions amply.  To that comes what location and arithmetic leave
 open of the richer result.
 
@@ -91,14 +91,18 @@ class Again:
 
 
 class Enriched:
-    """A second, richer discretisation of the system of a solver, and its estimates."""
+    """A second, richer discretisation of the system of a solver, and its estimates.
+
+    ``origins`` are branch points that were located there: each with the special point of the first discretisation, and
+    the part of the error that is left.
+    """
 
     def __init__(self, solver: BranchSolver) -> None:
         """Compile and allocate the richer system."""
         self.coarse, self.system = solver, richer_system(solver.system)
         self.solver = BranchSolver(self.system)
         self.transfer = Transfer(solver.system, self.system)
-        self._origins: list[tuple[SpecialPoint, Origin, float]] = []
+        self.origins: list[tuple[SpecialPoint, Origin, float]] = []
         weights = weights_of(self.system.scene)
         self._indicators = SmoothnessIndicator(solver, weights), SmoothnessIndicator(self.solver, weights)
 
@@ -165,7 +169,7 @@ class Enriched:
         """Set the uncertainty of a law of the first discretisation: that of the rod's law, infinite without another."""
         self.system.damping = self.coarse.system.damping
         way, again, rho = self.transfer(direction, state=False), None, 0.0
-        for known, origin, left in self._origins:
+        for known, origin, left in self.origins:
             if known is special:
                 again, rho = normal_form_of(self.solver, origin, way), left
         if again is None or (again.kind, again.power) != (law.kind, law.power):
@@ -210,7 +214,7 @@ class Enriched:
         sharp, indicator = solver.inertia.held.sharpened(mode), self._indicators[1]  # by the factors of a state nearby
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(indicator.changed(x, found.x, state=True), indicator.changed(mode, sharp, state=False))
-        self._origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
+        self.origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
         return Again(found.x, found.load, ordinate, found.uncertainty, left, rho, changed)
 
 

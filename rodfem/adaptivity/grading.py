@@ -2,8 +2,8 @@ r"""Graded meshes: how smooth a state is along the rod, and the cheapest element
 
 On each element the Legendre coefficients of the strains (curvature and stretch, weighted as in the stored energy) decay
 like ``A rho^-j``, for singularities of the state at a distance ``h (rho - 1/rho) / 4`` across the rod (Trefethen,
-Approximation Theory and Approximation Practice, chapter 8).  With elements of degree k the strains are missed by
-``A rho^-k``, and loads and positions, being stationary, by the *square* of that, integrated along the rod; the factor
+Approximation Theory and Approximation Practice, chapter 8).  With elements of degree d the strains are missed by
+``A rho^-d``, and loads and positions, being stationary, by the *square* of that, integrated along the rod; the factor
 in front is measured by a computation on a richer mesh.  On an element of another size the distance stays, and ``rho``
 follows: how large an element may be at each place is had in closed form.
 """
@@ -27,7 +27,7 @@ from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY, same_place
 DEGREES = range(4, 11)
 """Degrees to choose from."""
 FIXED, PER_DEGREE = 600.0, 0.27
-"""Cost of a point of a branch with n unknowns of degree k is as ``FIXED + n (1 + PER_DEGREE k)``: measured, cord."""
+"""Cost of a point of a branch with n unknowns of degree d is as ``FIXED + n (1 + PER_DEGREE d)``: measured, cord."""
 KEEP = 0.15
 """Another degree than the present one must save this part of the cost: its forms have to be compiled or loaded."""
 LARGEST = 3.0

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
 Mesh = Callable[..., "Discretization"]
+KEPT = "the branches that were finished are in"
+"""What there is in the folder of a run that was interrupted."""
 
 
 def main(
@@ -61,12 +63,11 @@ def main(
         with sentences(parser):
             _run(statement, mesh, options, petsc, parser.in_options)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; the branches that were finished are in {options.output}") from None
+        raise KeyboardInterrupt(
+            f"interrupted; {KEPT} {options.output}: {parser.option('resume')} goes on there"
+        ) from None
     except MemoryError:
-        complain(
-            "Memory is exhausted: use fewer elements or a lower degree; the branches that were finished are in "
-            f"{options.output}."
-        )
+        complain(f"Memory is exhausted: use fewer elements or a lower degree; {KEPT} {options.output}.")
 
 
 def parser_of(statement: Statement, usual: Scene, program: str) -> Parser:
@@ -103,6 +104,7 @@ def _run(
     """
     from petsc4py import PETSc
 
+    from rodfem.app.resume import resume
     from rodfem.app.run import run
     from rodfem.app.terminal import Report
 
@@ -112,7 +114,11 @@ def _run(
     scene, discretization, plan = statement.scene(**constants), _mesh(mesh, options, constants), plan_of(options)
     if plan.span is not None:
         scene = replace(scene, span=plan.span)
-    run(scene, discretization, plan, options.output, figures=options.figures and not options.quick, words=words)
+    figures = options.figures and not options.quick
+    if options.resume:
+        resume(options.output, scene, discretization, plan, figures=figures, words=words)
+    else:
+        run(scene, discretization, plan, options.output, figures=figures, words=words)
     if unread := petsc_options.unread(petsc):
         Report().warn(f"PETSc did not read the option {', '.join(unread)}: see whether it is spelled right.")
 

@@ -5,25 +5,25 @@ from __future__ import annotations
 import atexit
 import gc
 import os
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path
 
 from mpi4py import MPI
 
 from rodfem.app.interrupts import held
+from rodfem.app.loci import follow_all
+from rodfem.app.run_terminal import Terminal
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import Branch
-from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.diagram import Diagram
+from rodfem.diagram.journal import Journal
 from rodfem.diagram.plan import Plan
+from rodfem.diagram.record import Record
 from rodfem.diagram.solver import MESH, RANKS, SCENE
-from rodfem.diagram.trace import PLAN, trace
-from rodfem.errors import ConvergenceError, InputError
+from rodfem.diagram.trace import PLAN, traced
 from rodfem.fem.fields import Discretization
-from rodfem.fem.system import System
-from rodfem.output.files import save_json, save_run
-from rodfem.output.folder import locked, remove_earlier
+from rodfem.output.checkpoint import remove_steps
+from rodfem.output.files import save_json
+from rodfem.output.folder import locked
 from rodfem.output.typical import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
@@ -58,8 +58,9 @@ def run(
 ) -> Diagram:
     """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
-    Files are updated after every branch: an interrupted run keeps all completed branches.  Those of an earlier run in
-    the folder stay until the first branch is complete.  Returns the diagram.  Raises
+    Files are updated after every branch: an interrupted run keeps all completed branches, and goes on from there by
+    :func:`rodfem.resume`.  Those of an earlier run in the folder stay until the first branch is complete.  Returns the
+    diagram.  Raises
     :class:`~rodfem.errors.InputError` for bad input, before any computation, and where the folder cannot be written any
     more or is in use by another process, and
     :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
@@ -83,13 +84,26 @@ def run(
     words
         Rewords each line on the terminal.
     """
-    plan = plan or Plan()
+    plan, discretization = plan or Plan(), discretization or Discretization()
     output = Path(output or Path("results") / scene.name)
-    plan.check(scene, discretization or Discretization())
+    plan.check(scene, discretization)
     terminal = Terminal(plan, output, comm, quiet, words)
     with locked(output, comm):
-        diagram = trace(scene, discretization, plan, terminal, comm=comm)
-        _report(diagram, terminal, figures)
+        return carry_out(scene, discretization, terminal, figures, comm)
+
+
+def carry_out(
+    scene: Scene, discretization: Discretization, terminal: Terminal, figures: bool, comm: MPI.Comm
+) -> Diagram:
+    """Do all that the plan of the ``terminal`` asks for, in its folder, which is locked; go on with what is known.
+
+    ``scene`` and ``discretization`` have passed the plan's check; pictures are drawn if ``figures``, and the ranks of
+    ``comm`` share the rod.
+    """
+    known = [Record(step.text, step.vectors) for step in terminal.steps]
+    journal = Journal(known, terminal.keep, terminal.run)
+    diagram = traced(scene, discretization, terminal.plan, terminal, comm, journal)
+    _report(diagram, terminal, figures)
     return diagram
 
 
@@ -97,9 +111,11 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     """Print tables, do what the plan asks for beyond branches, and draw the pictures if ``figures``."""
     scene, plan, output, comm = diagram.scene, terminal.plan, terminal.output, diagram.solvers[0].system.comm
     branches, clock = diagram.branches, diagram.clock
-    on_first(comm, lambda: save_json(diagram.data, output / "diagram.json"))
+    terminal.save(diagram)
+    data = diagram.data
+    on_first(comm, lambda: save_json(data, output / "diagram.json"))
     terminal.table(branches, diagram.solvers[0].system, plan.most_branches)
-    terminal.summary(diagram.data)
+    terminal.summary(data)
     terminal.spectra(branches, scene)
     terminal.frequencies(branches, scene.load)
     terminal.timing(clock, sum(len(b.points) for b in branches))
@@ -109,86 +125,16 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
 
         assess_all(branches, diagram.solvers, plan, output, terminal, figures)
     if plan.locus is not None:
-        _loci(branches, diagram.solvers, plan, output, terminal, figures)
+        follow_all(branches, diagram.solvers, plan, output, terminal, figures, known=terminal.goes_on)
     if figures:
-        on_first(comm, lambda: _draw(output, terminal))
+        on_first(comm, lambda: draw(output, terminal))
+    diagram.complete = True
+    with held():
+        on_first(comm, lambda: save_json(data | {"complete": True}, output / "diagram.json"))
+        on_first(comm, lambda: remove_steps(output))
 
 
-class Terminal(Report):
-    """Shows a run on the terminal, and keeps its files up to date."""
-
-    def __init__(
-        self, plan: Plan, output: Path, comm: MPI.Comm, quiet: bool, words: Callable[[str], str] = str
-    ) -> None:
-        """Write into the folder ``output``, which there is; with ``quiet`` print nothing.
-
-        The ``plan`` says what is printed; ``comm`` has the ranks, of which the first one writes; ``words`` rewords each
-        line.
-        """
-        super().__init__(comm, words=words)
-        if quiet:
-            self.on = self.live = False
-        self.plan, self.output = plan, output
-
-    def system(self, system: System, accuracy: float | None = None) -> None:
-        """Say what is solved, and refuse a method that does not apply before anything is computed."""
-        super().system(system, accuracy)
-        if self.plan.method or self.plan.modes:
-            from rodfem.app.assess_all import check_method
-
-            check_method(system, self.plan)
-
-    def complete(self, diagram: Diagram) -> None:
-        """Save all that there is: an interrupted run keeps all completed branches."""
-        with diagram.clock("files"), held():
-            first = len(diagram) == 1
-            if first:
-                on_first(diagram.solvers[0].system.comm, lambda: remove_earlier(self.output))
-            save_run(diagram.data, diagram.branches[-1:], diagram.solvers, self.output, first=first)
-
-
-def _loci(
-    branches: list[Branch], solvers: Sequence[StaticSolver], plan: Plan, output: Path, report: Report, figures: bool
-) -> None:
-    """Follow all special points in the plane of two parameters; each into a file of its own, all into one picture.
-
-    Each on the mesh on which it was found.
-    """
-    from rodfem.codim2.locus import Locus, locus
-    from rodfem.output.plot_locus import draw_locus
-
-    if plan.locus is None:
-        return
-    name, low, high = plan.locus
-    span, comm = plan.over(solvers[0].system.scene), solvers[0].system.comm
-    load = (min(span), max(span))
-    saved: list[dict] = []
-    for branch in branches:
-        known: list[Locus] = []
-        for special in branch.special:
-            if not (special.kind.counted or special.kind.line) or special.connects_to is not None:
-                continue
-            if any(found.passes(special) for found in known):
-                report.say(f"\nThe {special.kind} of {branch.name} at {special.point.load:.8g} is on a locus above")
-                continue
-            if plan.accuracy is not None:
-                report.say("\nA locus stays on the mesh of its special point: its own estimate says how accurate it is")
-            report.say(f"\nLocus of the {special.kind} of {branch.name} at {special.point.load:.8g}")
-            try:
-                found = locus(solvers[special.point.mesh], special, name, (load, (low, high)))
-            except (InputError, ConvergenceError) as trouble:
-                report.warn(str(trouble))
-                continue
-            report.say(found.text())
-            saved.append(found.data())
-            known.append(found)
-            on_first(comm, partial(found.save, output / f"locus-{len(saved)}.json"))
-    if saved and figures:
-        on_first(comm, lambda: draw_locus(saved, output / "locus.png"))
-        report.say(f"Loci in {output}{os.sep}: locus-1.json ..., locus.png")
-
-
-def _draw(output: Path, report: Report) -> None:
+def draw(output: Path, report: Report) -> None:
     """Draw the diagram, and the shape of a stable state if there is one."""
     from rodfem.output.files import load_json
     from rodfem.output.plot_diagram import draw_diagram

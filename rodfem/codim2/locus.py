@@ -31,7 +31,7 @@ from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.transfer import Transfer, richer_system
-from rodfem.file_format import LOCUS
+from rodfem.file_format import LOCUS, read_json
 from rodfem.output.digits import number
 from rodfem.output.files import mesh_of, save_json
 from rodfem.stability.cluster import as_vectors
@@ -43,6 +43,9 @@ SAME = 1e-6
 """Loads of special points that differ by less than this, relative, may be one and the same point of a curve."""
 CUSP = 1e-3
 """Part of the tangent in the plane, as a share of the bounds, below which a node is at a cusp."""
+
+AS_THEY_ARE = ("scene", "title", "kind", "ordinate_name", "start", "lower", "constants", "discretization")
+"""Entries of a file that are attributes of a locus."""
 
 
 @dataclass
@@ -94,8 +97,7 @@ class Locus:
     states
         State vector of each row, of the system on which the locus was computed; not saved.
     crossings
-        Load and ordinate at the start, and wherever else the curve passes the second parameter's value there; not
-        saved.
+        Load and ordinate at the start, and wherever else the curve passes the second parameter's value there.
     """
 
     scene: str
@@ -134,8 +136,7 @@ class Locus:
             columns[key] = table.tolist()
         columns["error"] = [[v if np.isfinite(v) else None for v in row] for row in self.error.tolist()]
         columns["omega2"] = [None if np.isnan(v) else v for v in self.omega2.tolist()]
-        same = ("scene", "title", "kind", "ordinate_name", "start", "lower", "constants", "discretization")
-        out = {"format": LOCUS.mark(), **{name: getattr(self, name) for name in same}}
+        out = {"format": LOCUS.mark(), **{name: getattr(self, name) for name in AS_THEY_ARE}}
         return out | {
             "parameters": list(self.names),
             "labels": list(self.labels),
@@ -144,7 +145,36 @@ class Locus:
             "without_estimate": np.flatnonzero(np.isinf(self.error[:, 0])).tolist(),
             "marks": [{"kind": m.kind, "row": m.row} for m in self.marks],
             "ended": list(self.ended),
+            "crossings": [list(crossing) for crossing in self.crossings],
         }
+
+    @classmethod
+    def read(cls, path: Path) -> Locus:
+        """Read what :meth:`save` has written, but for the states; raises :class:`InputError` where that is missing."""
+        data = read_json(path, LOCUS, ("parameters", "columns", "marks", "crossings", "lower"))
+        columns, (first, second) = data["columns"], data["parameters"]
+        tables: dict[str, Any] = {
+            key: np.array(columns[key], dtype=float) for key in ("ordinate", "located_to", "error", "omega2")
+        }
+        tables["error"][data["without_estimate"]] = np.inf
+        return cls(
+            **{name: data[name] for name in AS_THEY_ARE},
+            names=(first, second),
+            labels=tuple(data["labels"]),
+            bounds=(tuple(data["bounds"][0]), tuple(data["bounds"][1])),
+            values=np.array([columns[first], columns[second]]).T,
+            index=np.array(columns["index"]),
+            marks=[Mark(mark["kind"], mark["row"]) for mark in data["marks"]],
+            ended=tuple(data["ended"]),
+            crossings=[(load, ordinate) for load, ordinate in data["crossings"]],
+            **tables,
+        )
+
+    def starts_at(self, special: SpecialPoint) -> bool:
+        """Whether the curve was started from a special point."""
+        here = np.array([special.point.load, special.point.ordinate])
+        near = SAME * np.maximum(1.0, abs(here))
+        return self.kind == special.kind and bool((abs(here - self.crossings[0]) <= near).all())
 
     def save(self, path: Path) -> None:
         """Write :meth:`data` as JSON, whole or not at all; call it on one rank."""

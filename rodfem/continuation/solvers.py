@@ -143,6 +143,13 @@ class StaticSolver:
         """All factors that this solver makes."""
         return [self.system.lu]
 
+    def forget(self) -> None:
+        """Forget what one computation leaves to the next, which then is the same whatever came before."""
+        self.system.set_phase(None)
+        for factors in self.factors():
+            if isinstance(factors, AlongRod):
+                factors.forget()
+
     def notices(self) -> list[str]:
         """Sentences for the record that nobody has read: symmetries that were none, factors by the last resort."""
         out = self.system.verification.read()
@@ -193,6 +200,11 @@ class BranchSolver(StaticSolver):
     def factors(self) -> list[Factors]:
         """Those of Newton's method, and the symmetric ones that count."""
         return [*super().factors(), self.inertia.factors]
+
+    def forget(self) -> None:
+        """Forget the vectors that Newton's method carries along a branch, too."""
+        super().forget()
+        self.corrector.restart()
 
     def is_stable(self, x: PETSc.Vec) -> bool:
         """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""

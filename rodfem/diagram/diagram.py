@@ -56,6 +56,10 @@ class Diagram:
         Seconds by scope.
     run
         Name of this run on the first rank, which its files have in common.
+    asked
+        Scene, discretisation and plan in numbers, as they were traced; None: unknown.
+    complete
+        Whether all that was asked for has been done.
     """
 
     def __init__(self, scene: Scene, plan: Plan, branches: list[Branch], solvers: Sequence[StaticSolver]) -> None:
@@ -64,6 +68,8 @@ class Diagram:
         self.warnings: list[str] = []
         self.notes: list[str] = []
         self.run = uuid4().hex
+        self.asked: dict[str, Any] | None = None
+        self.complete = False
         self._asked: dict[int, Solver] = {}
 
     # --- what there is ---------------------------------------------------------------------------------------------
@@ -228,7 +234,9 @@ class Diagram:
     def data(self) -> dict[str, Any]:
         """Contents of ``diagram.json``: see docs/files.md."""
         systems = [solver.system for solver in self.solvers]
-        return as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy) | {"run": self.run}
+        data = as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy)
+        asked = {} if self.asked is None else {"asked": self.asked}
+        return data | asked | {"complete": self.complete, "run": self.run}
 
     def in_words(self) -> str:
         """What the diagram says, a sentence a line: ranges of stability, how stability is lost, what is left open."""

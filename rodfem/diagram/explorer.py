@@ -52,16 +52,26 @@ class Explorer(Tracer):
 
     def _search(self, load: float) -> None:
         """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
-        self.observer.note("")
-        with self.solver.system.clock.scope("search"):
-            self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
-            known = equilibria_at(self.solver, self.branches, load, self.here)
-            found = find_equilibria(self.solver, load, known, self.plan.tries, observer=self.observer)
-        before = len(self.branches)
+        found, before = self._found(load), len(self.branches)
         for i, point in enumerate(found):
             if not self._on_branch(point, before):
                 self.trace_whole(point, f"found {i + 1} at {load:g}", 0)
         self._branch_off(before)
+
+    def _found(self, load: float) -> list[Point]:
+        """Equilibria at ``load`` that a search finds beside the branches, unless the journal knows them."""
+        name = f"search at {load!r}"
+        self.observer.note("")
+        self.use(max(self.meshes.solvers, key=lambda f: f.system.fields.unknowns).mesh)
+        if (recalled := self.book.recall(name)) is not None:
+            self._repeat(recalled)
+            return list(recalled.found)
+        self.book.begin()
+        with self.solver.system.clock.scope("search"):
+            known = equilibria_at(self.solver, self.branches, load, self.here)
+            found = find_equilibria(self.solver, load, known, self.plan.tries, observer=self.observer)
+        self.book.keep(name, found, {})
+        return found
 
     def _on_branch(self, point: Point, first: int = 0) -> bool:
         """Whether a point is on one of the branches traced, from number ``first`` on."""

@@ -58,6 +58,7 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
     plan = Plan(tuple(data["range"]), accuracy=data["accuracy"])
     diagram = Diagram(scene, plan, branches, solvers)
     diagram.notes.append(f"read from {folder}")
+    diagram.asked, diagram.complete = data.get("asked"), data.get("complete", True)
     return diagram
 
 

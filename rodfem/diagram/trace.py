@@ -10,14 +10,17 @@ from rodfem import compat
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.observer import Observer, Recorder
 from rodfem.continuation.solvers import BranchSolver
+from rodfem.diagram.asked import as_asked
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.frequency_mesh import frequency_mesh
+from rodfem.diagram.journal import Journal
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
 from rodfem.diagram.sweep import FREQUENCIES, Sweep
 from rodfem.diagram.waves import check_waves
 from rodfem.fem.fields import Discretization
+from rodfem.fem.fingerprint import fingerprint
 from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
 from rodfem.problem.scene import Scene
@@ -72,16 +75,42 @@ def trace(
     ``diagram``.  On several ranks one that nobody catches ends all ranks, which would wait for the one that fails; so
     does the end of what started them (:func:`rodfem.ranks.end_together`).
     """
-    plan = plan or Plan()
-    plan.check(scene, discretization or Discretization())
+    diagram = traced(scene, discretization or Discretization(), plan or Plan(), observer or Observer(), comm)
+    diagram.complete = True
+    return diagram
+
+
+def traced(
+    scene: Scene,
+    discretization: Discretization,
+    plan: Plan,
+    observer: Observer,
+    comm: MPI.Comm,
+    journal: Journal | None = None,
+) -> Diagram:
+    """Trace a scene as :func:`trace` does, and go on with the steps that a journal knows.
+
+    Parameters
+    ----------
+    scene, discretization, plan, observer, comm
+        As there.
+    journal
+        Steps of a run that was interrupted, and what keeps further ones.
+
+    Raises as :func:`trace` does, and :class:`~rodfem.errors.InputError` for the journal of another run.
+    """
+    plan.check(scene, discretization)
     end_together()
-    recorder, clock = Recorder(observer or Observer()), Clock()
+    journal = journal or Journal()
+    recorder, clock = Recorder(observer), Clock()
     with compat.announce_compilation(recorder.compiling) as compiled:
         with clock("setup"):
-            mesh = _mesh(scene, discretization or Discretization(), plan, recorder, comm)
+            mesh = journal.first_mesh or _mesh(scene, discretization, plan, recorder, comm)
             if plan.accuracy is None:
                 check_waves(scene, mesh, plan.over(scene), comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
+        asked = as_asked(scene, discretization, plan) | {"equations": fingerprint(found.system)}
+        recorder.asked(asked)
         recorder.system(found.system, plan.accuracy)
         if doubt := round_off_of_strains(scene):
             recorder.warn(doubt)
@@ -94,11 +123,12 @@ def trace(
 
         tracer: Explorer | Sweep
         if isinstance(found, BranchSolver):
-            tracer = Explorer(found, plan, recorder, complete)
+            tracer = Explorer(found, plan, recorder, complete, journal)
         else:
             tracer = Sweep(found, plan, recorder, complete)
         diagram = Diagram(scene, plan, tracer.branches, tracer.solvers)
-        diagram.warnings, diagram.notes = recorder.warnings, recorder.notes
+        diagram.warnings, diagram.notes, diagram.asked = recorder.warnings, recorder.notes, asked
+        diagram.run = journal.run or diagram.run
         try:
             tracer.run()
         except BaseException as trouble:  # an interrupt, too: nothing that has been computed is lost

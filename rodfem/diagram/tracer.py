@@ -16,10 +16,12 @@ from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.locate import solve_at
-from rodfem.continuation.observer import Observer
+from rodfem.continuation.observer import Observer, Recorder
 from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance, follow, hermite
 from rodfem.continuation.special_points import FIRST
+from rodfem.diagram.bookkeeper import Bookkeeper, Recalled
 from rodfem.diagram.events import Events
+from rodfem.diagram.journal import Journal
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
 from rodfem.errors import ConvergenceError
@@ -47,11 +49,18 @@ class Tracer:
     is lost.
     """
 
-    def __init__(self, solver: BranchSolver, plan: Plan, observer: Observer, finished: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        solver: BranchSolver,
+        plan: Plan,
+        observer: Observer,
+        finished: Callable[[], None],
+        journal: Journal | None = None,
+    ) -> None:
         """Start with no branch; the plan must have passed its :meth:`Plan.check`.
 
         ``solver`` has the first mesh, the ``observer`` hears of the progress, ``finished()`` is called after each
-        branch.  The ``plan`` has range, depth and steps.
+        branch.  The ``plan`` has range, depth and steps; the ``journal`` knows the steps of a run that goes on.
         """
         self.solver, self.plan, self.observer, self.finished = solver, plan, observer, finished
         self.scene = solver.system.scene
@@ -63,6 +72,8 @@ class Tracer:
         self.warned = False
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
         self.events = Events(plan.events)
+        said = observer if isinstance(observer, Recorder) else None
+        self.book = Bookkeeper(journal or Journal(), self.meshes, self.gaps, self.branches, plan.events, said)
 
     @property
     def solvers(self) -> Sequence[BranchSolver]:
@@ -79,6 +90,10 @@ class Tracer:
 
     def trace(self, branch: Branch) -> None:
         """Follow a branch to its end, insert its special points, estimate errors, hand it on as finished."""
+        if branch.ended == NOT_TRACED:
+            if self._recalled(branch.name):
+                return
+            self.book.begin()
         self.branches.append(branch)
         if branch.ended == NOT_TRACED:
             self.observer.branch(branch)
@@ -107,6 +122,9 @@ class Tracer:
         """
         if point.tangent is None:
             raise ValueError("A point without a tangent is no start of a branch.")
+        if self._recalled(name):
+            return
+        self.book.begin()
         back = Branch(name, None, depth, [reversed_point(point, 0.0)])
         self.use(point.mesh)
         self.observer.branch(back)
@@ -455,7 +473,33 @@ class Tracer:
             self.observer.warn(str(unexplained))
         self.observer.finished(branch)
         self.control.summary(branch, self.observer)
+        self.book.keep(branch.name, branch, {"warned": self.warned, "mesh": self.solver.mesh})
         self.finished()
+
+    def _recalled(self, name: str) -> bool:
+        """Whether the journal knows a branch of that name, which is then one of those that have been traced."""
+        known = self.book.recall(name)
+        if known is None:
+            return False
+        branch: Branch = known.found
+        self.branches.append(branch)
+        self.warned = known.left["warned"]
+        self.use(known.left["mesh"])
+        self.observer.branch(branch)
+        for special in branch.special:
+            if special.kind != END:
+                self.observer.special(branch, special)
+        self._repeat(known)
+        self.observer.finished(branch)
+        self.finished()
+        return True
+
+    def _repeat(self, known: Recalled) -> None:
+        """Say once more what was said in a step."""
+        for note in known.notes:
+            self.observer.note(f"  {note}")
+        for warning in known.warnings:
+            self.observer.warn(warning)
 
     def _error_bars(self, branch: Branch) -> None:
         with self.solver.system.clock.scope("error bars"):

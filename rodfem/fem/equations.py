@@ -183,7 +183,7 @@ class Equations:
 
     @staticmethod
     def quadrature_degree(degree: int) -> int:
-        """Gauss degree ``2k``, and the midpoint rule for k = 1, as in Kumar & Healey (2010)."""
+        """Gauss degree twice the degree, and the midpoint rule for linear elements, as in Kumar & Healey (2010)."""
         return 1 if degree == 1 else 2 * degree
 
     def _named(self, parts: Any, at: Any = None) -> SimpleNamespace:

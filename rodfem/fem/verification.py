@@ -50,6 +50,8 @@ class Verification:
         Places of the symmetries that were found to be none.
     notices
         A sentence on each of them that nobody has read yet.
+    norm
+        That of ``S`` at the first state, to which residuals are relative; zero before.
     """
 
     def __init__(self, system: System) -> None:
@@ -57,7 +59,7 @@ class Verification:
         self.system = system
         self.dropped: set[int] = set()
         self.notices: list[str] = []
-        self._norm = 0.0
+        self.norm = 0.0
         self._closing: list[PETSc.Vec] | None = None
         self._left, self._none = system.new_vector(), np.zeros(len(system.drifts))
 
@@ -80,7 +82,7 @@ class Verification:
         candidates = [i for i in range(len(self.system.symmetries)) if i not in self.dropped]
         if not candidates:
             return []
-        self._norm = self._norm or self.system.matrix_in_units(matrix).norm(PETSc.NormType.INFINITY)
+        self.norm = self.norm or self.system.matrix_in_units(matrix).norm(PETSc.NormType.INFINITY)
         generators = self.system.generators.at(state)
 
         def holds(chosen: list[int]) -> bool:
@@ -122,11 +124,11 @@ class Verification:
             left.setValues(system.drifts, self._none)  # phase conditions, no part of S
         left.assemble()
         size, length = system.norm(g) ** 2, system.in_units(g, -1).norm()
-        zero = ZERO * system.stiffness_scale * max(size, TINY) + EPS * self._norm * length**2
+        zero = ZERO * system.stiffness_scale * max(size, TINY) + EPS * self.norm * length**2
         quotient = float(np.real(left.dot(g)))
         if system.symmetries[chosen[0]].along:
             return abs(quotient) <= zero or self._of_the_mesh(chosen[0], g, quotient, zero, state, equations)
-        small = RESIDUAL * self._norm * (length + TINY)
+        small = RESIDUAL * self.norm * (length + TINY)
         if equations is not None:
             pulled = system.generators.pulled_back(self._unloaded(state, equations))
             left.axpy(1.0, system.generators.vector(weights @ pulled[chosen]))

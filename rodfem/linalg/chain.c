@@ -649,6 +649,7 @@ void chain_schur(const chain *c, double *out)
         out[(size_t)j * c->rest + i] = c->schur[(size_t)j * c->rest + i] * unscaled(c, c->left, i) * unscaled(c, c->right, j);
 }
 
+void chain_forget(chain *c) { c->scaled = 0; } /* the scale of the matrix before */
 int chain_rest(const chain *c) { return c->rest; }
 int chain_negative(const chain *c) { return c->negative; }
 int chain_zero(const chain *c) { return c->zero; }

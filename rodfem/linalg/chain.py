@@ -31,6 +31,7 @@ int chain_forward(chain *c, int k, const double *b, double *rest);
 void chain_back(chain *c, int k, const double *rest, double *x);
 int chain_solve(chain *c, int k, const double *b, double *x);
 void chain_schur(const chain *c, double *out);
+void chain_forget(chain *c);
 int chain_rest(const chain *c);
 int chain_negative(const chain *c);
 int chain_zero(const chain *c);
@@ -183,6 +184,10 @@ class Elimination:
         self.lib.chain_schur(self._chain, self._pointer(out))
         return out
 
+    def forget(self) -> None:
+        """Forget the scale of the last matrix, which the next one has otherwise as long as it serves."""
+        self.lib.chain_forget(self._chain)
+
     @property
     def rest(self) -> int:
         """Number of unknowns that an open chain leaves."""
@@ -247,6 +252,11 @@ class Chain(AlongRod):
     def adopt(self, *, regular: bool) -> None:
         """The factors are those that other compiled code has just made by :attr:`Elimination.functions`."""
         self.resorted, self.regular, self.elimination.regular = False, regular, regular
+
+    def forget(self) -> None:
+        """Forget the scale of the last matrix."""
+        if self._matrix is not None:
+            self.elimination.forget()
 
     def solve_columns(self, right: np.ndarray) -> np.ndarray:
         """Solutions (n, k) for ``right`` (n, k); raises :class:`MemoryError` where there is no room for them."""

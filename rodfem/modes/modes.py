@@ -179,6 +179,18 @@ def _check_arrays(arrays: Mapping[str, Any], motion: tuple[str, ...], path: Path
             raise InputError(f"{path} has a {name} that is not finite: run the scene again.")
 
 
+def rows_with_modes(path: Path) -> list[tuple[str, int]]:
+    """Branches and rows that a file has modes of, none without a file; raises :class:`InputError` where it is unfit."""
+    if not path.exists():
+        return []
+    try:
+        with h5py.File(path, "r") as file:
+            MODES.check_hdf5(file, ("branches",))
+            return [(name, int(row)) for name, rows in file["branches"].items() for row in rows]
+    except UNREADABLE as trouble:
+        raise InputError(f"{path} is no {MODES.name} ({trouble}): give {MODES.file}.") from trouble
+
+
 def load_setting(path: Path, branch: str, row: int) -> Setting:
     """Supports and loads of the rod whose modes are in a file, as far as it has them."""
     with h5py.File(path, "r") as file:

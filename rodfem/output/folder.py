@@ -19,7 +19,8 @@ LOCK = ".lock"
 """File whose lock says that the folder is in use; it has the process and the host in words."""
 MOST = 300
 """Bytes of the lock that are read."""
-OF_A_RUN = ("modes.h5", "locus*.json", "locus.png", "diagram.png", "shape.png", "modes-*.png", "modes-*.gif")
+PICTURES_OF_A_RUN = ("locus.png", "diagram.png", "shape.png", "modes-*.png", "modes-*.gif")
+OF_A_RUN = ("resume-*.h5", "modes.h5", "locus*.json", *PICTURES_OF_A_RUN)
 """Files that a run may leave beside its diagram and states."""
 PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".eps", ".ps", "")
 """Suffixes of pictures of diagrams; without one it is PNG."""

@@ -17,17 +17,17 @@ multipliers (each column the gradient of one constraint), ``M`` (m, m) the kinet
 A ring is closed by ``q(l) = +-q(0)``.  The norms being fulfilled, three of these four equations are independent: in
 tangent and compatible coordinates those across ``q(0)``, one in the plane.
 
-Sizes for ``N`` elements of degree ``k``, ``f`` free strains, one end clamped (``e = 1``) or both (``e = 2``), ``h``
+Sizes for ``N`` elements of degree ``d``, ``f`` free strains, one end clamped (``e = 1``) or both (``e = 2``), ``h``
 held components of the centreline's ends, ``g`` scalar contact forces (reduced formulation):
 
     coordinates              rows of K and C                                 columns of C
-    full, pointwise          4 (kN + 1 - e) + f kN + 3 (kN + 1) - h          kN + 1 - e + 3 kN
-    full, reduced            4 (kN + 1 - e) + f kN                           kN + 1 - e + g
-    tangent, pointwise       3 (kN + 1 - e) + f kN + 3 (kN + 1) - h          3 kN
-    tangent, reduced         3 (kN + 1 - e) + f kN                           g
-    compatible, pointwise    3 (kN + 1 - e) + 3 (kN + 1) - h                 (3 - f) kN
+    full, pointwise          4 (dN + 1 - e) + f dN + 3 (dN + 1) - h          dN + 1 - e + 3 dN
+    full, reduced            4 (dN + 1 - e) + f dN                           dN + 1 - e + g
+    tangent, pointwise       3 (dN + 1 - e) + f dN + 3 (dN + 1) - h          3 dN
+    tangent, reduced         3 (dN + 1 - e) + f dN                           g
+    compatible, pointwise    3 (dN + 1 - e) + 3 (dN + 1) - h                 (3 - f) dN
 
-For ``k = 1`` these are the sizes of Kumar & Healey (2010) with ``n = N`` but for what discontinuous fields change.
+For ``d = 1`` these are the sizes of Kumar & Healey (2010) with ``n = N`` but for what discontinuous fields change.
 Cord: ``(6n - 5) x (6n - 5)`` and ``3n`` columns.  A continuous multiplier has ``3n + 3`` components less the known
 ``n3`` at the end, ``3n + 2``; a discontinuous one has three in each cell, and dead forces enter the load instead.
 Hemitropic, compatible: ``6 (n - 1)`` and ``2n`` columns.  Hemitropic, reduced: ``4n - 3`` rows and 3 columns, where a

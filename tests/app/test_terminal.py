@@ -186,7 +186,7 @@ def test_what_is_no_module_is_named() -> None:
 @pytest.mark.alone
 def test_python_of_the_readme(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     """All its blocks, one after the other, as they stand."""
-    monkeypatch.setattr("rodfem.app.run._draw", lambda *_: None)
+    monkeypatch.setattr("rodfem.app.run.draw", lambda *_: None)
     monkeypatch.chdir(folder)
     names: dict[str, Any] = {}
     for block in re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), flags=re.DOTALL):

@@ -1,0 +1,149 @@
+# %% [markdown]
+# # 5. Branch points and imperfections
+#
+# ## Idea
+#
+# At Euler's load the straight rod and a bent one meet. Close by only one amplitude matters: all other directions are
+# stiff and follow. So the energy of the rod is, locally, a function of one number $a$. Its Taylor series tells which
+# branch leaves, on which side, whether it is stable, and what becomes of a rod that is not quite straight.
+#
+# No rod is. A branch point is a crossing of curves, and the smallest imperfection takes it apart: into a curve that
+# every real rod follows, and another one with a fold. A fold survives imperfections, a branch point does not.
+
+# %% [markdown]
+# ## Picture
+#
+# The angle $a$ of the tip of the elastica: for a perfect rod (grey), and for one with a small transverse load
+# $\varepsilon$, by the formula that the next section derives. Solid is stable.
+
+# %%
+import numpy as np
+
+from rodfem.course.pictures import axes, show
+
+EULER = np.pi**2 / 4
+near = lambda a, eps: EULER * (1 + a**2 / 8) - 4 * eps / (np.pi * a)  # noqa: E731, load of the amplitude a
+at_fold = lambda eps: (16 * eps / (np.pi * EULER)) ** (1 / 3)  # noqa: E731, size of a at the fold
+ax = axes("load $P$", "angle $a$ of the tip")
+a = np.linspace(1e-3, 1.5, 600)
+for loads, angles, style in (([1.8, EULER], [0, 0], "-"), ([EULER, 3.2], [0, 0], ":"), (near(a, 0), [a, -a], "-")):
+    ax.plot(loads, np.transpose(angles), color="0.65", lw=2, ls=style)
+for eps, colour in ((0.02, "#0072B2"), (0.005, "#D55E00")):
+    ax.plot(near(a, eps), a, color=colour, lw=2, label=f"$\\varepsilon = {eps}$")
+    for part, style in ((a > at_fold(eps), "-"), (a <= at_fold(eps), ":")):
+        ax.plot(near(-a[part], eps), -a[part], color=colour, lw=2, ls=style)
+ax.set(xlim=(1.8, 3.2), ylim=(-1.5, 1.5))
+ax.legend(frameon=False, loc="upper left")
+show(ax.figure, "05_pitchfork")
+
+# %% [markdown]
+# ## Form
+#
+# The energy with a transverse dead load $\varepsilon$ at the tip, and its null vector at $P_1 = \pi^2/4$:
+#
+# $$\Pi[\theta] = \int_0^1 \tfrac12\theta'^2 + P\cos\theta - \varepsilon\sin\theta\;ds, \qquad \phi = \sin(\pi s/2).$$
+#
+# Insert $\theta = a\phi$ and expand in $a$, $P - P_1$ and $\varepsilon$ (*Lyapunov-Schmidt reduction*; other directions
+# enter through $\Pi'''[\phi, \phi, \cdot]$, which vanishes as the energy is even in $\theta$):
+#
+# $$\Pi(a) \approx \tfrac12\Pi''_P\,(P - P_1)\,a^2 + \tfrac1{24}\Pi''''a^4 + \Pi'_\varepsilon\,\varepsilon\,a .$$
+#
+# Three numbers, derivatives in the direction $\phi$, which UFL takes. From $d\Pi/da = 0$ follows the load of an
+# amplitude.
+
+# %%
+from ufl import cos, derivative, dx, sin
+
+from rodfem.course.by_hand import angle, assemble, constant, nodes
+
+theta = angle()
+phi = theta.copy()
+phi.x.array[:] = np.sin(np.pi * nodes(theta) / 2)
+P = constant(theta, EULER)
+
+
+def along(form, times):  # derivative of a form at the straight rod
+    for _ in range(times):
+        form = derivative(form, theta, phi)
+    return assemble(form)
+
+
+fourth = along((theta.dx(0) ** 2 / 2 + P * cos(theta)) * dx, 4)
+second_P, first_eps = along(cos(theta) * dx, 2), along(-sin(theta) * dx, 1)
+curvature = -fourth / (6 * second_P) / EULER
+tilt = -first_eps / second_P
+print(f"P = P1 (1 + {curvature:.9f} a^2) {tilt:+.6f} eps/a")
+
+# %% [markdown]
+# ## Program
+#
+# rodfem computes the same numbers at every branch point (`law`: here in the tip's displacement $x \approx 2a/\pi$).
+# With $\varepsilon$ a parameter of the scene, the imperfect rod is `varying`. From small loads it bends, and never sees
+# a critical load. The other curve has to be entered from above, bent the wrong way; going down the rod snaps at a fold.
+
+# %%
+from dataclasses import replace
+
+import rodfem
+from forms.energy import bending_and_twist
+from rodfem import Ordinate, Plan, Scene, clamped, free
+
+column = Scene(
+    name="column",
+    interval=(0.0, 1.0),
+    rod="unshearable and inextensible",
+    energy=lambda v, k, c: bending_and_twist(k, (2.0, 1.0, 1.0)),
+    parameters={"P": 1.0, "eps": 0.0},
+    load="P",
+    ends=(clamped(), free(force=lambda c: (c.eps, 0.0, -c.P))),
+    ordinate=Ordinate("tip displacement", s=1.0, of=lambda r, q: r[0]),
+    span=(1.0, 4.0),
+    planar="e2",
+)
+
+
+def bent(s):  # quaternions of a rotation by -1.7 sin(pi s/2)
+    half = -0.85 * np.sin(np.pi * s / 2)
+    return np.stack([np.cos(half), 0 * s, np.sin(half), 0 * s], axis=1)
+
+
+perfect = rodfem.trace(column, plan=Plan(depth=1)).special("branch point")[0]
+print(perfect, perfect.law, sep="\n")
+imperfect = column.varying("P", (1.0, 4.0), eps=0.02)
+followed = rodfem.trace(imperfect)
+other = rodfem.trace(replace(imperfect, start=bent, span=(4.0, 1.0), states="the other one"))
+show(other.plot(), "05_snap")
+(snap,) = other.special("fold")
+print(f"followed: {followed.special()}; the other: {snap}")
+
+# %% [markdown]
+# ## Number
+#
+# $P = P_1(1 + a^2/8)$: the column carries more as it bends, a *supercritical* pitchfork (Timoshenko & Gere, §2.7).
+# Folds go as $\varepsilon^{2/3}$, Koiter's law (1945), here up: $P_1(1 + \frac38(16\varepsilon/\pi P_1)^{2/3})$.
+# Exactly it is at the least $P$ that solves $(P^2 + \varepsilon^2)^{1/4} = K(m) + F(\arcsin(\sin(\delta/2)/\sqrt m),
+# m)$, $\tan\delta = \varepsilon/P$: 2.5764720698.
+
+# %%
+answer = perfect.law.coefficient * (2 / np.pi) ** 2 / EULER
+koiter = near(-at_fold(0.02), 0.02)
+assert abs(answer - 1 / 8) < 1e-6 and abs(curvature - 1 / 8) < 1e-6
+assert followed.special() == [] and abs(snap.point.load - 2.5764720698) < 1e-8
+print(f"curvature {answer:.9f} (exact 1/8); the fold is at {snap.point.load:.10f}, Koiter's law says {koiter:.4f}")
+
+# %% [markdown]
+# ## Exercises
+#
+# **5.1** Where is the fold for $\varepsilon = 0.05$?
+#
+# **5.2** A rigid column, hinged at its foot, a horizontal spring at its top: the energy is $\frac12\sin^2\theta +
+# p\cos\theta - \varepsilon\sin\theta$. Its pitchfork is *subcritical*. At which largest $p$ does it collapse for
+# $\varepsilon = 0.01$? How much of the perfect column's load is that?
+#
+# **5.3** A heavy column (exercise 2.2): $q = q_1(1 + c\,a^2)$. Find $c$, with $a$ the angle of the tip.
+
+# %% [markdown]
+# ## Where it breaks
+#
+# The law is local: at $\varepsilon = 0.02$ it is off by 0.06 %, later by more. Two modes at nearly one load make the
+# reduced energy one of two amplitudes, with worse imperfections. Symmetric rods do that always (lesson 7).

@@ -1,0 +1,67 @@
+"""Small diagrams for the pages: branches with their index and special points, or frequencies, in given axes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from rodfem.output.sheet import HALO, PALETTE, tex
+
+MARKERS: dict[str, dict[str, Any]] = {
+    "branch point": {"marker": "o", "mfc": "white"},
+    "fold": {"marker": "D", "mfc": "black"},
+    "flutter": {"marker": "*", "mfc": "#F0E442"},
+}
+
+
+def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), width: float = 2.4) -> None:
+    """Draw a diagram, the contents ``found`` of a ``diagram.json``, with the ``signs`` of its ordinate.
+
+    Lines of a ``width`` in points are solid where the index is zero, dashed where it is zero in the plane only.
+    """
+    for branch, colour in zip(found["branches"], 3 * PALETTE, strict=False):
+        if branch["columns"].get("omega2"):
+            frequencies(axes, branch, colour)
+            continue
+        load, ordinate = (np.array(branch["columns"][x]) for x in ("load", "ordinate"))
+        for rows, index, in_space in pieces(branch):
+            style = ":" if index else "--" if in_space else "-"
+            for sign in signs if np.ptp(ordinate) else (1,):
+                axes.plot(load[rows], sign * ordinate[rows], style, color=colour, linewidth=width)
+            middle = (rows.start + rows.stop - 1) // 2
+            text = f"{index} ({in_space})" if in_space != index else f"{index}"
+            place = {"xytext": (3 * width, 3 * width), "textcoords": "offset points"}
+            axes.annotate(text, (load[middle], ordinate[middle]), color=colour, path_effects=HALO, **place)
+        for special in branch["special"]:
+            for sign in signs if special["kind"] in MARKERS else ():
+                style = {"mec": "black", "mew": 0.6 * width, "ms": 3 * width} | MARKERS[special["kind"]]
+                axes.plot(special["load"], sign * special["ordinate"], ls="none", zorder=5, **style)
+    axes.set_xlabel(tex(found["parameter_label"], always=True))
+
+
+def pieces(branch: Mapping[str, Any]) -> list[tuple[slice, int, int]]:
+    """Rows of each part of a branch with one index, that index, and the one in space."""
+    columns = branch["columns"]
+    index = columns["negative"]
+    in_space = columns.get("negative_in_space") or index
+    special = {s["row"] for s in branch["special"] if s["kind"] != "user"}
+    both = list(zip(index, in_space, strict=True))
+    changed = {
+        i for i in range(2, len(index)) if both[i] != both[i - 1] and not special & {i, i - 1}
+    }  # 0: the parent's
+    cuts = sorted({0, len(index) - 1} | special | changed)
+    return [(slice(a, b + 1), *both[(a + b) // 2 if b > a + 1 else b]) for a, b in pairwise(cuts)]
+
+
+def frequencies(axes: Axes, branch: Mapping[str, Any], colour: str, most: int = 3) -> None:
+    """Draw the real parts of the ``most`` left-most frequencies of a ``branch`` in a ``colour``; flutter is a star."""
+    omega2 = np.array(branch["columns"]["omega2"], dtype=float)
+    omega = np.sqrt(omega2[:, : 2 * most, 0] + 1j * omega2[:, : 2 * most, 1])
+    axes.plot(branch["columns"]["load"], omega.real, ".", color=colour, markersize=2)
+    for special in (s for s in branch["special"] if s["kind"] == "flutter"):
+        axes.plot(special["load"], special["omega2"] ** 0.5, ls="none", mec="black", ms=12, **MARKERS["flutter"])
+    axes.set_ylim(0, 1.1 * float(omega.real[:, :most].max()))

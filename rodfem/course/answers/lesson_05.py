@@ -1,0 +1,38 @@
+"""Answers of lesson 5: branch points and imperfections."""
+
+from rodfem.course.answer import Answer
+
+ANSWERS = (
+    Answer(
+        "curvature c of the pitchfork of the column, P = P1 (1 + c a^2) with a the angle of the tip",
+        1 / 8,
+        "exact 1/8",
+        1e-6,
+        "c = -Pi''''/(6 Pi''_P P1): derivatives of the energy in the direction of the null vector.",
+        ((1 / 4, "Divide the fourth derivative by 4!, and the second by 2!."),),
+    ),
+    Answer(
+        "load of the fold of the imperfect column, eps = 0.05",
+        2.66604501656597,
+        "exact, in elliptic integrals",
+        1e-6,
+        "Enter the other curve from above: start bent against the transverse load, and go down.",
+        ((2.6709824215169577, "That is Koiter's law, which is right for small eps only."),),
+    ),
+    Answer(
+        "largest load of the rigid column, eps = 0.01",
+        0.9311904418870033,
+        "exact (1 - eps^(2/3))^(3/2)",
+        1e-6,
+        "p = cos(theta) - eps cot(theta) along the curve of equilibria: where is it largest?",
+        ((1.0, "That is the perfect column."),),
+    ),
+    Answer(
+        "curvature c of the pitchfork of the heavy column, q = q1 (1 + c a^2) with a the angle of the tip",
+        0.1137215639,
+        "computed by two programs: the reduced energy, and shooting at small angles",
+        1e-6,
+        "Take the null vector of exercise 2.2, one at the tip, and the derivatives of lesson 5 with the weight 1 - s.",
+        ((1 / 8, "That is the load at the tip: the upper part of a heavy column carries less."),),
+    ),
+)

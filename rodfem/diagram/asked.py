@@ -1,0 +1,70 @@
+"""What a run was asked for, in numbers and texts: recorded in its files, and compared by a run that goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, fields
+from typing import Any
+
+from rodfem.continuation.step_control import StepControl
+from rodfem.diagram.plan import Plan
+from rodfem.errors import InputError
+from rodfem.fem import formulations
+from rodfem.fem.fields import Discretization
+from rodfem.fem.fingerprint import same
+from rodfem.problem.scene import Scene
+
+EQUATIONS = "equations"
+"""Entry that has the fingerprint of the equations (:mod:`rodfem.fem.fingerprint`), where it is known."""
+REMEDY = "give what was run, or choose another folder"
+
+
+def as_asked(scene: Scene, discretization: Discretization, plan: Plan) -> dict[str, Any]:
+    """What JSON can hold of a run before anything is computed; steps are a text, events their names."""
+    chosen = {f.name: getattr(plan, f.name) for f in fields(plan)}
+    chosen |= {"span": plan.over(scene), "steps": repr(plan.steps), "events": [event.name for event in plan.events]}
+    mesh = asdict(discretization) | {"formulation": formulations.chosen(discretization.formulation, scene).name}
+    return {
+        "scene": {"name": scene.name, "load": scene.load, "rod": scene.rod},
+        "constants": {name: p.value for name, p in scene.parameters.items() if name != scene.load},
+        "discretization": _plain(mesh),
+        "plan": _plain(chosen),
+    }
+
+
+def check_asked(there: dict[str, Any], here: dict[str, Any], folder: Any) -> None:
+    """Raise :class:`InputError` where a run in a ``folder`` was asked for something else than this one.
+
+    ``there`` and ``here`` are what the two were asked for; the equations are compared where both have them.
+    """
+    for name, before, now in _differences(there, here):
+        raise InputError(f"{folder} was run with {name} = {before!r}, not {now!r}: {REMEDY}.")
+    if EQUATIONS in there and EQUATIONS in here and not same(there[EQUATIONS], here[EQUATIONS]):
+        raise InputError(
+            f"{folder} was run with other equations than those of the scene {here['scene']['name']!r} (at one and the "
+            f"same state their residual, energy or ordinate differ): {REMEDY}."
+        )
+
+
+def plan_of(asked: dict[str, Any], folder: Any) -> Plan:
+    """Plan that a run in a ``folder`` was asked for; :class:`InputError` where files cannot hold it."""
+    entries = asked["plan"]
+    if entries["events"] or entries["steps"] != repr(StepControl()):
+        what = "events" if entries["events"] else "steps"
+        raise InputError(f"The plan of the run in {folder} has {what} of its own, which no file holds: give the plan.")
+    named: dict[str, Any] = {n: tuple(entry) if isinstance(entry, list) else entry for n, entry in entries.items()}
+    named |= {"steps": StepControl(), "events": ()}
+    return Plan(**named)
+
+
+def _plain(entries: dict[str, Any]) -> dict[str, Any]:
+    return {name: list(entry) if isinstance(entry, tuple) else entry for name, entry in entries.items()}
+
+
+def _differences(there: dict[str, Any], here: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
+    """Entries that differ: a name, and both values."""
+    for group in (name for name in here if name != EQUATIONS):
+        before, now = there.get(group, {}), here[group]
+        for name in dict.fromkeys([*before, *now]):
+            if before.get(name) != now.get(name):
+                yield name, before.get(name), now.get(name)

@@ -1,0 +1,176 @@
+"""Saved diagrams in the formats of other programs: VTKHDF for ParaView, CSV tables, netCDF through xarray."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodfem.errors import InputError
+from rodfem.file_format import STATES, UNREADABLE
+from rodfem.modes.modes import load_modes, rows_with_modes
+from rodfem.output.contents import read_diagram
+from rodfem.output.strains import strains
+from rodfem.output.vtkhdf import write_curves
+from rodfem.problem.quaternions import directors
+from rodfem.whole_files import write_whole
+
+Floats = NDArray[np.float64]
+DRIFT = "drift"
+"""Beginning of the names of scalars that are zero at every equilibrium."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """All rows of a branch.
+
+    Attributes
+    ----------
+    name
+        Of the branch.
+    columns
+        Numbers of the rows, by name (rows,): load, ordinate, index, ...
+    fields
+        At the nodes, by name, an array (m, k) for each row: ``s``, ``r``, ``q``, directors ``d1`` to ``d3``, strains
+        ``v``, curvatures ``k``, and the nodal unknowns of the scene.
+    """
+
+    name: str
+    columns: dict[str, Floats]
+    fields: dict[str, list[Floats]]
+
+
+def rows_of(folder: Path) -> Iterator[Rows]:
+    """Branches of the run in a folder, in order; raises :class:`InputError` where files are missing or do not fit."""
+    import h5py
+
+    data, path = read_diagram(folder / "diagram.json", ("branches", "parameter")), folder / "states.h5"
+    try:
+        with h5py.File(path, "r") as file:
+            STATES.check_hdf5(file, ("branches",))
+            for branch in data["branches"]:
+                group = file["branches"][branch["name"]]
+                stored = {name: np.asarray(x) for name, x in group.items() if isinstance(x, h5py.Dataset)}
+                yield Rows(branch["name"], _columns(branch["columns"], stored), _fields(stored))
+    except UNREADABLE as trouble:
+        if isinstance(trouble, InputError):
+            raise
+        raise InputError(
+            f"{path} does not hold the states of diagram.json beside it: run the scene again."
+        ) from trouble
+
+
+def _columns(columns: Mapping[str, list[Any]], stored: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Numbers of each row: those of the diagram, nan where there is none, and the scalar unknowns of the states."""
+    out = {}
+    for name, column in columns.items():
+        if all(x is None or isinstance(x, (int, float)) for x in column):
+            out[name] = np.array([np.nan if x is None else x for x in column])
+    scalars = {name: x for name, x in stored.items() if x.ndim == 1 and not name.startswith(DRIFT)}
+    return scalars | out
+
+
+def _fields(stored: Mapping[str, Floats]) -> dict[str, list[Floats]]:
+    """Nodal values of each row, without the nodes that only rows of finer meshes have."""
+    s = stored["s"]
+    nodal = {name: x for name, x in stored.items() if x.ndim > 1 and x.shape[:2] == s.shape and name not in ("v", "k")}
+    out: dict[str, list[Floats]] = {name: [] for name in (*nodal, "d1", "d2", "d3", "v", "k")}
+    for row, there in enumerate(np.isfinite(s)):
+        here = {name: x[row, there] for name, x in nodal.items()}
+        frames = directors(here["q"])
+        v, k = strains(here["s"], here["r"], here["q"], int(stored["elements"][row]))
+        for name, values in (here | {f"d{i + 1}": frames[:, :, i] for i in range(3)} | {"v": v, "k": k}).items():
+            out[name].append(values)
+    return out
+
+
+def to_vtkhdf(folder: Path, target: Path) -> list[Path]:
+    """Write a file for each branch: a row is a step, the centreline a polyline with all fields; returns the files.
+
+    Modes, where there are any, have a file for each state.  Raises :class:`InputError` for a folder without a run.
+    """
+    made = []
+    for rows in rows_of(folder):
+        path = target / f"{rows.name.replace(' ', '-')}.vtkhdf"
+        fields = {name: values for name, values in rows.fields.items() if name != "r"}
+        write_curves(path, rows.fields["r"], fields, rows.columns)
+        made.append(path)
+    return made + [_write_modes(place, folder, target) for place in rows_with_modes(folder / "modes.h5")]
+
+
+def _write_modes(place: tuple[str, int], folder: Path, target: Path) -> Path:
+    """Write the modes of a row of a branch, as vectors at the nodes of its state, real parts of complex ones."""
+    branch, row = place
+    modes = load_modes(folder / "modes.h5", branch, row)
+    fields, numbers = {"s": [modes.s]}, {"load": np.array([modes.load])}
+    for i, value in enumerate(modes.value.real, start=1):
+        fields[f"displacement {i}"] = [modes.displacement[i - 1].real]
+        fields[f"rotation {i}"] = [modes.rotation[i - 1].real]
+        numbers[f"mu {i}"] = np.array([value])
+    path = target / f"modes-{branch.replace(' ', '-')}-{row}.vtkhdf"
+    write_curves(path, [modes.r], fields, numbers)
+    return path
+
+
+def to_csv(folder: Path, target: Path) -> list[Path]:
+    """Write ``rows.csv``, a line for each row of each branch, and ``special.csv``; returns the files.
+
+    Raises :class:`InputError` for a folder without a run.
+    """
+    data = read_diagram(folder / "diagram.json", ("branches", "parameter"))
+    every = [(branch["name"], branch) for branch in data["branches"]]
+    names = list(dict.fromkeys(name for _, branch in every for name in branch["columns"]))
+    lines = [["branch", "row", *names]]
+    for name, branch in every:
+        columns = [branch["columns"].get(column) for column in names]
+        for row in range(len(branch["columns"]["load"])):
+            lines.append([name, row, *(None if column is None else column[row] for column in columns)])
+    entries = list(dict.fromkeys(entry for _, branch in every for s in branch["special"] for entry in s))
+    special = [["branch", *entries]]
+    special += [[name, *(s.get(entry) for entry in entries)] for name, branch in every for s in branch["special"]]
+    contents = {target / "rows.csv": _table(lines), target / "special.csv": _table(special)}
+    write_whole(contents)
+    return list(contents)
+
+
+def _table(lines: list[list[Any]]) -> bytes:
+    """Lines as text, numbers with all their digits, nothing where there is none."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerows([["" if x is None else repr(x) if isinstance(x, float) else x for x in line] for line in lines])
+    return text.getvalue().encode()
+
+
+def to_netcdf(folder: Path, target: Path) -> list[Path]:
+    """Write a file for each branch, of the dimensions row, node and component; returns the files.
+
+    Nodes that a row has not are nan.  Raises :class:`InputError` for a folder without a run, and without xarray.
+    """
+    try:
+        import xarray
+    except ImportError:
+        raise InputError("netCDF needs the package xarray: install it by pip install xarray h5netcdf.") from None
+    made = []
+    for rows in rows_of(folder):
+        most = max(len(s) for s in rows.fields["s"])
+        variables: dict[str, Any] = {name: ("row", column) for name, column in rows.columns.items()}
+        for name, values in rows.fields.items():
+            padded = np.full((len(values), most, *values[0].shape[1:]), np.nan)
+            for place, value in zip(padded, values, strict=True):
+                place[: len(value)] = value
+            variables[name] = (("row", "node", f"component_{padded.shape[-1]}")[: padded.ndim], padded)
+        path = target / f"{rows.name.replace(' ', '-')}.nc"
+        image = xarray.Dataset(variables, attrs={"branch": rows.name}).to_netcdf(None, engine="scipy")
+        write_whole({path: bytes(image)})
+        made.append(path)
+    return made
+
+
+FORMATS: dict[str, Callable[[Path, Path], list[Path]]] = {"vtkhdf": to_vtkhdf, "csv": to_csv, "netcdf": to_netcdf}
+"""Formats by name, and what writes them."""

@@ -1,0 +1,95 @@
+"""The command that judges a student's program."""
+
+from __future__ import annotations
+
+import sys
+from math import pi
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from rodfem.app import console
+from rodfem.course.answer import Answer
+from rodfem.course.answers import answers
+from rodfem.course.pictures import axes, show
+from rodfem.errors import InputError
+
+pytestmark = pytest.mark.alone
+
+EULER = Answer("load", pi**2 / 4, "exact pi^2/4", 1e-4, "Look at the clamp.", ((pi**2, "Those are pinned ends."),))
+
+
+@pytest.mark.parametrize(
+    ("answer", "right", "sentence"),
+    [
+        (pi**2 / 4, True, "2.46740110027 (exact pi^2/4): right to 1e-12"),
+        (2.4674, True, "2.4674 (exact pi^2/4): right to 1e-06"),
+        (2.5, False, "2.5 is too large, by 0.03. Look at the clamp."),
+        (-1, False, "-1 is too small, by 3. Look at the clamp."),
+        (9.8696, False, "9.8696 is not right. Those are pinned ends."),
+    ],
+)
+def test_judgement(answer: float, right: bool, sentence: str) -> None:
+    assert EULER.judge(answer) == (right, sentence)
+
+
+def test_a_count_is_right_or_wrong() -> None:
+    count = Answer("index", 3, "exact 3", 0.0, "Count again.")
+    assert count.judge(3) == (True, "3 (exact 3): right")
+    assert count.judge(2) == (False, "2 is too small, by 1. Count again.")
+
+
+@pytest.mark.parametrize("answer", ["many", None, float("nan"), float("inf"), [1.0]])
+def test_what_is_no_number(answer: object) -> None:
+    with pytest.raises(InputError, match="assign a"):
+        EULER.judge(answer)
+
+
+@pytest.mark.parametrize("name", answers())
+def test_traps_are_wrong_and_answers_right(name: str) -> None:
+    answer = answers()[name]
+    assert answer.judge(answer.value)[0]
+    for wrong, mistake in answer.traps:
+        assert answer.judge(wrong) == (False, f"{wrong:.12g} is not right. {mistake}")
+
+
+@pytest.mark.parametrize(
+    ("program", "status", "words"),
+    [
+        ("answer = 2 / 3.141592653589793", 0, "0.636619772368 (exact 2/pi: a quarter of a circle): right to 1e-12\n"),
+        ("answer = 0.5", 1, "0.5 is too small, by 0.1. "),
+        ("x = 1\nanswer = x / 0", 2, "mine.py stops at line 2: ZeroDivisionError: division by zero"),
+        ("x = 1\ny = (", 2, "mine.py stops at line 2: SyntaxError"),
+        ("x = 1", 2, "mine.py assigns nothing to answer: end it with a line like answer = 9.8696."),
+    ],
+)
+def test_a_program(program: str, status: int, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.py").write_text(program)
+    with pytest.raises(SystemExit) as left:
+        console.main(["check", "1.1", str(tmp_path / "mine.py")])
+    said = capsys.readouterr()
+    assert left.value.code == status
+    assert words in said.out + said.err
+
+
+def test_mistakes_and_questions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    console.main(["check", "1.1"])
+    assert capsys.readouterr().out == f"1.1   {answers()['1.1'].question}\n"
+    console.main(["check"])
+    assert capsys.readouterr().out.count("\n") == len(answers())
+    for words, sentence in ((["11"], "no question '11'"), (["1", str(tmp_path / "none.py")], "is no file")):
+        with pytest.raises(SystemExit):
+            console.main(["check", *words])
+        assert sentence in capsys.readouterr().err
+
+
+def test_a_notebook_displays_pictures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    shown: list[bytes] = []
+    stand_in = SimpleNamespace(Image=lambda png: png, display=shown.append)
+    monkeypatch.setitem(sys.modules, "ipykernel", SimpleNamespace())
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(display=stand_in, get_ipython=lambda: None))
+    monkeypatch.setitem(sys.modules, "IPython.display", stand_in)
+    monkeypatch.chdir(tmp_path)
+    show(axes("x", "y").figure, "empty")
+    assert shown[0].startswith(b"\x89PNG") and not list(tmp_path.iterdir())

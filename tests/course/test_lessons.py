@@ -1,0 +1,94 @@
+"""Lessons and solutions of the course run, quickly, and end with the right numbers."""
+
+from __future__ import annotations
+
+import ast
+import re
+import runpy
+import time
+from pathlib import Path
+
+import pytest
+
+from rodfem.course.answers import answer_to, answers
+
+COURSE = Path(__file__).parents[2] / "docs" / "course"
+LESSONS = sorted(COURSE.glob("[0-9]*.py"))
+SOLUTIONS = sorted((COURSE / "solutions").glob("*.py"))
+HEADINGS = ["Idea", "Picture", "Form", "Program", "Number", "Exercises", "Where it breaks"]
+LONGEST = 150
+"""Lines of a lesson."""
+SLOWEST = 10.0
+"""Processor time of a lesson in seconds, with its forms compiled."""
+CHEAP = ("01", "02")
+"""Lessons that also run on two ranks."""
+
+
+def question(path: Path) -> str:
+    """Name of the question that a lesson or a solution answers: 3 of 03_constraints.py, 3.2 of 03_2.py."""
+    lesson, rest = path.stem.split("_", 1)
+    return f"{int(lesson)}.{rest}" if rest.isdigit() else f"{int(lesson)}"
+
+
+def judged(path: Path) -> tuple[bool, str]:
+    """Run a program, and judge its answer."""
+    return answer_to(question(path)).judge(runpy.run_path(str(path))["answer"])
+
+
+@pytest.mark.parametrize(
+    "path", [pytest.param(p, marks=[] if p.name[:2] in CHEAP else pytest.mark.alone, id=p.stem) for p in LESSONS]
+)
+def test_a_lesson_ends_with_its_number(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    for _ in range(2):  # the first run may compile
+        start = time.process_time()
+        right, sentence = judged(path)
+        seconds = time.process_time() - start
+        if seconds < SLOWEST:
+            break
+    assert right, sentence
+    assert seconds < SLOWEST
+    assert list((folder / "results" / "course").glob("*.png")), "a lesson has a picture"
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("path", SOLUTIONS, ids=lambda path: path.stem)
+def test_a_solution_is_right(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    right, sentence = judged(path)
+    assert right, sentence
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_a_lesson_has_its_sections(path: Path) -> None:
+    text = path.read_text()
+    assert text.count("\n") <= LONGEST
+    assert re.findall(r"^# ## (.*)$", text, flags=re.MULTILINE) == HEADINGS
+    assert re.search(rf"^# # {int(path.name[:2])}\. ", text, flags=re.MULTILINE)
+    number = text[text.index("# ## Number") : text.index("# ## Exercises")]
+    assert any(isinstance(node, ast.Assert) for node in ast.walk(ast.parse(number)))
+    asked = re.findall(r"\*\*(\d+\.\d)\*\*", text)
+    assert asked == [name for name in answers() if name.startswith(f"{question(path)}.")]
+    assert 2 <= len(asked) <= 3
+
+
+@pytest.mark.alone
+def test_every_question_has_its_program() -> None:
+    assert sorted(map(question, LESSONS + SOLUTIONS)) == sorted(answers())
+
+
+@pytest.mark.alone
+def test_the_page_lists_all_lessons() -> None:
+    assert re.findall(r"\]\((\d\d_\w+\.py)\)", (COURSE / "README.md").read_text()) == [p.name for p in LESSONS]
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_a_lesson_is_a_notebook(path: Path) -> None:
+    jupytext = pytest.importorskip("jupytext")
+    notebook = jupytext.read(path)
+    kinds = {cell.cell_type for cell in notebook.cells}
+    assert kinds == {"markdown", "code"}
+    assert notebook.cells[0].source.startswith("# ")
+    assert jupytext.reads(jupytext.writes(notebook, fmt="ipynb"), fmt="ipynb").cells == notebook.cells
