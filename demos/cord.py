@@ -45,7 +45,7 @@ def cord(turns: float = 1.5) -> Scene:
         rod="unshearable and inextensible",
         energy=energy,
         parameters={
-            "lam": Parameter(60.0, r"\lambda"),
+            "lam": Parameter(60.0, r"\lambda", words="tension"),
             "k0": Parameter(2 * pi * turns),
         },
         load="lam",
@@ -53,7 +53,7 @@ def cord(turns: float = 1.5) -> Scene:
             clamped(),
             sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, c.lam)),
         ),
-        ordinate=Ordinate("shortening 1 - r3(1)", s=1.0, of=lambda r, q: 1 - r[2], label="$1 - r_3(1)$"),
+        ordinate=Ordinate("shortening 1 - r3(1)", s=1.0, of=lambda r, q: 1 - r[2], label="shortening $1 - r_3(1)$"),
         span=(max(60.0, 10.0 * ceil(0.11 * (2 * pi) ** 2 * (within(turns) ** 2 - 1))), 0.0),  # stable at first
     )
 

@@ -55,7 +55,7 @@ def pushed_rod(
         rod="unshearable and inextensible",
         energy=energy,
         parameters={
-            "P": Parameter(0.0, "P"),
+            "P": Parameter(0.0, "P", words="follower force"),
             "B1": Parameter(b1),
             "B2": Parameter(b2),
             "B3": Parameter(b3),

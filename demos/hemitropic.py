@@ -52,7 +52,7 @@ def hemitropic_rod(
         rod="unshearable",
         energy=energy,
         parameters={
-            "lam": Parameter(0.0, r"\lambda", admissible=(-inf, 1.0)),
+            "lam": Parameter(0.0, r"\lambda", admissible=(-inf, 1.0), words="end shortening"),
             "A": Parameter(coupling),
             "B": Parameter(twisting),
             "C": Parameter(bending),

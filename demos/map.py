@@ -70,7 +70,11 @@ def draw(couplings: np.ndarray, loads: np.ndarray, results: list[dict], path: Pa
         label = f"{pair[0]} | {pair[1]}"
         axes.annotate(label, (couplings[middle], line[middle]), (0, -12), textcoords="offset points", color="white")
     figure.colorbar(picture, label="mid-point displacement of the stable state")
-    axes.set(xlabel="$A$", ylabel=r"$\lambda$", title="Compressed hemitropic rod; lines: index of the straight one")
+    axes.set(
+        xlabel="coupling $A$",
+        ylabel=r"end shortening $\lambda$",
+        title="Compressed hemitropic rod; lines: index of the straight one",
+    )
     with draft_of(path) as draft:
         figure.savefig(draft)
 

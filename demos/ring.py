@@ -46,7 +46,10 @@ def ring(twisting: float = 1.5) -> Scene:
         interval=(0.0, 2 * pi),
         rod="unshearable and inextensible",
         energy=lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t0), (1.0, 1.0, c.C)),
-        parameters={"t0": Parameter(0.0, "t_0"), "C": Parameter(twisting, admissible=(0.0, inf))},
+        parameters={
+            "t0": Parameter(0.0, "t_0", words="natural twist"),
+            "C": Parameter(twisting, admissible=(0.0, inf)),
+        },
         load="t0",
         ends=Ring(),
         start=circle,

@@ -58,7 +58,7 @@ def ruler(
         rod="unshearable",
         energy=energy,
         parameters={
-            "lam": Parameter(0.0, r"\lambda"),
+            "lam": Parameter(0.0, r"\lambda", words="lateral force"),
             "E": Parameter(stretching, admissible=(0.0, float("inf"))),
             "B1": Parameter(bending[0]),
             "B2": Parameter(bending[1]),

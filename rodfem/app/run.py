@@ -114,7 +114,8 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     terminal.save(diagram)
     data = diagram.data
     on_first(comm, lambda: save_json(data, output / "diagram.json"))
-    terminal.table(branches, diagram.solvers[0].system)
+    terminal.table(branches, diagram.solvers[0].system, plan.most_branches)
+    terminal.summary(data)
     terminal.spectra(branches, scene)
     terminal.frequencies(branches, scene.load)
     terminal.timing(clock, sum(len(b.points) for b in branches))

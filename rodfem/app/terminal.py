@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
-from typing import TextIO
+from shutil import get_terminal_size
+from textwrap import fill
+from typing import Any, TextIO
 
 import numpy as np
 from mpi4py import MPI
 
 from forms.kinematics import RODS
+from rodfem.app.colour import painted, wanted
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint, not_followed
 from rodfem.continuation.kinds import END, FLUTTER
 from rodfem.continuation.observer import Observer
@@ -19,6 +22,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.modes import Modes
 from rodfem.output.digits import in_decimals, in_words, index_in_words, number, rounded_up
+from rodfem.output.summary import in_sentences
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
@@ -27,6 +31,8 @@ from rodfem.timing import WORK, Clock
 
 INDEX, UNSTABLE = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
+WIDTH = 110
+"""Columns of a paragraph."""
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
 
 
@@ -72,13 +78,16 @@ class Report(Observer):
         self.on = comm.rank == 0
         self.stream = stream or sys.stdout
         self.live = self.on and self.stream.isatty() and comm.size == 1
+        self.paint = painted if self.on and wanted(self.stream) else str
+        self.known: list[Branch] = []
 
     def say(self, line: str = "", end: str = "\n") -> None:
         """Print one line."""
         if self.on:
             if self.live:
                 self.stream.write("\r\033[K")
-            self.stream.write(self.words(line) + end)
+            lines = self.words(line).split("\n")
+            self.stream.write("\n".join(map(self.paint, lines)) + end)
             self.stream.flush()
 
     def note(self, sentence: str) -> None:
@@ -144,6 +153,7 @@ class Report(Observer):
 
     def branch(self, branch: Branch) -> None:
         """Head a new branch."""
+        self.known.append(branch)
         origin = f" from {branch.parent[0]}, special point {branch.parent[1] + 1}" if branch.parent else ""
         self.say(f"\n{branch.name}{origin}")
         self.say(f"       load           ordinate       int W ds  {self.count:>6}  zero  located to")
@@ -151,11 +161,12 @@ class Report(Observer):
     def progress(self, branch: Branch, point: Point) -> None:
         """Keep one line up to date while a branch is traced (on a terminal only)."""
         if self.live:
-            self.say(
-                f"  ... {len(branch.points)} points, load {in_decimals(point.load, 5, self.units.load)}, "
-                f"ordinate {in_decimals(point.ordinate, 5, self.units.ordinate)}, {self.count} {point.negative}",
-                end="",
+            line = (
+                f"  ... {branch.name}: {len(branch.points)} points, {self.count} {point.negative}, "
+                f"load {in_decimals(point.load, 5, self.units.load)}; {len(self.known)} branches known, "
+                f"{not_followed(self.known)} branch points waiting"
             )
+            self.say(line[: get_terminal_size().columns - 1], end="")
 
     def special(self, branch: Branch, special: SpecialPoint) -> None:
         """Print a special point as it is found, as AUTO does."""
@@ -182,8 +193,8 @@ class Report(Observer):
             self.say("  " + self._line(branch.special[-1]))
         self.say(f"  {len(branch.points)} points; ended: {branch.ended}")
 
-    def table(self, branches: Sequence[Branch], system: System) -> None:
-        """Print the final table: every special point with its error bar."""
+    def table(self, branches: Sequence[Branch], system: System, most: int = 0) -> None:
+        """Print the final table: every special point with its error bar; ``most`` is the plan's number of branches."""
         scene = system.scene
         self.say(f"\nSpecial points (in parentheses a bound of the error; ordinate: {scene.ordinate.name})")
         self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
@@ -209,10 +220,17 @@ class Report(Observer):
         missed = not_followed(branches)
         if missed:
             deepest = max(b.depth for b in branches if any(s.to_follow for s in b.special))
-            self.say(
-                f"  {missed} branch point{'s were' if missed > 1 else ' was'} not followed, at the depth of switches: "
-                f"{Argument('Plan', 'depth', deepest + 1)} follows what leaves there"
-            )
+            more, limit = Argument("Plan", "depth", deepest + 1), "at the depth of switches"
+            if most and len(branches) >= most:
+                more, limit = Argument("Plan", "most_branches", 2 * most), f"as there are {len(branches)} branches"
+            many = "s were" if missed > 1 else " was"
+            self.say(f"  {missed} branch point{many} not followed, {limit}: {more} follows what leaves there")
+
+    def summary(self, data: Mapping[str, Any]) -> None:
+        """Print a diagram, the contents of ``diagram.json``, in sentences."""
+        self.say("\nIn words (rodfem explain WORD has more)")
+        for sentence in in_sentences(data):
+            self.say(fill(sentence, WIDTH, initial_indent="  ", subsequent_indent="    "))
 
     def spectra(self, branches: Sequence[Branch], scene: Scene) -> None:
         """Print the left-most eigenvalues of the special points, if they were asked for."""

@@ -26,7 +26,7 @@ from rodfem.codim2.curve import Criterion, Half, Tracer
 from rodfem.codim2.parameter_plane import Interval, LocusPoint, Plane
 from rodfem.codim2.singular import Singular, null_vectors
 from rodfem.continuation.branch import SpecialPoint
-from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FOLD, KINDS
+from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, KINDS
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
@@ -44,7 +44,7 @@ SAME = 1e-6
 CUSP = 1e-3
 """Part of the tangent in the plane, as a share of the bounds, below which a node is at a cusp."""
 
-AS_THEY_ARE = ("scene", "title", "kind", "ordinate_name", "start", "constants", "discretization")
+AS_THEY_ARE = ("scene", "title", "kind", "ordinate_name", "start", "lower", "constants", "discretization")
 """Entries of a file that are attributes of a locus."""
 
 
@@ -77,6 +77,9 @@ class Locus:
     index
         Index of the equilibria on the two sides of the curve, (n, 2): the eigenvalues that vanish on it positive, and
         negative.  -1 for flutter and divergence.
+    lower
+        Side of the load on which the index is the lower one at the start of a locus of branch points: -1 below, 1
+        above, 0 where it is not known.
     omega2
         The double eigenvalue of flutter, (n,), nan for others.
     located_to
@@ -107,6 +110,7 @@ class Locus:
     values: np.ndarray
     ordinate: np.ndarray
     index: np.ndarray
+    lower: int
     omega2: np.ndarray
     located_to: np.ndarray
     error: np.ndarray
@@ -147,7 +151,7 @@ class Locus:
     @classmethod
     def read(cls, path: Path) -> Locus:
         """Read what :meth:`save` has written, but for the states; raises :class:`InputError` where that is missing."""
-        data = read_json(path, LOCUS, ("parameters", "columns", "marks", "crossings"))
+        data = read_json(path, LOCUS, ("parameters", "columns", "marks", "crossings", "lower"))
         columns, (first, second) = data["columns"], data["parameters"]
         tables: dict[str, Any] = {
             key: np.array(columns[key], dtype=float) for key in ("ordinate", "located_to", "error", "omega2")
@@ -270,6 +274,7 @@ def locus(
         values=np.array([n.p for n in nodes]),
         ordinate=np.array([n.ordinate for n in nodes]),
         index=np.stack([rest, np.where(rest >= 0, rest + k, -1)], axis=1),
+        lower=_lower_side(special),
         omega2=np.array([n.omega2 for n in nodes]),
         located_to=np.array([n.located_to for n in nodes]),
         error=error,
@@ -309,6 +314,14 @@ def _criterion(solver: StaticSolver, plane: Plane, kind: str, near: LocusPoint) 
     if kind == FLUTTER:
         return Collision(solver, plane)
     return Singular(solver, plane, near.modes, kind == FOLD, near.left)
+
+
+def _lower_side(special: SpecialPoint) -> int:
+    """Side of the load, -1 or 1, on which the index of a branch is the lower one beside a branch point; 0: unknown."""
+    change = special.negative_after - special.negative_before
+    if special.kind != BRANCH_POINT or special.test_function != "mu":
+        return 0
+    return int(-np.sign(change * special.point.slope))
 
 
 def _estimate(

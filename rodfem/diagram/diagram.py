@@ -243,6 +243,12 @@ class Diagram:
         asked = {} if self.asked is None else {"asked": self.asked}
         return data | asked | {"complete": self.complete, "run": self.run, "origin": self.origin}
 
+    def in_words(self) -> str:
+        """What the diagram says, a sentence a line: ranges of stability, how stability is lost, what is left open."""
+        from rodfem.output.summary import in_sentences
+
+        return "\n".join(in_sentences(self.data))
+
     @checked(folder=path("results/column"))
     def save(self, folder: Path | str) -> Path:
         """Write ``diagram.json`` and ``states.h5`` into a folder, which is made; returns it.

@@ -93,16 +93,20 @@ class Explorer(Tracer):
         """Trace what leaves the branch points of the branches from number ``first`` on, breadth first."""
         for branch in itertools.islice(self.branches, first, None):  # grows while it is walked
             if branch.depth < self.plan.depth:
-                while self._crossed < len(self.gaps.known):
+                while self._crossed < len(self.gaps.known) and not self._enough():
                     self._crossed += 1
                     gap = self.gaps.known[self._crossed - 1]
                     with self.without(f"The other side of the gap at {gap.point.load:.8g} was not followed"):
                         self._detached(gap, branch.depth + 1)
                 for i, special in enumerate(branch.special):
-                    if special.to_follow:
+                    if special.to_follow and not self._enough():
                         where = f"{branch.name} at {special.point.load:.8g}"
                         with self.without(f"No branch could be followed from {where}"):
                             self._switch(branch, i, special)
+
+    def _enough(self) -> bool:
+        """Whether there are as many branches as the plan wants at most."""
+        return 0 < self.plan.most_branches <= len(self.branches)
 
     def _primary(self) -> Branch:
         """First branch: its first state.  Where none is found constraints that repeat each other are named."""

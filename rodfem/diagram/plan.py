@@ -19,6 +19,7 @@ MODES, METHOD, SPECTRUM = Argument("Plan", "modes"), Argument("Plan", "method"),
 FEWER = "give less in {}, or use more elements"
 COUNTS = {
     Argument("Plan", "depth"): "depth",
+    Argument("Plan", "most_branches"): "number of branches",
     Argument("Plan", "tries"): "number of tries",
     SPECTRUM: "number of eigenvalues",
     MODES: "number of modes",
@@ -60,6 +61,8 @@ class Plan:
         by less than this (relative to values greater than one).
     events
         Numbers of the state whose zeros are special points, too (conservative scenes).
+    most_branches
+        Nothing more is followed from branch points once there are so many branches; 0 for no limit.
     """
 
     span: tuple[float, float] | None = None
@@ -74,13 +77,14 @@ class Plan:
     modes: int = 0
     accuracy: float | None = None
     events: tuple[Event, ...] = ()
+    most_branches: int = 0
 
     def __post_init__(self) -> None:
         """Check that all is of the right kind; raises :class:`InputError`."""
         if self.span is not None:
             object.__setattr__(self, "span", reals("span", self.span, (0.0, 1.0), 2))
         object.__setattr__(self, "at", reals("at", self.at, (0.5, 1.0)))
-        for name, example in (("depth", 2), ("spectrum", 4), ("tries", 24), ("modes", 3)):
+        for name, example in (("depth", 2), ("spectrum", 4), ("tries", 24), ("modes", 3), ("most_branches", 20)):
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
         if not isinstance(self.steps, StepControl):
             raise InputError(f"steps is {self.steps!r}: give StepControl, as in steps=StepControl(largest=0.02).")

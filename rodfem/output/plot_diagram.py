@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Mapping, Sequence
-from itertools import cycle, product
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import IMPERFECT, KINDS
 from rodfem.file_format import DIAGRAM
 from rodfem.output.contents import read_diagram
+from rodfem.output.placement import dense, place_words
 from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
 from rodfem.output.program import status_of, terse
-from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, save, tex
+from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, axis_label, mesh_in_words, save, tex
 from rodfem.output.view import POINT
 
 __all__ = ["draw_diagram", "main"]
@@ -37,6 +37,20 @@ MARKERS: dict[str, Mapping[str, Any]] = {
     UNEXPLAINED: {"marker": "^", "ms": 10.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
     SINGULAR: {"marker": "s", "ms": 8.5, "mfc": "#F0E442", "mec": "#B3123E", "mew": 1.8},
 }
+
+ENDS = "ends: "
+"""Beginning of the words for the end of a branch before the range ends."""
+END_MARKER = {"marker": "X", "ms": 8.5, "mfc": "white", "mec": "#B3123E", "mew": 1.3}
+COMPLETE = ("end of range", "closed loop", "not traced")
+"""Ends of branches that need no mark."""
+SHAPES = ("", "^", "<", "v", ">", "p", "h")
+"""Marks along the curves of branches, another one whenever the hues are used up."""
+HUES, APART, TINY_MARK = 7, 0.08, 5.0
+"""Hues of the palette that are told apart at a glance; distance of marks over the diagonal of the axes; their size."""
+
+
+NOTE: dict[str, Any] = {"ha": "center", "color": "0.4", "fontsize": FONT - 1}
+"""Style of a remark inside the axes."""
 
 
 def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
@@ -84,19 +98,40 @@ def figure_of(diagram: Mapping[str, Any]) -> Figure:
         axes = figure.add_subplot(axisbelow=True)
         handles, pieces, points = _draw_branches(axes, branches)
         axes.margins(0.05, 0.08)
-        if not any(np.ptp(piece.curve[:, 1]) for piece in pieces):  # no more than the straight rod
+        if _is_flat(branches):
             axes.set_ylim(-1.0, 1.0)
-        axes.set_xlabel(tex(diagram["parameter_label"], always=True), fontsize=FONT + 3)
+            if len(branches) > 1:
+                axes.text(
+                    0.5,
+                    0.25,
+                    "the ordinate is zero all over: another one tells branches apart",
+                    transform=axes.transAxes,
+                    **NOTE,
+                )
+        axes.set_xlabel(axis_label(diagram), fontsize=FONT + 1)
         axes.set_ylabel(tex(diagram.get("ordinate_label") or diagram["ordinate"]))
         title = figure.suptitle(tex(diagram["title"]), fontsize=FONT + 2)
         footer = figure.text(0.012, 0.013, _footer(diagram), color="0.4", fontsize=FONT - 3)
         for text in (title, footer):  # one line each: shrink what is too long
             width = text.get_window_extent().width / figure.bbox.width
             text.set_fontsize(text.get_fontsize() * min(1.0, 0.97 / max(width, POINT)))
-        legend, obstacles = _place_legend(axes, handles, pieces, points, len(branches) <= 8)
         _uncover(axes, pieces)
-        _place_labels(axes, pieces, legend, obstacles)
+        place_words(axes, handles[: len(branches)], handles[len(branches) :], pieces, points)
     return figure
+
+
+def _is_flat(branches: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether the ordinate is zero all over, to the error bars that special points have of it: as of a straight rod."""
+    bars = [point.get("ordinate_error_estimate") for branch in branches for point in branch.get("special", [])]
+    error = max((bar for bar in bars if bar is not None), default=0.0)
+    return all(abs(x) <= error for branch in branches for x in branch["columns"]["ordinate"])
+
+
+def _ends(branch: Mapping[str, Any]) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Why a branch ends before the range does, in a few words, and its last load and ordinate."""
+    reason = str(branch.get("ended", "")).split(" at ")[0].split(":")[0].split(" any more")[0]
+    if reason and reason not in COMPLETE and not reason.startswith("meets"):
+        yield f"{ENDS}{reason}", tuple(branch["columns"][key][-1] for key in ("load", "ordinate"))
 
 
 def _draw_branches(
@@ -106,27 +141,35 @@ def _draw_branches(
     handles: list[Line2D] = []
     pieces: list[Piece] = []
     found: dict[str, list[tuple[float, float]]] = {}
-    for branch, colour in zip(branches, cycle(PALETTE), strict=False):
+    for number, (branch, colour) in enumerate(zip(branches, cycle(PALETTE), strict=False)):
         new = list(pieces_of(branch, colour))
         pieces += new
-        handles.append(Line2D([], [], ls="", marker="s", ms=8, color=colour, label=branch["name"]))
+        shape = SHAPES[number // HUES % len(SHAPES)]
+        handles.append(Line2D([], [], ls="", marker=shape or "s", ms=8, color=colour, label=branch["name"]))
+        if shape:
+            places = (branch["columns"][key] for key in ("load", "ordinate"))
+            axes.plot(*places, ls="", marker=shape, ms=TINY_MARK, color=colour, markevery=APART, zorder=3)
         if not new:
             axes.plot(branch["columns"]["load"], branch["columns"]["ordinate"], ".", color=colour, markersize=9)
         for point in branch.get("special", []):
             found.setdefault(point["kind"], []).append((point["load"], point["ordinate"]))
         found.setdefault(UNEXPLAINED, []).extend(_unexplained(branch))
+        for reason, place in _ends(branch):
+            found.setdefault(reason, []).append(place)
         if branch.get("singular_start"):
             found.setdefault(SINGULAR, []).append(tuple(branch["columns"][key][0] for key in ("load", "ordinate")))
     for piece in sorted(pieces, key=lambda piece: -piece.negative):  # the stable ones on top: see _uncover
         axes.plot(*piece.curve.T, color=piece.colour, **STYLES[piece.kind])
-    kinds = {piece.kind for piece in pieces} | {STABLE, UNSTABLE}
-    handles += [Line2D([], [], color="0.45", label=kind, **style) for kind, style in STYLES.items() if kind in kinds]
+    drawn = {piece.kind for piece in pieces} | {STABLE, UNSTABLE}
+    handles += [Line2D([], [], color="0.45", label=kind, **style) for kind, style in STYLES.items() if kind in drawn]
     in_space = any(piece.in_space is not None for piece in pieces)
     text = "negative eigenvalues" + (" in the plane (in space)" if in_space else "")
     handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=text))
-    points = {kind: np.unique(np.array(found[kind], float), axis=0) for kind in MARKERS if found.get(kind)}
+    kinds = [*MARKERS, *(kind for kind in found if kind.startswith(ENDS))]
+    points = {kind: np.unique(np.array(found[kind], float), axis=0) for kind in kinds if found.get(kind)}
     for kind, places in points.items():
-        style = {"linestyle": "none", "zorder": 5, "label": _kind_label(kind, branches), **MARKERS[kind]}
+        marker = MARKERS.get(kind, END_MARKER)
+        style = {"linestyle": "none", "zorder": 5, "label": _kind_label(kind, branches), **marker}
         handles += axes.plot(*places.T, path_effects=HALO, **style)
     return handles, pieces, points
 
@@ -147,16 +190,16 @@ def _kind_label(kind: str, branches: Sequence[Mapping[str, Any]]) -> str:
         if point["kind"] == kind == IMPERFECT and point.get("unfolding") is not None
     ]
     if not values:
-        return str(MARKERS[kind].get("label", kind))
+        return str(MARKERS.get(kind, END_MARKER).get("label", kind))
     words = dict.fromkeys(f"{value:.0e}" for value in (min(values), max(values)))
     return f"{kind}, unfolding {' to '.join(words)}"
 
 
 def _uncover(axes: Axes, pieces: Sequence[Piece]) -> None:
     """Draw what is not stable once more, within stable lines that lie on it."""
-    stable = [_dense(axes, piece.curve)[0] for piece in pieces if piece.kind == STABLE]
+    stable = [dense(axes, piece.curve)[0] for piece in pieces if piece.kind == STABLE]
     for piece in pieces:
-        for part in hidden(_dense(axes, piece.curve)[0], stable) if piece.kind != STABLE else ():
+        for part in hidden(dense(axes, piece.curve)[0], stable) if piece.kind != STABLE else ():
             line = axes.transData.inverted().transform(part)
             axes.plot(*line.T, color="white", linewidth=2.0, solid_capstyle="butt", zorder=2.5)
             axes.plot(*line.T, color=piece.colour, **STYLES[piece.kind] | {"linewidth": 1.5}, zorder=2.6)
@@ -179,64 +222,6 @@ def _footer(diagram: Mapping[str, Any]) -> str:
     if coarse:
         parts.append(f"{coarse} of {len(counted)} special points not resolved by the mesh")
     return "; ".join(parts)
-
-
-def _dense(axes: Axes, curve: Floats) -> tuple[Floats, float]:
-    """Return points (k, 2) on a curve at equal distances of about two pixels, and its length, in pixels."""
-    pixels = axes.transData.transform(curve)
-    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))])
-    along = np.linspace(0.0, lengths[-1], max(2, int(lengths[-1] / 2.0) + 1))
-    return np.column_stack([np.interp(along, lengths, pixels[:, k]) for k in (0, 1)]), float(lengths[-1])
-
-
-def _inside(box: Bbox, points: Floats) -> int:
-    """Return how many of the points (k, 2) lie in the box."""
-    return int(np.count_nonzero(np.all((points > box.min) & (points < box.max), axis=1)))
-
-
-def _place_legend(
-    axes: Axes, handles: list[Line2D], pieces: list[Piece], points: dict[str, Floats], inside: bool
-) -> tuple[Bbox, Floats]:
-    """Put the legend into an empty corner or to the right; return its box and all covered pixels (k, 2)."""
-    around = np.array(list(product((-14.0, -7.0, 0.0, 7.0, 14.0), repeat=2)))
-    corners = ("upper left", "upper right", "lower left", "lower right") if inside else ()
-    beside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.015, 1.0), "borderaxespad": 0.0}
-    for style in (*({"loc": corner} for corner in corners), beside):
-        legend = axes.legend(handles=handles, fontsize=min(8.5, 195.0 / len(handles)), **style)
-        axes.figure.draw_without_rendering()
-        box = legend.get_window_extent().padded(8.0)
-        lines = [_dense(axes, curve)[0] for curve in (piece.curve for piece in pieces)]
-        marks = [axes.transData.transform(at) + around for places in points.values() for at in places]
-        obstacles = np.concatenate([np.empty((0, 2)), *lines, *marks])
-        if not _inside(box, obstacles):
-            break
-    return box, obstacles
-
-
-def _place_labels(axes: Axes, pieces: list[Piece], legend: Bbox, obstacles: Floats) -> None:
-    """Write the index beside each piece, near its middle and off everything else."""
-    height, taken, seen = FONT * DPI / 72.0, [legend], set()
-    curves = [(*_dense(axes, piece.curve), piece) for piece in pieces]
-    for curve, length, piece in sorted(curves, key=lambda item: -item[1]):
-        needed = (piece.branch, piece.label) not in seen
-        seen.add((piece.branch, piece.label))
-        half = np.array([0.33 * height * len(piece.label) + 6.0, 0.38 * height + 6.0])
-        best, chosen = math.inf, legend
-        for share, gap, side in product(np.linspace(0.1, 0.9, 13), (2.0, 8.0, 16.0), (1.0, -1.0)):
-            middle = round(share * (len(curve) - 1))
-            tangent = curve[min(middle + 4, len(curve) - 1)] - curve[max(middle - 4, 0)]
-            normal = side * np.array([-tangent[1], tangent[0]]) / max(math.hypot(*tangent), POINT)
-            centre = curve[middle] + normal * (np.abs(normal) @ half + gap)
-            box = Bbox([centre - half, centre + half])
-            cost = 40.0 * abs(share - 0.5) + 0.3 * gap + 2.0 * (normal[1] < 0.0)
-            cost += 10.0 * _inside(box, obstacles) + 1e3 * sum(box.overlaps(label) for label in taken)
-            cost += 1e4 * (_inside(axes.bbox, box.get_points()) < 2)
-            best, chosen = min((best, chosen), (cost, box), key=lambda choice: choice[0])
-        if needed or (best < 100.0 and length > 1.6 * height):  # else no room
-            taken.append(chosen)
-            x, y = axes.transData.inverted().transform((chosen.min + chosen.max) / 2.0)
-            text = axes.text(x, y, piece.label, color=piece.colour, weight="bold", ha="center", va="center")
-            text.set(zorder=6, in_layout=False, path_effects=HALO)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,18 +10,26 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from rodfem.continuation.kinds import FLUTTER, FREQUENCY, KINDS
+from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FREQUENCY, KINDS
 from rodfem.file_format import DIAGRAM
-from rodfem.output.sheet import DPI, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, save
+from rodfem.output.intervals import intervals_of
+from rodfem.output.plot_pieces import STABLE
+from rodfem.output.sheet import DPI, HALO, PALETTE, SIZE, STYLE, at_most, axis_label, mesh_in_words, save
 
 COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5}
 """Places in the palette."""
 SPECIAL = {name: kind.marker for name, kind in KINDS.items() if kind.test == FREQUENCY}
 """Markers of the special points of a sweep."""
+WIDTH, EVERY = 1.8, 0.03
+"""Width of the line of a real frequency; distance of the marks of others, over the diagonal of the axes."""
+RANGES = ("#E9E4F3", "#FBE6D9")
+"""Shades of ranges of divergence, and of those of flutter."""
 REAL = 1e-6
 """An imaginary part smaller than this is none, relative to the root."""
 
@@ -62,10 +70,10 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path, most: int = 3) -> P
     """Draw the square roots of the left-most eigenvalues against the load, as in Kumar & Healey (2010), figure 11.
 
     One line a curve, one colour a kind of motion: eigenvalues that are double are two lines on each other, of one
-    colour.  Real frequencies are dots, a complex pair is a cross (real part) and a plus (imaginary part), what has
-    diverged is a plus; flutter loads are stars, divergence loads triangles.  The axis shows the ``most`` left-most
-    eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any ``omega2``, and InputError for
-    contents of another or a newer format.
+    colour.  Real frequencies are lines, a complex pair is a cross (real part) and a plus (imaginary part), what has
+    diverged is a plus; flutter loads are stars, divergence loads triangles, and unstable ranges are shaded.  The axis
+    shows the ``most`` left-most eigenvalues; all are nondimensional.  Returns ``path``; raises ValueError without any
+    ``omega2``, and InputError for contents of another or a newer format.
     """
     return save(figure_of(diagram, most), path)
 
@@ -81,7 +89,9 @@ def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
         axes = figure.subplots()
         motions: dict[str, str] = {}
         shown: set[str] = set()
+        ranges: dict[str, Patch] = {}
         for branch in branches:
+            ranges |= _shade(axes, branch)
             for curve in curves(branch["columns"]):
                 motions.setdefault(curve.motion, PALETTE[COLORS.get(curve.motion, 7) % len(PALETTE)])
                 shown |= _draw_curve(axes, curve, motions[curve.motion])
@@ -90,16 +100,19 @@ def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
                     _mark(axes, special)
                     shown.add(special["kind"])
         axes.set_ylim(0, 1.15 * max(_top(b["columns"], most) for b in branches))
-        axes.set_xlabel(f"${diagram['parameter_label']}$")
-        axes.set_ylabel(r"$\omega$")
+        axes.set_xlabel(axis_label(diagram))
+        axes.set_ylabel(r"frequency $\omega$")
         axes.set_title(str(diagram["title"]))
-        handles = [Line2D([], [], color=color, marker=".", lw=1, label=motion) for motion, color in motions.items()]
+        handles: list[Artist] = [
+            Line2D([], [], color=color, lw=WIDTH, label=motion) for motion, color in motions.items()
+        ]
         handles += [
             Line2D([], [], color="0.3", marker=marker, ls=style, lw=0.8, label=what)
             for what, (marker, style) in PARTS.items()
             if what in shown
         ]
         handles += [Line2D([], [], ls="none", label=kind, **SPECIAL[kind]) for kind in SPECIAL if kind in shown]
+        handles += ranges.values()
         axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9)
         figure.supxlabel(_footer(diagram, branches), fontsize=8.5, color="0.4", x=0.01, ha="left")
     return figure
@@ -119,11 +132,31 @@ def _draw_curve(axes: Axes, curve: _Curve, color: str) -> set[str]:
     straight, lower = abs(w.imag) <= REAL * abs(w), w.imag < -REAL * abs(w)
     sideways = (w.real <= REAL * abs(w)) & ~straight
     pair = ~straight & ~lower & ~sideways
-    axes.plot(curve.loads, curve.where(straight, w.real), ".-", color=color, ms=4, lw=0.8)
+    axes.plot(curve.loads, curve.where(straight, w.real), "-", color=color, lw=WIDTH)
     values = (pair, w.real), (pair, w.imag), (sideways, abs(w.imag))
     for (chosen, part), (marker, style) in zip(values, PARTS.values(), strict=True):
-        axes.plot(curve.loads, curve.where(chosen, part), marker + style, color=color, ms=4, lw=0.8)
+        if chosen.any():
+            axes.plot(
+                curve.loads, curve.where(chosen, part), marker + style, color=color, ms=4, lw=0.8, markevery=EVERY
+            )
     return {what for what, (chosen, _) in zip(PARTS, values, strict=True) if chosen.any()}
+
+
+def _shade(axes: Axes, branch: Mapping[str, Any]) -> dict[str, Patch]:
+    """Shade the ranges of the load in which a branch is unstable; returns them by the words of the legend."""
+    out, columns = {}, branch["columns"]
+    for interval in intervals_of(branch):
+        if interval.kind == STABLE:
+            continue
+        values = [complex(*v) for row in columns["omega2"][interval.first : interval.last + 1] for v in row]
+        real = [v.real for v in values if abs(v.imag) <= REAL * abs(v)]
+        least = REAL * max(map(abs, values))
+        found = {FLUTTER: len(real) < len(values), DIVERGENCE: any(x < -least for x in real)}
+        words = "range of " + (" and ".join(kind for kind, there in found.items() if there) or "instability")
+        shade = RANGES[found[FLUTTER]]
+        out[words] = Patch(color=shade, label=words)
+        axes.axvspan(*interval.covers, color=shade, zorder=0, lw=0)
+    return out
 
 
 def _mark(axes: Axes, special: Mapping[str, Any]) -> None:

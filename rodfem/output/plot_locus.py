@@ -8,11 +8,13 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rodfem.continuation.kinds import BRANCH_POINT, KINDS, USER
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD, KINDS, USER
 from rodfem.file_format import LOCUS
 from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, save, tex
+from rodfem.output.view import POINT
 
 LINES = {name: (PALETTE[kind.line[0]], kind.line[1]) for name, kind in KINDS.items() if kind.line is not None}
 """Colour and dashes by kind."""
@@ -24,6 +26,9 @@ POINTS: dict[str, dict[str, Any]] = {
 }
 """Markers of rows by how what is said of them begins, or for the fold's end how it reads."""
 
+STABLE_SIDE, BAND, STEEP = "#CDE9DF", 60.0, 0.05
+"""Colour and width, in pixels, of the shade on the stable side of a curve; vertical component of the unit normal at the
+start below which that has no side of the load."""
 ROOM = 0.1
 """Share of the height above and below the curves, for the indices that stand beside them."""
 
@@ -32,7 +37,7 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     """Draw loci of one scene in the plane of its two parameters, one over the other.
 
     The first parameter, the load, is upwards.  Beside each curve stand the indices of the equilibria on its two sides
-    where they were counted, as ``0|1``.
+    where they were counted, as ``0|1``; the stable side of a curve of branch points is shaded next to it.
 
     Parameters
     ----------
@@ -77,15 +82,38 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
             low, high = columns["index"][len(x) // 2]
             if low >= 0:
                 place = (x[len(x) // 2], y[len(x) // 2])
-                text = axes.annotate(f"{low}|{high}", place, (6, 6), textcoords="offset points", color=colour)
+                aside = (8, -18) if kind == FOLD else (6, 6)
+                text = axes.annotate(f"{low}|{high}", place, aside, textcoords="offset points", color=colour)
                 text.set(weight="bold", path_effects=HALO)
+        figure.draw_without_rendering()
+        for one in loci:
+            _shade_stable_side(axes, one)
         axes.set_xlabel(tex(loci[0]["labels"][1], always=True), fontsize=FONT + 3)
         axes.set_ylabel(tex(loci[0]["labels"][0], always=True), fontsize=FONT + 3)
         axes.set_title(tex(loci[0]["title"]))
-        handles = {handle.get_label(): handle for handle in axes.get_lines()}
+        handles = {handle.get_label(): handle for handle in (*axes.get_lines(), *axes.patches)}
         axes.legend(handles=list(handles.values()), fontsize=8.5)
         figure.supxlabel(_footer(loci), fontsize=FONT - 3, color="0.4", x=0.012, ha="left")
     return save(figure, path)
+
+
+def _shade_stable_side(axes: Axes, one: Mapping[str, Any]) -> None:
+    """Shade the side of a locus of branch points on which the index is zero, as far as rows tell: next to the curve.
+
+    The vanishing eigenvalues have one sign to the left of the oriented curve, and the other one to its right.
+    """
+    places = axes.transData.transform(np.column_stack([one["columns"][name] for name in reversed(one["parameters"])]))
+    along = np.gradient(places, axis=0) if len(places) > 1 else np.zeros_like(places)
+    normals = np.column_stack([-along[:, 1], along[:, 0]]) / np.maximum(np.hypot(*along.T), POINT)[:, None]
+    upwards = normals[one["start"], 1]
+    if not one.get("lower") or abs(upwards) < STEEP:
+        return
+    beside = places + BAND * np.sign(upwards * one["lower"]) * normals
+    stable = np.array([low == 0 for low, _ in one["columns"]["index"]])
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], stable, [False]]).astype(int)))
+    for a, b in zip(ends[::2], ends[1::2], strict=True):
+        outline = np.concatenate([places[a:b], beside[a:b][::-1]])
+        axes.fill(*axes.transData.inverted().transform(outline).T, color=STABLE_SIDE, label="stable side", zorder=0)
 
 
 def _footer(loci: Sequence[Mapping[str, Any]]) -> str:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rodfem.continuation.kinds import KINDS
+from rodfem.continuation.kinds import FREQUENCY, KINDS
 from rodfem.stability.soft_mode import index_range
 
 Floats = NDArray[np.float64]
@@ -22,7 +22,8 @@ STYLES: dict[str, dict[str, Any]] = {
     UNDECIDED: {"linestyle": (0, (4.0, 1.2, 1.0, 1.2)), "linewidth": 2.4},
     UNSTABLE: {"linestyle": (0, (1.0, 1.3)), "linewidth": 1.9},
 }
-COUNTED = {name for name, kind in KINDS.items() if kind.counted}
+COUNTED = {name for name, kind in KINDS.items() if kind.counted or kind.test == FREQUENCY}
+"""Kinds whose index before and after is that of the segments beside."""
 SAME = 2.0
 """Distance in pixels up to which two lines lie on each other."""
 APART = 30.0

@@ -43,6 +43,13 @@ def tex(text: str, always: bool = False) -> str:
     return text
 
 
+def axis_label(diagram: Mapping[str, Any]) -> str:
+    """Load of a diagram for its axis: in words, where the scene has some, and its symbol."""
+    symbol = tex(diagram["parameter_label"], always=True)
+    words = str(diagram.get("parameter_words") or "").replace("$", "")
+    return f"{words} {symbol}" if words else symbol
+
+
 def mesh_in_words(d: Mapping[str, Any]) -> str:
     """Discretisation, as files record it, in words."""
     return f"{d['formulation']} formulation, {d['elements']} elements of degree {d['degree']}, {d['unknowns']} unknowns"

@@ -50,12 +50,14 @@ class Parameter:
     """A named constant of a scene.
 
     ``value`` is where it starts, ``label`` its TeX name without dollars, ``admissible`` the open interval that makes
-    sense for it.  Any parameter can be the one that a continuation varies.
+    sense for it, ``words`` what it is, for the axes of pictures ("end shortening").  Any parameter can be the one that
+    a continuation varies.
     """
 
     value: float
     label: str = ""
     admissible: tuple[float, float] = (-inf, inf)
+    words: str = ""
 
     def check(self, name: str, value: float) -> None:
         """Raise :class:`SceneError` unless ``value`` is a finite number inside the admissible interval."""

@@ -77,16 +77,17 @@ def check_kinds(scene: Scene) -> None:
 
 
 def check_parameter(name: object, parameter: Any) -> None:
-    """Raise :class:`SceneError` for a parameter whose name, value, label or bounds make no sense."""
+    """Raise :class:`SceneError` for a parameter whose name, value, label, words or bounds make no sense."""
     if not isinstance(name, str) or not name.isidentifier() or iskeyword(name) or name == "s" or name.startswith("__"):
         raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
-    value, label = getattr(parameter, "value", parameter), getattr(parameter, "label", "")
+    value = getattr(parameter, "value", parameter)
+    texts = [getattr(parameter, text, "") for text in ("label", "words")]
     try:
         real(name, value, 0.0)
         bounds = reals(name, getattr(parameter, "admissible", (0.0, 1.0)), (0.0, 1.0), 2)
     except InputError:
         bounds = ()
-    if not bounds or not isinstance(label, str):
+    if not bounds or not all(isinstance(text, str) for text in texts):
         raise SceneError(
             f"The parameter {name} is {SHORT.repr(parameter)}: give a number or a Parameter, as in Parameter(1.0, 'P')."
         )

@@ -103,6 +103,9 @@ def test_divergence_is_marked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
         assert {text.get_text() for text in axes.texts} == {"5.29241", "15.8616", "16.4039"}
         legend = [text.get_text() for text in axes.get_legend().get_texts()]
         assert {"divergence", "flutter", "diverged, growth rate"} < set(legend)
+        assert {"range of divergence", "range of flutter"} < set(legend)
+        spans = sorted(patch.get_xy()[:, 0].min() for patch in axes.patches)
+        assert spans == pytest.approx([places[0], 16.4039], rel=1e-5)
         columns = data["branches"][0]["columns"]
         for row in columns["omega2"]:  # all eigenvalues negative: there is no frequency to scale the axis by
             row[:] = [[-abs(mu), 0.0] for mu, _ in row]

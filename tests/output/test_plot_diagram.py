@@ -18,7 +18,9 @@ from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.link import link
-from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram
+from rodfem.file_format import LOCUS
+from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram, figure_of
+from rodfem.output.plot_locus import draw_locus
 from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE, hidden, pieces_of
 from rodfem.output.sheet import PALETTE
 from rodfem.problem.scene import Ordinate
@@ -119,6 +121,79 @@ def test_imperfect_bifurcations_have_a_mark_and_their_unfolding(folder: Path) ->
     assert "imperfect bifurcation" in legend(unknown)
     assert [(p.negative, len(p.curve)) for p in pieces_of(one, "black")] == [(0, 3), (1, 3)]
     assert draw_diagram(diagram(one), folder / "one.png").exists()
+
+
+def words(*branches: dict[str, Any], **more: Any) -> tuple[set[str], set[str]]:
+    """What stands inside the axes, and in the legend."""
+    axes = figure_of(diagram(*branches) | more).axes[0]
+    inside, legend = axes.texts, axes.get_legend().get_texts()
+    return {text.get_text() for text in inside}, {text.get_text() for text in legend}
+
+
+@pytest.mark.alone
+def test_names_stand_at_the_curves_where_there_is_room() -> None:
+    far = [branch(name, [float(i)] * 9, [i] * 9) for i, name in enumerate(("straight", "branch 1"))]
+    inside, legend = words(*far)
+    assert {"straight", "branch 1", "0", "1"} == inside and not {"straight", "branch 1"} & legend
+    close = [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(12)]
+    inside, legend = words(*close)
+    assert "branch 7" not in inside and {f"branch {i}" for i in range(12)} <= legend
+
+
+@pytest.mark.alone
+def test_branches_of_one_hue_have_other_marks() -> None:
+    axes = Figure().subplots()
+    handles = _draw_branches(axes, [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(20)])[0][:20]
+    assert len({(handle.get_color(), handle.get_marker()) for handle in handles}) == 20
+
+
+@pytest.mark.alone
+def test_an_end_before_the_end_of_the_range_is_marked() -> None:
+    for ended, mark in (
+        ("stretch reaches zero", "ends: stretch reaches zero"),
+        ("no convergence at P = 3 (steps below 1e-05)", "ends: no convergence"),
+        ("the stored energy is not convex any more at P = 2", "ends: the stored energy is not convex"),
+    ):
+        assert mark in legend(branch("a", [0.0, 1.0, 2.0], [0, 0, 0], ended=ended))
+    for ended in ("end of range", "closed loop", "meets straight at P = 2"):
+        assert not any(x.startswith("ends") for x in legend(branch("a", [0.0, 1.0], [0, 0], ended=ended)))
+
+
+@pytest.mark.alone
+def test_an_ordinate_that_is_round_off_is_drawn_as_zero() -> None:
+    """A tip that does not move: numbers of 1e-17 are no shape, beside error bars of 1e-12."""
+    end = {"kind": "end", "row": 2, "load": 2.0, "ordinate": 1e-17, "ordinate_error_estimate": 1e-12}
+    noise = [branch(name, [0.0, 3e-17, 1e-17], [0, 0, 0], special=[end]) for name in ("straight", "branch 1")]
+    assert figure_of(diagram(*noise)).axes[0].get_ylim() == (-1.0, 1.0)
+    assert "the ordinate is zero all over: another one tells branches apart" in words(*noise)[0]
+    real = branch("branch 1", [0.0, 3e-11, 1e-11], [0, 0, 0], special=[end])
+    assert figure_of(diagram(real)).axes[0].get_ylim()[1] < 1e-10
+
+
+@pytest.mark.alone
+def test_the_load_is_named_in_words() -> None:
+    plain = branch("a", [0.0, 1.0], [0, 0])
+    assert figure_of(diagram(plain)).axes[0].get_xlabel() == "$P$"
+    assert figure_of(diagram(plain) | {"parameter_words": "dead force"}).axes[0].get_xlabel() == "dead force $P$"
+
+
+@pytest.mark.alone
+def test_the_stable_side_of_a_locus_is_shaded(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A curve that turns back: what is below its lower half, where it starts, is above its upper half."""
+    t = np.linspace(-1.0, 1.0, 41)
+    mesh = {"formulation": "reduced", "elements": 1, "degree": 1, "unknowns": 1}
+    columns = {"P": t.tolist(), "A": (1 - t**2).tolist(), "index": [[0, 1]] * 41, "error": [[None, None]] * 41}
+    one = {"kind": "branch point", "parameters": ["P", "A"], "columns": columns, "marks": [], "start": 5, "lower": -1}
+    one |= {"labels": ["P", "A"], "title": "by hand", "discretization": mesh, "format": LOCUS.mark()}
+    drawn: list[Figure] = []
+    monkeypatch.setattr("rodfem.output.plot_locus.save", lambda figure, path: drawn.append(figure))
+    draw_locus([one], folder / "locus.png")
+    (patch,) = drawn[0].axes[0].patches
+    inside = [patch.get_path().contains_point(place) for place in ((0.3, -0.9), (0.3, 0.9), (0.3, -0.78), (0.3, 0.78))]
+    assert inside == [True, True, False, False]
+    for spoiled in (one | {"lower": 0}, one | {"columns": columns | {"index": [[1, 2]] * 41}}):
+        draw_locus([spoiled], folder / "locus.png")
+        assert not drawn[-1].axes[0].patches
 
 
 def test_twist_of_a_ring_is_its_link_less_its_writhe() -> None:

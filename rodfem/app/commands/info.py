@@ -11,8 +11,9 @@ from rodfem.app.cli import Parser
 from rodfem.continuation.kinds import KINDS
 from rodfem.output.contents import read_diagram
 from rodfem.output.digits import number
+from rodfem.output.summary import in_sentences
 
-NEEDED = ("parameter", "constants", "branches", "meshes", "discretization", "ordinate")
+NEEDED = ("parameter", "constants", "branches", "meshes", "discretization", "ordinate", "range")
 """Entries of a diagram that are printed."""
 
 
@@ -35,6 +36,7 @@ def lines(data: Mapping[str, Any]) -> Iterator[str]:
         for special in branch["special"]:
             yield f"  {branch['name']:<12} {special['kind']:<13} {_values(special)}"
         yield f"  {branch['name']:<12} {len(branch['columns']['load'])} points; ended: {branch['ended']}"
+    yield from (f"  {sentence}" for sentence in in_sentences(data))
 
 
 def _values(special: Mapping[str, Any]) -> str:

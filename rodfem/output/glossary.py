@@ -1,0 +1,211 @@
+"""Glossary: every word and code of tables, files and pictures, in a sentence or two.
+
+A key has all names of one entry, between bars.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+
+from rodfem.continuation.kinds import KINDS
+from rodfem.errors import InputError
+
+ENTRIES = {
+    # special points
+    "branch point": (
+        "An equilibrium in which branches cross: the second variation is singular, and the load does no work on "
+        "the null vectors. What leaves it is followed, to the depth that was asked for."
+    ),
+    "fold": (
+        "A limit point: the load turns back along the branch, and one eigenvalue changes its sign. Beyond its "
+        "load no state of this branch is near, so that a loaded rod jumps."
+    ),
+    "imperfect bifurcation": (
+        "A branch point that an imperfection takes apart, by less than steps along the branch resolve; its "
+        "unfolding is the size of the imperfection."
+    ),
+    "flutter": (
+        "Under a load without a potential: two real frequencies coincide and become a complex pair, so that "
+        "oscillations grow. AUTO's word is Hopf bifurcation."
+    ),
+    "divergence": (
+        "Under a load without a potential: a frequency passes through zero and becomes imaginary, so that the rod "
+        "leaves the state without oscillating."
+    ),
+    "event": "A load at which a number of the state that the plan names passes through zero.",
+    "user | requested load": "A load that was asked for; every branch is computed at exactly this load.",
+    "end": "The first or the last state of a branch; `ended` says why no more follow.",
+    # stability
+    "index | negative | negative eigenvalues": (
+        "Number of negative eigenvalues of the second variation of the energy, on perturbations that keep the "
+        "constraints: the number of directions in which the energy falls. 0 is stable."
+    ),
+    "negative_before | negative_after": "Index right before and right after a special point along its branch.",
+    "zero": (
+        "Number of eigenvalues that vanish, those of symmetries included: directions in which the energy does not "
+        "change to second order."
+    ),
+    "stable": (
+        "The index is zero: every small perturbation that keeps the constraints and is no symmetry costs energy. "
+        "Drawn as a solid line."
+    ),
+    "unstable": (
+        "The index is not zero. Without a potential: number of eigenvalues, of those found, that are negative or "
+        "complex. Drawn dotted."
+    ),
+    "stable in the plane, unstable in space | negative_in_space | in space": (
+        "Of a planar rod: the index in its plane is zero, that among all perturbations in space is not. Drawn "
+        "dashed; the index in space is in parentheses."
+    ),
+    "mu | omega^2 | omega2": (
+        "Eigenvalue of the second variation with the rod's inertia (unit rotary inertia where it has none): the "
+        "square of a frequency. A negative one is a growing motion."
+    ),
+    "spectrum | left-most eigenvalues": "The smallest eigenvalues mu of a state, on request.",
+    "band | inside": (
+        "Eigenvalues nearer to zero than the band have a sign that round-off of the factors hides; their Rayleigh "
+        "quotients, each with an uncertainty, decide."
+    ),
+    "counts prove that none is missing | certified": (
+        "The number of eigenvalues found below a shift is that of the inertia of the shifted matrix."
+    ),
+    "residual": "Size of (S - mu M) x for the eigenpair found, relative to S x.",
+    "index change unexplained | unexplained": (
+        "Between two rows the index changes, and no special point was found that says why: smaller steps or more "
+        "elements are needed."
+    ),
+    "singular first state, not located | singular first state | singular_start": (
+        "The range begins in a state of which eigenvalues vanish that do not vanish along the branch; what leaves "
+        "it is not followed."
+    ),
+    "hysteresis": "At one load two stable states coexist: which one the rod takes depends on the loads before.",
+    "circle of states": (
+        "States that a symmetry turns into each other, all at one load and of one energy; one eigenvalue is zero "
+        "along the circle."
+    ),
+    "symmetry | drift": (
+        "A rigid motion, or another continuous family of perturbations, that leaves the equations as they are. It "
+        "is a zero eigenvalue, never part of the index; the drift scalar that fixes it vanishes but for round- "
+        "off."
+    ),
+    "mode": "An eigenvector of the second variation with the rod's inertia: how the rod moves.",
+    # the local law
+    "normal form | law": (
+        "load = load_b + c x^p + ...: the load along the branch that leaves a branch point, in the change x of "
+        "the ordinate."
+    ),
+    "pitchfork": "A branch and its mirror image leave on one side of the critical load.",
+    "supercritical pitchfork | supercritical": (
+        "The new branch exists on the side of the load on which the old one has the higher index: the rod moves "
+        "away gradually."
+    ),
+    "subcritical pitchfork | subcritical": (
+        "The new branch exists on the side on which the old one has the lower index: at the critical load the rod "
+        "jumps, and imperfections lower that load."
+    ),
+    "transcritical": "The new branch passes through the critical load, with a slope.",
+    "vertical branch": "The new branch consists of states at one and the same load.",
+    "multiplicity | directions at once": "Number of eigenvalues that vanish at a special point and not beside it.",
+    "coupling": (
+        "Cosine between the null vector and the derivative of the equations in the load: zero at a branch point, "
+        "not at a fold."
+    ),
+    "unfolding": (
+        "Imperfection of the equations at a branch point, relative to the metric: round-off, or what takes the "
+        "point apart."
+    ),
+    "null vector": "Perturbation whose eigenvalue vanishes at a special point.",
+    # numbers and their errors
+    "load | parameter": "The number that varies along a diagram, as the scene declares it.",
+    "ordinate": "The scene's number of a state on the vertical axis of the diagram.",
+    "energy | int W ds": "Stored energy of the rod alone, without the potential of loads, springs and foundations.",
+    "error bar | error_estimate | ordinate_error_estimate | estimate": (
+        "In parentheses after a number: a bound of the error of the discretisation, by a second computation on a "
+        "richer mesh. The error of the model is not in it."
+    ),
+    "at least | resolved | not resolved": (
+        "The mesh does not resolve the state: the number in parentheses is no bound, and the rod need not have "
+        "such a state."
+    ),
+    "no estimate": "The second computation that bounds the error failed, or was not asked for.",
+    "located to | located_to": (
+        "Uncertainty of the load of a special point on this mesh, without the error of the mesh."
+    ),
+    "accuracy": "Error that every load and ordinate keeps below, by meshes chosen on the way.",
+    "error": "Of a row: size of the last Newton correction, in the metric.",
+    "metric": "Measure of a change of state: root mean square of the rotation in radian, with centreline and load.",
+    "arclength": "Length along a branch in the metric.",
+    "slope": "The load's component of the unit tangent of a branch; it changes its sign at a fold.",
+    "stretch": "Least stretch v3 along the rod; the rod ends to exist where it is zero.",
+    "mesh": "Number of the discretisation of a row, in `meshes`.",
+    "row | point": "One equilibrium of a branch.",
+    "reduced | pointwise | formulation": (
+        "Reduced: the contact force and the centreline follow from the rotation by integration. Pointwise: they "
+        "are unknown fields."
+    ),
+    "eta": "Multiplier of the unit norm of the quaternions, a field of unknowns.",
+    # branches
+    "branch": "A curve of equilibria, row by row along its arclength.",
+    "detached": "A branch on the other side of a gap that an imperfection leaves: no step from the others reaches it.",
+    "found": "A branch through an equilibrium that a search by deflation found.",
+    "depth | branch_points_not_followed": (
+        "Number of switches from the first branch; the plan says how many are followed."
+    ),
+    "meets": "This special point is one of another branch, too.",
+    "followed": "Whether branches were sought from a branch point.",
+    "note": "What else there is to say of a special point.",
+    "ended": "Why a branch has no more rows.",
+    "end of range": "The branch reaches a bound of the load's range.",
+    "closed loop": "The branch has come back to its beginning.",
+    "meets another branch": "The branch ends on another one, in a branch point.",
+    "stretch reaches zero": "The rod is squeezed to nothing somewhere: no rod beyond.",
+    "no convergence": "Newton's method failed with the smallest step: there may be more of this branch.",
+    "points reached": "The largest number of rows of a branch was reached: there is more of it.",
+    "not convex": "The stored energy loses convexity: an index means nothing beyond.",
+    # pictures of frequencies, loci
+    "motion | bending about d1 | bending about d2 | bending | torsion | mixed": (
+        "The rotation that a mode mostly consists of: about a director of the cross-section, about the axis, or "
+        "several."
+    ),
+    "curve": "Number of the curve of frequencies that an eigenvalue is on.",
+    "complex pair, real part | complex pair, imaginary part": (
+        "Two frequencies a +- ib: the rod oscillates with a, and the oscillation grows as exp(b t)."
+    ),
+    "diverged, growth rate": "An imaginary frequency: the motion grows as exp(b t) without oscillating.",
+    "locus": "Curve of the loads of one special point as a second parameter varies: a boundary of stability.",
+    "range of flutter | range of divergence | range of instability": (
+        "Loads at which a complex pair, or an imaginary frequency, is among those found: shaded."
+    ),
+    "stable side": (
+        "Side of a locus of branch points on which the branch has the index 0; shaded next to the curve only, as far "
+        "as the index was counted."
+    ),
+    "start": "Where a locus was started: the special point of the diagram.",
+    "turning point | turns": "Where a locus turns back in the second parameter.",
+    "cusp": "Where two folds meet and vanish: beyond it there is no hysteresis.",
+    "fold meets branch point": "Where a locus of folds ends on one of branch points.",
+}
+NAMES = {name: key for key in ENTRIES for name in key.split(" | ")}
+"""Entry of each name."""
+NEAR = 3
+"""Names that are suggested for one that there is not."""
+
+
+def title(entry: str) -> str:
+    """Names of an entry in words, the codes of the terminal among them: ``branch point, BP``."""
+    codes = dict.fromkeys(kind.code for name, kind in KINDS.items() if name in entry.split(" | "))
+    return ", ".join([*entry.split(" | "), *codes])
+
+
+def explanation(word: str) -> list[tuple[str, str]]:
+    """Titles and texts of a word, several for a code of several kinds.
+
+    Raises :class:`~rodfem.errors.InputError` for a word that no entry has.
+    """
+    found = [name for name, kind in KINDS.items() if kind.code == word.upper()]
+    if not found:
+        found = [name for name in NAMES if name.lower() == " ".join(word.lower().split())]
+    if not found:
+        near = get_close_matches(word.lower(), NAMES, n=NEAR) or ["index"]
+        raise InputError(f"There is no entry {word!r}: try {' or '.join(near)}, or rodfem explain, which lists all.")
+    return [(title(NAMES[name]), ENTRIES[NAMES[name]]) for name in dict.fromkeys(found)]

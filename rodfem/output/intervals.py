@@ -1,0 +1,106 @@
+"""Intervals of a branch on which stability does not change, and what happens where they meet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, groupby
+from typing import Any
+
+import numpy as np
+
+from rodfem.output.plot_pieces import STABLE, STYLES, pieces_of
+from rodfem.tolerances import SAME_SPECIAL
+
+SAME_ENERGY = 1e-3
+"""Energies, interpolated linearly between rows, that differ by less than this, relative, may be those of one state."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Consecutive rows of a ``branch`` of ``diagram.json`` with one ``kind`` of stability, from ``first`` to ``last``.
+
+    ``least`` and ``most`` bound the index, ``in_space`` the index among all perturbations of a planar rod (None where
+    it is not known).
+    """
+
+    branch: Mapping[str, Any]
+    kind: str
+    first: int
+    last: int
+    least: int
+    most: int
+    in_space: int | None
+
+    @property
+    def rank(self) -> int:
+        """The greater, the less stable."""
+        return list(STYLES).index(self.kind)
+
+    @property
+    def loads(self) -> tuple[float, float]:
+        """Load at its first and at its last row."""
+        column = self.branch["columns"]["load"]
+        return column[self.first], column[self.last]
+
+    @property
+    def covers(self) -> tuple[float, float]:
+        """Least and greatest load of its rows."""
+        column = self.branch["columns"]["load"][self.first : self.last + 1]
+        return min(column), max(column)
+
+    def energy(self, load: float) -> float:
+        """Stored energy at a load, by linear interpolation between rows."""
+        rows = slice(self.first, self.last + 1)
+        loads, energies = (np.array(self.branch["columns"][name][rows]) for name in ("load", "energy"))
+        order = np.argsort(loads, kind="stable")
+        return float(np.interp(load, loads[order], energies[order]))
+
+
+def intervals_of(branch: Mapping[str, Any]) -> list[Interval]:
+    """Intervals of a branch in the order of its rows; none for a branch of one row."""
+    out, row = [], 0
+    for kind, group in groupby(pieces_of(branch, ""), lambda piece: piece.kind):
+        pieces = list(group)
+        last = row + sum(len(piece.curve) - 1 for piece in pieces)
+        indices, space = [piece.negative for piece in pieces], [piece.in_space for piece in pieces]
+        known = None if None in space else max(i for i in space if i is not None)
+        out.append(Interval(branch, kind, row, last, min(indices), max(indices), known))
+        row = last
+    return out
+
+
+def changes_at(branch: Mapping[str, Any], row: int) -> list[Mapping[str, Any]]:
+    """Special points in a row at which the index changes."""
+    return [s for s in branch["special"] if s["row"] == row and s["negative_before"] != s["negative_after"]]
+
+
+def without_stable(stable: Sequence[Interval], low: float, high: float) -> Iterator[tuple[float, float]]:
+    """Parts of a range of loads that no stable interval covers, from below."""
+    reached = low
+    for a, b in sorted(interval.covers for interval in stable):
+        if a - reached > SAME_SPECIAL * (high - low):
+            yield reached, min(a, high)
+        reached = max(reached, b)
+    if high - reached > SAME_SPECIAL * (high - low):
+        yield reached, high
+
+
+def coexisting(stable: Sequence[Interval]) -> Iterator[tuple[Interval, Interval, float, float]]:
+    """Pairs of stable intervals with a range of loads in common and other energies there: the pair and that range.
+
+    Those of one energy are mirror images of each other, or one branch traced twice.
+    """
+    for one, other in combinations(stable, 2):
+        (a, b), (c, d) = one.covers, other.covers
+        low, high = max(a, c), min(b, d)
+        if high - low > SAME_SPECIAL * max(b - a, d - c):
+            middle = (low + high) / 2
+            first, second = one.energy(middle), other.energy(middle)
+            if abs(first - second) > SAME_ENERGY * max(abs(first), abs(second)):
+                yield one, other, low, high
+
+
+def stable_ones(branches: Sequence[Mapping[str, Any]]) -> list[Interval]:
+    """All stable intervals of a diagram."""
+    return [x for branch in branches for x in intervals_of(branch) if x.kind == STABLE]

@@ -1,0 +1,132 @@
+"""A diagram in sentences: where the rod is stable, how stability is lost, and what the diagram leaves open.
+
+Every sentence repeats the contents of ``diagram.json``: indices between rows, special points and their normal forms,
+ends of branches.  What was not examined is not claimed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rodfem.output.change_words import FEW, change_in_words, known_digits
+from rodfem.output.intervals import Interval, coexisting, intervals_of, stable_ones, without_stable
+from rodfem.output.plot_pieces import PLANAR, STABLE
+
+MOST_INTERVALS, MOST_NAMES = 6, 6
+"""Intervals of a branch that are told one by one, and branches that are named in one sentence."""
+
+
+def in_sentences(data: Mapping[str, Any]) -> list[str]:
+    """Sentences on a diagram, the contents of ``diagram.json``: its branches, ranges of stability, open questions."""
+    first, *others = data["branches"]
+    told = [x for x in others if {i.kind for i in intervals_of(x)} & {STABLE, PLANAR}]
+    quiet = [x for x in others if x not in told and intervals_of(x)]
+    out = [_of_branch(first, data), *(_of_branch(branch, data) for branch in told[:MOST_NAMES])]
+    if more := told[MOST_NAMES:]:
+        out.append(f"{_names(more)} have stable states, too.")
+    if quiet:
+        verb = "is unstable on its" if len(quiet) == 1 else "are unstable on their"
+        out.append(f"{_names(quiet)} {verb} whole range.")
+    if not _is_sweep(data):
+        out += _ranges(data)
+    return out + list(_open(data))
+
+
+def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
+    """What is stable along a branch, what happens where that changes, and how it ends."""
+    intervals, load = intervals_of(branch), data["parameter"]
+    name = _subject(branch, data)
+    if not intervals:
+        return f"{name} has one state only; it ends there: {branch['ended'].rstrip('.')}."
+    parts, told = [], intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
+    start, stop = (f"{x:.{FEW}g}" for x in (intervals[0].loads[0], intervals[-1].loads[1]))
+    if len(intervals) == 1:
+        parts.append(f"{name} is {_state(told[0], data)} on its whole range, from {load} = {start} to {stop}")
+    for number, (one, after) in enumerate(zip(told, intervals[1:], strict=False)):
+        where, what = change_in_words(one, after, data["branches"])
+        begin = f"{name} is {_state(one, data)} from {load} = {start}" if not number else f"then {_state(one, data)}"
+        parts.append(f"{begin} to {where}, where it {what}")
+    if 1 < len(intervals) == len(told):
+        parts.append(f"then {_state(told[-1], data)} to {stop}")
+    elif len(intervals) > len(told):
+        changes = _count(len(intervals) - 1 - len(told), "time", "times")
+        parts.append(f"then its stability changes {changes} more before {load} = {stop}")
+    if branch["ended"] != "end of range":
+        parts.append(f"it ends there: {branch['ended'].rstrip('.')}")
+    return "; ".join(parts) + "."
+
+
+def _subject(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
+    """Name of a branch, and where it comes from, as the beginning of a sentence."""
+    name, parent = _named(branch["name"]), branch["parent"]
+    if branch is data["branches"][0]:
+        return f"The first branch, {branch['name']},"
+    if parent is None:
+        return f"{name}, which leaves none of the others,"
+    special = next(b for b in data["branches"] if b["name"] == parent[0])["special"][parent[1]]
+    return f"{name}, which leaves {parent[0]} at {known_digits(special)},"
+
+
+def _named(name: str) -> str:
+    """Name of a branch at the beginning of a sentence."""
+    return name[:1].upper() + name[1:]
+
+
+def _state(interval: Interval, data: Mapping[str, Any]) -> str:
+    """Stability of an interval in words."""
+    if interval.kind == STABLE:
+        if _is_sweep(data):
+            return "stable, by the frequencies found,"
+        if data.get("planar") and interval.in_space is None:
+            return "stable in its plane (not examined in space)"
+        return "stable"
+    if interval.kind == PLANAR:
+        return f"stable in its plane but not in space (index {interval.in_space} at most)"
+    index = f"{interval.least}" if interval.least == interval.most else f"{interval.least} to {interval.most}"
+    many = "s"[: interval.most != 1]
+    return f"unstable ({index} eigenvalue{many})" if _is_sweep(data) else f"unstable (index {index})"
+
+
+def _ranges(data: Mapping[str, Any]) -> Iterator[str]:
+    """Ranges of the load without a stable state, and with several."""
+    load, stable = data["parameter"], stable_ones(data["branches"])
+    low, high = sorted(data["range"])
+    for a, b in without_stable(stable, low, high):
+        yield f"From {load} = {a:.{FEW}g} to {b:.{FEW}g} no stable state was found."
+    pairs = list(coexisting(stable))
+    for one, other, a, b in pairs[:MOST_NAMES]:
+        names = " and ".join(dict.fromkeys(interval.branch["name"] for interval in (one, other)))
+        yield f"From {load} = {a:.{FEW}g} to {b:.{FEW}g} two stable states coexist, of {names}: hysteresis is possible."
+    if more := pairs[MOST_NAMES:]:
+        yield f"So do {_count(len(more), 'further pair', 'further pairs')} of stable states at other loads."
+
+
+def _open(data: Mapping[str, Any]) -> Iterator[str]:
+    """What a diagram leaves open."""
+    branches = data["branches"]
+    if any(branch.get("singular_start") for branch in branches):
+        yield "The first state is singular: what leaves it was not followed."
+    if missed := data.get("branch_points_not_followed"):
+        yield f"{_count(missed, 'branch point was', 'branch points were')} not followed."
+    if changes := sum(len(branch.get("unexplained") or ()) for branch in branches):
+        yield f"{_count(changes, 'change', 'changes')} of the index without a special point: see the warnings."
+    if coarse := sum(special.get("resolved") is False for branch in branches for special in branch["special"]):
+        yield f"The mesh does not resolve {_count(coarse, 'special point', 'special points')}: use more elements."
+
+
+def _count(number: int, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"
+
+
+def _names(branches: Sequence[Mapping[str, Any]]) -> str:
+    """Branches by name, or, where they are many, by number."""
+    names = [branch["name"] for branch in branches]
+    if len(names) > MOST_NAMES:
+        return f"{len(names)} other branches"
+    return _named(" and ".join(filter(None, (", ".join(names[:-1]), names[-1]))))
+
+
+def _is_sweep(data: Mapping[str, Any]) -> bool:
+    """Whether stability is that of frequencies, under loads without a potential."""
+    return any("omega2" in branch["columns"] for branch in data["branches"])

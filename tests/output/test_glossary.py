@@ -1,0 +1,59 @@
+"""The glossary has an entry for each word that tables, files and pictures use."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from rodfem.app import console
+from rodfem.continuation.kinds import KINDS
+from rodfem.errors import InputError
+from rodfem.output.files import COLUMNS, MEANING, OPTIONAL, SPECIAL
+from rodfem.output.glossary import ENTRIES, NAMES, explanation
+from rodfem.output.plot_diagram import MARKERS
+from rodfem.output.plot_frequencies import COLORS, PARTS
+from rodfem.output.plot_locus import POINTS
+from rodfem.output.plot_pieces import STYLES
+
+HOME = Path(__file__).parents[2]
+pytestmark = pytest.mark.alone
+
+
+def test_every_word_has_an_entry() -> None:
+    words = {*KINDS, *MEANING, *COLUMNS, *OPTIONAL, *SPECIAL, *MARKERS, *STYLES, *PARTS, *COLORS}
+    words |= {"stable side", "range of flutter", "range of divergence"}
+    words |= {str(style["label"]) for style in POINTS.values()}
+    words |= {kind.code for kind in KINDS.values()}
+    headings = {"load", "ordinate", "int W ds", "index", "zero", "located to", "unstable"}  # of the terminal
+    columns = re.findall(r"^\| `(\w+)` \|.*", (HOME / "docs" / "files.md").read_text().split("### `branches[].col")[1])
+    for word in words | headings | set(columns):
+        assert explanation(word), word
+
+
+def test_entries_of_a_special_point_in_files() -> None:
+    text = (HOME / "docs" / "files.md").read_text()
+    part = text[text.index("### `branches[].special[]`") : text.index("## `states.h5`")]
+    for name in re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE):
+        assert name == "kind" or explanation(name)
+
+
+def test_each_name_has_one_entry() -> None:
+    assert len(NAMES) == sum(key.count(" | ") + 1 for key in ENTRIES)
+    assert all(text[-1] == "." and text == " ".join(text.split()) for text in ENTRIES.values())
+
+
+def test_a_code_of_several_kinds() -> None:
+    assert [title.split(",")[0] for title, _ in explanation("bp")] == ["branch point", "divergence"]
+    assert explanation("Branch  Point") == explanation("branch point")
+
+
+def test_words_on_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    console.main(["explain", "branch", "point"])
+    assert capsys.readouterr().out.startswith("branch point, BP: An equilibrium in which branches cross")
+    console.main(["explain"])
+    listed = capsys.readouterr().out.splitlines()
+    assert len(listed) == len(ENTRIES) and "fold, LP" in listed
+    with pytest.raises(InputError, match="no entry 'foldd': try fold"):
+        explanation("foldd")

@@ -1,0 +1,174 @@
+"""A diagram in sentences: what is known of classical rods, and of diagrams made by hand."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from math import pi, sqrt
+from typing import Any
+
+import classics
+import demo_cases
+import golden_cases
+import pytest
+
+from rodfem import Discretization, Plan, trace
+from rodfem.output.summary import in_sentences
+
+
+def branch(name: str, loads: list[float], negative: list[int], **more: Any) -> dict[str, Any]:
+    energy = more.pop("energy", [x**2 for x in loads])
+    columns = {"load": loads, "ordinate": loads, "energy": energy, "negative": negative, "zero": [0] * len(loads)}
+    made = {"name": name, "parent": None, "columns": columns | more.pop("columns", {}), "special": []}
+    return made | {"ended": "end of range", **more}
+
+
+def special(kind: str, row: int, load: float, before: int, after: int, **more: Any) -> dict[str, Any]:
+    known = {"kind": kind, "row": row, "load": load, "negative_before": before, "negative_after": after}
+    return known | {"multiplicity": abs(after - before), "law": None, "followed": True, **more}
+
+
+def said(*branches: dict[str, Any], span: tuple[float, float] = (0.0, 4.0), **more: Any) -> str:
+    return " ".join(in_sentences({"parameter": "P", "range": list(span), "branches": list(branches), **more}))
+
+
+@cache
+def known(name: str) -> str:
+    """Sentences on a recorded scene, traced on its usual mesh."""
+    return golden_cases.trace(golden_cases.cases()[name](), error_bars=False).in_words()
+
+
+# --- what is known ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "load", "verb"),
+    [
+        (
+            "demo hemitropic",
+            "straight",
+            0.1143042145,
+            "buckles supercritically (2 directions at once: a circle of states",
+        ),
+        ("demo cord", "straight", 49.3480220, "buckles supercritically;"),
+        ("demo ruler", "plane", 4.4259484, "buckles supercritically;"),
+        ("demo ring", "circle", sqrt(3) / 1.5, "buckles supercritically (2 directions at once: a circle of states"),
+        ("demo follower", "straight", 20.0509536, "flutters: two frequencies coincide"),
+        ("classic tip spring", "straight", 9.956342657, "buckles subcritically;"),
+        ("classic bent about one axis", "straight", pi**2 / 2, "buckles supercritically;"),
+    ],
+)
+def test_how_stability_is_lost(name: str, first: str, load: float, verb: str) -> None:
+    words = known(name)
+    found = re.match(rf"The first branch, {first}, is stable,? .*?from \w+ = [\d.]+ to ([\d.]+), where it ", words)
+    assert found, words
+    assert float(found[1]) == pytest.approx(load, rel=1e-5)
+    assert words[found.end() :].startswith(verb)
+
+
+def test_hysteresis_between_a_subcritical_pitchfork_and_a_fold() -> None:
+    words = known("classic tip spring")
+    assert "Branch 1, which leaves straight at 9.95634, is unstable (index 1) from P = 9.95634 to 3.40805" in words
+    assert "where it turns back in a fold; then stable to 15." in words
+    assert "From P = 3.40805 to 9.95634 two stable states coexist, of straight and branch 1" in words
+
+
+def test_a_range_without_a_stable_state() -> None:
+    assert "From t0 = 1.16279 to 1.6 no stable state was found." in known("demo ring")
+    assert "no stable state" not in known("demo hemitropic")
+
+
+def test_stable_in_the_plane_only() -> None:
+    """A planar column, twice as stiff in its plane: by rows, it is unstable in space from pi^2/4 on."""
+    words = known("classic planar column")
+    found = re.search(r"some load between ([\d.]+) and ([\d.]+), where it loses its stability against motions", words)
+    assert found and float(found[1]) < pi**2 / 4 < float(found[2])
+    assert "then stable in its plane but not in space (index 1 at most) to 4.9348, where it buckles super" in words
+    rod = classics.planar_column()
+    columns = branch("straight", [0.0, 1.0], [0, 0])
+    assert "stable in its plane (not examined in space) on" in said(columns, span=(0.0, 1.0), planar=rod.planar)
+
+
+def test_divergence_is_named() -> None:
+    found = special("divergence", 1, 2.0, 0, 1)
+    words = said(branch("straight", [0.0, 2.0, 4.0], [0, 0, 1], columns={"omega2": []}, special=[found]))
+    assert "stable, by the frequencies found, from P = 0 to 2, where it diverges: a frequency passes through" in words
+    assert "then unstable (1 eigenvalue) to 4" in words
+
+
+def test_a_diagram_says_it_itself() -> None:
+    diagram = trace(demo_cases.scene("cord", span=(60.0, 55.0)), Discretization("reduced", 6, 3), Plan(depth=0))
+    assert diagram.in_words() == "The first branch, straight, is stable on its whole range, from lam = 60 to 55."
+
+
+# --- by hand ----------------------------------------------------------------------------------------------------------
+
+LAW = {"kind": "transcritical", "coefficient": 1.0, "power": 1, "uncertainty": 0.01, "side": 1}
+
+
+@pytest.mark.short
+@pytest.mark.parametrize(
+    ("more", "verb"),
+    [
+        ({"law": LAW}, "meets another branch transcritically;"),
+        ({"law": LAW | {"kind": "subcritical pitchfork"}}, "buckles subcritically;"),
+        ({"law": LAW | {"kind": "supercritical pitchfork", "uncertainty": 2.0}}, "buckles supercritically, or nearly"),
+        ({"law": LAW | {"kind": "supercritical pitchfork", "uncertainty": None}}, "buckles supercritically, or nearly"),
+        ({"law": LAW | {"kind": "vertical branch", "side": 0}}, "meets a family of states at one and the same load;"),
+        ({"law": LAW | {"kind": "pitchfork"}}, "passes a branch point of undetermined form;"),
+        ({}, "passes a branch point of undetermined form;"),
+        ({"followed": False}, "passes a branch point that was not followed;"),
+        ({"kind": "fold"}, "turns back in a fold;"),
+        ({"kind": "imperfect bifurcation", "unfolding": -3e-9}, "passes a branch point that an imperfection of the"),
+        ({"resolved": False}, "passes a branch point of undetermined form, as far as this mesh tells"),
+    ],
+)
+def test_verbs(more: dict[str, Any], verb: str) -> None:
+    point = special("branch point", 2, 2.0, 0, 1) | more
+    words = said(branch("straight", [0.0, 1.0, 2.0, 3.0, 4.0], [0, 0, 0, 1, 1], special=[point]))
+    assert f"to 2, where it {verb}" in words
+
+
+@pytest.mark.short
+def test_digits_are_those_of_the_error_bar() -> None:
+    point = special("fold", 2, 2.123456789, 0, 1, error_estimate=1e-4)
+    rod = branch("straight", [0.0, 1.0, 2.123456789, 3.0, 4.0], [0, 0, 0, 1, 1], special=[point])
+    assert "to 2.123, where" in said(rod)
+    point["error_estimate"] = None
+    assert "to 2.12346, where" in said(rod)
+
+
+@pytest.mark.short
+def test_what_is_open_is_said() -> None:
+    change = [{"row": 1, "before": 0, "after": 2}]
+    jump = branch("straight", [0.0, 1.0, 2.0, 4.0], [0, 0, 2, 2], unexplained=change, singular_start=1)
+    words = said(jump, branch_points_not_followed=2)
+    assert "to some load between 1 and 2, where it changes its index without a special point" in words
+    for sentence in (
+        "The first state is singular: what leaves it was not followed.",
+        "2 branch points were not followed.",
+        "1 change of the index without a special point: see the warnings.",
+    ):
+        assert sentence in words
+    coarse = special("fold", 1, 1.0, 0, 1, resolved=False)
+    rod = branch("straight", [0.0, 1.0, 4.0], [0, 0, 1], special=[coarse])
+    assert "The mesh does not resolve 1 special point: use more elements." in said(rod)
+
+
+@pytest.mark.short
+def test_many_branches_and_many_intervals_are_counted() -> None:
+    unstable = [branch(f"branch {i}", [0.0, 4.0], [1, 1]) for i in range(9)]
+    straight = branch("straight", [0.0, 4.0], [0, 0])
+    assert "9 other branches are unstable on their whole range." in said(straight, *unstable)
+    assert "Branch 0 and branch 1 are unstable on their" in said(straight, *unstable[:2])
+    turns = [special("fold", i, float(i), i % 2 == 0, i % 2, multiplicity=1) for i in range(1, 12)]
+    winding = branch("straight", [float(i) for i in range(13)], [i % 2 for i in range(13)], special=turns)
+    assert "then its stability changes" in said(winding, span=(0.0, 12.0))
+
+
+@pytest.mark.short
+def test_mirror_images_are_no_hysteresis() -> None:
+    one, image = (branch(name, [0.0, 2.0, 4.0], [0, 0, 0]) for name in ("straight", "branch 1"))
+    assert "coexist" not in said(one, image)
+    other = branch("branch 1", [0.0, 2.0, 4.0], [0, 0, 0], energy=[1.0, 9.0, 20.0])
+    assert "From P = 0 to 4 two stable states coexist, of straight and branch 1" in said(one, other)
