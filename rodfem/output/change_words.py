@@ -8,7 +8,7 @@ from typing import Any
 
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, IMPERFECT
 from rodfem.output.intervals import Interval, changes_at
-from rodfem.output.plot_pieces import STABLE
+from rodfem.output.plot_pieces import STABLE, UNDECIDED
 
 Branches = Sequence[Mapping[str, Any]]
 DIGITS, FEW = 10, 6
@@ -38,6 +38,8 @@ def change_in_words(one: Interval, after: Interval, branches: Branches) -> tuple
     where = f"some load between {column[segment]:.{FEW}g} and {column[segment + 1]:.{FEW}g}"
     if any(change["row"] == segment for change in branch.get("unexplained") or ()):
         return where, "changes its index without a special point that says why"
+    if UNDECIDED in (one.kind, after.kind):
+        return where, "has an eigenvalue that is not told from zero on one side"
     verb = "loses" if one.kind == STABLE else "changes"
     return where, f"{verb} its stability against motions out of the plane"
 

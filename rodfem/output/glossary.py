@@ -69,6 +69,14 @@ ENTRIES = {
     "counts prove that none is missing | certified": (
         "The number of eigenvalues found below a shift is that of the inertia of the shifted matrix."
     ),
+    "undecided | stability undecided | 0 or 1": (
+        "Eigenvalues so near to zero that the error of the mesh, or round-off, leaves their sign open: the index lies "
+        "between its first value and that plus their number."
+    ),
+    "soft mode | soft | soft_value | soft_uncertainty": (
+        "An eigenvalue near zero with the name of what moves, its value in the metric, and a bound of its error: "
+        "sliding along the rod, turning of an end, slipping of a ring along itself."
+    ),
     "residual": "Size of (S - mu M) x for the eigenpair found, relative to S x.",
     "index change unexplained | unexplained": (
         "Between two rows the index changes, and no special point was found that says why: smaller steps or more "

@@ -11,7 +11,7 @@ from typing import Any
 
 from rodfem.output.change_words import FEW, change_in_words, known_digits
 from rodfem.output.intervals import Interval, coexisting, intervals_of, stable_ones, without_stable
-from rodfem.output.plot_pieces import PLANAR, STABLE
+from rodfem.output.plot_pieces import PLANAR, STABLE, UNDECIDED
 
 MOST_INTERVALS, MOST_NAMES = 6, 6
 """Intervals of a branch that are told one by one, and branches that are named in one sentence."""
@@ -20,7 +20,7 @@ MOST_INTERVALS, MOST_NAMES = 6, 6
 def in_sentences(data: Mapping[str, Any]) -> list[str]:
     """Sentences on a diagram, the contents of ``diagram.json``: its branches, ranges of stability, open questions."""
     first, *others = data["branches"]
-    told = [x for x in others if {i.kind for i in intervals_of(x)} & {STABLE, PLANAR}]
+    told = [x for x in others if {i.kind for i in intervals_of(x)} & {STABLE, PLANAR, UNDECIDED}]
     quiet = [x for x in others if x not in told and intervals_of(x)]
     out = [_of_branch(first, data), *(_of_branch(branch, data) for branch in told[:MOST_NAMES])]
     if more := told[MOST_NAMES:]:
@@ -81,6 +81,8 @@ def _state(interval: Interval, data: Mapping[str, Any]) -> str:
         if data.get("planar") and interval.in_space is None:
             return "stable in its plane (not examined in space)"
         return "stable"
+    if interval.kind == UNDECIDED:
+        return "of undecided stability (an eigenvalue is too near zero for its sign to be known on this mesh)"
     if interval.kind == PLANAR:
         return f"stable in its plane but not in space (index {interval.in_space} at most)"
     index = f"{interval.least}" if interval.least == interval.most else f"{interval.least} to {interval.most}"

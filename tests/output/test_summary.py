@@ -172,3 +172,14 @@ def test_mirror_images_are_no_hysteresis() -> None:
     assert "coexist" not in said(one, image)
     other = branch("branch 1", [0.0, 2.0, 4.0], [0, 0, 0], energy=[1.0, 9.0, 20.0])
     assert "From P = 0 to 4 two stable states coexist, of straight and branch 1" in said(one, other)
+
+
+def test_undecided_stability_is_no_stability() -> None:
+    """An eigenvalue that is not told from zero: the branch is neither called stable nor unstable there."""
+    loads, columns = [0.0, 1.0, 2.0, 3.0], {"undecided": [0, 0, 1, 1]}
+    words = said(branch("straight", loads, [0, 0, 0, 0], columns=columns))
+    assert "straight, is stable from P = 0 to some load between 1 and 2" in words
+    assert "then of undecided stability" in words and "its whole range" not in words
+    side = branch("branch 1", loads, [0] * 4, columns={"undecided": [1] * 4}, parent=["straight", 0])
+    first = branch("straight", loads, [0] * 4) | {"special": [special("branch point", 1, 1.0, 0, 0)]}
+    assert "of undecided stability" in said(first, side) and "unstable on its whole range" not in said(first, side)
