@@ -115,6 +115,7 @@ def figure_of(diagram: Mapping[str, Any]) -> Figure:
         for text in (title, footer):  # one line each: shrink what is too long
             width = text.get_window_extent().width / figure.bbox.width
             text.set_fontsize(text.get_fontsize() * min(1.0, 0.97 / max(width, POINT)))
+        axes.autoscale_view()  # otherwise done when it is drawn: until then pixels are those of other limits
         _uncover(axes, pieces)
         place_words(axes, handles[: len(branches)], handles[len(branches) :], pieces, points)
     return figure

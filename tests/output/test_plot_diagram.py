@@ -19,6 +19,8 @@ from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.link import link
 from rodfem.file_format import LOCUS
+from rodfem.output import plot_diagram
+from rodfem.output.placement import dense
 from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, _draw_branches, draw_diagram, figure_of
 from rodfem.output.plot_locus import draw_locus
 from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE, hidden, pieces_of
@@ -223,3 +225,18 @@ def test_ordinates_along_the_rod_are_checked() -> None:
     ):
         with pytest.raises(SceneError, match=sentence):
             replace(ring, ordinate=Ordinate("twist", s=None, of=of))
+
+
+def test_pixels_are_those_of_the_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Loads of any size: lines are sampled at the scale at which they are drawn."""
+    seen: list[int] = []
+
+    def counted(axes: Any, curve: np.ndarray) -> Any:
+        found = dense(axes, curve)
+        seen.append(len(found[0]))
+        return found
+
+    monkeypatch.setattr(plot_diagram, "dense", counted)
+    large = {"columns": {"load": [0.0, 1e5, 2e5, 3e5]}}
+    figure_of(diagram(branch("straight", [0.0] * 4, [0, 0, 1, 1], **large), branch("other", [0, 1, 2, 3], [1] * 4)))
+    assert seen and max(seen) < 2000
