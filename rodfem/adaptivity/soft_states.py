@@ -86,7 +86,7 @@ class SoftStates:
         if modes and self._richer:
             with self.solver.system.clock.scope("error bars"):
                 modes = self._refined(point, modes, fixed_load, every - len(modes))
-        return judge(near, modes, self.solver.inertia.tolerance)
+        return judge(near, modes, self.solver.inertia.tolerance, refined=bool(self._richer))
 
     def _across_the_branch(self, point: Point, near: NearZero) -> NearZero:
         """Eigenvalues without that of the branch itself, where it is a family of equilibria at one load."""

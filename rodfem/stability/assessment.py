@@ -16,10 +16,9 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.stability.method import Method
 from rodfem.stability.methods import AUTO, METHODS, find
-from rodfem.stability.near_zero import judge, near_zero
 from rodfem.stability.rank import rank_of
 from rodfem.stability.round_off import Decision, decide
-from rodfem.stability.soft_mode import Judgement, SoftMode, is_stable
+from rodfem.stability.soft_mode import SoftMode, is_stable
 from rodfem.stability.workspace import Workspace
 
 SMALL = 12
@@ -130,7 +129,7 @@ class Assessor(Workspace):
         name, reason = self.choose(method, number)
         if number < 0:
             raise InputError(f"{number} eigenvalues cannot be computed: ask for none or more.")
-        started, undecided = perf_counter(), 0
+        started = perf_counter()
         if self.inertia is None:
             found = self._method(name).nearest(x, max(number, 1))
             scale = ZERO * self.system.stiffness_scale / self.system.scene.length
@@ -139,15 +138,14 @@ class Assessor(Workspace):
             inside: tuple[float, np.ndarray, np.ndarray] = 0.0, nothing, nothing
             made = 0
         else:
-            decision, judged = self._index(x)
-            index, zero, undecided = judged.negative, judged.zero, judged.undecided
+            decision = self._index(x)
+            index, zero = decision.index.negative, decision.index.zero
             inside, made = (decision.band, decision.inside, decision.uncertainty), 2 - self.factorisations()
             found = self._method(name if number else "count").leftmost(x, number, interval)
             made += self.factorisations()
         return Verdict(
             *(index, zero, found.values, found.vectors, found.errors, *inside, found.certified),
             *(perf_counter() - started, made + found.factorisations, name, reason + found.note),
-            undecided=undecided,
         )
 
     def _method(self, name: str) -> Method:
@@ -156,17 +154,11 @@ class Assessor(Workspace):
             self._methods[name] = find(name)(self)
         return self._methods[name]
 
-    def _index(self, x: PETSc.Vec) -> tuple[Decision, Judgement]:
-        """Count, and judge what is near zero; where that breaks down, name the constraints that are dependent."""
+    def _index(self, x: PETSc.Vec) -> Decision:
+        """Count; where that breaks down, name the constraints that depend on each other."""
         assert self.inertia is not None
         try:
-            found = self.inertia.at(x)
-            decision = decide(found)
-            if decision.count.zero == found.drifts:
-                return decision, Judgement(decision.index.negative, decision.index.zero, 0, ())
-            near = near_zero(found, decision.count)
-            modes = [SoftMode("", *pair) for pair in zip(near.values.tolist(), near.uncertainty.tolist(), strict=True)]
-            return decision, judge(near, modes, self.inertia.tolerance)
+            return decide(self.inertia.at(x))
         except ConvergenceError:
             rank_of(self.pencil(x, "full"))
             raise

@@ -39,15 +39,12 @@ class Decision:
         Rayleigh quotients of the eigenvalues inside the band, symmetry modes left out.
     uncertainty
         What round-off in the matrix may make of each of them: those smaller than theirs are counted as zero.
-    count
-        The count itself: all inside the band are zero.
     """
 
     index: Index
     band: float
     inside: np.ndarray
     uncertainty: np.ndarray
-    count: Index
 
 
 def decide(found: Factored) -> Decision:
@@ -62,7 +59,7 @@ def decide(found: Factored) -> Decision:
     inside = index.zero - known
     least = ZERO_BAND * inertia.scale
     if inside == 0 or inertia.resolution <= least:
-        return Decision(index, inertia.tolerance, np.zeros(0), np.zeros(0), index)
+        return Decision(index, inertia.tolerance, np.zeros(0), np.zeros(0))
     if inside > MANY:
         raise ConvergenceError(
             f"{inside} eigenvalues are within round-off of the count, {inertia.resolution:.2g} in the metric: the mesh "
@@ -74,8 +71,8 @@ def decide(found: Factored) -> Decision:
     theta = np.array([vectors[i].dot(found.matrix * vectors[i]) for i in nearest]) + found.shift
     negative = int((theta < -doubt).sum())
     zero = int((abs(theta) <= doubt).sum())
-    decided = replace(index, negative=index.negative + negative, zero=zero + known)
-    return Decision(decided, inertia.tolerance, theta, doubt, index)
+    index = replace(index, negative=index.negative + negative, zero=zero + known)
+    return Decision(index, inertia.tolerance, theta, doubt)
 
 
 def resolve(found: Factored) -> tuple[int, int]:
