@@ -81,16 +81,11 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
 def judge(found: NearZero, modes: Sequence[SoftMode], tolerance: float, *, refined: bool) -> Judgement:
     """Numbers of eigenvalues of a state with its ``modes``, decided or not.
 
-    Those within the ``tolerance`` of a count are zero, as in every count, unless they were computed on richer meshes,
-    too (``refined``): round-off alone does not tell what is zero for the rod.
+    ``found`` are these modes as the mesh has them.  Those within the ``tolerance`` of a count are zero, as in every
+    count, unless they were computed on richer meshes, too (``refined``): round-off alone does not tell what is zero for
+    the rod.
     """
-    if not refined:
-        inside = [m for m in modes if abs(m.value) <= tolerance]
-        outside = [m for m in modes if abs(m.value) > tolerance]
-        negative = found.firm + sum(m.decided and m.value < 0 for m in outside)
-        undecided = sum(not m.decided for m in outside)
-        return Judgement(negative, found.zero + len(inside), undecided, tuple(modes))
-    negative = found.firm + sum(m.decided and m.value < 0 for m in modes)
-    undecided = sum(not m.decided for m in modes)
-    within = sum(not m.decided and abs(v) <= tolerance for m, v in zip(modes, found.values.tolist(), strict=True))
-    return Judgement(negative, found.zero + within, undecided, tuple(modes))
+    told = [m for m in modes if m.decided and (refined or abs(m.value) > tolerance)]
+    negative = found.firm + sum(m.value < 0 for m in told)
+    zero = sum(m not in told and abs(v) <= tolerance for m, v in zip(modes, found.values.tolist(), strict=True))
+    return Judgement(negative, found.zero + zero, sum(not m.decided for m in modes), tuple(modes))
