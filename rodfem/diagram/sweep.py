@@ -54,7 +54,7 @@ DRIVEN = 1e-7
 """Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
 MEAN = 10.0
 """Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
-SHIFT = -1.0
+SHIFT = -10.0
 """Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix is singular.
 
 Far enough from it for a rod that floats, whose rigid motions are zero eigenvalues: what is nearest to the shift takes
