@@ -93,7 +93,7 @@ FAULTS = {
         f"{CONTINUATION}normal_form.py",
         'return NormalForm("pitchfork", best,',
         'return NormalForm("pitchfork", -best,',
-        f"{CORD} {FOLLOW}",
+        f"{ERRORS}",
     ),
     # index
     "constraints-are-miscounted": Fault(
@@ -161,13 +161,13 @@ FAULTS = {
         "rodfem/output/digits.py",
         "ceil(error / 10.0**power * (1 - NEGLIGIBLE))",
         "round(error / 10.0**power)",
-        "tests/app/test_terminal.py tests/output",
+        ERRORS,
     ),
     "bar-without-digits-left-out": Fault(
         "rodfem/output/digits.py",
         "error + abs(value - float(text))",
         "error",
-        "tests/app/test_terminal.py tests/output",
+        ERRORS,
     ),
     "end-of-a-branch-is-too-sharp": Fault(
         "rodfem/adaptivity/zero_stretch.py", "else 0.25", "else 0.0025", f"{ERRORS} {HEMITROPIC} {BUCKLED}"

@@ -381,6 +381,23 @@ def test_small_eigenvalues_on_many_elements(formulation: str, elements: int) -> 
         assert found.band < 1e-4
 
 
+@SERIAL
+def test_quotients_decide_within_a_wide_band() -> None:
+    """Where round-off of the count is said to be large, signs of eigenvalues inside are those of their quotients."""
+    solver = Solver(scene("cord"), Discretization("reduced", 8, 6)).equilibria
+    solver.system.set_phase(None)
+    count = Count(solver.system)
+    for load, negative in ((49.3475, 1), (49.3485, 0), (40.0, 1), (55.0, 0)):
+        x, _ = solver.at_load(solver.start(load), load)
+        exact = decide(count.at(x)).index
+        assert (exact.negative, exact.zero) == (negative, 0)
+        value = abs(float(count.held.nearest(1, accuracy=1e-8)[0][0]))
+        given, count.tolerance, count.resolution = (count.tolerance, count.resolution), 3 * value, 3 * value
+        found = decide(count.at(x))
+        count.tolerance, count.resolution = given
+        assert len(found.inside) == 1 and found.index == exact
+
+
 # --- rank of the constraints -------------------------------------------------------------------------------------
 
 
