@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from petsc4py import PETSc
@@ -101,6 +101,11 @@ class Point:
         Zero ones, which :attr:`zero` counts, are those of symmetries, or leave it undecided beyond that.
         """
         return is_stable(self.negative, self.undecided)
+
+    def backwards(self, total: float) -> Point:
+        """The same equilibrium on the branch of length ``total`` followed the other way."""
+        tangent = None if self.tangent is None else -self.tangent
+        return replace(self, arclength=total - self.arclength, tangent=tangent, slope=-self.slope)
 
     def __repr__(self) -> str:
         """Load, ordinate and stability."""
@@ -267,6 +272,23 @@ class Branch:
             f"The first state, at {load} = {self.points[0].load:.8g}, is singular: {self.singular_start} eigenvalue(s) "
             "vanish there that do not all along the branch. What else leaves it is not followed: begin before it."
         )
+
+    def backwards(self) -> Branch:
+        """The same branch followed the other way, from its end, with the same name and reason of its end."""
+        total = self.points[-1].arclength
+        points = {id(p): p.backwards(total) for p in self.points}
+        special = [
+            replace(s, point=points[id(s.point)], negative_before=s.negative_after, negative_after=s.negative_before)
+            for s in self.special
+        ]
+        out = Branch(self.name, self.parent, self.depth, list(points.values()), special, self.ended)
+        out.renumber()
+        return out
+
+    def cut(self, last: float) -> None:
+        """Drop what lies beyond the arclength ``last``."""
+        self.points = [p for p in self.points if p.arclength <= last]
+        self.special = [s for s in self.special if s.point.arclength <= last]
 
     def insert(self, special: SpecialPoint) -> None:
         """Put a special point among the points by its arclength, and renumber the rows of all special points."""

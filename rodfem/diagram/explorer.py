@@ -17,7 +17,8 @@ from rodfem.continuation.solvers import ON_BOUND
 from rodfem.continuation.special_points import COUPLED, coupling_of, directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
-from rodfem.diagram.tracer import Tracer, equivalent, near
+from rodfem.diagram.equivalence import equivalent, near
+from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
 from rodfem.stability.blocks import Blocks

@@ -41,8 +41,8 @@ from rodfem.continuation.index_chain import Row, breaks, chained, explain
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.solvers import _to_load
 from rodfem.continuation.special_points import directions, leave
+from rodfem.diagram.equivalence import equivalent
 from rodfem.diagram.explorer import Explorer
-from rodfem.diagram.tracer import equivalent
 from rodfem.output.files import _branch_data
 from rodfem.stability.assessment import assess
 
