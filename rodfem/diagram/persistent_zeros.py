@@ -29,8 +29,7 @@ class PersistentZeros:
     def check(self, solver: BranchSolver, history: Sequence[Point], point: Point, level: int) -> None:
         """Damp Newton's method where eigenvalues stay zero, and say so once.
 
-        ``history`` has the rows of a ``solver`` before the ``point``, ``level`` is the number of zeros that a branch has
-        had all along.
+        ``history`` has the rows of a ``solver`` before the ``point``; a branch has had ``level`` zeros all along.
         """
         extra = self.extra(solver, point)
         recent = [p for p in history[-ROWS:] if p.arclength > 0.0]  # a branch point has zeros of its own
