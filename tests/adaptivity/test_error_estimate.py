@@ -73,6 +73,7 @@ def test_ring(mesh: tuple[int, int]) -> None:
         check(s.point.load, sqrt(n * n - 1) / 1.5, s.error_estimate)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("mesh", [(8, 2), (4, 4), (4, 6), (6, 6)])
 def test_deep_arch(mesh: tuple[int, int]) -> None:
     """On few elements one degree more may lower an error by a third only, or turn its sign."""

@@ -189,6 +189,7 @@ def helix(s: np.ndarray, curvature: float, torsion: float) -> np.ndarray:
     return np.stack([np.cos(w * s / 2), 0 * s, np.sin(w * s / 2) * curvature / w, np.sin(w * s / 2) * torsion / w], 1)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_helix_of_any_pitch(formulation: str) -> None:
     """A helix is a solution for any pitch; what holds it is a force and a moment along its axis."""
@@ -203,6 +204,7 @@ def test_helix_of_any_pitch(formulation: str) -> None:
         assert abs(n - force).max() < 1e-7
 
 
+@pytest.mark.alone
 def test_helix_as_the_degree_grows() -> None:
     """Its error falls to round-off."""
     errors, t = [], 2.0

@@ -92,6 +92,7 @@ def test_thrust_along_the_end() -> None:
     assert found.point.load == pytest.approx(109.69, abs=5e-3)
 
 
+@pytest.mark.alone
 def test_forces_that_nothing_balances() -> None:
     one_sided = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
     with pytest.raises(SceneError, match="nothing holds the rod against"):

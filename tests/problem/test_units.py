@@ -41,6 +41,7 @@ def column(length: float, stiffness: float, rod: str) -> Scene:
     )
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("rod", ["unshearable and inextensible", "flexible"])
 @pytest.mark.parametrize(
     ("length", "stiffness"),
@@ -113,6 +114,7 @@ def test_numbers_in_words() -> None:
     assert digits.in_decimals(1.0, 3, 1.0) == "1.000"
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     "name",
     [
