@@ -6,13 +6,17 @@ import os
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rodfem.app.terminal import Report
-from rodfem.continuation.branch import Branch
+from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.solvers import StaticSolver
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.ranks import on_first
+
+if TYPE_CHECKING:
+    from rodfem.codim2.locus import Locus
 
 
 def follow_all(
@@ -44,38 +48,68 @@ def follow_all(
     known
         Whether loci that are in the folder are those of this run, and stay.
     """
-    from rodfem.codim2.locus import Locus, locus
-    from rodfem.output.plot_locus import draw_locus
-
     if plan.locus is None:
         return
-    name, low, high = plan.locus
-    span, comm = plan.over(solvers[0].system.scene), solvers[0].system.comm
-    load = (min(span), max(span))
-    saved: list[dict] = []
+    found = _Loci(plan, plan.locus, output, report, solvers, known)
     for branch in branches:
+        found.follow(branch)
+    if found.saved and figures:
+        from rodfem.output.plot_locus import draw_locus
+
+        on_first(found.comm, lambda: draw_locus(found.saved, output / "locus.png"))
+        report.say(f"Loci in {output}{os.sep}: locus-1.json ..., locus.png")
+
+
+class _Loci:
+    """Loci of one run, in the plane of its load and the parameter of ``asked``; what :func:`follow_all` is given."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        asked: tuple[str, float, float],
+        output: Path,
+        report: Report,
+        solvers: Sequence[StaticSolver],
+        known: bool,
+    ) -> None:
+        """Nothing is followed yet."""
+        self.solvers, self.output, self.report, self.known = solvers, output, report, known
+        self.name, *self.interval = asked
+        self.load = sorted(plan.over(solvers[0].system.scene))
+        self.adapted = plan.accuracy is not None
+        self.comm = solvers[0].system.comm
+        self.saved: list[dict] = []
+
+    def follow(self, branch: Branch) -> None:
+        """Follow the special points of a branch, each that no locus of another one passes."""
         near: list[Locus] = []
         for special in branch.special:
             if not (special.kind.counted or special.kind.line) or special.connects_to is not None:
                 continue
+            which = f"{special.kind} of {branch.name} at {special.point.load:.8g}"
             if any(found.passes(special) for found in near):
-                report.say(f"\nThe {special.kind} of {branch.name} at {special.point.load:.8g} is on a locus above")
+                self.report.say(f"\nThe {which} is on a locus above")
                 continue
-            if plan.accuracy is not None:
-                report.say("\nA locus stays on the mesh of its special point: its own estimate says how accurate it is")
-            report.say(f"\nLocus of the {special.kind} of {branch.name} at {special.point.load:.8g}")
-            file = output / f"locus-{len(saved) + 1}.json"
+            if self.adapted:
+                self.report.say(
+                    "\nA locus stays on the mesh of its special point: its own estimate says how accurate it is"
+                )
+            self.report.say(f"\nLocus of the {which}")
             try:
-                found = Locus.read(file) if known and file.exists() else None
-                if found is None or not found.starts_at(special):
-                    found = locus(solvers[special.point.mesh], special, name, (load, (low, high)))
+                near.append(self._locus(special))
             except (InputError, ConvergenceError) as trouble:
-                report.warn(str(trouble))
-                continue
-            report.say(found.text())
-            saved.append(found.data())
-            near.append(found)
-            on_first(comm, partial(found.save, file))
-    if saved and figures:
-        on_first(comm, lambda: draw_locus(saved, output / "locus.png"))
-        report.say(f"Loci in {output}{os.sep}: locus-1.json ..., locus.png")
+                self.report.warn(str(trouble))
+
+    def _locus(self, special: SpecialPoint) -> Locus:
+        """Locus of a special point, from its file where the run goes on; said, and saved."""
+        from rodfem.codim2.locus import Locus, locus
+
+        file = self.output / f"locus-{len(self.saved) + 1}.json"
+        found = Locus.read(file) if self.known and file.exists() else None
+        if found is None or not found.starts_at(special):
+            bounds = (self.load[0], self.load[1]), (self.interval[0], self.interval[1])
+            found = locus(self.solvers[special.point.mesh], special, self.name, bounds)
+        self.report.say(found.text())
+        self.saved.append(found.data())
+        on_first(self.comm, partial(found.save, file))
+        return found

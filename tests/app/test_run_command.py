@@ -10,8 +10,9 @@ import pytest
 
 import rodfem
 from rodfem.app import console
-from rodfem.app.commands.run import load, mesh_of, rod_of
+from rodfem.app.commands.run import mesh_of, rod_of
 from rodfem.app.constants import Statement
+from rodfem.app.persons_file import load
 from rodfem.errors import InputError
 
 pytestmark = pytest.mark.alone

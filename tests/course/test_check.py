@@ -59,8 +59,8 @@ def test_traps_are_wrong_and_answers_right(name: str) -> None:
     [
         ("answer = 2 / 3.141592653589793", 0, "0.636619772368 (exact 2/pi: a quarter of a circle): right to 1e-12\n"),
         ("answer = 0.5", 1, "0.5 is too small, by 0.1. "),
-        ("x = 1\nanswer = x / 0", 2, "mine.py stops at line 2: ZeroDivisionError: division by zero"),
-        ("x = 1\ny = (", 2, "mine.py stops at line 2: SyntaxError"),
+        ("x = 1\nanswer = x / 0", 2, "mine.py, line 2: ZeroDivisionError: division by zero"),
+        ("x = 1\ny = (", 2, "mine.py, line 2: SyntaxError"),
         ("x = 1", 2, "mine.py assigns nothing to answer: end it with a line like answer = 9.8696."),
     ],
 )

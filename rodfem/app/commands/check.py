@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import runpy
 import sys
-import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from rodfem.app.cli import Parser
+from rodfem.app.persons_file import load
 from rodfem.course.answers import answer_to, answers
 from rodfem.errors import InputError
 
@@ -37,20 +36,7 @@ def main(words: Sequence[str]) -> None:
 
 def answer_of(program: Path) -> Any:
     """Value that a program assigns to ``answer``; raises :class:`~rodfem.errors.InputError` where it does not."""
-    if not program.is_file():
-        raise InputError(f"{program} is no file: give the path of a Python program that assigns a number to answer.")
-    try:
-        names = runpy.run_path(str(program), run_name="__main__")
-    except Exception as failure:
-        raise InputError(f"{_place(program, failure)}: {type(failure).__name__}: {failure}") from failure
+    names = vars(load(program, "__main__"))
     if "answer" not in names:
         raise InputError(f"{program} assigns nothing to answer: end it with a line like answer = 9.8696.")
     return names["answer"]
-
-
-def _place(program: Path, failure: Exception) -> str:
-    """Program and the last of its own lines that ran, in words."""
-    if isinstance(failure, SyntaxError):
-        return f"{program} stops at line {failure.lineno}"
-    lines = [frame.lineno for frame in traceback.extract_tb(failure.__traceback__) if frame.filename == str(program)]
-    return f"{program} stops at line {lines[-1] if lines else 1}"

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from importlib.util import module_from_spec, spec_from_file_location
 from inspect import isfunction, signature
 from pathlib import Path
-from traceback import extract_tb
 from types import ModuleType
 from typing import Any
 
 from rodfem.app.main import Mesh
 from rodfem.app.main import main as run_rod
+from rodfem.app.persons_file import load
 from rodfem.errors import InputError
 from rodfem.problem.scene import Scene
 
@@ -38,28 +37,6 @@ def main(words: Sequence[str]) -> None:
         name, rest = (rest[1] if len(rest) > 1 else ""), rest[2:]
     module = load(Path(file))
     run_rod(rod_of(module, name), mesh_of(module), rest, f"rodfem run {file}")
-
-
-def load(file: Path) -> ModuleType:
-    """Module of a file; raises :class:`InputError` where it is missing, or fails."""
-    if not file.is_file():
-        raise InputError(f"There is no file {file}: give one in Python that states a rod, as demos/cord.py.")
-    spec = spec_from_file_location(file.stem, file.resolve())
-    if spec is None or spec.loader is None:
-        raise InputError(f"{file} is no file in Python: give one whose name ends in .py.")
-    module = module_from_spec(spec)
-    sys.modules[file.stem] = module  # where pickling, and dataclasses, look
-    sys.path.insert(0, str(file.resolve().parent))
-    try:
-        spec.loader.exec_module(module)
-    except InputError:
-        raise
-    except Exception as trouble:  # whatever the file does
-        inside = [frame.lineno for frame in extract_tb(trouble.__traceback__) if frame.filename == str(file.resolve())]
-        line = getattr(trouble, "lineno", None) or (inside[-1] if inside else None)
-        where = f"{file}, line {line}" if line else f"{file}"
-        raise InputError(f"{where}: {type(trouble).__name__}: {trouble}; run python {file} to see more.") from trouble
-    return module
 
 
 def rod_of(module: ModuleType, name: str | None) -> Callable[..., Scene] | Scene:

@@ -1,0 +1,44 @@
+"""A person's Python file, run by a command of the program: the module that it is, or one sentence on where it fails."""
+
+from __future__ import annotations
+
+import sys
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+from traceback import extract_tb
+from types import ModuleType
+
+from rodfem.errors import InputError
+
+
+def load(file: Path, name: str | None = None) -> ModuleType:
+    """Module of a file, by its own name or another one.
+
+    Raises :class:`~rodfem.errors.InputError` where it is missing, or fails: with the last of its own lines that ran.
+    """
+    if not file.is_file():
+        raise InputError(f"{file} is no file: give the path of a Python program.")
+    path = file.resolve()
+    spec = spec_from_loader(name or file.stem, SourceFileLoader(name or file.stem, str(path)))
+    assert spec is not None and spec.loader is not None
+    module, before = module_from_spec(spec), sys.modules.get(spec.name)
+    sys.modules[spec.name] = module  # where pickling, and dataclasses, look
+    sys.path.insert(0, str(path.parent))
+    try:
+        spec.loader.exec_module(module)
+    except InputError:
+        raise
+    except Exception as trouble:  # whatever the file does
+        line = getattr(trouble, "lineno", None) if isinstance(trouble, SyntaxError) else _last_line(path, trouble)
+        where = f"{file}, line {line}" if line else f"{file}"
+        raise InputError(f"{where}: {type(trouble).__name__}: {trouble}; run python {file} to see more.") from trouble
+    finally:
+        if before is not None:
+            sys.modules[spec.name] = before
+    return module
+
+
+def _last_line(path: Path, trouble: Exception) -> int | None:
+    """Last line of a file that ran before it failed."""
+    return next((f.lineno for f in reversed(extract_tb(trouble.__traceback__)) if f.filename == str(path)), None)
