@@ -2,30 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import EVENT
 from rodfem.continuation.locate import event_at, locate_event
 from rodfem.continuation.solvers import BranchSolver, hermite
+from rodfem.diagram.step import Step
 from rodfem.problem.events import Event
 from rodfem.tolerances import INSIDE, round_off
+
+if TYPE_CHECKING:
+    from rodfem.diagram.plan import Plan
 
 
 class Events:
     """The events of one branch: their values at the last row."""
 
-    def __init__(self, events: Sequence[Event]) -> None:
+    at_start = False
+
+    def __init__(self, plan: Plan) -> None:
         """Nothing is known yet."""
-        self.events = tuple(events)
+        self.events = tuple(plan.events)
         self._row: Point | None = None
         self._values: list[float] = []
 
-    def between(self, solver: BranchSolver, a: Point, b: Point) -> list[SpecialPoint]:
-        """Special points of the events that happen in the step from ``a`` to ``b``."""
+    def between(self, step: Step) -> list[SpecialPoint]:
+        """Special points of the events that happen in a step."""
         if not self.events:
             return []
+        solver, a, b = step.solver, step.a, step.b
         before = self._values if self._row is a else [event_at(solver, event, a.x) for event in self.events]
         self._row, self._values = b, [event_at(solver, event, b.x) for event in self.events]
         changes = zip(self.events, before, self._values, strict=True)

@@ -20,12 +20,12 @@ from rodfem.continuation.special_points import FIRST
 from rodfem.diagram.bookkeeper import Bookkeeper, Recalled
 from rodfem.diagram.branch_ends import closes, end_at_zero_stretch, last_admissible, meeting, singular_end
 from rodfem.diagram.equivalence import equivalent
-from rodfem.diagram.events import Events
+from rodfem.diagram.finders import FINDERS
 from rodfem.diagram.journal import Journal
 from rodfem.diagram.persistent_zeros import PersistentZeros
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.requested_loads import RequestedLoads
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
+from rodfem.diagram.step import Step
 from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without
 from rodfem.tolerances import DRIFT
@@ -63,7 +63,7 @@ class Tracer:
         self.gaps = Gaps(self.meshes)
         self.zeros = PersistentZeros(observer, self.high - self.low)
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
-        self.events, self.requested = Events(plan.events), RequestedLoads(plan.at)
+        self.finders = [finder(plan) for finder in FINDERS]
         self.invariants: dict[int, Invariants] = {}
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
         said = observer if isinstance(observer, Recorder) else None
@@ -149,7 +149,7 @@ class Tracer:
             try:
                 self.control.row(history[-1], self.solver)
                 if not begun:
-                    self._first_requested(branch)
+                    self._first_specials(branch)
                     begun = True
                 self._advance(branch, history)
                 return
@@ -210,18 +210,19 @@ class Tracer:
                 return
 
     def _between(self, branch: Branch, a: Point, b: Point) -> str:
-        """Insert folds, branch points and user points between two points; a reason if the branch ends there."""
+        """Insert special points between two points; a reason if the branch ends there."""
         with self.solver.system.clock.scope("location"):
             specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b)
-            asked = self.requested.between(self.solver, a, b, specials, begins=a is branch.points[0])
-            return self._insert(branch, specials + asked + self.events.between(self.solver, a, b))
+            step = Step(self.solver, a, b, specials, begins=a is branch.points[0])
+            return self._insert(branch, specials + [s for finder in self.finders for s in finder.between(step)])
 
-    def _first_requested(self, branch: Branch) -> None:
-        """Loads asked for between the special point that a branch leaves and its first point, if they are on it."""
+    def _first_specials(self, branch: Branch) -> None:
+        """What is found between the special point that a branch leaves and its first point, if that is on it."""
         if len(branch.points) != 2 or branch.parent is None:
             return
         a, b = map(self.here, branch.points)
-        for special in self.requested.between(self.solver, a, b, [], begins=a is branch.points[0]):
+        step = Step(self.solver, a, b, begins=a is branch.points[0])
+        for special in (s for finder in self.finders if finder.at_start for s in finder.between(step)):
             self.control.special(special)
             branch.insert(special)
             self.observer.special(branch, special)
