@@ -13,11 +13,14 @@ from mpi4py import MPI
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.diagram.asked import EQUATIONS
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import RANKS, SCENE, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
+from rodfem.fem.fingerprint import fingerprint, same
+from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM
 from rodfem.output.contents import check_run
 from rodfem.output.files import COLUMNS, OPTIONAL, SOFT, SPECIAL, UNDECIDED, load_json, load_state
@@ -57,6 +60,7 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
     _check(data, scene, folder)
     check_run(data, folder / "states.h5")
     solvers = [_solver(scene, data["discretization"]["formulation"], mesh, comm) for mesh in data["meshes"]]
+    _check_equations(data, solvers[0].system, folder)
     branches = [_branch(entry, solvers, folder / "states.h5") for entry in data["branches"]]
     plan = Plan(tuple(data["range"]), accuracy=data["accuracy"])
     diagram = Diagram(scene, plan, branches, solvers)
@@ -92,6 +96,16 @@ def _check(data: dict[str, Any], scene: Scene, folder: Path) -> None:
                 f"{folder} was computed with {constant} = {value:.12g}, and the scene {there}: give the scene that was "
                 "run."
             )
+
+
+def _check_equations(data: dict[str, Any], system: System, folder: Path) -> None:
+    """Raise :class:`InputError` where the equations of a ``system`` are not those that the files of the run tell."""
+    before = (data.get("asked") or {}).get(EQUATIONS)
+    if before is not None and not same(before, fingerprint(system)):
+        raise InputError(
+            f"{folder} was computed with other equations than those of the scene {system.scene.name!r} (at one and the "
+            "same state their residual, energy or ordinate differ): give the scene that was run."
+        )
 
 
 def _solver(scene: Scene, formulation: str, mesh: dict[str, Any], comm: MPI.Comm) -> StaticSolver:
