@@ -1,7 +1,8 @@
 """Many rods: the same work on a list of scenes, shared among the ranks, each rod on one of them.
 
 Results are files, one for each rod, written whole as they finish: an interrupted run goes on where it stopped, on any
-number of ranks.  A rod that is no longer the same (other constants, another range) is computed anew.
+number of ranks.  A rod that is no longer the same (other constants, another range, energy or load) is computed anew,
+and so are all where the work on them is another.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 
 from mpi4py import MPI
 
+from rodfem.app.code_digest import digest
 from rodfem.app.interrupts import held
 from rodfem.diagram.solver import RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
@@ -21,16 +23,18 @@ from rodfem.file_format import RESULT
 from rodfem.output.files import save_json
 from rodfem.output.folder import locked
 from rodfem.problem.arguments import checked, each, function, path
+from rodfem.problem.roles import functions_of
 from rodfem.problem.scene import Scene
 from rodfem.ranks import end_together, on_first
 
 Work = Callable[[Scene], dict[str, Any]]
 
 
-def key_of(scene: Scene) -> dict[str, Any]:
-    """Properties of a scene in which a saved result must agree with it to be used again."""
+def key_of(scene: Scene, work: Work) -> dict[str, Any]:
+    """Properties of a scene, and of the ``work`` on it, in which a saved result must agree to be used again."""
     constants = {name: p.value for name, p in scene.parameters.items()}
-    return {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants}
+    code = digest([*(function for _, function, _ in functions_of(scene)), work])
+    return {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants, "code": code}
 
 
 @checked(
@@ -70,17 +74,19 @@ def _shared(
     trouble: InputError | None = None
     try:
         for done, i in enumerate(range(comm.rank, len(scenes), comm.size), start=1):
-            if _saved(files[i], key_of(scenes[i])) is None:
+            if _saved(files[i], key_of(scenes[i], work)) is None:
                 result = _result(scenes[i], work)
                 with held():
-                    save_json({"format": RESULT.mark(), "key": key_of(scenes[i]), "result": result}, files[i])
+                    save_json({"format": RESULT.mark(), "key": key_of(scenes[i], work), "result": result}, files[i])
             if comm.rank == 0:
                 progress(min(done * comm.size, len(scenes)), len(scenes))
     except InputError as error:  # a result or a file cannot be written: the other ranks go on with theirs
         trouble = error
     for other in filter(None, comm.allgather(trouble)):
         raise other
-    found = [_saved(file, key_of(scene)) for file, scene in zip(files, scenes, strict=True)] if comm.rank == 0 else []
+    found = (
+        [_saved(file, key_of(scene, work)) for file, scene in zip(files, scenes, strict=True)] if comm.rank == 0 else []
+    )
     return comm.bcast([{} if result is None else result for result in found])
 
 

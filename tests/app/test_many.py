@@ -43,6 +43,23 @@ def test_shared_kept_and_taken_up_again(folder: Path) -> None:
     assert COMM.allreduce(len(done)) == 2  # the one that was cut off, the one that has changed
 
 
+def test_another_energy_or_other_work_is_computed_anew(folder: Path) -> None:
+    def softer(v: Any, k: Any, c: Any) -> Any:
+        return 0.5 * given(v, k, c)
+
+    rods, done = [scene("cord", turns=1.0)], [0]
+    given = rods[0].energy
+
+    def work(rod: Scene) -> dict[str, Any]:
+        done[0] += 1
+        return {"name": rod.name}
+
+    for others, count in ((rods, 1), (rods, 1), ([replace(rods[0], energy=softer)], 2), (rods, 3)):
+        many(others, work, folder, MPI.COMM_SELF if COMM.size == 1 else COMM)
+        assert COMM.allreduce(done[0]) == count
+    assert many(rods, lambda rod: {"name": rod.name.upper()}, folder) == [{"name": "CORD"}]
+
+
 @pytest.mark.short
 def test_a_result_of_a_newer_format_is_kept(folder: Path) -> None:
     """It is refused on every rank, and not written over."""
