@@ -106,9 +106,9 @@ def traced(
     with compat.announce_compilation(recorder.compiling) as compiled:
         with clock("setup"):
             mesh = journal.first_mesh or _mesh(scene, discretization, plan, recorder, comm)
-            if plan.accuracy is None:
-                check_waves(scene, mesh, plan.over(scene), comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
+            if plan.accuracy is None:
+                check_waves(found, plan.over(scene))
         asked = as_asked(scene, discretization, plan) | {"equations": fingerprint(found.system)}
         recorder.asked(asked)
         recorder.system(found.system, plan.accuracy)

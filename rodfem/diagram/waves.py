@@ -10,11 +10,9 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
-from mpi4py import MPI
 
-from rodfem.continuation.solvers import BranchSolver
-from rodfem.diagram.solver import Solver, check_index
-from rodfem.fem.fields import Discretization
+from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.diagram.solver import check_index
 from rodfem.problem.roles import functions_of
 from rodfem.problem.scene import Scene
 
@@ -24,20 +22,20 @@ SMALL = 1e-6
 """Curvature times length of the differences that give the moment of the undeformed rod."""
 
 
-def check_waves(scene: Scene, discretization: Discretization, span: tuple[float, float], comm: MPI.Comm) -> None:
-    """Raise :class:`InputError` where a mesh cannot hold the half-waves at an end of a range of loads; collective.
+def check_waves(solver: StaticSolver, span: tuple[float, float]) -> None:
+    """Raise :class:`InputError` where a solver's mesh cannot hold the half-waves at an end of a range of loads.
 
-    ``discretization`` is that of the ``scene``, ``span`` the range, and ``comm`` has the ranks that share the rod.
+    ``span`` is the range; collective.
     """
-    nodes = discretization.elements * discretization.degree
-    loads = [load for load in span if FEW * half_waves(scene, load) > nodes] if scene.conservative else []
-    found = Solver(scene, discretization, comm).equilibria if loads else None
-    if not isinstance(found, BranchSolver):
+    if not isinstance(solver, BranchSolver):
         return
-    for load in loads:
-        x, outcome = found.at_load(found.start(load), load)
-        if outcome.converged:
-            check_index(scene, load, found.inertia.at(x).count().negative, nodes)
+    fields = solver.system.fields
+    scene, nodes = fields.scene, fields.discretization.elements * fields.discretization.degree
+    for load in span:
+        if FEW * half_waves(scene, load) > nodes:
+            x, outcome = solver.at_load(solver.start(load), load)
+            if outcome.converged:
+                check_index(scene, load, solver.inertia.at(x).count().negative, nodes)
 
 
 def half_waves(scene: Scene, load: float) -> float:
