@@ -51,7 +51,7 @@ Measured up to 50 for Greenhill's rod, but 1e6 and more for some eigenvalues: th
 EVERY = 20
 """Loads from one certificate to the next."""
 NEAR = 1e-3
-"""Eigenvalues nearer than this to each other, relative, are solved for anew, unless they are one that is multiple."""
+"""Relative distance of recorded eigenvalues below which they are solved for anew, unless they are one: multiple."""
 AGREED = 1e-8
 """Difference of an inverse eigenvalue followed and one found anew, over the greatest: far ones of SLEPc have 1e-10."""
 WORTH, LONGEST = 4, 16
@@ -85,7 +85,12 @@ class FrequencyRows:
         pencil = self.eigensolver.at(point.x)
         found = self._followed(pencil, point)
         changed = found is None or _numbers(found) != _numbers(self._before)
-        if found is not None and not changed and len(self._open) < EVERY - 1 and not self._doubtful(found):
+        if (
+            found is not None
+            and not changed
+            and len(self._open) < EVERY - 1
+            and not near(found.values[: self.number + 1])
+        ):
             self._open.append(Row(point, found, anew=False))
             self._before, self._kept = found, self._kept + 1
             return []
@@ -142,18 +147,17 @@ class FrequencyRows:
         self._kept = 0
         self.followed.begin(pencil, point.load)
 
-    def _doubtful(self, found: Frequencies) -> bool:
-        """Whether two eigenvalues come near each other, or one of a pair may be too far to be among those found."""
-        v = found.values
-        sizes = np.maximum(abs(v), NEAR_ZERO * abs(v).max())
-        apart = abs(v[:, None] - v) / np.maximum(sizes[:, None], sizes)
-        far = self._before.values[self._before.values.imag > 0]
-        return bool(((apart < NEAR) & (apart > ALIKE)).any() or (abs(far) > SEEN * abs(v).max()).any())
-
 
 def sought(number: int) -> int:
     """Number of eigenvalues to ask for where ``number`` are recorded."""
     return max(number, FREQUENCIES) + BEYOND
+
+
+def near(values: np.ndarray) -> bool:
+    """Whether two of some eigenvalues are near each other, but not one that is multiple."""
+    sizes = np.maximum(abs(values), NEAR_ZERO * abs(values).max())
+    apart = abs(values[:, None] - values) / np.maximum(sizes[:, None], sizes)
+    return bool(((apart < NEAR) & (apart > ALIKE)).any())
 
 
 def leftmost(pencil: NonsymmetricPencil, number: int, before: Frequencies = NONE) -> Frequencies:
@@ -163,12 +167,12 @@ def leftmost(pencil: NonsymmetricPencil, number: int, before: Frequencies = NONE
     ``number`` are sought.
     """
     one = pencil.system.scene.units.omega2
-    near = pencil.near(sought(number), SHIFT * one)
-    reach = SEEN * abs(near.values).max()
-    near = replace(near, values=_without_round_off(near.values, SHIFT * one))
+    found = pencil.near(sought(number), SHIFT * one)
+    reach = SEEN * abs(found.values).max()
+    found = replace(found, values=_without_round_off(found.values, SHIFT * one))
     for pair in (v for v in before.values if v.imag > 0 and abs(v) > reach):
-        near = _joined(near, pencil.near(2, pair * (1 + BESIDE)))
-    return in_order(near)
+        found = _joined(found, pencil.near(2, pair * (1 + BESIDE)))
+    return in_order(found)
 
 
 def _joined(found: Frequencies, beside: Frequencies) -> Frequencies:
@@ -177,9 +181,8 @@ def _joined(found: Frequencies, beside: Frequencies) -> Frequencies:
         both = (value, value.conjugate()) if abs(value.imag) > REAL * abs(value) else (value,)
         for v in both:
             if (abs(v - found.values) > AGAIN * unit(v, one=found.one)).all():
-                column, weighed = (
-                    x[:, i : i + 1] if v == value else x[:, i : i + 1].conj() for x in (beside.vectors, beside.weighed)
-                )
+                columns = (x[:, i : i + 1] for x in (beside.vectors, beside.weighed))
+                column, weighed = (x if v == value else x.conj() for x in columns)
                 found = Frequencies(
                     np.append(found.values, v),
                     np.append(found.errors, beside.errors[i]),

@@ -41,14 +41,16 @@ import scipy.sparse as sp
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.chain import Elimination
-from rodfem.stability.nonsymmetric import ALIKE, EPS, SPARE, Frequencies, NonsymmetricPencil
+from rodfem.stability.nonsymmetric import ALIKE, EPS, SPARE, Frequencies, NonsymmetricPencil, orthonormal
 from rodfem.tolerances import TINY
 
-GUARDS = 4
+GUARDS = 6
 """Number of eigenvalues that are followed beyond those that are wanted."""
 SUPPORT = 4
 """Number of loads that the polynomial of the prediction goes through."""
-STEPS = 3
+BEGINNING = 12
+"""Steps of inverse iteration on either side at the first load."""
+STEPS = 5
 """Steps of inverse iteration at one load, at most."""
 ERROR = 1e-13
 """Error of ``nu``, over the greatest, that is round-off: what SLEPc is asked for."""
@@ -118,23 +120,32 @@ class FollowedPairs:
         return not self._past
 
     def begin(self, pencil: NonsymmetricPencil, load: float) -> None:
-        """Begin anew with the invariant subspaces of a ``pencil`` at a load, by SLEPc on both sides.
+        """Begin anew with the invariant subspaces of a ``pencil`` at a load.
 
-        Nothing is followed where the pencil has hardly more eigenvalues than are wanted.
+        The right one is SLEPc's, filled up with any vectors, of equal eigenvalues SLEPc may miss one; the left one is
+        iterated from it.  Nothing is followed where the pencil has hardly more eigenvalues than are wanted.
         """
         self.end()
-        if pencil.eliminated(self.shift) is None:
-            return
         try:
-            right, left = pencil.sides(self.number + GUARDS, self.shift)
-            mass = pencil.mass_in_units()
-            right, left = (side / np.sqrt((side * (mass @ side)).sum(axis=0)) for side in (right, left))
-            probe = np.random.default_rng(1).normal(size=len(right))
-            self._probe = probe - right @ np.linalg.solve(left.T @ (mass @ right), left.T @ (mass @ probe))
+            factors = pencil.eliminated(self.shift)
+            if factors is not None:
+                self._past = [self._first(pencil, factors, load)]
         except (ConvergenceError, np.linalg.LinAlgError):
             return
-        if right.shape[1] > self.number + SPARE:
-            self._past = [_Sides(load, right, left)]
+
+    def _first(self, pencil: NonsymmetricPencil, factors: Elimination, load: float) -> _Sides:
+        """Bases of the first load; raises :class:`ConvergenceError` where SLEPc finds nothing."""
+        mass, size, rng = pencil.mass_in_units(), self.number + SPARE + GUARDS, np.random.default_rng(1)
+        found = pencil.basis(self.number + GUARDS, self.shift)[:, :size]
+        block = rng.normal(size=(len(found), size + 1))
+        block[:, : found.shape[1]] = found
+        right, left = block[:, :-1], block[:, :-1]
+        for _ in range(BEGINNING):
+            right, left = factors.solve(mass @ right), factors.solve_transposed(mass @ left)
+            right, left = (orthonormal(pencil.system.comm, side, mass @ side) for side in (right, left))
+        overlap = left.T @ (mass @ right)
+        self._probe = block[:, -1] - right @ np.linalg.solve(overlap, left.T @ (mass @ block[:, -1]))
+        return _Sides(load, right, left)
 
     def end(self) -> None:
         """Follow nothing."""

@@ -379,21 +379,15 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             number //= 2
         raise ConvergenceError(f"SLEPc found no eigenvalue near {target:.6g}: use a richer discretisation.")
 
-    def sides(self, number: int, target: float) -> tuple[np.ndarray, np.ndarray]:
-        """Real bases (n, p) of the right and of the left invariant subspace of ``number`` eigenvalues, or a few more.
+    def basis(self, number: int, target: float) -> np.ndarray:
+        """Real basis (n, p) of the invariant subspace of about ``number`` eigenvalues nearest to ``target``, by SLEPc.
 
-        They are those nearest to ``target``, on one rank, for unknowns in units of their natural sizes.  Raises
-        :class:`ConvergenceError` as :meth:`near` does.
+        It is that for unknowns in units of their natural sizes, on one rank.  Raises :class:`ConvergenceError` as
+        :meth:`near` does.
         """
-        matrix, mass = self.in_units()
-        transposed = matrix.copy()
-        transposed.transpose()
-        target /= self.system.scene.units.omega2
         with self.system.clock("stability"):
-            both = [_real_basis(self._shifted(number, target, side, mass)) for side in (matrix, transposed)]
-        transposed.destroy()
-        size = min(basis.shape[1] for basis in both)
-        return both[0][:, :size], both[1][:, :size]
+            found = self._shifted(number, target / self.system.scene.units.omega2, *self.in_units())
+        return _real_basis(found)
 
     def eliminated(self, target: float) -> Elimination | None:
         """Factors of ``S - target M`` in units of natural sizes that solve for arrays; None where there are none."""
