@@ -21,7 +21,7 @@ Bai, Demmel, Dongarra, Ruhe & van der Vorst, Templates for the Solution of Algeb
 and the same on the left, go on as smoothly as the prediction does, and ``E = X' - X``, ``F = Y' - Y`` are its errors.
 With a left vector ``u`` such that ``u^t (Y^t M X1) w = 1`` the relative error of ``nu`` is at most about ::
 
-    |F T_l u| |E T w| / |nu| / (1 - r)^2,
+    |F T_l u| |E T w| / |nu| / (1 - r)^2,         T w = nu w,  T_l u = nu u  but for these errors,
 
 in the norm of the mass, ``r`` being the ratio of the least followed ``nu`` to this one; the condition of ``nu`` is in
 the sizes of ``u`` and ``w``.  This is the error before the step: the step makes it smaller.
@@ -33,7 +33,7 @@ complement of all that is followed, has the size of the greatest ``nu'`` there.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import prod
+from math import prod, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -58,15 +58,6 @@ VECTOR = 1e-4
 """Error of a vector before the last step, relative in the mass, below which the vector serves."""
 
 
-@dataclass(frozen=True)
-class _Sides:
-    """Right and left basis (n, p) at a ``load``."""
-
-    load: float
-    right: np.ndarray
-    left: np.ndarray
-
-
 class _Span(NamedTuple):
     """Some vectors (n, p) and their products with the mass."""
 
@@ -79,7 +70,7 @@ class _Ritz:
     """Pairs in the span of a right and a left basis: ``nu`` (p,), the vectors' coefficients ``w`` (p, p).
 
     ``errors`` (p,) of ``nu`` and ``inexact`` (p,) of the vectors, in the mass, are relative, and those before the step.
-    ``basis`` (n, p) is the right one.
+    ``basis`` (n, p) is the right one, ``projected`` (p, p) the projected mass.
     """
 
     nu: np.ndarray
@@ -87,6 +78,7 @@ class _Ritz:
     errors: np.ndarray
     inexact: np.ndarray
     basis: np.ndarray
+    projected: np.ndarray
 
     def serves(self, chosen: np.ndarray, shift: float) -> bool:
         """Whether the ``chosen`` ones, nearest first, are known, and no pair is cut in two.
@@ -111,7 +103,8 @@ class FollowedPairs:
     def __init__(self, number: int, shift: float) -> None:
         """Follow ``number`` eigenvalues nearest to ``shift``, as many as :meth:`NonsymmetricPencil.near` returns."""
         self.number, self.shift = number, shift
-        self._past: list[_Sides] = []
+        self._loads: list[float] = []
+        self._past: list[np.ndarray] = []
         self._probe = np.zeros(0)
 
     @property
@@ -129,12 +122,12 @@ class FollowedPairs:
         try:
             factors = pencil.eliminated(self.shift)
             if factors is not None:
-                self._past = [self._first(pencil, factors, load)]
+                self._past, self._loads = [self._first(pencil, factors)], [load]
         except (ConvergenceError, np.linalg.LinAlgError):
             return
 
-    def _first(self, pencil: NonsymmetricPencil, factors: Elimination, load: float) -> _Sides:
-        """Bases of the first load; raises :class:`ConvergenceError` where SLEPc finds nothing."""
+    def _first(self, pencil: NonsymmetricPencil, factors: Elimination) -> np.ndarray:
+        """Left and right basis (n, 2 p) of the first load; raises :class:`ConvergenceError` as SLEPc does."""
         mass, size, rng = pencil.mass_in_units(), self.number + SPARE + GUARDS, np.random.default_rng(1)
         found = pencil.basis(self.number + GUARDS, self.shift)[:, :size]
         block = rng.normal(size=(len(found), size + 1))
@@ -145,7 +138,7 @@ class FollowedPairs:
             right, left = (orthonormal(pencil.system.comm, side, mass @ side) for side in (right, left))
         overlap = left.T @ (mass @ right)
         self._probe = block[:, -1] - right @ np.linalg.solve(overlap, left.T @ (mass @ block[:, -1]))
-        return _Sides(load, right, left)
+        return np.concatenate([left, right], axis=1)
 
     def end(self) -> None:
         """Follow nothing."""
@@ -173,6 +166,7 @@ class FollowedPairs:
                 chosen = np.argsort(-abs(found.nu), kind="stable")[: self.number + SPARE]
                 if found.serves(chosen, abs(self.shift) / pencil.system.scene.units.omega2):
                     self._past = [*self._past[1 - SUPPORT :], sides]
+                    self._loads = [*self._loads[1 - SUPPORT :], load]
                     nearer = outside > abs(found.nu[chosen[-1]])
                     return None if nearer else self._frequencies(pencil, found, chosen)
         return None
@@ -182,61 +176,57 @@ class FollowedPairs:
         vectors = found.basis @ found.w[:, chosen]
         return pencil.frequencies(values.astype(complex), found.errors[chosen], vectors.astype(complex))
 
-    def _step(self, mass: sp.csr_matrix, factors: Elimination, sides: _Sides) -> tuple[_Sides, _Ritz, float]:
-        """One step of inverse iteration: bases, Ritz pairs, and the size of the greatest ``nu`` outside."""
-        size = sides.left.shape[1]
-        block = np.column_stack([sides.left, sides.right, self._probe])
-        images = mass @ block
-        solved = np.column_stack([factors.solve_transposed(images[:, :size]), factors.solve(images[:, size:])])
+    def _step(self, mass: sp.csr_matrix, factors: Elimination, sides: np.ndarray) -> tuple[np.ndarray, _Ritz, float]:
+        """One step of inverse iteration: bases (n, 2 p), Ritz pairs, and the size of the greatest ``nu`` outside."""
+        both = sides.shape[1]
+        block = np.empty((len(sides), both + 1))
+        block[:, :-1], block[:, -1] = sides, self._probe
+        images, solved = mass @ block, np.empty_like(block)
+        left, right = slice(both // 2), slice(both // 2, both)
+        solved[:, left] = factors.solve_transposed(images[:, left])
+        solved[:, both // 2 :] = factors.solve(images[:, both // 2 :])
         ahead = mass @ solved
-        left, right = (
-            [_Span(v[:, part], m[:, part]) for v, m in ((block, images), (solved, ahead))]
-            for part in (slice(size), slice(size, 2 * size))
+        before, after = (
+            [_Span(v[:, side], m[:, side]) for side in (right, left)] for v, m in ((block, images), (solved, ahead))
         )
-        sides, found, projected = _ritz(sides.load, right, left)
-        share = np.linalg.solve(projected, solved[:, :size].T @ ahead[:, -1])
-        probe, image = (v[:, -1] - v[:, size:-1] @ share for v in (solved, ahead))
-        norm = np.sqrt(max(probe @ image, TINY))
-        outside = norm / np.sqrt(max(self._probe @ images[:, -1], TINY))
+        sides, found = _ritz(*before, *after)
+        share = np.linalg.solve(found.projected, solved[:, left].T @ ahead[:, -1])
+        probe, image = (v[:, -1] - v[:, right] @ share for v in (solved, ahead))
+        norm = sqrt(max(probe @ image, TINY))
+        outside = norm / sqrt(max(self._probe @ images[:, -1], TINY))
         self._probe = probe / norm
-        return sides, found, float(outside)
+        return sides, found, outside
 
-    def _predicted(self, load: float) -> _Sides:
+    def _predicted(self, load: float) -> np.ndarray:
         """Bases at a load by the polynomial, Lagrange's, through those at the last ones."""
-        loads = [p.load for p in self._past]
-        weights = [prod((load - b) / (a - b) for b in loads if b != a) for a in loads]
-        right = sum(w * p.right for w, p in zip(weights, self._past, strict=True))
-        left = sum(w * p.left for w, p in zip(weights, self._past, strict=True))
-        return _Sides(load, np.asarray(right), np.asarray(left))
+        out = np.zeros_like(self._past[0])
+        for a, sides in zip(self._loads, self._past, strict=True):
+            out += prod((load - b) / (a - b) for b in self._loads if b != a) * sides
+        return out
 
 
-def _ritz(load: float, right: list[_Span], left: list[_Span]) -> tuple[_Sides, _Ritz, np.ndarray]:
-    """Bases that go on, and Ritz pairs, of the spans before and after a step on either side; the projected mass (p, p).
+def _ritz(right: _Span, left: _Span, solved: _Span, dual: _Span) -> tuple[np.ndarray, _Ritz]:
+    """Bases (n, 2 p) that go on after a step from ``right`` and ``left`` to ``solved`` and ``dual``, and Ritz pairs.
 
-    The bases belong to a ``load``.
+    Ritz vectors are eigenvectors of ``T`` up to the error that is measured.
     """
-    (x, x1), (y, y1) = right, left
-    before, after, projected = y.vectors.T @ x.images, y.images.T @ x1.vectors, y1.vectors.T @ x1.images
-    nu, w = np.linalg.eig(np.linalg.solve(after, projected))
-    u = np.linalg.inv(after @ w).T
-    of_right, beyond = _gone_on(x, x1, np.linalg.solve(after, before), w)
-    of_left, beyond_left = _gone_on(y, y1, np.linalg.solve(after.T, before.T), u)
-    size = _sizes(x1.vectors.T @ x1.images, w)
+    before, after = left.vectors.T @ right.images, left.images.T @ solved.vectors
+    projected, inverse = dual.vectors.T @ solved.images, np.linalg.inv(after)
+    nu, w = np.linalg.eig(inverse @ projected)
+    u = (np.linalg.inv(w) @ inverse).T
+    on_right, beyond = _gone_on(right, solved, inverse @ before, w)
+    on_left, beyond_left = _gone_on(left, dual, inverse.T @ before.T, u)
+    size = np.sqrt((w.conj() * w).real.sum(axis=0))  # the basis is about orthonormal
     inside = np.maximum(1.0 - abs(nu).min() / abs(nu), EPS)
-    errors = beyond * beyond_left / abs(nu) / inside**2
-    return _Sides(load, of_right, of_left), _Ritz(nu, w, errors, beyond / size, x1.vectors), projected
+    errors = beyond * beyond_left * abs(nu) / inside**2
+    return np.concatenate([on_left, on_right], axis=1), _Ritz(nu, w, errors, beyond / size, solved.vectors, projected)
 
 
 def _gone_on(old: _Span, new: _Span, turn: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Basis (n, p) of the new span that goes on from the old one, and how far vectors of the new one are outside it.
+    """Basis (n, p) of the new span that goes on from the old one, and how far its vectors are from those before.
 
-    ``turn`` (p, p) is ``T^-1``, and ``w`` (p, p) are the coefficients of the vectors.
+    ``turn`` (p, p) is ``T^-1``, and ``w`` (p, p) are the coefficients of the vectors; distances are in the mass.
     """
     vectors = new.vectors @ turn
-    rest, images = vectors - old.vectors, new.images @ turn - old.images
-    return vectors, _sizes(rest.T @ images, np.linalg.solve(turn, w))
-
-
-def _sizes(gram: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Norms (p,) of the vectors with the coefficients ``w`` (p, p), complex, in a basis with a Gram matrix (p, p)."""
-    return np.asarray(np.sqrt(np.maximum((w.conj() * (gram @ w)).real.sum(axis=0), 0.0)))
+    gram = (vectors - old.vectors).T @ (new.images @ turn - old.images)
+    return vectors, np.sqrt(np.maximum((w.conj() * (gram @ w)).real.sum(axis=0), 0.0))

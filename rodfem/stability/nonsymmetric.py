@@ -265,7 +265,11 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
         """``M X`` for real or complex vectors (n, k), with any PETSc."""
         if self.system.comm.size == 1:
-            return np.asarray(self._held().rows @ vectors)
+            rows = self._held().rows
+            if not np.iscomplexobj(vectors):
+                return np.asarray(rows @ vectors)
+            parts = np.ascontiguousarray(vectors).view(float)  # real and imaginary parts in turn, in real arithmetic
+            return np.ascontiguousarray(rows @ parts).view(complex)
         if np.iscomplexobj(vectors):
             return np.asarray(self.weighed(vectors.real) + 1j * self.weighed(vectors.imag))
         out, x = np.empty_like(vectors), self.system.new_vector()
