@@ -144,6 +144,18 @@ FAULTS = {
         "others[others.imag >= 0]",
         "tests/literature/test_follower.py tests/diagram/test_sweep.py",
     ),
+    "frequencies-without-a-certificate": Fault(
+        "rodfem/diagram/frequency_rows.py",
+        "found is not None and agree(found, anew)",
+        "found is not None",
+        "tests/diagram/test_followed.py",
+    ),
+    "transposed-factors-are-not": Fault(
+        "rodfem/linalg/chain.c",
+        "down(c, WIDTH, 1, y, z);",
+        "down(c, WIDTH, 0, y, z);",
+        "tests/linalg/test_chain.py",
+    ),
     # error bars
     "bound-without-what-is-left": Fault(
         "rodfem/adaptivity/error_estimate.py", "abs(richer - value) / (1 - rho) + left", "abs(richer - value)", ERRORS

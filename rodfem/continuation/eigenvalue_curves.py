@@ -9,8 +9,9 @@ eigenvalue is multiple.
 from __future__ import annotations
 
 import numpy as np
+from mpi4py import MPI
 
-from rodfem.stability.nonsymmetric import ALIKE, Frequencies, NonsymmetricPencil, groups
+from rodfem.stability.nonsymmetric import ALIKE, Frequencies, groups, orthonormal, product, squares
 from rodfem.tolerances import TINY
 
 STRANGE = 1.0
@@ -20,14 +21,14 @@ STRANGE = 1.0
 class Curves:
     """Numbers the curves of eigenvalues from one load to the next."""
 
-    def __init__(self) -> None:
-        """Begin without any curve."""
-        self.count = 0
+    def __init__(self, comm: MPI.Comm) -> None:
+        """Begin without any curve; the ranks of ``comm`` share the rod."""
+        self.comm, self.count = comm, 0
         self._last: Frequencies | None = None
         self._numbers: list[int] = []
         self._spans: list[tuple[list[int], np.ndarray]] = []
 
-    def numbers(self, pencil: NonsymmetricPencil, found: Frequencies, *, keep: bool = True) -> list[int]:
+    def numbers(self, found: Frequencies, *, keep: bool = True) -> list[int]:
         """Numbers of the curves of eigenvalues found at a state, which go on from the load before.
 
         Without ``keep`` the next load goes on from the one before all the same.
@@ -36,11 +37,10 @@ class Curves:
 
         numbers = [-1] * len(found.values)
         last = self._last
-        weighed = pencil.weighed(found.vectors)
-        energy = np.maximum(pencil.squares(found.vectors, weighed), TINY)
+        energy = np.maximum(squares(self.comm, found.vectors, found.weighed), TINY)
         if last is not None:
             bases = np.concatenate([basis for _, basis in self._spans], axis=1)
-            cost = self._distances(last, found, abs(pencil.product(bases, weighed)) ** 2 / energy)
+            cost = self._distances(last, found, abs(product(self.comm, bases, found.weighed)) ** 2 / energy)
             for i, j in zip(*linear_sum_assignment(cost), strict=True):
                 if cost[i, j] < STRANGE:
                     numbers[j] = self._numbers[i]
@@ -50,7 +50,7 @@ class Curves:
             self.count += 1
         if keep:
             self._last, self._numbers = found, numbers
-            self._spans = [(group, _span(pencil, found, group, energy)) for group in groups(found.values, ALIKE)]
+            self._spans = [(group, self._span(found, group, energy)) for group in groups(found.values, ALIKE)]
         return numbers
 
     def _distances(self, last: Frequencies, found: Frequencies, parts: np.ndarray) -> np.ndarray:
@@ -66,8 +66,9 @@ class Curves:
         a, b = last.values[:, None], found.values[None, :]
         return np.asarray(outside + abs(a - b) / np.maximum(np.maximum(abs(a), abs(b)), found.one))
 
-
-def _span(pencil: NonsymmetricPencil, found: Frequencies, group: list[int], energy: np.ndarray) -> np.ndarray:
-    """Basis of the span of some vectors, orthonormal in the mass."""
-    vectors = found.vectors[:, group]
-    return vectors / np.sqrt(energy[group]) if len(group) == 1 else pencil.orthonormal(vectors)
+    def _span(self, found: Frequencies, group: list[int], energy: np.ndarray) -> np.ndarray:
+        """Basis of the span of some vectors, orthonormal in the mass."""
+        vectors = found.vectors[:, group]
+        if len(group) == 1:
+            return np.asarray(vectors / np.sqrt(energy[group]))
+        return orthonormal(self.comm, vectors, found.weighed[:, group])

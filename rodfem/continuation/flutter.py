@@ -41,6 +41,8 @@ def unmatched(found: Frequencies, others: np.ndarray) -> list[list[int]]:
     from scipy.optimize import linear_sum_assignment  # slow to load
 
     upper = [i for i, v in enumerate(found.values) if v.imag > 0]
+    if not upper:
+        return []
     mine, there = found.values[upper][:, None], others[others.imag > 0]
     distance = abs(mine - there[None, :]) / abs(mine)
     rows, columns = linear_sum_assignment(distance)

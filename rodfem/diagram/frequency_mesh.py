@@ -16,7 +16,8 @@ from mpi4py import MPI
 
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.solvers import StaticSolver
-from rodfem.diagram.sweep import SHIFT, at_load
+from rodfem.diagram.frequency_rows import SHIFT
+from rodfem.diagram.sweep import at_load
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System

@@ -1,7 +1,7 @@
 """Frequencies against the load for a rod under loads without a potential, and the loads at which they become unstable.
 
-At each load the equilibrium is solved for, and the left-most eigenvalues ``mu = omega^2`` of its pencil are
-found.  Where two real ones collide and become a complex pair, the square of half their difference ``D = ((mu1 -
+At each load the equilibrium is solved for, and the left-most eigenvalues ``mu = omega^2`` of its pencil are found
+(:mod:`rodfem.diagram.frequency_rows`).  Where two real ones collide and become a complex pair, the square of half their difference ``D = ((mu1 -
 mu2)/2)^2`` passes through zero.  Unlike the eigenvalues, which have a square root there, ``D`` is a smooth
 function of the load: the discriminant of the pencil projected on the two of them.  Its zero is found by Chebyshev
 interpolation, at spectral accuracy and without ever solving at the double eigenvalue.  Where a single real one
@@ -25,55 +25,30 @@ from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER, Kind
 from rodfem.continuation.locate import SHARP, real_root, zero_uncertainty
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import StaticSolver
+from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, SHIFT, FrequencyRows, Row, leftmost
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.faults import as_failure, without
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
-from rodfem.stability.nonsymmetric import (
-    EPS,
-    MULTIPLE,
-    NEAR_ZERO,
-    REAL,
-    Frequencies,
-    NonsymmetricPencil,
-    NonsymmetricSolver,
-)
+from rodfem.stability.nonsymmetric import MULTIPLE, REAL, Frequencies, NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
-FREQUENCIES = 6
-"""Number of frequencies recorded at each load where nobody asks for another."""
-SEEN = 0.5
-"""A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
 DRIVEN = 1e-7
 """Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
 MEAN = 10.0
 """Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
-SHIFT = -10.0
-"""Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix is singular.
-
-Far enough from it for a rod that floats, whose rigid motions are zero eigenvalues: what is nearest to the shift takes
-its digits from all others.
-"""
 BESIDE = 1e-4
-"""Relative distance of a shift from the pair that is sought there, and of the first two loads of a secant method."""
-AGAIN = 1e-7
-"""Eigenvalues of two shifts that differ by less than this, relative to them or to one, were found twice."""
-MANY = 100.0
-"""Round-off of the inverse eigenvalues, in units of the largest and of eps.
-
-Measured up to 50 for Greenhill's rod, but 1e6 and more for some eigenvalues: those are not covered.
-"""
+"""Relative distance of the first two loads of a secant method."""
 AROUND = 1e-4
 """Half width, relative to a divergence load, over which its eigenvalues are sampled."""
 TOGETHER = 1e-6
 """Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
-NONE = Frequencies(np.zeros(0, dtype=complex), np.zeros(0))
 
 
 @dataclass
@@ -102,7 +77,9 @@ class Sweep:
         self.span, self.units = plan.over(solver.system.scene), solver.system.scene.units
         self.eigensolver = NonsymmetricSolver(solver.system)
         self.number = plan.spectrum or FREQUENCIES
-        self.curves, self.last = Curves(), NONE
+        self.rows = FrequencyRows(self.eigensolver, self.number)
+        self.curves = Curves(solver.system.comm)
+        self.last: Row | None = None
         self.branches: list[Branch] = []
         self._load = solver.system.scene.load
 
@@ -144,20 +121,26 @@ class Sweep:
         a, b = self.span
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
         x, _ = self.solver.first(a)
-        grid: list[Point] = []
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
-        for load in loads if a < b else loads[::-1]:
-            x = at_load(self.solver, x, float(load))
-            before = self.last
-            point = self._point(x)
-            for notice in self.solver.notices():
-                self.observer.warn(notice)
-            if grid:
-                self._between(branch, grid[-1], point, before, self.last)
+        try:
+            for load in loads if a < b else loads[::-1]:
+                x = at_load(self.solver, x, float(load))
+                for notice in self.solver.notices():
+                    self.observer.warn(notice)
+                self._take(branch, self.rows.add(self._point(x)))
+        finally:  # also where there is no equilibrium, or at an interrupt: nothing that has been computed is lost
+            self._take(branch, self.rows.finish())
+
+    def _take(self, branch: Branch, rows: list[Row]) -> None:
+        """Take rows of the grid into a branch, and the special points before each."""
+        for row in rows:
+            point, before, self.last = row.point, self.last, row
+            self._record(point, row.found, on_the_way=True)
+            if before is not None:
+                self._between(branch, before, row)
             branch.points.append(point)
-            grid.append(point)
-            if load in self.plan.at:
+            if point.load in self.plan.at:
                 self._special(branch, self.solver.given(USER, point))
             self.observer.progress(branch, point)
 
@@ -172,18 +155,13 @@ class Sweep:
 
     def at(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of an equilibrium that is not on the way of the sweep."""
-        return self._point(x, on_the_way=False)
+        point, before = self._point(x), NONE if self.last is None else self.last.found
+        self._record(point, leftmost(self.eigensolver.at(x), self.number, before), on_the_way=False)
+        return point
 
-    def _point(self, x: PETSc.Vec, *, on_the_way: bool = True) -> Point:
-        """Evaluate the records of the equilibrium ``x``; a special point is not ``on_the_way`` of the curves."""
-        solver, system = self.solver, self.solver.system
-        pencil = self.eigensolver.at(x)
-        found = self._leftmost(pencil)
-        curves = self.curves.numbers(pencil, found, keep=on_the_way)
-        if on_the_way:
-            self.last = found
-        values = found.values
-        load = system.scalar(x)
+    def _point(self, x: PETSc.Vec) -> Point:
+        """Evaluate the records of the equilibrium ``x``, but for those of its frequencies."""
+        solver, load = self.solver, self.solver.system.scalar(x)
         return Point(
             x=x,
             tangent=None,
@@ -192,43 +170,25 @@ class Sweep:
             ordinate=solver.shape.ordinate(x),
             energy=solver.energy(x),
             stretch=solver.shape.stretch(x),
-            negative=found.unstable(found.noise),
-            zero=int((abs(values) < REAL * self.units.omega2).sum()) + system.active_drifts(x),
+            negative=0,
+            zero=solver.system.active_drifts(x),
             slope=float("nan"),
             drift=0.0,
             error=0.0,
-            omega2=[[float(v.real), float(v.imag)] for v in values[: self.number]],
-            motion=list(found.kinds[: self.number]),
-            curve=curves[: self.number],
         )
 
-    def _leftmost(self, pencil: NonsymmetricPencil) -> Frequencies:
-        """Left-most eigenvalues: those near the origin, and what became of the complex ones before.
+    def _record(self, point: Point, found: Frequencies, *, on_the_way: bool) -> None:
+        """Record the frequencies ``found`` at a point; a special point is not ``on_the_way`` of the curves."""
+        values = found.values
+        point.negative = found.unstable(found.noise)
+        point.zero += int((abs(values) < REAL * self.units.omega2).sum())
+        point.omega2 = [[float(v.real), float(v.imag)] for v in values[: self.number]]
+        point.motion = list(found.kinds[: self.number])
+        point.curve = self.curves.numbers(found, keep=on_the_way)[: self.number]
 
-        A complex shift looks for a pair that may be farther from the origin than all that the real shift found.
-        """
-        one = self.units.omega2
-        near = pencil.near(max(self.number, FREQUENCIES) + 6, SHIFT * one)
-        reach = SEEN * abs(near.values).max()
-        found = list(
-            zip(_without_round_off(near.values, SHIFT * one), near.errors, near.kinds, near.vectors.T, strict=True)
-        )
-        for pair in (v for v in self.last.values if v.imag > 0 and abs(v) > reach):
-            beside = pencil.near(2, pair * (1 + BESIDE))
-            for value, error, kind, vector in zip(
-                beside.values, beside.errors, beside.kinds, beside.vectors.T, strict=True
-            ):
-                both = [(value, vector), (value.conjugate(), vector.conj())]
-                for v, x_v in both if abs(value.imag) > REAL * abs(value) else both[:1]:
-                    if all(abs(v - other) > AGAIN * unit(v, one=one) for other, *_ in found):
-                        found.append((v, error, kind, x_v))
-        real = [(complex(v.real) if abs(v.imag) < REAL * abs(v) else complex(v), *rest) for v, *rest in found]
-        order = sorted(real, key=lambda f: (round(f[0].real / one, 6), f[0].imag))
-        values, errors, kinds, vectors = zip(*order, strict=True)
-        return Frequencies(np.array(values), np.array(errors), kinds, np.stack(vectors, axis=1), one)
-
-    def _between(self, branch: Branch, a: Point, b: Point, before: Frequencies, after: Frequencies) -> None:
+    def _between(self, branch: Branch, first: Row, second: Row) -> None:
         """Locate what happens between two loads: eigenvalues that collide, and real ones that pass through zero."""
+        (a, before), (b, after) = ((row.point, row.found) for row in (first, second))
         with self.solver.system.clock.scope("location"):
             events = self._collisions(a, b, before, after)
             real = [f.diverged() for f in (before, after)]
@@ -241,7 +201,7 @@ class Sweep:
         negative = a.negative
         for i, event in enumerate(events):
             point = a if event.load == a.load else b if event.load == b.load else None
-            point = point or self._point(at_load(self.solver, a.x, event.load), on_the_way=False)
+            point = point or self.at(at_load(self.solver, a.x, event.load))
             after_it = negative + event.change
             if i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
                 after_it = b.negative  # of all eigenvalues that are recorded
@@ -357,7 +317,8 @@ class Sweep:
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
         """Real eigenvalues at a load near the origin, in ascending order."""
         pencil = self.eigensolver.at(at_load(self.solver, guess, load))
-        return sorted(v.real for v in self._leftmost(pencil).values if v.imag == 0)
+        before = NONE if self.last is None else self.last.found
+        return sorted(v.real for v in leftmost(pencil, self.number, before).values if v.imag == 0)
 
     def _special(self, branch: Branch, special: SpecialPoint) -> None:
         branch.special.append(special)
@@ -427,17 +388,6 @@ def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
             "balance the loads."
         )
     return x
-
-
-def _without_round_off(values: np.ndarray, shift: float) -> np.ndarray:
-    """Eigenvalues next to a ``shift``, imaginary parts that are round-off of real ones dropped: (k,).
-
-    The solver has ``1 / (mu - shift)`` to round-off of the largest of them: ``mu`` to ``eps |mu - shift|^2 / min |mu -
-    shift|``, and one near zero to that of the matrix.
-    """
-    apart, least = abs(values - shift), NEAR_ZERO * abs(values).max()
-    doubt = np.maximum(REAL * np.maximum(abs(values), least), MANY * EPS * apart**2 / apart.min())
-    return np.where(abs(values.imag) < doubt, values.real, values)
 
 
 def _zero_between(measured: AtLoad, cluster: Cluster, load: float, one: float) -> tuple[float, float]:

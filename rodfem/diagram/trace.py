@@ -14,10 +14,11 @@ from rodfem.diagram.asked import as_asked
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.frequency_mesh import frequency_mesh
+from rodfem.diagram.frequency_rows import FREQUENCIES
 from rodfem.diagram.journal import Journal
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
-from rodfem.diagram.sweep import FREQUENCIES, Sweep
+from rodfem.diagram.sweep import Sweep
 from rodfem.diagram.waves import check_waves
 from rodfem.fem.fields import Discretization
 from rodfem.fem.fingerprint import fingerprint

@@ -114,7 +114,8 @@ class Shape:
         cell, place = divmod(int(dense.argmin()), dense.shape[1])
         spacing = 2.0 / (dense.shape[1] - 1)
         turn = minimum((self._v_to_powers @ nodal[cell]).tolist(), -1.0 + spacing * place, spacing)
-        return float(self.system.comm.allreduce(min(float(dense[cell, place]), turn), op=MPI.MIN))
+        mine, comm = min(float(dense[cell, place]), turn), self.system.comm
+        return mine if comm.size == 1 else float(comm.allreduce(mine, op=MPI.MIN))
 
     def sample(self, x: PETSc.Vec) -> dict[str, Any]:
         """All of a state in natural order on every rank, independent of the number of ranks.

@@ -514,17 +514,20 @@ int chain_factor(chain *c, const double *values)
 #define WIDTH 4 /* columns solved for at once: the factors are read once for all of them */
 #define ALL(q) for (int q = 0; q < w; q++)
 
-/* L z = y for w columns, interleaved: those of one unknown are next to each other.  */
-static inline void down(const chain *c, const int w, double *y, double *z)
+/* L z = y for w columns, interleaved: those of one unknown are next to each other.  Of the transposed matrix that is
+   U^t z = y: U has its pivots on its diagonal, and its right-hand sides belong to columns.  */
+static inline void down(const chain *c, const int w, const int transposed, double *y, double *z)
 {
     for (int index = 0; index < c->fronts; index++) {
         const Front *f = &c->front[index];
-        const int *rows = (const int *)c->order.data + f->rows;
-        const double *l = (const double *)c->panel.data + f->values;
+        const int *rows = (const int *)c->order.data + (transposed ? f->columns : f->rows);
         int m = f->size;
+        const double *l = (const double *)c->panel.data + f->values + (transposed ? (size_t)m * f->pivots : 0);
         for (int i = 0; i < m; i++) ALL(q) z[i * w + q] = y[(size_t)rows[i] * w + q];
-        for (int j = 0; j < f->pivots; j++)
+        for (int j = 0; j < f->pivots; j++) {
+            if (transposed) ALL(q) z[j * w + q] /= l[(size_t)j * m + j];
             for (int i = j + 1; i < m; i++) ALL(q) z[i * w + q] -= l[(size_t)j * m + i] * z[j * w + q];
+        }
         for (int i = 0; i < m; i++) ALL(q) y[(size_t)rows[i] * w + q] = z[i * w + q];
         if (!c->symmetric) continue;
         const double *d = (const double *)c->pivot.data + f->diagonal;
@@ -543,20 +546,22 @@ static inline void down(const chain *c, const int w, double *y, double *z)
     }
 }
 
-/* L^t x = y or U x = y.  Solutions belong to columns, right-hand sides to rows: x may be y if they are the same.  */
-static inline void up(const chain *c, const int w, const double *y, double *x, double *z)
+/* L^t x = y or U x = y.  Solutions belong to columns, right-hand sides to rows: x may be y if they are the same.  Of a
+   transposed matrix without symmetry it is L^t x = y, and solutions belong to rows.  */
+static inline void up(const chain *c, const int w, const int transposed, const double *y, double *x, double *z)
 {
+    const int unit = c->symmetric || transposed; /* the diagonal of L is one */
     for (int index = c->fronts - 1; index >= 0; index--) {
         const Front *f = &c->front[index];
-        const int *rows = (const int *)c->order.data + f->rows, *columns = (const int *)c->order.data + f->columns;
-        int m = f->size;
-        const double *u = (const double *)c->panel.data + f->values + (c->symmetric ? 0 : (size_t)m * f->pivots);
+        const int *order = (const int *)c->order.data, m = f->size;
+        const int *rows = order + (transposed ? f->columns : f->rows), *columns = order + (transposed ? f->rows : f->columns);
+        const double *u = (const double *)c->panel.data + f->values + (unit ? 0 : (size_t)m * f->pivots);
         for (int i = f->pivots; i < m; i++) ALL(q) z[i * w + q] = x[(size_t)columns[i] * w + q];
         for (int j = f->pivots - 1; j >= 0; j--) {
             double t[WIDTH];
             ALL(q) t[q] = y[(size_t)rows[j] * w + q];
             for (int i = j + 1; i < m; i++) ALL(q) t[q] -= u[(size_t)j * m + i] * z[i * w + q];
-            ALL(q) z[j * w + q] = c->symmetric ? t[q] : t[q] / u[(size_t)j * m + j];
+            ALL(q) z[j * w + q] = unit ? t[q] : t[q] / u[(size_t)j * m + j];
         }
         for (int i = 0; i < f->pivots; i++) ALL(q) x[(size_t)columns[i] * w + q] = z[i * w + q];
     }
@@ -566,20 +571,20 @@ static inline void up(const chain *c, const int w, const double *y, double *x, d
 static void down_by(const chain *c, int w, double *y, double *z)
 {
     switch (w) {
-    case 1: down(c, 1, y, z); break;
-    case 2: down(c, 2, y, z); break;
-    case 3: down(c, 3, y, z); break;
-    default: down(c, WIDTH, y, z);
+    case 1: down(c, 1, 0, y, z); break;
+    case 2: down(c, 2, 0, y, z); break;
+    case 3: down(c, 3, 0, y, z); break;
+    default: down(c, WIDTH, 0, y, z);
     }
 }
 
 static void up_by(const chain *c, int w, const double *y, double *x, double *z)
 {
     switch (w) {
-    case 1: up(c, 1, y, x, z); break;
-    case 2: up(c, 2, y, x, z); break;
-    case 3: up(c, 3, y, x, z); break;
-    default: up(c, WIDTH, y, x, z);
+    case 1: up(c, 1, 0, y, x, z); break;
+    case 2: up(c, 2, 0, y, x, z); break;
+    case 3: up(c, 3, 0, y, x, z); break;
+    default: up(c, WIDTH, 0, y, x, z);
     }
 }
 
@@ -639,6 +644,27 @@ int chain_solve(chain *c, int k, const double *b, double *x)
 {
     if (chain_forward(c, k, b, NULL)) return 2;
     chain_back(c, k, NULL, x);
+    return 0;
+}
+
+/* Solutions x of a closed chain without symmetry, transposed, for k columns of b.  Columns that are missing in the last
+   strip are zero.  2: out of memory.  */
+int chain_solve_transposed(chain *c, int k, const double *b, double *x)
+{
+    const int w = WIDTH;
+    if (!room_for_columns(c, w)) return 2;
+    double *y = c->forward, *solved = c->back, *z = c->back + (size_t)c->n * w;
+    for (int column = 0; column < k; column += w) {
+        const double *right = b + (size_t)column * c->n;
+        double *out = x + (size_t)column * c->n;
+        int here = k - column < w ? k - column : w;
+        for (int i = 0; i < c->n; i++)
+            ALL(q) y[(size_t)i * w + q] = q < here ? right[(size_t)q * c->n + i] * c->scale[i] : 0.0;
+        down(c, WIDTH, 1, y, z);
+        up(c, WIDTH, 1, y, solved, z);
+        for (int i = 0; i < c->n; i++)
+            for (int q = 0; q < here; q++) out[(size_t)q * c->n + i] = solved[(size_t)i * w + q] * c->scale[i];
+    }
     return 0;
 }
 

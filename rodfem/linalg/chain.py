@@ -30,6 +30,7 @@ int chain_factor(chain *c, const double *values);
 int chain_forward(chain *c, int k, const double *b, double *rest);
 void chain_back(chain *c, int k, const double *rest, double *x);
 int chain_solve(chain *c, int k, const double *b, double *x);
+int chain_solve_transposed(chain *c, int k, const double *b, double *x);
 void chain_schur(const chain *c, double *out);
 void chain_forget(chain *c);
 int chain_rest(const chain *c);
@@ -177,6 +178,17 @@ class Elimination:
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solutions (n, k) of a closed chain for ``right`` (n, k)."""
         return self.back(self.forward(right))
+
+    def solve_transposed(self, right: np.ndarray) -> np.ndarray:
+        """Solutions (n, k) of a closed chain without symmetry, transposed, for ``right`` (n, k).
+
+        Raises :class:`MemoryError` where there is no room.
+        """
+        right = np.asarray(right, dtype=float, order="F")
+        out = np.empty_like(right)
+        if self.lib.chain_solve_transposed(self._chain, right.shape[1], self._pointer(right), self._pointer(out)):
+            raise MemoryError(f"No memory for solutions of {self.rows} unknowns.")
+        return out
 
     def schur(self) -> np.ndarray:
         """Schur complement (rest, rest) that an open chain leaves, delayed pivots first; else (0, 0)."""

@@ -66,9 +66,8 @@ def measure(pencil: NonsymmetricPencil, cluster: Cluster) -> Measured:
     beside = BESIDE * pencil.system.scene.units.omega2
     for number in (size + 2, 3 * size + 10):
         found = pencil.near(number, 0.97 * cluster.mean if abs(cluster.mean) > beside else -beside)
-        weighed = pencil.weighed(found.vectors)
-        inside = pencil.product(basis, weighed)
-        energy = pencil.squares(found.vectors, weighed)
+        inside = pencil.product(basis, found.weighed)
+        energy = pencil.squares(found.vectors, found.weighed)
         share = (abs(inside) ** 2).sum(axis=0) / energy
         chosen = sorted(np.argsort(-share, kind="stable")[:size].tolist())
         values = found.values[chosen]

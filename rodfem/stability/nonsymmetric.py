@@ -20,7 +20,7 @@ A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,8 +31,9 @@ from slepc4py import SLEPc
 from rodfem import compat
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
+from rodfem.linalg.chain import Chain, Elimination
 from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, is_spread
-from rodfem.linalg.matrices import gathered, petsc_matrix
+from rodfem.linalg.matrices import gathered, local_rows, petsc_matrix, shared
 from rodfem.linalg.selection import factors_of
 from rodfem.stability import mode_type
 from rodfem.stability.dense import finite_eigenpairs
@@ -73,16 +74,19 @@ SPARE = 2
 
 @dataclass(frozen=True)
 class Frequencies:
-    """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and backward ``errors`` (k,).
+    """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and their ``errors`` (k,).
 
-    ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors`` (n, k) are complex, with the
-    n unknowns of this rank.  ``one`` is their natural size.
+    Errors are backward errors; of eigenvalues that were followed (:mod:`rodfem.stability.followed_pairs`) relative ones
+    of ``1 / (mu - shift)``.  ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors``
+    (n, k) are complex, with the n unknowns of this rank, ``weighed`` (n, k) are their products with the mass, and
+    ``one`` is the natural size of the eigenvalues.
     """
 
     values: np.ndarray
     errors: np.ndarray
     kinds: tuple[str, ...] = ()
     vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    weighed: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     one: float = 1.0
 
     @property
@@ -121,6 +125,17 @@ class NonsymmetricSolver(PencilMatrices):
         super().__init__(system)
         self.inverted: tuple[PETSc.Mat, Factors] | None = None
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
+        self._rows: sp.csr_matrix | None = None
+
+    @property
+    def rows(self) -> sp.csr_matrix:
+        """The mass on one rank, real; where compiled code assembles it, an array that is the matrix's own."""
+        if (own := shared(self.mass)) is None:
+            start, columns, values = self.mass.getValuesCSR()
+            return sp.csr_matrix((values.real, columns, start), shape=self.mass.size)
+        if self._rows is None:
+            self._rows = own.matrix
+        return self._rows
 
     def at(self, x: PETSc.Vec) -> NonsymmetricPencil:
         """Assemble the pencil at the state ``x``.
@@ -197,8 +212,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         return whole, mass
 
     def _near(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> Frequencies:
-        units, sizes = self.system.scene.units, self.system.sizes.array_r.real
-        target /= units.omega2
+        target /= self.system.scene.units.omega2
         with self.system.clock("stability"):
             if matrix.getSize()[0] < DENSE * (2 * number + 20):
                 found = self._dense(matrix, mass)
@@ -209,38 +223,37 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             found = sorted(found, key=lambda p: abs(p.value - target))[: number + SPARE]
             third = abs(found[min(2, len(found) - 1)].value - target)
             found = [p for p in found if abs(p.value - target) <= FAR * third]
-            if not units.ordinary:
-                found = [replace(p, value=p.value * units.omega2, parts=[x * sizes for x in p.parts]) for p in found]
-            for pair in found:
-                self._complete(pair)
-            kinds = self._kinds(found)
-        one = units.omega2
-        order = sorted(range(len(found)), key=lambda i: (round(found[i].value.real / one, 9), found[i].value.imag))
-        return Frequencies(
-            np.array([found[i].value for i in order]),
-            np.array([found[i].error for i in order]),
-            tuple(kinds[i] for i in order),
-            np.stack([found[i].vector for i in order], 1),
-            one,
-        )
+            vectors = np.stack([p.vector for p in found], axis=1)
+            return self.frequencies(np.array([p.value for p in found]), np.array([p.error for p in found]), vectors)
 
-    def _kinds(self, found: list[_Pair]) -> list[str]:
+    def frequencies(self, values: np.ndarray, errors: np.ndarray, vectors: np.ndarray) -> Frequencies:
+        """Frequencies from eigenvalues (k,) and vectors (n, k), complex, of the pencil in units of natural sizes."""
+        units = self.system.scene.units
+        if not units.ordinary:
+            values, vectors = values * units.omega2, vectors * self.system.sizes.array_r.real[:, None]
+        self._complete(values, vectors)
+        kinds = self._kinds(values, vectors)
+        order = np.lexsort((values.imag, np.round(values.real / units.omega2, 9)))
+        vectors = vectors[:, order]
+        named = tuple(kinds[i] for i in order)
+        return Frequencies(values[order], errors[order], named, vectors, self.weighed(vectors), units.omega2)
+
+    def _kinds(self, values: np.ndarray, vectors: np.ndarray) -> list[str]:
         """Names of the motions; a multiple eigenvalue has one for its invariant subspace.
 
         Its vectors are any in its invariant subspace: bending about d1 in one state and about d2 in the next.
         """
-        together, columns = groups(np.array([p.value for p in found]), ALIKE), []
-        for group in together:
-            if len(group) == 1:
-                columns.append(np.stack(found[group[0]].parts, axis=1))
-            else:
-                basis = self.orthonormal(np.stack([found[j].vector for j in group], axis=1))
-                columns.append(np.concatenate([basis.real, basis.imag], axis=1))
+        together, columns, owners = groups(values, ALIKE), [], []
+        for number, group in enumerate(together):
+            basis = vectors[:, group] if len(group) == 1 else self.orthonormal(vectors[:, group])
+            parts = [basis.real, basis.imag] if self.system.comm.size > 1 or basis.imag.any() else [basis.real]
+            columns += parts
+            owners += [number] * (len(parts) * len(group))
         squares = mode_type.squares(self.system, self._turned, np.concatenate(columns, axis=1))
-        kinds, begin = [""] * len(found), 0
-        for group, part in zip(together, columns, strict=True):
-            square = squares[begin : begin + part.shape[1]].sum(axis=0)
-            begin += part.shape[1]
+        sums = np.zeros((len(together), squares.shape[1]))
+        np.add.at(sums, owners, squares)
+        kinds = [""] * len(values)
+        for group, square in zip(together, sums, strict=True):
             for j in group:
                 kinds[j] = mode_type.name(square / max(square.sum(), TINY))
         return kinds
@@ -252,8 +265,11 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
         """``M X`` for real or complex vectors (n, k), with any PETSc."""
         if self.system.comm.size == 1:
-            start, columns, values = self.mass.getValuesCSR()
-            return np.asarray(sp.csr_matrix((values.real, columns, start), shape=self.mass.size) @ vectors)
+            rows = self._held().rows
+            if not np.iscomplexobj(vectors):
+                return np.asarray(rows @ vectors)
+            parts = np.ascontiguousarray(vectors).view(float)  # real and imaginary parts in turn, in real arithmetic
+            return np.ascontiguousarray(rows @ parts).view(complex)
         if np.iscomplexobj(vectors):
             return np.asarray(self.weighed(vectors.real) + 1j * self.weighed(vectors.imag))
         out, x = np.empty_like(vectors), self.system.new_vector()
@@ -262,29 +278,32 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             out[:, i] = (self.mass * x).array_r.real
         return out
 
+    def mass_in_units(self) -> sp.csr_matrix:
+        """The mass on one rank for unknowns in units of their natural sizes."""
+        return self._held().rows if self.system.scene.units.ordinary else local_rows(self.in_units()[1])
+
     def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """``a^* b`` of all ranks' rows."""
-        return np.asarray(self.system.comm.allreduce(a.conj().T @ b))
+        return product(self.system.comm, a, b)
 
     def squares(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Products of each column of ``a`` with the same of ``b``, real parts."""
-        return np.asarray(self.system.comm.allreduce(np.sum(a.conj() * b, axis=0).real))
+        return squares(self.system.comm, a, b)
 
     def orthonormal(self, vectors: np.ndarray) -> np.ndarray:
         """Basis of the span of complex vectors (n, k), orthonormal in the mass."""
-        squares, turn = np.linalg.eigh(self.product(vectors, self.weighed(vectors)))
-        return np.asarray(vectors @ (turn / np.sqrt(np.maximum(squares, EPS * squares[-1]))))
+        return orthonormal(self.system.comm, vectors, self.weighed(vectors))
 
-    def _complete(self, pair: _Pair) -> None:
-        """Add to a vector, in place, its part along free motions, which follows from its multipliers."""
+    def _complete(self, values: np.ndarray, vectors: np.ndarray) -> None:
+        """Add to vectors, in place, their parts along free motions, which follow from their multipliers."""
         begin, end = self.matrix.getOwnershipRange()
         for index, mode in self._free.items():
-            mine = [part[index - begin] if begin <= index < end else 0.0 for part in pair.parts]
-            multiplier = complex(*self.system.comm.allreduce(np.array([*mine, 0.0][:2])))
-            if abs(pair.value) > 0:
-                share = -multiplier / pair.value
-                for part, along in zip(pair.parts, (share.real, share.imag), strict=False):
-                    part += along * mode.array_r.real
+            mine = vectors[index - begin] if begin <= index < end else np.zeros_like(values)
+            multipliers = self.system.comm.allreduce(mine)
+            moving = abs(values) > 0
+            shares = np.zeros_like(multipliers)
+            shares[moving] = -multipliers[moving] / values[moving]
+            vectors += np.outer(mode.array_r.real, shares)
 
     def _dense(self, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
         """All finite eigenvalues of a pencil that is small enough for dense matrices."""
@@ -364,6 +383,24 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             number //= 2
         raise ConvergenceError(f"SLEPc found no eigenvalue near {target:.6g}: use a richer discretisation.")
 
+    def basis(self, number: int, target: float) -> np.ndarray:
+        """Real basis (n, p) of the invariant subspace of about ``number`` eigenvalues nearest to ``target``, by SLEPc.
+
+        It is that for unknowns in units of their natural sizes, on one rank.  Raises :class:`ConvergenceError` as
+        :meth:`near` does.
+        """
+        with self.system.clock("stability"):
+            found = self._shifted(number, target / self.system.scene.units.omega2, *self.in_units())
+        return _real_basis(found)
+
+    def eliminated(self, target: float) -> Elimination | None:
+        """Factors of ``S - target M`` in units of natural sizes that solve for arrays; None where there are none."""
+        if self.system.comm.size > 1 or compat.COMPLEX:
+            return None
+        inverse = self._inverse(*self.in_units(), target / self.system.scene.units.omega2)
+        factors = None if inverse is None else inverse.factors
+        return factors.elimination if isinstance(factors, Chain) and not factors.resorted else None
+
     def _inverse(self, matrix: PETSc.Mat, mass: PETSc.Mat, target: complex) -> Inverse | None:
         """Inverse of ``matrix - target mass`` along the rod, piece by piece on several ranks; None: SLEPc's own.
 
@@ -389,10 +426,47 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         return Inverse(factors)
 
 
+def product(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """``a^* b`` of the rows of all ranks of ``comm``: (k, m) for (n, k) and (n, m)."""
+    mine = a.conj().T @ b
+    return np.asarray(mine if comm.size == 1 else comm.allreduce(mine))
+
+
+def squares(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products (k,) of each column of ``a`` (n, k) with the same of ``b``, real parts, of all ranks of ``comm``."""
+    mine = np.sum(a.conj() * b, axis=0).real
+    return np.asarray(mine if comm.size == 1 else comm.allreduce(mine))
+
+
+def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.ndarray:
+    """Basis of the span of complex vectors (n, k), orthonormal in the mass; ``weighed`` are their products with it.
+
+    The ranks of ``comm`` share the rows.
+    """
+    parts, turn = np.linalg.eigh(product(comm, vectors, weighed))
+    return np.asarray(vectors @ (turn / np.sqrt(np.maximum(parts, EPS * parts[-1]))))
+
+
+def _real_basis(found: list[_Pair]) -> np.ndarray:
+    """Real basis (n, p) of the span of the vectors of some pairs and of their conjugates, in the order of the pairs."""
+    columns: list[np.ndarray] = []
+    seen: list[complex] = []
+    for pair in found:
+        if abs(pair.value.imag) < REAL * abs(pair.value):
+            columns.append(pair.parts[0])
+        elif not any(abs(pair.value - v.conjugate()) < ALIKE * abs(v) for v in seen):
+            columns += pair.parts
+            seen.append(pair.value)
+    return np.stack(columns, axis=1)
+
+
 def groups(values: np.ndarray, tolerance: float = MULTIPLE) -> list[list[int]]:
     """Places of eigenvalues in groups of equal ones, in the order of the first of each."""
     out: list[list[int]] = []
     least = NEAR_ZERO * abs(values).max(initial=0.0)
+    sizes = tolerance * np.maximum(abs(values), least)
+    if (abs(values[:, None] - values) < sizes[:, None]).sum() <= len(values):  # no two of them
+        return [[i] for i in range(len(values))]
     for i, value in enumerate(values):
         for group in out:
             if abs(value - values[group[0]]) < tolerance * max(abs(value), least):

@@ -87,15 +87,18 @@ int main(void)
             for (int i = 0; i < n * k; i++) { b[i] = number(&state); x[i] = b[i]; }
             if (open ? joined(c, symmetric, k, x) : chain_forward(c, k, x, NULL)) return 2;
             if (!open) chain_back(c, k, NULL, x);
-            for (int column = 0; column < k; column++) {
-                double worst = 0, size = 0;
-                for (int i = 0; i < n; i++) {
-                    double r = -b[column * n + i];
-                    for (int j = 0; j < n; j++) r += a[i * n + j] * x[column * n + j];
-                    worst = fmax(worst, fabs(r));
-                    size = fmax(size, fabs(x[column * n + i]));
+            for (int transposed = 0; transposed <= (!open && !symmetric); transposed++) {
+                if (transposed && chain_solve_transposed(c, k, b, x)) return 2;
+                for (int column = 0; column < k; column++) {
+                    double worst = 0, size = 0;
+                    for (int i = 0; i < n; i++) {
+                        double r = -b[column * n + i];
+                        for (int j = 0; j < n; j++) r += a[transposed ? j * n + i : i * n + j] * x[column * n + j];
+                        worst = fmax(worst, fabs(r));
+                        size = fmax(size, fabs(x[column * n + i]));
+                    }
+                    if (!(worst < 1e-10 * (size + 1))) { wrong++; printf("trial %d, transposed %d: residual %g of %g\n", trial, transposed, worst, size); }
                 }
-                if (!(worst < 1e-10 * (size + 1))) { wrong++; printf("trial %d: residual %g of %g\n", trial, worst, size); }
             }
         }
         chain_free(c);

@@ -41,10 +41,14 @@ def test_random_chains(symmetric: bool) -> None:
         tried += 1
         factors = Chain("cholesky" if symmetric else "lu", border)
         factors(petsc(dense, coupled))
-        right = rng.normal(size=(len(dense), 3))
+        right = rng.normal(size=(len(dense), int(rng.integers(1, 7))))
         found = factors.solve_columns(right)
         size = abs(dense).sum(axis=1).max() * abs(found).max()
         assert factors.regular and abs(dense @ found - right).max() < 100 * BACKWARD * size
+        if not symmetric:
+            found = factors.elimination.solve_transposed(right)
+            size = abs(dense).sum(axis=0).max() * abs(found).max()
+            assert abs(dense.T @ found - right).max() < 100 * BACKWARD * size
         assert factors.determinant() == pytest.approx(np.linalg.slogdet(dense)[1], abs=1e-5)
         assert factors.elimination.growth <= 100.0 or factors.elimination.fronts == 1
         delayed += factors.elimination.delayed

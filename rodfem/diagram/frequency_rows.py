@@ -1,0 +1,244 @@
+"""Left-most eigenvalues at the loads of a sweep: followed from load to load, and certified by solving for them anew.
+
+To solve anew is to find, from nothing and by SLEPc, the eigenvalues nearest to a shift below zero, and by a complex
+shift the pairs that are farther.  That is done at the first load and at the last one, at every :data:`EVERY`-th, and
+where eigenvalues come near one another; on both sides of every change of the numbers of complex and of negative
+eigenvalues; and where they were not followed to the accuracy that SLEPc is asked for.  In between they are followed
+(:mod:`rodfem.stability.followed_pairs`).  Rows are open until the next certificate: what is found anew has to be what
+was followed.  Where it is not, all open rows are solved for anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rodfem.continuation.branch import Point
+from rodfem.stability.followed_pairs import FollowedPairs
+from rodfem.stability.nonsymmetric import (
+    ALIKE,
+    EPS,
+    NEAR_ZERO,
+    REAL,
+    Frequencies,
+    NonsymmetricPencil,
+    NonsymmetricSolver,
+)
+from rodfem.tolerances import unit
+
+FREQUENCIES = 6
+"""Number of frequencies recorded at each load where nobody asks for another."""
+BEYOND = 6
+"""Eigenvalues that are sought beyond those that are recorded."""
+SEEN = 0.5
+"""A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
+SHIFT = -10.0
+"""Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix is singular.
+
+Far enough from it for a rod that floats, whose rigid motions are zero eigenvalues: what is nearest to the shift takes
+its digits from all others.
+"""
+BESIDE = 1e-4
+"""Relative distance of a shift from the pair that is sought there."""
+AGAIN = 1e-7
+"""Eigenvalues of two shifts that differ by less than this, relative to them or to one, were found twice."""
+MANY = 100.0
+"""Round-off of the inverse eigenvalues, in units of the largest and of eps.
+
+Measured up to 50 for Greenhill's rod, but 1e6 and more for some eigenvalues: those are not covered.
+"""
+EVERY = 20
+"""Loads from one certificate to the next."""
+NEAR = 1e-3
+"""Relative distance of recorded eigenvalues below which they are solved for anew, unless they are one: multiple."""
+AGREED = 1e-8
+"""Difference of an inverse eigenvalue followed and one found anew, over the greatest: far ones of SLEPc have 1e-10."""
+WORTH, LONGEST = 4, 16
+"""Loads for which to follow is worth its beginning; most loads solved for anew before it is tried again."""
+NONE = Frequencies(np.zeros(0, dtype=complex), np.zeros(0))
+
+
+@dataclass
+class Row:
+    """A point of a sweep and what was found there; ``anew``: by SLEPc."""
+
+    point: Point
+    found: Frequencies
+    anew: bool
+
+
+class FrequencyRows:
+    """Finds the eigenvalues at points that follow one another, and gives them away when they are certified."""
+
+    def __init__(self, eigensolver: NonsymmetricSolver, number: int) -> None:
+        """Find ``number`` eigenvalues and some more."""
+        self.eigensolver, self.number = eigensolver, number
+        units = eigensolver.system.scene.units
+        self.followed = FollowedPairs(sought(number), SHIFT * units.omega2)
+        self._open: list[Row] = []
+        self._certified = self._before = NONE
+        self._kept = self._pause = self._resting = 0
+
+    def add(self, point: Point) -> list[Row]:
+        """Find the eigenvalues at the next point; rows that are certified by now, in their order."""
+        pencil = self.eigensolver.at(point.x)
+        found = self._followed(pencil, point)
+        changed = found is None or _numbers(found) != _numbers(self._before)
+        if (
+            found is not None
+            and not changed
+            and len(self._open) < EVERY - 1
+            and not near(found.values[: self.number + 1])
+        ):
+            self._open.append(Row(point, found, anew=False))
+            self._before, self._kept = found, self._kept + 1
+            return []
+        done = self.finish() if changed else []
+        if done:
+            pencil = self.eigensolver.at(point.x)
+        anew = leftmost(pencil, self.number, self._before)
+        if found is not None and agree(found, anew):
+            self._open.append(Row(point, found if len(found.values) == len(anew.values) else anew, anew=True))
+            self._pause = 0
+        else:
+            self._begin(pencil, point)
+            self._solve_anew()
+            self._open.append(Row(point, anew, anew=True))
+        return done + self._close()
+
+    def _followed(self, pencil: NonsymmetricPencil, point: Point) -> Frequencies | None:
+        """What was followed to a point, None where nothing was."""
+        found = self.followed.at(pencil, point.load)
+        if found is None:
+            return None
+        return in_order(replace(found, values=_without_round_off(found.values, SHIFT * found.one)))
+
+    def finish(self) -> list[Row]:
+        """Certify the last point: all rows that are left."""
+        if self._open and not self._open[-1].anew:
+            row, before = self._open[-1], self._open[-2].found if len(self._open) > 1 else self._certified
+            if not agree(row.found, leftmost(self.eigensolver.at(row.point.x), self.number, before)):
+                self.followed.end()
+                self._solve_anew()
+        return self._close()
+
+    def _close(self) -> list[Row]:
+        done, self._open = self._open, []
+        if done:
+            self._certified = self._before = done[-1].found
+        return done
+
+    def _solve_anew(self) -> None:
+        """Solve anew for all rows that are open."""
+        before = self._certified
+        for row in self._open:
+            before = row.found = leftmost(self.eigensolver.at(row.point.x), self.number, before)
+            row.anew = True
+
+    def _begin(self, pencil: NonsymmetricPencil, point: Point) -> None:
+        """Begin to follow at a point, but not at each of those where that was of no use."""
+        if self._resting:
+            self._resting -= 1
+            self.followed.end()
+            return
+        if self._kept < WORTH and self._certified is not NONE:
+            self._resting = self._pause = min(2 * self._pause + 1, LONGEST)
+        self._kept = 0
+        self.followed.begin(pencil, point.load)
+
+
+def sought(number: int) -> int:
+    """Number of eigenvalues to ask for where ``number`` are recorded."""
+    return max(number, FREQUENCIES) + BEYOND
+
+
+def near(values: np.ndarray) -> bool:
+    """Whether two of some eigenvalues are near each other, but not one that is multiple."""
+    sizes = np.maximum(abs(values), NEAR_ZERO * abs(values).max())
+    apart = abs(values[:, None] - values) / np.maximum(sizes[:, None], sizes)
+    return bool(((apart < NEAR) & (apart > ALIKE)).any())
+
+
+def leftmost(pencil: NonsymmetricPencil, number: int, before: Frequencies = NONE) -> Frequencies:
+    """Left-most eigenvalues: those near the origin, and what became of the complex ones ``before``.
+
+    A complex shift looks for a pair that may be farther from the origin than all that the real shift found.  At least
+    ``number`` are sought.
+    """
+    one = pencil.system.scene.units.omega2
+    found = pencil.near(sought(number), SHIFT * one)
+    reach = SEEN * abs(found.values).max()
+    found = replace(found, values=_without_round_off(found.values, SHIFT * one))
+    for pair in (v for v in before.values if v.imag > 0 and abs(v) > reach):
+        found = _joined(found, pencil.near(2, pair * (1 + BESIDE)))
+    return in_order(found)
+
+
+def _joined(found: Frequencies, beside: Frequencies) -> Frequencies:
+    """Frequencies with those of a complex shift, and their conjugates, that are not among them."""
+    for i, value in enumerate(beside.values.tolist()):
+        both = (value, value.conjugate()) if abs(value.imag) > REAL * abs(value) else (value,)
+        for v in both:
+            if (abs(v - found.values) > AGAIN * unit(v, one=found.one)).all():
+                columns = (x[:, i : i + 1] for x in (beside.vectors, beside.weighed))
+                column, weighed = (x if v == value else x.conj() for x in columns)
+                found = Frequencies(
+                    np.append(found.values, v),
+                    np.append(found.errors, beside.errors[i]),
+                    (*found.kinds, beside.kinds[i]),
+                    np.concatenate([found.vectors, column], axis=1),
+                    np.concatenate([found.weighed, weighed], axis=1),
+                    found.one,
+                )
+    return found
+
+
+def in_order(found: Frequencies) -> Frequencies:
+    """Frequencies by their real parts, without imaginary parts that are round-off."""
+    values = np.where(abs(found.values.imag) < REAL * abs(found.values), found.values.real, found.values)
+    order = np.lexsort((values.imag, np.round(values.real / found.one, 6)))
+    return Frequencies(
+        values[order],
+        found.errors[order],
+        tuple(found.kinds[i] for i in order),
+        found.vectors[:, order],
+        found.weighed[:, order],
+        found.one,
+    )
+
+
+def agree(followed: Frequencies, anew: Frequencies) -> bool:
+    """Whether each eigenvalue followed is one that was found anew, and conversely, as far as both go."""
+    shift = SHIFT * followed.one
+    nu, other = (1.0 / (found.values - shift) for found in (followed, anew))
+    tolerance = AGREED * abs(other).max()
+    least = max(abs(nu).min(), abs(other).min()) + tolerance
+    return _among(nu[abs(nu) > least], other, tolerance) and _among(other[abs(other) > least], nu, tolerance)
+
+
+def _among(some: np.ndarray, others: np.ndarray, tolerance: float) -> bool:
+    """Whether each of ``some`` numbers is one of ``others``, a different one for each."""
+    left = others.tolist()
+    for value in some.tolist():
+        distance, place = min((abs(value - v), i) for i, v in enumerate(left)) if left else (np.inf, 0)
+        if distance > tolerance:
+            return False
+        left.pop(place)
+    return True
+
+
+def _numbers(found: Frequencies) -> tuple[int, int, int]:
+    """Numbers of complex, of negative, and of unstable eigenvalues."""
+    return int((found.values.imag != 0).sum()), found.diverged(), found.unstable(found.noise)
+
+
+def _without_round_off(values: np.ndarray, shift: float) -> np.ndarray:
+    """Eigenvalues next to a ``shift``, imaginary parts that are round-off of real ones dropped: (k,).
+
+    The solver has ``1 / (mu - shift)`` to round-off of the largest of them: ``mu`` to ``eps |mu - shift|^2 / min |mu -
+    shift|``, and one near zero to that of the matrix.
+    """
+    apart, least = abs(values - shift), NEAR_ZERO * abs(values).max()
+    doubt = np.maximum(REAL * np.maximum(abs(values), least), MANY * EPS * apart**2 / apart.min())
+    return np.where(abs(values.imag) < doubt, values.real, values)

@@ -1,0 +1,135 @@
+"""Eigenvalues that are followed from load to load, against SLEPc's at every load of every sweep, and nearer shifts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import classics
+import numpy as np
+import pytest
+from fem.test_free_motion import scene as pinned
+from golden_cases import cases
+from literature.test_free_rods import floating
+from scipy.optimize import linear_sum_assignment
+
+import rodfem
+from rodfem import Discretization, Plan, Scene, free
+from rodfem.continuation.branch import Branch, Point
+from rodfem.diagram import frequency_rows
+from rodfem.diagram.frequency_rows import SHIFT, FrequencyRows, Row
+from rodfem.diagram.solver import Solver
+from rodfem.diagram.sweep import at_load
+from rodfem.stability.followed_pairs import FollowedPairs
+from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil, NonsymmetricSolver
+
+pytestmark = pytest.mark.alone
+THRUST = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
+SCENES: dict[str, Callable[[], Scene]] = {name: s for name, s in cases().items() if not s().conservative} | {
+    "Leipholz": classics.leipholz,
+    "divergence": lambda: classics.partly_following(0.4, (0.0, 25.0)),
+    "double": lambda: classics.partly_following(0.2, (0.0, 25.0), 1.0),
+    "double flutter": lambda: classics.partly_following(1.0, (0.0, 25.0), 1.0),
+    "torque": lambda: replace(classics.torque("follower_moment"), span=(-1.0, 9.0)),
+    "pins": lambda: pinned("follower_moment"),
+    "floating": lambda: floating(THRUST, (0.0, 130.0), distributed=lambda c: (0.0, 0.0, c.P)),
+}
+CLAIMED = 1e-10
+"""Difference of inverse eigenvalues, next to the shift, over the greatest: SLEPc has far ones to that."""
+
+
+class Watched(FrequencyRows):
+    """Counts the rows that were certified without SLEPc."""
+
+    followed_rows = 0
+
+    def _close(self) -> list[Row]:
+        Watched.followed_rows += sum(not row.anew for row in self._open)
+        return super()._close()
+
+
+def swept(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> Branch:
+    """A sweep over the range of a scene."""
+    Watched.followed_rows = 0
+    monkeypatch.setattr("rodfem.diagram.sweep.FrequencyRows", Watched)
+    return rodfem.trace(scene, Discretization("pointwise", 2, 6), Plan(error_bars=False))[0]
+
+
+def difference(p: Point, q: Point, one: float) -> float:
+    """Largest difference of inverse eigenvalues over the greatest; of a pair, which may be cut, either one."""
+    a, b = (np.array([1.0 / (mu + 1j * abs(other) - SHIFT * one) for mu, other in x.omega2]) for x in (p, q))
+    apart = abs(a[:, None] - b)
+    return float(apart[linear_sum_assignment(apart)].max() / abs(b).max())
+
+
+def same(followed: Branch, anew: Branch, one: float) -> None:
+    """Assert that two sweeps have the same rows and special points."""
+    assert [p.negative for p in followed.points] == [p.negative for p in anew.points]
+    assert [p.zero for p in followed.points] == [p.zero for p in anew.points]
+    assert [p.motion for p in followed.points] == [p.motion for p in anew.points]
+    assert [(s.kind, s.negative_before, s.negative_after) for s in followed.special] == [
+        (s.kind, s.negative_before, s.negative_after) for s in anew.special
+    ]
+    assert [s.point.load for s in followed.special] == pytest.approx([s.point.load for s in anew.special], rel=1e-9)
+    special = {s.row for s in anew.special if s.kind in ("flutter", "divergence")}
+    for i, (p, q) in enumerate(zip(followed.points, anew.points, strict=True)):
+        if i not in special:  # two that are one there have the root of the accuracy
+            assert difference(p, q, one) < CLAIMED, p.load
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_row_is_that_of_solving_anew(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frequencies, motions and the numbers of unstable eigenvalues; most loads need no SLEPc."""
+    scene = SCENES[name]()
+    followed = swept(scene, monkeypatch)
+    assert Watched.followed_rows > 0.6 * len(followed.points)
+    monkeypatch.setattr(FollowedPairs, "begin", lambda *given: None)
+    anew = swept(scene, monkeypatch)
+    assert Watched.followed_rows == 0
+    same(followed, anew, scene.units.omega2)
+
+
+@pytest.mark.parametrize("wrong", ["another", "missing"])
+def test_what_is_not_certified_is_solved_anew(wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One followed eigenvalue is another, or left out, from some load on: no row has what was followed."""
+    scene = replace(SCENES["demo follower"](), span=(0.0, 15.0))
+    expected = swept(scene, monkeypatch)
+    right = FollowedPairs.at
+
+    def at(self: FollowedPairs, pencil: NonsymmetricPencil, load: float) -> Frequencies | None:
+        found = right(self, pencil, load)
+        if found is None or load < 7.0:
+            return found
+        values = found.values.copy()
+        values[3] = values[3] * 1.001 if wrong == "another" else 2.0 * values[-1]
+        return replace(found, values=values)
+
+    monkeypatch.setattr(FollowedPairs, "at", at)
+    same(swept(scene, monkeypatch), expected, 1.0)
+
+
+def test_accuracy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Against SLEPc with a shift next to each eigenvalue: all digits, where a shift far off leaves seven."""
+    scene = SCENES["demo follower"]()
+    solver = Solver(scene, Discretization("pointwise", 2, 6)).equilibria
+    eigensolver, followed = NonsymmetricSolver(solver.system), FollowedPairs(12, SHIFT)
+    x, _ = solver.first(0.0)
+    for load in np.linspace(0.0, 10.0, 41).tolist():
+        x = at_load(solver, x, load)
+        found = followed.at(eigensolver.at(x), load)
+        if found is None:
+            assert load == 0.0
+            followed.begin(eigensolver.at(x), load)
+    assert found is not None and len(found.values) == 14
+    pencil = eigensolver.at(x)
+    for value in found.values:
+        near = pencil.near(1, value.real * (1 + 1e-4)).values
+        assert abs(near - value).min() < 1e-11 * abs(value)
+
+
+def test_near_and_agreed() -> None:
+    values = np.array([12.0, 12.001, 480.0, 50 + 1e-3j, 50 - 1e-3j])
+    assert frequency_rows.near(values[:3]) and frequency_rows.near(values[2:])
+    assert not frequency_rows.near(np.array([12.0, 12.0 + 1e-9, 480.0]))
+    one, other = (Frequencies(np.array(v, dtype=complex), np.zeros(len(v))) for v in ([1.0, 1.0, 5.0], [1.0, 5.0, 9.0]))
+    assert not frequency_rows.agree(one, other) and frequency_rows.agree(other, other)
