@@ -25,7 +25,7 @@ from rodfem.continuation.solvers import BranchSolver
 from rodfem.continuation.special_points import midpoint, point_between
 
 LOWER = 0.5
-"""A vertex below this share of the value at the lower end of a step is looked at."""
+"""A vertex above this share of the lowest value known is no pair's, once the vertex is believed."""
 MULTIPLICITIES = (1, 2)
 TRIES = 10
 """Interpolations until a lowest value is given up."""
@@ -49,12 +49,12 @@ class Touching:
     def __init__(self) -> None:
         """No row yet."""
         self._rows: list[Point] = []
-        self._begun, self._told = True, False
+        self._begun, self._told, self._seen = True, False, False
 
     def restart(self, rows: Sequence[Point]) -> None:
         """Begin at the last of some rows of one branch; the step before it counts as looked at."""
         same = [row for row in rows[-2:] if row.mesh == rows[-1].mesh]  # determinants of two meshes do not compare
-        self._rows, self._begun, self._told = same, len(rows) < 2, False
+        self._rows, self._begun, self._told, self._seen = same, len(rows) < 2, False, len(rows) > 1
 
     def add(self, row: Point, *, told: bool) -> None:
         """Go on to the next row; ``told`` is whether special points are known in the step to it."""
@@ -64,14 +64,15 @@ class Touching:
     def between(self, solver: BranchSolver, a: Point, b: Point) -> list[Point]:
         """Rows to insert, in order of arclength, where an eigenvalue passes zero twice in the step from ``a`` to ``b``.
 
-        The first step of a branch is looked at with the second: its row before that step then comes first.
+        Of two steps the parabola may have its vertex in the wrong one: where that of the last three rows was not in the
+        step to ``a``, that step is looked at, too, and its row before that step then comes first.
         """
         if len(self._rows) < 2 or self._rows[-1] is not a:
             return []
         rows = [self._rows[-2], a, b]
-        found = []
-        if self._begun and not self._told and rows[0].negative == a.negative:
-            early = inside(solver, rows, rows[0], a) or beside(solver, rows[0], a)
+        found, seen, self._seen = [], self._seen, dips(rows, a, b)
+        if not (self._told or seen) and rows[0].negative == a.negative:
+            early = inside(solver, rows, rows[0], a) or (beside(solver, rows[0], a) if self._begun else [])
             found += [rows[0], *early, a] if early else []
         if found or self._told:  # what lies on the other side of the row between the steps is known
             near = beside(solver, a, b)
@@ -109,6 +110,12 @@ def inside(solver: BranchSolver, rows: Sequence[Point], p: Point, q: Point) -> l
             if found is not None:
                 return [found]
     return []
+
+
+def dips(rows: Sequence[Point], p: Point, q: Point) -> bool:
+    """Whether a parabola through three rows has its vertex between the neighbours ``p`` and ``q`` among them."""
+    samples = [[(row.arclength, relative(row, p, m)) for row in rows] for m in MULTIPLICITIES]
+    return any(p.arclength < vertex(x)[0] < q.arclength for x in samples)
 
 
 def around(solver: BranchSolver, rows: Sequence[Point]) -> list[Point]:
@@ -192,20 +199,21 @@ def lowest(solver: BranchSolver, samples: list[Sample], p: Point, q: Point, mult
     margin = MARGIN * (q.arclength - p.arclength)
     for tried in range(TRIES):
         s, value = vertex(samples)
-        close = 0 < tried < CLOSER  # the first parabolas reach too far to tell how low it is
-        if not p.arclength < s < q.arclength or (value > LOWER * least and not close):
+        # the first parabolas reach too far to tell how low it is
+        if not p.arclength < s < q.arclength or (value > LOWER * least and tried >= CLOSER):
             break
         s = min(max(s, p.arclength + margin), q.arclength - margin)
+        if any(s == other for other, _ in samples):
+            break
         state = point_between(solver, p, q, s)
         if state is None or differs(state, p):
             return state
         size = relative(state, p, multiplicity)
-        if not size < least or any(s == other for other, _ in samples):
-            break
-        least = size
         known = sorted([*known, (s, size)])
         # the next parabola goes through the lowest value and its two neighbours
-        middle = known.index((s, size))
+        least, middle = min((value, i) for i, (_, value) in enumerate(known))
+        if not 0 < middle < len(known) - 1:
+            break
         samples = known[middle - 1 : middle + 2]
     return None
 

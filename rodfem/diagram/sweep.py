@@ -345,9 +345,21 @@ class Sweep:
                     measured, cluster = self._measured(richer, eigensolver, x), self._transferred(transfer, s)
                     load = _zero(measured, cluster, point.load, self.units.load)
                     s.error_estimate = max(bound(point.load, load, s.located_to, rho), s.located_to)
+                if s.kind in (FLUTTER, DIVERGENCE):
+                    s.ordinate_error += self._moved(richer, x, s)
                 asked = self.plan.accuracy
                 if asked is not None and s.error_estimate > asked * unit(s.point.load, one=self.units.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"
+
+    def _moved(self, richer: StaticSolver, x: PETSc.Vec, s: SpecialPoint) -> float:
+        """Change of the ordinate, on the ``richer`` mesh, over the error bar of a special point's load, where ``x`` is.
+
+        Of a bar wider than half of the range no more is asked for.
+        """
+        low, high = sorted(self.span)
+        step = min(s.error_estimate, (high - low) / 2) * (1.0 if s.point.load < (low + high) / 2 else -1.0)
+        beside = at_load(richer, x, s.point.load + step)
+        return abs(richer.shape.ordinate(beside) - richer.shape.ordinate(x))
 
     def _transferred(self, transfer: Transfer, s: SpecialPoint) -> Cluster:
         """The cluster of a special point on another discretisation."""

@@ -39,6 +39,11 @@ def split(matrix: np.ndarray, norm: float) -> tuple[np.ndarray, np.ndarray, np.n
     return u[:, :rank], s[:rank], vt[:rank].T, u[:, rank:], vt[rank:].T
 
 
+def kernel(matrix: np.ndarray) -> np.ndarray:
+    """Orthonormal basis (n, k) of the null space of a matrix (m, n), of which m may be zero: LAPACK refuses that."""
+    return np.asarray(scipy.linalg.null_space(matrix, rcond=RANK)) if matrix.size else np.eye(matrix.shape[1])
+
+
 def finite_eigenpairs(S: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return all finite eigenvalues (complex, sorted by magnitude) and their vectors (n, number).
 
@@ -55,8 +60,7 @@ def finite_eigenpairs(S: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndar
         s01, s10 = u0.T @ S @ v1, u1.T @ S @ v0
         condensed = q @ ((p.T @ s01) / regular[:, None])
         s11 = u1.T @ S @ v1 - s10 @ condensed
-        z = scipy.linalg.null_space(p0.T @ s01, rcond=RANK)
-        w = scipy.linalg.null_space((s10 @ q0).T, rcond=RANK)
+        z, w = kernel(p0.T @ s01), kernel((s10 @ q0).T)
         if w.shape != z.shape:  # dependent constraints on one side only: the pencil has no definite eigenvalues
             raise np.linalg.LinAlgError("the pencil is singular for every mu")
         back = back @ ((v1 - v0 @ condensed) @ z)

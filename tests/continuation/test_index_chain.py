@@ -14,6 +14,7 @@ import pytest
 from classics import ON_AXIS, RIGID, ROUND, WIDE, circle, column, explore, push, winkler
 from closed_form_hemitropic import buckling
 from closed_form_hemitropic import loads as buckling_loads
+from hard.two_freedoms import scene as two_freedoms
 from mpi4py import MPI
 from rows import verify
 from scipy.optimize import brentq
@@ -78,15 +79,19 @@ def test_a_rod_under_high_tension() -> None:
         assert assess(solver, point.x, "reduction").negative == 1
 
 
-@pytest.mark.parametrize("apart", [3e-3, 1e-4, 1e-6])
-def test_neighbours_in_one_step(apart: float) -> None:
-    """A pinned column that bends almost alike about both axes: P = pi^2 B, each with its own index on either side."""
+@pytest.mark.parametrize(("apart", "most"), [(3e-3, 4.0), (1e-4, 4.0), (1e-6, 4.0), (1e-6, 40.0)])
+def test_neighbours_in_one_step(apart: float, most: float) -> None:
+    """A column that bends almost alike about both axes: (2n - 1)^2 pi^2 B/4, each with its own index on either side.
+
+    Over the wider range the first two are one place, by their arclengths: their null vectors tell them apart.
+    """
     scene = column(
-        "neighbours", (clamped(), free(push)), (0.0, 4.0), constants={"B1": 1.0, "B2": 1.0 + apart}
+        "neighbours", (clamped(), free(push)), (0.0, most), constants={"B1": 1.0, "B2": 1.0 + apart}
     )  # fmt: skip
-    first, second = explore(scene).special()
-    assert [s.point.load for s in (first, second)] == pytest.approx([EULER, EULER * (1 + apart)], abs=1e-11)
-    assert [(s.negative_before, s.negative_after) for s in (first, second)] == [(0, 1), (1, 2)]
+    found = explore(scene).special()
+    expected = [load * B for load in (EULER, 9 * EULER) for B in (1.0, 1.0 + apart) if load < most]
+    assert [s.point.load for s in found] == pytest.approx(expected, abs=1e-11)
+    assert [(s.negative_before, s.negative_after) for s in found] == [(n, n + 1) for n in range(len(expected))]
 
 
 @pytest.mark.parametrize("half", [1e-6, 1e-5, 1e-3])
@@ -225,6 +230,24 @@ def test_a_pair_of_crossings_is_listed_once() -> None:
     (straight,) = trace(hemitropic_cases.scene(constants), Discretization("reduced", 16, 6), plan)
     found = [s.point.load for s in straight.special if s.kind == BRANCH_POINT]
     assert found == pytest.approx([x for x in buckling_loads(*constants) if 0.42077 < x < 0.7111], abs=1e-9)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize(("slope", "largest"), [(2.0, 0.15), (2.8, 0.15), (2.8, 0.3), (-2.2, 0.15)])
+def test_a_pair_of_crossings_that_no_parabola_shows(slope: float, largest: float) -> None:
+    """The eigenvalue ``(P^2 - d^2)(1 + slope P)``: the parabola through three rows has its vertex too high, or in the
+    step beside, and the second one may be off by more than the first.
+    """
+    apart = 1e-3
+    model = two_freedoms(
+        lambda u, f2, c: 0.6 * u**2 + 0.5 * (c.P * c.P - c.a) * (1 + c.b * c.P) * f2 + 0.1 * f2**2,
+        (-0.31, 0.4), a=apart**2 / 4, b=slope,
+    )  # fmt: skip
+    plan = Plan(depth=0, steps=StepControl(first=largest / 2, largest=largest), error_bars=False)
+    (branch,) = trace(model, Discretization("reduced", 4, 3), plan)
+    found = [s for s in branch.special if s.kind == BRANCH_POINT]
+    assert [(s.negative_before, s.negative_after) for s in found] == [(0, 1), (1, 0)]
+    assert [s.point.load for s in found] == pytest.approx([-apart / 2, apart / 2], abs=1e-10)
 
 
 @pytest.mark.alone

@@ -12,11 +12,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from classics import BEAM, push
+from classics import column as straight
 from closed_forms import column, double
 from demo_cases import scene
 from hemitropic_cases import specials
 from mpi4py import MPI
 
+from forms.energy import bending_and_twist
+from rodfem import Ordinate, clamped, free
 from rodfem.continuation.branch import Branch
 from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
@@ -70,6 +74,26 @@ def test_flutter(span: tuple[float, float], J: float) -> None:
             for re, im in p.omega2[:2]:  # the two that meet, or the weak and the strong plane
                 value = complex(re, im)
                 assert np.nanmin([abs(column(value, p.load, *plane) - value) for plane in ((1, J), (10, 0))]) < 1e-6
+
+
+@pytest.mark.alone
+def test_ordinate_of_a_load_that_is_not_known_better() -> None:
+    """A stretching column stays straight, and its length is ``1 - P/EA``: its bar is that of P over EA.
+
+    Nothing is left of the constraints of this pencil once strains and forces are eliminated.
+    """
+    EA = 500.0
+    rod = straight(
+        "stretching", (clamped(), free(follower=push)), (15.0, 25.0), rod="unshearable", inertia=BEAM, planar="e1",
+        constants={"P": 15.0, "EA": EA},
+        energy=lambda v, k, c: 0.5 * c.EA * (v[2] - 1) ** 2 + bending_and_twist(k, (c.B1, c.B2, c.C)),
+        ordinate=Ordinate("length", s=1.0, of=lambda r, q: r[2]),
+    )  # fmt: skip
+    coarse, fine = (trace(rod, Discretization("pointwise", *mesh)).special("flutter") for mesh in ((2, 4), (6, 6)))
+    (s,), (t,) = coarse, fine
+    assert s.point.ordinate == pytest.approx(1 - s.point.load / EA, abs=1e-12)
+    assert 1e-8 < abs(s.point.load - t.point.load) <= s.error_estimate
+    assert abs(s.point.ordinate - (1 - t.point.load / EA)) <= s.ordinate_error <= 1.01 * s.error_estimate / EA + 1e-11
 
 
 @pytest.mark.parametrize("P", [0.0, 10.0])

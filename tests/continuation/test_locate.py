@@ -1,0 +1,40 @@
+"""Zeros of interpolants, against polynomials whose zeros are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.polynomial import chebyshev
+from numpy.polynomial.polynomial import polyfromroots
+
+from rodfem.continuation.flutter import locate_flutter
+from rodfem.continuation.locate import real_root
+from rodfem.stability.cluster import Cluster, Measured
+
+pytestmark = pytest.mark.alone
+
+
+def test_the_zero_nearest_to_a_guess() -> None:
+    """Of -0.7, 0.2 and 0.6; those far outside and the complex ones are none."""
+    series = chebyshev.poly2cheb(polyfromroots([-0.7, 0.2, 0.6, 3.0, 0.5 + 0.1j, 0.5 - 0.1j]).real)
+    for guess, expected in ((-1.0, -0.7), (0.0, 0.2), (0.35, 0.2), (0.45, 0.6), (2.5, 0.6)):
+        assert real_root(series, guess) == pytest.approx(expected, abs=1e-12)
+    assert real_root(series, 0.0, 0.5, 1.0) == pytest.approx(0.6, abs=1e-12)  # within bounds before a nearer one
+    assert real_root(series, 0.3, 0.7, 0.9) == pytest.approx(0.2, abs=1e-12)  # none is within
+    assert real_root(chebyshev.poly2cheb(np.array([1.0, 0.0, 1.0])), 0.0) is None
+
+
+@pytest.mark.parametrize("start", [0.0, 0.9])
+def test_a_collision_is_not_extrapolated(start: float) -> None:
+    """``D = 1.2 - P - 0.01 T6(P)``: on the first piece the nodes are zeros of T6, and say that D vanishes at 1.2."""
+    series = np.array([1.2, -1.0, 0.0, 0.0, 0.0, 0.0, -0.01])
+    (expected,) = (z.real for z in chebyshev.chebroots(series) if abs(z.imag) < 1e-9 and 0 < z.real < 1.2)
+    assert expected < 1.15
+
+    def at(load: float, cluster: Cluster) -> Measured:
+        d = float(chebyshev.chebval(load, series))
+        return Measured(d, np.emath.sqrt(d) * np.array([1.0, -1.0]) + 5.0, Cluster(np.zeros((1, 2)), 5.0))
+
+    found = locate_flutter(at, Cluster(np.zeros((1, 2)), 5.0), start, 1.0)
+    assert abs(found.load - expected) <= found.uncertainty + 1e-15
+    assert found.uncertainty < 1e-9

@@ -1,0 +1,314 @@
+"""One scene, traced twice: by different formulations, meshes, factors and steps, which have no number in common.
+
+What must agree: every recorded index with a dense count; the indices along each branch with its special points; special
+points within the sum of their error bars; states at the loads asked for; the number of branches.  What differs is
+*silent* unless one of the two traces has said that it leaves something open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import pairwise
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+
+from rodfem import Diagram, Discretization, Plan, Scene, StepControl, trace
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.diagram.sweep import FREQUENCIES
+from rodfem.errors import ConvergenceError, InputError
+from rodfem.fem.system import System
+from rodfem.tolerances import round_off
+
+from .oracle import Oracle
+
+ZERO, NEAR = 1e-7, 1e-4
+"""An eigenvalue less than the first, over the lowest bending one, is zero; between the two it may be either."""
+OF_A_RING = 1e-2
+"""The second where a closed rod may move along itself: the mesh's eigenvalue of that motion."""
+SQUARE = 1e-5
+"""Relative difference of two values of omega^2 that are one: double ones have half of the digits."""
+STORED = 1e-6
+"""Relative difference of two stored energies that are one."""
+ROWS = 40, 12
+"""Most rows of the first and of the second trace that are counted, spread over all of them."""
+MOST_BRANCHES = 7
+ENDED = ("end of range", "closed loop", "meets another branch", "stretch reaches zero")
+"""Beginnings of the reasons for which a branch ends, but for those that depend on steps and meshes."""
+AT = (0.37, 0.81)
+"""Loads to stop at, as parts of the range."""
+
+
+@dataclass
+class Compared:
+    """What a scene shows.
+
+    ``rows`` were counted, ``unclear`` of them too near a critical state; ``ratios`` are differences of special points
+    over the sums of their bars, in load and ordinate.  ``wrong`` (indices) and ``differs`` are sentences on what
+    disagrees, ``said`` is what the traces say they leave open, ``refused`` the errors by which they ended.
+    """
+
+    scene: str
+    rows: int = 0
+    unclear: int = 0
+    ratios: list[float] = field(default_factory=list)
+    unresolved: int = 0
+    wrong: list[str] = field(default_factory=list)
+    differs: list[str] = field(default_factory=list)
+    said: list[str] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+
+    @property
+    def silent(self) -> bool:
+        """Whether something differs, and neither trace said a word."""
+        return bool(self.wrong) or bool(self.differs and not self.said)
+
+    def entry(self) -> dict[str, Any]:
+        """As a line of a file of results."""
+        return asdict(self) | {"silent": self.silent}
+
+
+def meshes(scene: Scene, number: int) -> tuple[Discretization, Discretization]:
+    """Two discretisations: the first formulation that applies, and all fields, some by MUMPS."""
+    more = 2 if scene.closed else 1
+    factors = "petsc" if number % 5 == 3 else "chain"
+    return Discretization("auto", 5 * more, 6), Discretization("pointwise", 7 * more, 5, factors=factors)
+
+
+def plans(scene: Scene, depth: int) -> tuple[Plan, Plan]:
+    """Two plans, of long steps and of short ones."""
+    low, high = scene.span
+    at = tuple(low + part * (high - low) for part in AT)
+    steps = StepControl(first=0.05, largest=0.2, most=120), StepControl(first=0.02, largest=0.11, most=240)
+    return tuple(Plan(at=at, depth=depth, steps=s, most_branches=MOST_BRANCHES) for s in steps)  # type: ignore[return-value]
+
+
+def compared(scene: Scene, number: int = 0, depth: int = 1) -> Compared:
+    """Trace a scene twice and compare."""
+    out, diagrams = Compared(scene.name), []
+    for mesh, plan, most in zip(meshes(scene, number), plans(scene, depth), ROWS, strict=True):
+        diagram = traced(scene, mesh, plan, out)
+        if diagram is None:
+            continue
+        diagrams.append(diagram)
+        out.said += open_questions(diagram)
+        check_rows(diagram, out, most)
+        if scene.conservative:
+            for branch in diagram:
+                check_chain(branch, out)
+    if len(diagrams) == 2:
+        check_pair(*diagrams, out)
+    elif diagrams:
+        out.differs.append("one of the two traces is refused, the other is not")
+    return out
+
+
+def traced(scene: Scene, mesh: Discretization, plan: Plan, out: Compared) -> Diagram | None:
+    """Diagram of a scene; what is refused must be so in one sentence."""
+    try:
+        return trace(scene, mesh, plan)
+    except (InputError, ConvergenceError) as trouble:
+        out.refused.append(f"{type(trouble).__name__}: {trouble}")
+        if (fault := of_a_sentence(str(trouble))) != "":
+            out.wrong.append(f"refused by {fault}: {trouble}")
+        found: Diagram | None = getattr(trouble, "diagram", None)
+        if found is not None:
+            out.said.append(str(trouble))
+        return found
+
+
+def of_a_sentence(text: str) -> str:
+    """What is wrong with the sentence of an error; empty for nothing."""
+    if "\n" in text:
+        return "several lines"
+    if not text.rstrip().endswith(".") or not text[:1].strip():
+        return "no sentence"
+    return "numbers that are none" if any(word in text.split() for word in ("nan", "inf", "None")) else ""
+
+
+def open_questions(diagram: Diagram) -> list[str]:
+    """All that a diagram says it could not decide."""
+    unexplained = [str(u) for b in diagram for u in b.unexplained]
+    ended = [f"{b.name} ended: {b.ended}" for b in diagram if not b.ended.startswith(ENDED)]
+    points = [s for b in diagram for s in b.special if not s.kind.given]
+    notes = [f"{s!r}: {s.note}" for s in points if s.note]
+    unresolved = [f"{s!r} is not resolved" for s in points if s.resolved is False]
+    return [*diagram.warnings, *(n.strip() for n in diagram.notes if "eigenvalue" in n), *unexplained, *ended, *notes,
+            *unresolved]  # fmt: skip
+
+
+# --- indices --------------------------------------------------------------------------------------------------------
+
+
+def check_rows(diagram: Diagram, out: Compared, most: int) -> None:
+    """Compare index and zeros of rows with the oracle's."""
+    system = diagram.solvers[0].system
+    oracle = Oracle(system)
+    rows = [(b, i, p) for b in diagram for i, p in enumerate(b.points) if p.mesh == 0]
+    special = {id(s.point) for b in diagram for s in b.special if not s.kind.given}
+    for j in np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)):
+        branch, i, point = rows[j]
+        out.rows += 1
+        if not diagram.scene.conservative:
+            fault = frequencies_of(oracle, point) if id(point) not in special else None
+        else:
+            fault = index_of(oracle, system, point, id(point) in special)
+        if fault is None:
+            out.unclear += 1
+        elif fault:
+            out.wrong.append(f"{branch.name} row {i}, load {point.load:.8g}: {fault}")
+
+
+def index_of(oracle: Oracle, system: System, point: Point, special: bool) -> str | None:
+    """What a dense count denies of a row; None where an eigenvalue is too near zero to tell.
+
+    The signs of those that count as zero may have been decided by a richer mesh: each then has a name in the row.
+    """
+    mu = oracle.eigenvalues(point.x)
+    near = OF_A_RING if any(s.along for s in system.symmetries) else NEAR
+    if special or oracle.dependent or ((abs(mu) > ZERO) & (abs(mu) < near)).any():
+        return None
+    negative, zero = int((mu < -ZERO).sum()), int((abs(mu) <= ZERO).sum())
+    if point.negative <= negative <= point.negative + point.undecided and point.zero == zero:
+        return ""
+    below, above = point.negative - negative, negative + zero - point.negative - point.zero
+    if below >= 0 and above >= 0 and below + above <= len(point.soft):
+        return None
+    least = ", ".join(f"{m:.3g}" for m in mu[: negative + zero + 2])
+    return f"recorded ({point.negative}, {point.zero}), dense ({negative}, {zero}) of {least}"
+
+
+def frequencies_of(oracle: Oracle, point: Point) -> str | None:
+    """What dense linear algebra denies of the recorded eigenvalues, or of their number; None where two nearly meet."""
+    dense, one = oracle.squares(point.x), oracle.system.scene.units.omega2
+    mine = np.array([complex(*value) for value in point.omega2])
+    mine = mine[abs(mine) > NEAR * one]
+    if not len(mine):
+        return None
+    apart = abs(mine[:, None] - dense).min(axis=1) / np.maximum(abs(mine), one)
+    dense = dense[abs(dense) > NEAR * one]
+    close = [abs(a - b) < 1e-3 * max(abs(a), one) for a, b in pairwise(sorted(dense[:FREQUENCIES], key=abs))]
+    if apart.max() > SQUARE:
+        worst = int(apart.argmax())
+        return None if any(close) else f"omega^2 = {mine[worst]:.8g} is none of {dense[:FREQUENCIES]}"
+    return ""
+
+
+def check_chain(branch: Branch, out: Compared) -> None:
+    """Whether from row to row the index changes by what the special points in between say."""
+    special = sorted((s for s in branch.special if s.kind.singular), key=lambda s: s.point.arclength)
+    at_special = {id(s.point) for s in special}
+    least = min(p.zero for p in branch.points)  # a row with an eigenvalue near zero may have either index
+    rows = [p for p in branch.points if id(p) not in at_special and p.zero == least and not p.undecided]
+    for a, b in pairwise(rows[1:] if branch.parent else rows):
+        index = a.negative
+        for s in (s for s in special if a.arclength < s.point.arclength < b.arclength):
+            if s.negative_before != index:
+                break
+            index = s.negative_after
+        else:
+            if index == b.negative:
+                continue
+        if not branch.unexplained:
+            out.wrong.append(f"{branch.name}: from {a.load:.8g} ({a.negative}) to {b.load:.8g} ({b.negative})")
+
+
+# --- special points -------------------------------------------------------------------------------------------------
+
+
+def check_pair(first: Diagram, second: Diagram, out: Compared) -> None:
+    """Compare two diagrams: the first branches point by point, what leaves them by what is on it."""
+    a, b = first[0], second[0]
+    if whole(a) and whole(b):
+        if a.ended[:8] != b.ended[:8]:
+            out.differs.append(f"{a.name} ended: {a.ended}; and {b.ended}")
+        check_specials("trunk", singular(a), singular(b), out)
+    check_asked(a, b, out)
+    if not (all(map(whole, first)) and all(map(whole, second))) or max(len(first), len(second)) >= MOST_BRANCHES:
+        return
+    if len(first) != len(second):
+        out.differs.append(f"{len(first)} branches, and {len(second)}")
+    else:
+        pools = [sorted((s for x in d.branches[1:] for s in singular(x)), key=_place) for d in (first, second)]
+        check_specials("branches", *pools, out)
+
+
+def whole(branch: Branch) -> bool:
+    """Whether a branch ended where the rod says, not the steps."""
+    return branch.ended.startswith(ENDED)
+
+
+def singular(branch: Branch) -> list[SpecialPoint]:
+    """Special points at which something happens."""
+    return [s for s in branch.special if not s.kind.given]
+
+
+def _place(s: SpecialPoint) -> tuple[float, float]:
+    return s.point.load, s.point.ordinate
+
+
+def check_specials(where: str, first: Sequence[SpecialPoint], second: Sequence[SpecialPoint], out: Compared) -> None:
+    """Match two lists, each point with the nearest one of its kind in units of the bars."""
+    left = list(second)
+    for s in first:
+        candidates = [(ratio_of(s, t), t) for t in left if s.kind == t.kind and _change(s) == _change(t)]
+        ratio, t = min(candidates, key=lambda pair: pair[0], default=(inf, None))
+        if t is None or ratio > 1e6:
+            out.differs.append(f"{where}: {describe(s)} has no partner")
+            continue
+        left.remove(t)
+        if s.resolved is False or t.resolved is False:
+            out.unresolved += 1
+            continue
+        out.ratios.append(ratio)
+        if ratio > 1:
+            out.differs.append(f"{where}: {describe(s)} and {describe(t)}, apart by {ratio:.3g} times their bars")
+    out.differs += [f"{where}: {describe(t)} of the second trace has no partner" for t in left]
+
+
+def _change(s: SpecialPoint) -> tuple[int, ...]:
+    return tuple(sorted((s.negative_before, s.negative_after)))
+
+
+def ratio_of(s: SpecialPoint, t: SpecialPoint) -> float:
+    """Difference of two special points over the sum of their bars: the larger of load and ordinate."""
+    load = abs(s.point.load - t.point.load) / max(bars(s)[0] + bars(t)[0], 1e-300)
+    ordinate = abs(s.point.ordinate - t.point.ordinate) / max(bars(s)[1] + bars(t)[1], 1e-300)
+    return max(load, ordinate if all(isfinite(x.ordinate_error) for x in (s, t)) else 0.0)
+
+
+def bars(s: SpecialPoint) -> tuple[float, float]:
+    """Error bars of load and ordinate, each not below the round-off of the number itself."""
+    load = s.error_estimate if isfinite(s.error_estimate) else s.located_to
+    return max(load, round_off(s.point.load, 0.0)), max(s.ordinate_error, round_off(s.point.ordinate, 0.0))
+
+
+def describe(s: SpecialPoint) -> str:
+    """A special point with its bars."""
+    load, ordinate = bars(s)
+    return (
+        f"{s.kind} at {s.point.load:.12g} +- {load:.2g}, {s.point.ordinate:.10g} +- {ordinate:.2g}, "
+        f"{s.negative_before}->{s.negative_after}"
+    )
+
+
+def check_asked(a: Branch, b: Branch, out: Compared) -> None:
+    """Compare the states at loads that were asked for, in their order along the first branches."""
+    for s, t in zip(*(_asked(branch) for branch in (a, b)), strict=False):
+        if s.point.load != t.point.load:
+            return
+        ratio = abs(s.point.ordinate - t.point.ordinate) / max(bars(s)[1] + bars(t)[1], 1e-300)
+        if s.resolved is False or t.resolved is False or not isfinite(s.ordinate_error + t.ordinate_error):
+            out.unresolved += 1
+            continue
+        if ratio > 1:
+            out.differs.append(f"at load {s.point.load:.8g}: {describe(s)} and {describe(t)}, {ratio:.3g} bars apart")
+        low, high = sorted((s.point.energy, t.point.energy))
+        if high - low > STORED * max(abs(low), abs(high), 1e-6) + 100 * (s.ordinate_error + t.ordinate_error):
+            out.differs.append(f"at load {s.point.load:.8g}: stored energies {low:.12g} and {high:.12g}")
+
+
+def _asked(branch: Branch) -> Iterator[SpecialPoint]:
+    return (s for s in branch.special if s.kind == "user")

@@ -1,0 +1,84 @@
+"""Counts by dense linear algebra: numpy and the assembled matrices of a state, no phase conditions, no factors.
+
+With ``K`` and ``C`` the blocks of the saddle matrix, and ``Z`` a basis of the null space of ``C^t`` by a singular value
+decomposition, the index is the number of negative eigenvalues of ``Z^t K Z``.  All is scaled to unit rows before, which
+changes no sign.  Eigenvalues are relative to the metric, in which strains have a small part, and to the lowest one of
+bending.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rodfem.fem.system import System
+from rodfem.linalg.matrices import gathered
+from rodfem.stability.pencil import assemble_pencil
+
+RANK = 1e-11
+"""A singular value of the scaled constraints below this, relative to the largest, is zero."""
+NEARLY = 1e-9
+"""The same, below which constraints may be dependent: a straight rod that cannot stretch, between ends that stay."""
+STRAINS = 1e-3
+"""Weight of strains, which are not in the metric, relative to what is."""
+SWEEPS = 8
+"""Scalings of rows and columns (Ruiz 2001), each of which halves the exponents of what is left."""
+
+
+class Oracle:
+    """Eigenvalues of a system's states, on every rank alike."""
+
+    dependent = False
+    """Whether the constraints of the last state are nearly dependent."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
+        f = system.fields
+        fields = [f.number[f.dofs[b.name]].ravel() for b in f.blocks if b.multiplier]
+        mine = np.unique(np.concatenate([np.zeros(0, int), *fields]))
+        every = np.concatenate(system.comm.allgather(mine[mine >= 0]))
+        scalar = [f.scalars[x.name] for x in f.unknown_scalars if x.multiplier]
+        self.constraints = np.unique(np.append(every, scalar).astype(int))
+        none = [f.scalars["load"], *system.drifts]
+        self.state = np.setdiff1d(np.arange(f.unknowns), np.append(self.constraints, none))
+
+    def eigenvalues(self, x: Any) -> np.ndarray:
+        """Eigenvalues of ``K`` on the null space of ``C^t`` at the state ``x``, ascending."""
+        K, Z, G, _ = self._reduced(x)
+        L = np.linalg.cholesky(Z.T @ G @ Z)
+        half = np.linalg.solve(L, Z.T @ (K + K.T) / 2 @ Z)
+        full = np.linalg.solve(L, half.T)
+        return np.linalg.eigvalsh((full + full.T) / 2) / self.system.stiffness_scale
+
+    def squares(self, x: Any) -> np.ndarray:
+        """Finite eigenvalues ``omega^2`` of a rod under loads without a potential, by their distance from zero."""
+        K, Z, _, M = self._reduced(x)
+        one = 10.0 * self.system.scene.units.omega2
+        inverse = np.linalg.eigvals(np.linalg.solve(Z.T @ (K + one * M) @ Z, Z.T @ M @ Z))
+        finite = inverse[abs(inverse) > 1e-9 * abs(inverse).max()]
+        values = 1.0 / finite - one
+        return values[np.argsort(abs(values))]
+
+    def _reduced(self, x: Any) -> tuple[np.ndarray, ...]:
+        """Scaled ``K``, ``Z``, metric with a part of the strains, and kinetic metric."""
+        assemble_pencil(self.system, x, self.matrix, self.mass)
+        S, M, G = (gathered(a).toarray() for a in (self.matrix, self.mass, self.system.metric))
+        d = scaling(S, np.append(self.state, self.constraints))
+        K, C = ((d[:, None] * S * d)[np.ix_(self.state, of)] for of in (self.state, self.constraints))
+        G, M = ((d[:, None] * a * d)[np.ix_(self.state, self.state)] for a in (G, M))
+        u, s, _ = np.linalg.svd(C)
+        self.dependent = bool(s.size and s[-1] < NEARLY * s[0])
+        Z = u[:, int((s > RANK * s[0]).sum()) :] if s.size else np.eye(len(K))
+        size = np.diag(G)
+        return K, Z, G + STRAINS * np.diag(np.where(size == 0, size[size > 0].mean(), 0.0)), M
+
+
+def scaling(S: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Factors of rows and columns after which the largest entry of each of some ``rows`` is one."""
+    d = np.ones(len(S))
+    for _ in range(SWEEPS):
+        largest = abs(d[:, None] * S * d).max(axis=1)
+        d[rows] /= np.sqrt(np.where(largest > 0, largest, 1.0))[rows]
+    return d

@@ -1,0 +1,113 @@
+"""A few of the random scenes of ``python -m tests.hard.fuzz``, each traced twice and counted densely."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hard.fuzz import comparison, worker
+from hard.fuzz.comparison import compared, of_a_sentence
+from hard.fuzz.oracle import scaling
+from hard.fuzz.scenes import scene
+from hard.fuzz.summary import in_words
+
+pytestmark = pytest.mark.alone
+
+SCENES = [(1, 9), (1, 21), (1, 37), (1, 50), (1, 57)]
+"""Seed and number: a clamp that turns; a thrust, with cosh; a load without a potential; a plane; a logarithm."""
+
+
+@pytest.mark.parametrize(("seed", "number"), SCENES)
+def test_a_random_scene(seed: int, number: int) -> None:
+    """Indices are those of dense matrices, special points within their bars; no symmetry is claimed that is none.
+
+    A generic state of great curvature under a cosh energy would hide all forces but its own: a thrust, say.
+    """
+    found = compared(scene(seed, number), number, depth=0)
+    assert found.rows > found.unclear
+    assert (found.wrong, found.differs, found.refused) == ([], [], [])
+    assert not any("symmetry" in sentence for sentence in found.said)
+
+
+def test_a_difference_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An index too high by one, and a special point moved by three bars, of the first trace."""
+    trace, traces = comparison.trace, []
+
+    def spoilt(*given: object) -> object:
+        diagram = trace(*given)
+        traces.append(diagram)
+        if len(traces) == 1:
+            diagram[0].points[2].negative += 1
+            special = next(s for s in diagram[0].special if not s.kind.given)
+            special.point.load += 3 * special.error_estimate
+        return diagram
+
+    monkeypatch.setattr(comparison, "trace", spoilt)
+    found = compared(scene(1, 57), 57, depth=0)
+    assert any("row 2" in sentence and "dense" in sentence for sentence in found.wrong)
+    assert any("times their bars" in sentence for sentence in found.differs)
+    assert found.silent
+
+
+def test_a_scene_is_the_same_whatever_else_is_asked_for() -> None:
+    first, again = scene(3, 5), scene(3, 5)
+    assert (first.name, first.parameters, first.span) == (again.name, again.parameters, again.span)
+    assert scene(3, 6).parameters != first.parameters
+    assert scene(3, 6).rod == first.rod
+
+
+def test_sentences() -> None:
+    assert of_a_sentence("The load 3 is outside the range: choose less.") == ""
+    for bad in ("no end", "One line.\nTwo lines.", "At P = nan nothing holds: give a number.", ""):
+        assert of_a_sentence(bad)
+
+
+def test_results_go_on_and_are_summed_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scenes that have a line are not repeated; one that hangs, and one that dies, have a line and a new child."""
+    asked: list[int] = []
+
+    class Child:
+        done = 0
+
+        def __init__(self, *given: object) -> None:
+            pass
+
+        def ask(self, seed: int, number: int, limit: float) -> worker.Entry:
+            asked.append(number)
+            outcome = {2: worker.HUNG, 3: worker.CRASHED}.get(number, worker.COMPARED)
+            return {
+                "seed": seed,
+                "number": number,
+                "outcome": outcome,
+                "rows": 5,
+                "unclear": 1,
+                "ratios": [0.5, number],
+            }
+
+        def end(self) -> None:
+            pass
+
+    monkeypatch.setattr(worker, "Child", Child)
+    file = tmp_path / "results.jsonl"
+    worker.run(file, 1, 2, 0, 1.0)
+    entries = worker.run(file, 1, 4, 0, 1.0)
+    assert asked == [0, 1, 2, 3]
+    assert [json.loads(line)["number"] for line in file.read_text().splitlines()] == asked
+    assert [worker.is_fault(entry) for entry in entries] == [False, False, True, True]
+    words = in_words(entries)
+    assert "4 scenes: 2 compared, 1 hung, 1 crashed" in words
+    assert "20 rows counted densely (4 too near a critical state)" in words
+    assert "75.00% are within the sum of their bars; the largest ratios: 3, 2, 1" in words
+
+
+def test_the_oracle_knows_a_saddle_point() -> None:
+    """Scaling of rows changes no sign: a matrix of known inertia with entries from 1e-8 to 1e8."""
+    rng = np.random.default_rng(1)
+    S = rng.normal(size=(9, 9))
+    S += S.T
+    size = 10.0 ** rng.uniform(-4, 4, 9)
+    scaled = (d := scaling(size[:, None] * S * size, np.arange(9)))[:, None] * (size[:, None] * S * size) * d
+    assert abs(scaled).max(axis=1) == pytest.approx(1.0, rel=0.05)
+    assert (np.linalg.eigvalsh(scaled) < 0).sum() == (np.linalg.eigvalsh(S) < 0).sum()
