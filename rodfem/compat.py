@@ -392,6 +392,21 @@ def _is_warning(record: logging.LogRecord) -> bool:
     return record.levelno > logging.INFO
 
 
+@contextmanager
+def slepc_errors() -> Iterator[None]:
+    """Have the errors of SLEPc's functions raised as :class:`PETSc.Error`, whatever slepc4py makes of them.
+
+    Its functions set the exception and return a value all the same where petsc4py's check is compiled to another
+    convention (3.25.1 on Debian sid).  Python makes a SystemError of that, with the exception as its cause.
+    """
+    try:
+        yield
+    except SystemError as trouble:
+        if isinstance(trouble.__cause__, PETSc.Error):
+            raise trouble.__cause__ from None
+        raise
+
+
 def destroy_garbage(comm: Any) -> None:
     """Destroy the PETSc objects that Python has collected; collective over ``comm``.
 
