@@ -1,6 +1,7 @@
 """All differences between dolfinx releases, bridged by capability, not by version number.
 
-Supported: 0.5.2 (Debian 12), 0.9.0 (Debian 13) and 0.11.0 (Debian sid).  Nothing else in rodfem asks for a version.
+Supported: 0.5.2 (Debian 12), 0.9.0 (Debian 13), 0.10.0 (Ubuntu 26.04) and 0.11.0 (Debian sid).  Nothing else in rodfem
+asks for a version.
 """
 
 from __future__ import annotations
