@@ -1,6 +1,7 @@
 """All differences between dolfinx releases, bridged by capability, not by version number.
 
-Supported: 0.5.2 (Debian 12) and 0.9.0 (Debian 13).  Nothing else in rodfem asks for a version.
+Supported: 0.5.2 (Debian 12), 0.9.0 (Debian 13), 0.10.0 (Ubuntu 26.04) and 0.11.0 (Debian sid).  Nothing else in rodfem
+asks for a version.
 """
 
 from __future__ import annotations
@@ -184,15 +185,24 @@ def cell_dofs(space: Any, cells: int) -> np.ndarray:
     return _table(space.dofmap.list, cells)
 
 
+def _vertices(mesh: Any, cells: int) -> np.ndarray:
+    """Rows in the coordinates of the mesh of the two vertices of each local cell: (cells, 2)."""
+    geometry = mesh.geometry
+    tables = getattr(geometry, "dofmaps", None)  # one for each type of cells
+    if tables is None:
+        return _table(geometry.dofmap, cells)
+    return _table(tables(0) if callable(tables) else tables[0], cells)
+
+
 def cell_vertices(mesh: Any, cells: int) -> np.ndarray:
     """Arclengths of the two vertices of each local cell, in reference order: (cells, 2)."""
     x = np.asarray(mesh.geometry.x)[:, 0]
-    return x[_table(mesh.geometry.dofmap, cells)]
+    return x[_vertices(mesh, cells)]
 
 
 def cell_coordinates(mesh: Any, cells: int) -> np.ndarray:
     """Coordinates of the vertices of each local cell, in reference order: (cells, 2, 3)."""
-    return np.asarray(mesh.geometry.x)[_table(mesh.geometry.dofmap, cells)]
+    return np.asarray(mesh.geometry.x)[_vertices(mesh, cells)]
 
 
 def compile_forms(forms: Sequence[Any]) -> list[Any]:
@@ -350,7 +360,7 @@ class Integral(NamedTuple):
 def integrals(form: Any) -> list[Integral]:
     """Integrals of a compiled form, over the cells and facets of this rank."""
     found, compiled, cpp = [], form.ufcx_form, getattr(form, "_cpp_object", form)
-    kinds = dolfinx.cpp.fem.IntegralType
+    kinds = fem.IntegralType if hasattr(fem, "IntegralType") else dolfinx.cpp.fem.IntegralType
     types = (kinds.cell, kinds.exterior_facet, kinds.interior_facet)  # in the order of ufcx.h
     for place, (of_kind, kind) in enumerate(zip(types, KINDS, strict=True)):
         if hasattr(compiled, "form_integral_offsets"):
@@ -359,7 +369,9 @@ def integrals(form: Any) -> list[Integral]:
             kernels = [compiled.integrals(place)[i] for i in range(compiled.num_integrals(place))]
         if not kernels:
             continue
-        for kernel, name in zip(kernels, cpp.integral_ids(of_kind), strict=True):
+        # Entities are found by the number of the subdomain, in newer releases by the place among the integrals.
+        names = cpp.integral_ids(of_kind) if hasattr(cpp, "integral_ids") else range(len(kernels))
+        for kernel, name in zip(kernels, names, strict=True):
             entities = np.ascontiguousarray(cpp.domains(of_kind, name), dtype=np.int32).reshape(-1, kind)
             found.append(Integral(kernel.tabulate_tensor_float64, kind, entities))
     return found
@@ -385,6 +397,21 @@ def _quiet() -> Iterator[None]:
 
 def _is_warning(record: logging.LogRecord) -> bool:
     return record.levelno > logging.INFO
+
+
+@contextmanager
+def slepc_errors() -> Iterator[None]:
+    """Have the errors of SLEPc's functions raised as :class:`PETSc.Error`, whatever slepc4py makes of them.
+
+    Its functions set the exception and return a value all the same where petsc4py's check is compiled to another
+    convention (3.25.1 on Debian sid).  Python makes a SystemError of that, with the exception as its cause.
+    """
+    try:
+        yield
+    except SystemError as trouble:
+        if isinstance(trouble.__cause__, PETSc.Error):
+            raise trouble.__cause__ from None
+        raise
 
 
 def destroy_garbage(comm: Any) -> None:

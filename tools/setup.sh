@@ -1,8 +1,11 @@
 #!/bin/sh
-# Makes rodfem runnable on Debian 12 or 13: system packages, .venv, and rodfem in it. Where nothing is missing
+# Makes rodfem runnable on Debian 12, 13 or sid: system packages, .venv, and rodfem in it. Where nothing is missing
 # it does nothing, and needs neither network nor sudo.
 #
 #     tools/setup.sh EXTRAS        EXTRAS as in pyproject.toml: viz,test, dev or docs
+#
+# Where another Python has a dolfinx of its own (conda, the images of the FEniCS project), RODFEM_PYTHON names it: no
+# Debian package is installed then, and .venv sees what that Python sees.
 set -eu
 cd "$(dirname "$0")/.."
 extras=$1
@@ -14,11 +17,12 @@ fail() {
 
 # --- Debian packages -------------------------------------------------------------------------------------
 
-command -v dpkg-query >/dev/null ||
-    fail "this needs Debian 12 or 13, which have dolfinx as a package; elsewhere use the Dockerfile."
+system=${RODFEM_PYTHON-}
+[ -n "$system" ] || command -v dpkg-query >/dev/null ||
+    fail "this needs Debian, which has dolfinx as a package; elsewhere use the Dockerfile, environment.yml or RODFEM_PYTHON."
 
 missing=
-for package in $(sed 's/#.*//' packages.txt); do
+for package in $([ -n "$system" ] || sed 's/#.*//' packages.txt); do
     status=$(dpkg-query -W -f '${db:Status-Status} ' "$package" 2>/dev/null) || status=
     case " $status" in *" installed "*) ;; *) missing="$missing $package" ;; esac
 done
@@ -40,8 +44,8 @@ fi
 
 # --- .venv -------------------------------------------------------------------------------------------------
 
-# Always Debian's python3: another one that is first on PATH (pyenv, conda) cannot see Debian's dolfinx.
-system=/usr/bin/python3
+# By default Debian's python3: another one that is first on PATH (pyenv, conda) cannot see Debian's dolfinx.
+system=${system:-/usr/bin/python3}
 python=.venv/bin/python
 
 # The stamp tells for what the installation was made: it is repeated when that has changed.
@@ -51,13 +55,23 @@ if [ -x $python ] && [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$made_for" ]; the
     exit 0
 fi
 
-$system -c 'import dolfinx' || fail "$system cannot import dolfinx (see above), though python3-dolfinx is installed."
+$system -c 'import dolfinx' || fail "$system cannot import dolfinx (see above): is python3-dolfinx installed for it?"
 [ -e .venv ] || $system -m venv --system-site-packages .venv
+# From a virtual environment the new one would see only what lies below it: it is told of that one, too.
+$system -c 'import sys, site
+if sys.prefix != sys.base_prefix:
+    for folder in site.getsitepackages():
+        print(f"import site; site.addsitedir({folder!r})")' >"$($python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/system.pth"
 $python -c 'import dolfinx' ||
-    fail "the python of .venv cannot import Debian's dolfinx (see above): remove .venv and run this again."
+    fail "the python of .venv cannot import the dolfinx of $system (see above): remove .venv and run this again."
 
-# Debian's dolfinx, petsc4py and scipy are compiled against Debian's numpy: no other may come into .venv.
+# dolfinx, petsc4py and scipy are compiled against the numpy beside them: no other may come into .venv.
 $system -c 'import numpy; print("numpy==" + numpy.__version__)' >.venv/constraints.txt
+
+# Needed, but not in pyproject.toml (see there).
+$python -c 'import h5py' 2>/dev/null ||
+    $python -m pip install --quiet --disable-pip-version-check --constraint .venv/constraints.txt h5py ||
+    fail "pip could not install h5py in .venv (see above)."
 
 # As a path, not by setuptools' import hook: type checkers do not see through that.
 echo "Installing rodfem[$extras] in .venv"

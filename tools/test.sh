@@ -5,11 +5,16 @@
 #     tools/test.sh PYTHON MPIRUN SECONDS [options for pytest]        (as `make test` does)
 #
 # Two ranks do without the tests marked `alone` that are not `short`.  With quick=yes in the environment the serial run
-# has those marked `short` or `versions`, two ranks run the short ones only, and three ranks none.
+# has those marked `short` or `versions`, two ranks run the short ones only, and three ranks none; with quick=short the
+# serial run has the short ones only, too.
 set -eu
 cd "$(dirname "$0")/.."
 marks="not alone or short" serial=
-[ "${quick-}" != yes ] || serial="short or versions" marks=short
+case "${quick-}" in
+    yes) serial="short or versions" marks=short ;;
+    short) serial=short marks=short ;;
+    *) quick= ;;
+esac
 python=$1 mpirun=$2 limit=$3
 shift 3
 
@@ -37,5 +42,5 @@ run() {
 
 run "serially, in two processes" "$python" -m pytest -n 2 --dist loadfile -m "$serial" "$@"
 run "on two ranks ($marks)" $mpirun -n 2 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m "$marks" "$@"
-[ "${quick-}" = yes ] || run "on three ranks (the short ones)" $mpirun -n 3 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m short "$@"
+[ -n "$quick" ] || run "on three ranks (the short ones)" $mpirun -n 3 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m short "$@"
 echo "== Passed"

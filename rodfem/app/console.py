@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if name in ("-h", "--help", "help"):
         print(HELP.format(commands="\n".join(f"  {each:<10}{_words(_module(each))}" for each in COMMANDS)), end="")
     elif name == "--version":
-        print(f"rodfem {rodfem.__version__}")
+        print(_versions())
     elif name not in COMMANDS:
         near = get_close_matches(name, COMMANDS, n=1) or [" or ".join(COMMANDS)]
         Parser(prog="rodfem").error(f"unknown command {name!r}: choose {near[0]}")
@@ -39,6 +39,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _module(name).main(words)
         except InputError as trouble:
             complain(str(trouble))
+
+
+def _versions() -> str:
+    """A line for the program, and one for each library that computes."""
+    from rodfem.output.origin import versions  # imports dolfinx, which takes a second
+
+    found = {"rodfem": rodfem.__version__, **versions()}
+    return "\n".join(f"{name:<8}{version}" for name, version in found.items())
 
 
 def _module(name: str) -> ModuleType:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import platform
 import shlex
 import sys
@@ -19,11 +20,36 @@ def origin() -> dict[str, Any]:
     return {
         "command": shlex.join(sys.orig_argv),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": {
-            "python": platform.python_version(),
-            "dolfinx": dolfinx.__version__,
-            "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
-            "slepc": ".".join(map(str, SLEPc.Sys.getVersion())),
-            "numpy": np.__version__,
-        },
+        "versions": versions(),
     }
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the libraries that compute, each by its name in lower case.
+
+    That of MUMPS is absent where PETSc has it in another form than a shared library.
+    """
+    found = {
+        "python": platform.python_version(),
+        "dolfinx": dolfinx.__version__,
+        "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
+        "slepc": ".".join(map(str, SLEPc.Sys.getVersion())),
+        "mumps": _mumps(),
+        "numpy": np.__version__,
+    }
+    return {name: version for name, version in found.items() if version}
+
+
+def _mumps() -> str:
+    """Version of the MUMPS that PETSc is linked with, or nothing where that cannot be asked.
+
+    It is asked of MUMPS's own Fortran subroutine ``MUMPS_SET_VERSION(VERSION_STR)``, with the length of the text as its
+    hidden last argument.
+    """
+    try:
+        ask = ctypes.CDLL(PETSc.__file__).mumps_set_version_
+    except (AttributeError, OSError):
+        return ""
+    text = ctypes.create_string_buffer(b" " * 31, 32)
+    ask(text, ctypes.c_size_t(31))
+    return text.value.decode("ascii").strip()

@@ -14,6 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
+from rodfem.compat import slepc_errors
 from rodfem.errors import SceneError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
@@ -167,12 +168,36 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
     return deflated
 
 
+class EigenSolver(SLEPc.EPS):
+    """SLEPc's solver, all of whose functions that may give up raise :class:`PETSc.Error` then."""
+
+    def solve(self) -> None:
+        """Find the eigenvalues."""
+        with slepc_errors():
+            super().solve()
+
+    def setUp(self) -> None:
+        """Make the factors, and all else that :meth:`solve` needs."""
+        with slepc_errors():
+            super().setUp()
+
+    def setFromOptions(self) -> None:
+        """Overrule what is set by PETSc's options."""
+        with slepc_errors():
+            super().setFromOptions()
+
+    def getKrylovSchurKSP(self) -> PETSc.KSP:
+        """The solver of linear systems of spectrum slicing."""
+        with slepc_errors():
+            return super().getKrylovSchurKSP()
+
+
 def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str, *, symmetric: bool) -> SLEPc.EPS:
     """Krylov-Schur solver with shift-invert for the pencil ``matrix - mu mass``.
 
     Its options begin with ``prefix``; ``symmetric`` says that both matrices are, and the mass semidefinite.
     """
-    solver = SLEPc.EPS().create(matrix.comm)
+    solver = EigenSolver().create(matrix.comm)
     solver.setOptionsPrefix(prefix)
     solver.setOperators(matrix, mass)
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP if symmetric else SLEPc.EPS.ProblemType.GNHEP)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from importlib import metadata
 from pathlib import Path
 
+import petsc4py
 import pytest
 
+import rodfem
 from rodfem.app import console
 from rodfem.app.commands import COMMANDS
 
@@ -22,6 +26,23 @@ def test_every_command_is_listed_and_has_help(capsys: pytest.CaptureFixture[str]
         with pytest.raises(SystemExit) as left:
             console.main([command, "--help"])
         assert left.value.code == 0 and f"rodfem {command}" in capsys.readouterr().out
+
+
+def test_versions_are_those_of_the_libraries(capsys: pytest.CaptureFixture[str]) -> None:
+    """Against what their C headers and the package's metadata say."""
+    console.main(["--version"])
+    said = dict(line.split() for line in capsys.readouterr().out.splitlines())
+    assert list(said) == ["rodfem", "python", "dolfinx", "petsc", "slepc", "mumps", "numpy"]
+    assert said["numpy"] == metadata.version("numpy") and said["rodfem"] == rodfem.__version__
+    petsc = Path(petsc4py.get_config()["PETSC_DIR"])
+    for name, header in {
+        "petsc": petsc / "include" / "petscversion.h",
+        "mumps": Path("/usr/include/dmumps_c.h"),
+    }.items():
+        assert header.is_file()
+        defined = dict(re.findall(r'^#\s*define (\w+)\s+"?([\d.]+)"?', header.read_text(), flags=re.M))
+        numbers = [defined.get(f"PETSC_VERSION_{part}") for part in ("MAJOR", "MINOR", "SUBMINOR")]
+        assert said[name] == defined.get("MUMPS_VERSION", ".".join(map(str, numbers)))
 
 
 @pytest.mark.parametrize(
