@@ -1,11 +1,11 @@
 """Frequencies against the load for a rod under loads without a potential, and the loads at which they become unstable.
 
 At each load the equilibrium is solved for, and the left-most eigenvalues ``mu = omega^2`` of its pencil are found
-(:mod:`rodfem.diagram.frequency_rows`).  Where two real ones collide and become a complex pair, the square of half their
-difference ``D = ((mu1 - mu2)/2)^2`` passes through zero.  Unlike the eigenvalues, which have a square root there, ``D``
-is a smooth function of the load: the discriminant of the pencil projected on the two of them.  Its zero is found by
-Chebyshev interpolation, at spectral accuracy and without ever solving at the double eigenvalue.  Where a single real
-one passes through zero the rod diverges: the eigenvalue itself is smooth there.
+(:mod:`rodfem.diagram.frequency_rows`).  Where two real ones collide and become a complex pair, the square of half
+their difference ``D = ((mu1 - mu2)/2)^2`` passes through zero.  Unlike the eigenvalues, which have a square root
+there, ``D`` is a smooth function of the load: the discriminant of the pencil projected on the two of them.  Its zero
+is found by Chebyshev interpolation, at spectral accuracy and without ever solving at the double eigenvalue.  Where a
+single real one passes through zero the rod diverges: the eigenvalue itself is smooth there.
 """
 
 from __future__ import annotations
