@@ -46,13 +46,19 @@ class SoftStates:
         """Record the soft modes of a point, and its index as far as they are decided; whether there are any.
 
         On a richer mesh the point is at the same load (``fixed_load``), or on the plane across the branch.  With
-        ``compare`` the index there is asked for; eigenvalues that have another sign are soft, too.
+        ``compare`` the index there is asked for; eigenvalues that have another sign are soft, too.  Raises
+        :class:`ConvergenceError` where constraints that depend on each other leave less than no negative eigenvalue.
         """
         differing = self._differing(point, fixed_load) if compare and self._richer else 0
         if not differing and self._is_clear(point):
             return False
         near = near_zero(self.solver.inertia.at(point.x), least=differing)
         found = self.judgement(point, near, fixed_load=fixed_load)
+        if found.negative < 0:
+            raise ConvergenceError(
+                f"The count of negative eigenvalues at load {point.load:.8g} gave {found.negative}: the constraints "
+                "depend on each other, or nearly; remove those that follow from the others."
+            )
         point.negative, point.zero, point.undecided = found.negative, found.zero, found.undecided
         point.soft = list(found.soft)
         return bool(found.soft)

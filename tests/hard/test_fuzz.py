@@ -13,6 +13,9 @@ from hard.fuzz.oracle import scaling
 from hard.fuzz.scenes import scene
 from hard.fuzz.summary import in_words
 
+from rodfem import Discretization, Solver
+from rodfem.errors import ConvergenceError, SceneError
+
 pytestmark = pytest.mark.alone
 
 SCENES = [(1, 9), (1, 21), (1, 37), (1, 50), (1, 57)]
@@ -29,6 +32,13 @@ def test_a_random_scene(seed: int, number: int) -> None:
     assert found.rows > found.unclear
     assert (found.wrong, found.differs, found.refused) == ([], [], [])
     assert not any("symmetry" in sentence for sentence in found.said)
+
+
+def test_dependent_constraints_have_no_index() -> None:
+    """Both ends are held about d1, about which nothing bends: by MUMPS there was an index of -1."""
+    solver = Solver(scene(1, 98), Discretization("pointwise", 7, 5, factors="petsc"))
+    with pytest.raises((ConvergenceError, SceneError), match="depend on"):
+        solver.equilibrium(0.0)
 
 
 def test_a_difference_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
