@@ -28,12 +28,23 @@ SUFFIXES = {".py", ".pyi", ".c", ".js", ".css", ".html", ".typed", ""}
 pytestmark = pytest.mark.alone
 
 
+def tracked() -> set[str]:
+    """Files of the repository; none where there is none, or no git."""
+    if shutil.which("git") is None:
+        return set()
+    listed = subprocess.run(["git", "-C", str(HOME), "ls-files"], capture_output=True, text=True)
+    return set(listed.stdout.splitlines())
+
+
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A wheel and a source distribution, made from a copy without what tools left, and that copy."""
     pytest.importorskip("setuptools", minversion="77", reason="`make setup` installs a setuptools that builds wheels")
     folder = tmp_path_factory.mktemp("built")
     tree = Path(shutil.copytree(HOME, folder / "tree", ignore=LEFT))
+    for name in files(tree) - tracked() if tracked() else ():
+        (tree / name).unlink()  # a person's own
+    clean = Path(shutil.copytree(tree, folder / "clean"))
     make = "from setuptools import build_meta as b; print(b.build_sdist({0!r})); print(b.build_wheel({0!r}))"
     made = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", make.format(str(folder))],
@@ -41,7 +52,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
     return {
-        "tree": Path(shutil.copytree(HOME, folder / "clean", ignore=LEFT)),
+        "tree": clean,
         "sdist": next(folder.glob("*.tar.gz")),
         "wheel": next(folder.glob("*.whl")),
     }
