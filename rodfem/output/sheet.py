@@ -50,6 +50,13 @@ def axis_label(diagram: Mapping[str, Any]) -> str:
     return f"{words} {symbol}" if words else symbol
 
 
+def ordinate_in_words(diagram: Mapping[str, Any]) -> str:
+    """Ordinate of a diagram for its axis: its label, after its name where that is a symbol alone."""
+    name, label = diagram["ordinate"], diagram.get("ordinate_label") or ""
+    symbol = label.startswith("$") and label.endswith("$") and label.count("$") == 2
+    return f"{name} {label}" if symbol else label or name
+
+
 def mesh_in_words(d: Mapping[str, Any]) -> str:
     """Discretisation, as files record it, in words."""
     return f"{d['formulation']} formulation, {d['elements']} elements of degree {d['degree']}, {d['unknowns']} unknowns"
