@@ -23,6 +23,7 @@ from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance, follow
 from rodfem.continuation.special_points import FIRST
 from rodfem.diagram.bookkeeper import Bookkeeper, Recalled
 from rodfem.diagram.events import Events
+from rodfem.diagram.images import image_of
 from rodfem.diagram.journal import Journal
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
@@ -481,6 +482,7 @@ class Tracer:
             self._error_bars(branch)
             merge_doubles(branch)
         self._soft_modes(branch)
+        branch.image = image_of(branch, self.solver)
         for unexplained in branch.unexplained:
             self.observer.warn(str(unexplained))
         self.observer.finished(branch)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-COMPLETE = ("", "end of range", "closed loop", "not traced", "meets another branch")
-"""Ends that need no mark: the last one has that of its branch point."""
+COMPLETE = ("", "end of range", "closed loop", "not traced")
+"""Ends that need no mark."""
+MEETS = "meets"
+"""Beginning of an end that is on another branch, whose points say so."""
 BEGINS = "begins here: "
 """Beginning of the note at the first row of a branch that was traced to both sides."""
 
@@ -17,5 +19,5 @@ def endings(branch: Mapping[str, Any]) -> Iterator[tuple[int, str]]:
     begun = next((note.removeprefix(BEGINS) for note in notes if note.startswith(BEGINS)), "")
     for row, sentence in ((0, begun), (len(branch["columns"]["load"]) - 1, str(branch.get("ended") or ""))):
         reason = sentence.split(" at ")[0].split(":")[0].split(" any more")[0]
-        if reason not in COMPLETE:
+        if reason not in COMPLETE and not reason.startswith(MEETS):
             yield row, reason

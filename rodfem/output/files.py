@@ -152,6 +152,7 @@ def _branch_data(branch: Branch) -> dict[str, Any]:
         "columns": columns,
         "special": [_special_data(s) for s in branch.special],
         "singular_start": branch.singular_start,
+        "image": branch.image,
         "unexplained": [{"row": rows[id(u.a)], "before": u.before, "after": u.after} for u in branch.unexplained],
     }
 

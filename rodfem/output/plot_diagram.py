@@ -22,6 +22,7 @@ from rodfem.file_format import DIAGRAM
 from rodfem.output.contents import read_diagram
 from rodfem.output.endings import endings
 from rodfem.output.placement import dense, place_words
+from rodfem.output.plot_images import draw_images
 from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
 from rodfem.output.program import status_of, terse
 from rodfem.output.sheet import (
@@ -72,7 +73,8 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     planar rod that are stable in its plane but not in space are dashed, those whose stability is undecided dashes and
     dots, with the least and the greatest index.  Where a stable and another part lie on each
     other, the other one is drawn inside the stable one.  A segment in which the index changes without a special point
-    that says so has a mark of warning, and so has a first state that is singular.
+    that says so has a mark of warning, and so has a first state that is singular.  Images of branches by a symmetry of
+    the scene, of the opposite ordinate, are thin lines: they were not traced.
 
     Parameters
     ----------
@@ -172,6 +174,7 @@ def _draw_branches(
     in_space = any(piece.in_space is not None for piece in pieces)
     text = "negative eigenvalues" + (" in the plane (in space)" if in_space else "")
     handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=text))
+    handles += draw_images(axes, branches, [PALETTE[i % len(PALETTE)] for i in range(len(branches))])
     kinds = [*MARKERS, *(kind for kind in found if kind.startswith(ENDS))]
     points = {kind: np.unique(np.array(found[kind], float), axis=0) for kind in kinds if found.get(kind)}
     for kind, places in points.items():

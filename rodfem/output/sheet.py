@@ -45,8 +45,12 @@ def tex(text: str, always: bool = False) -> str:
 
 def axis_label(diagram: Mapping[str, Any]) -> str:
     """Load of a diagram for its axis: in words, where the scene has some, and its symbol."""
-    symbol = tex(diagram["parameter_label"], always=True)
-    words = str(diagram.get("parameter_words") or "").replace("$", "")
+    return named(str(diagram.get("parameter_words") or ""), diagram["parameter_label"])
+
+
+def named(words: str, label: str) -> str:
+    """A parameter for its axis: in words, where there are some, and its symbol in TeX."""
+    symbol, words = tex(label, always=True), words.replace("$", "")
     return f"{words} {symbol}" if words else symbol
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rodfem.errors import InputError
 from rodfem.modes.modes import rows_with_modes
 from rodfem.output.glyphs import glyphs_of
+from rodfem.output.plot_images import is_traced
 from rodfem.output.sheet import PALETTE
 from rodfem.output.solids import profile_of
 from rodfem.problem.setting import read as read_setting
@@ -53,7 +54,10 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
             setting = read_setting(group, row)
             modes[row] = motions_of(folder / "modes.h5", (name, row), here, setting, stage, shelf, found[row][0])
         along = profiles_data(group, states)
-        branches.append(branch_data(branch, here, colour) | _drawn(here, found) | along | {"modes": modes})
+        image = "" if is_traced(branch, data["branches"]) else branch.get("image", "")
+        branches.append(
+            branch_data(branch, here, colour) | _drawn(here, found) | along | {"modes": modes, "image": image}
+        )
     return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": _solids(shelf)}
 
 

@@ -200,7 +200,7 @@ def test_the_slider_shows_all_states_of_a_load(opened: Callable[..., Any]) -> No
 def test_modes_move(opened: Callable[..., Any]) -> None:
     page = opened("pinned")
     page.execute_script("import('report/store').then((store) => store.select(0, 0))")
-    until(page, lambda: "modes at" in page.find_element(By.ID, "modes").text)
+    until(page, lambda: shown(page) == ("straight", 0) and "modes at" in page.find_element(By.ID, "modes").text)
     page.find_element(By.CSS_SELECTOR, "#modes button").click()
     until(page, lambda: "grows" in page.find_element(By.ID, "modes").text)
     page.find_element(By.CSS_SELECTOR, "#modes button").click()
@@ -277,7 +277,7 @@ def long(payload: dict[str, Any]) -> dict[str, Any]:
         "bodies": [numbers] * POINTS,
         "maps": packed(maps),
         **dict.fromkeys(("estimate", "error", "spectrum", "omega2", "motion")),
-        **{"special": [], "unexplained": [], "modes": {}},
+        **{"special": [], "unexplained": [], "modes": {}, "endings": [], "image": ""},
     }
     return payload | {"branches": [branch], "start": [0, 0], "loci": []}
 

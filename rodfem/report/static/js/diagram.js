@@ -42,6 +42,12 @@ function line(branch, number, piece) {
   };
 }
 
+// The image of a piece by a symmetry of the scene, which takes the scene's ordinate to its opposite.
+function image(branch, number, piece) {
+  const { x, y, customdata, line: { color, dash } } = line(branch, number, piece), words = `image of ${escaped(branch.name)}, not traced: ${escaped(branch.image)}`;
+  return { x, y: y.map((value) => (value === null ? null : -value)), customdata, hovertemplate: `${words}<extra></extra>`, mode: "lines", opacity: 0.75, line: { color, width: 1.1, dash, simplify: false } };
+}
+
 function marks(branch, number, kind) {
   const rows = branch.special.filter((x) => x.drawn && x.kind === kind).map((x) => x.row);
   return points(branch, number, rows, SYMBOLS[kind]);
@@ -84,11 +90,12 @@ function traces() {
   const each = data.branches.map((branch, number) => [branch, number]);
   const thick = (trace) => -trace.line.width;
   const lines = each.flatMap(([b, i]) => b.pieces.map((piece) => line(b, i, piece))).sort((a, b) => thick(a) - thick(b));
+  const images = ordinate.key === "ordinate" ? each.filter(([b]) => b.image).flatMap(([b, i]) => b.pieces.map((piece) => image(b, i, piece))) : [];
   const single = each.filter(([b]) => !b.pieces.length).map(([b, i]) => points(b, i, [0], { size: 7, color: b.colour }));
   const special = Object.keys(SYMBOLS).flatMap((kind) => each.map(([b, i]) => marks(b, i, kind)));
   const doubts = each.map(([b, i]) => points(b, i, b.unexplained, UNEXPLAINED));
   const ends = each.map(([b, i]) => points(b, i, b.endings.map(([row]) => row), ENDS));
-  return [...lines, ...single, ...[...special, ...ends, ...doubts].filter((trace) => trace.x.length)];
+  return [...images, ...lines, ...single, ...[...special, ...ends, ...doubts].filter((trace) => trace.x.length)];
 }
 
 function redraw() {

@@ -31,6 +31,7 @@ export function start() {
       item(lineIcon("#555", WIDTHS[kind], DASHES[kind]), kind),
     ),
     ...Object.keys(SYMBOLS).filter((kind) => special.has(kind)).map((kind) => item(symbol(SYMBOLS[kind]), names[kind] ?? kind)),
+    ...[...new Set(data.branches.map((b) => b.image).filter(Boolean))].map((words) => item(lineIcon("#555", 1.1), `image, not traced: ${words}`)),
     ...[...new Set(data.branches.flatMap((b) => b.endings.map(([, reason]) => reason)))].map((reason) => item(symbol(ENDS), `ends: ${reason}`)),
     ...(data.branches.some((b) => b.unexplained.length) ? [item(symbol(UNEXPLAINED), "index change unexplained")] : []),
   );
