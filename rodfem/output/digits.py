@@ -23,7 +23,7 @@ def rounded_up(error: float) -> float:
 
 
 def number(value: float, error: float, resolved: bool | None = True, scale: float = 0.0) -> str:
-    """Write a number with the digits that its error supports, and its bar: ``0.3216501 (3e-07)``.
+    """Write a ``value`` with the digits that its error supports, and its bar: ``0.3216501 (3e-07)``.
 
     The bar is rounded up; to the error it adds what the digits left out amount to.  ``(at least 3e-02)`` where the mesh
     has not ``resolved`` what the number is of.  Without an ``error`` that is finite it says so, and is zero where it is
