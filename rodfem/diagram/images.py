@@ -11,6 +11,8 @@ from rodfem.continuation.solvers import StaticSolver
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
 from rodfem.tolerances import NEGLIGIBLE
 
+ZERO = 1e-9
+"""Ordinate, relative to the greatest one, below which it has no side."""
 SHARES = (0.5, 1.0)
 """Places along a branch, as shares of its rows, at whose states an image is asked for."""
 
@@ -23,8 +25,8 @@ def image_of(branch: Branch, solver: StaticSolver) -> str:
     """
     points = [point for point in branch.points if point.mesh == solver.mesh]
     chosen = [points[round(share * (len(points) - 1))] for share in SHARES] if points else []
-    size = max((abs(point.ordinate) for point in points), default=0.0)
-    if any(abs(point.ordinate) <= NEGLIGIBLE * size for point in chosen) or not chosen:
+    size = max([solver.units.ordinate, *(abs(point.ordinate) for point in points)])
+    if any(abs(point.ordinate) <= ZERO * size for point in chosen) or not chosen:
         return ""
     system, phase, known = solver.system, solver.system.phase, list[set[Mirror]]()
     for point in chosen:
