@@ -238,9 +238,7 @@ class Report(Observer):
         rows = [(b, s) for b in branches for s in b.special if s.point.spectrum]
         if rows:
             inertia = "the scene's inertia" if scene.has_inertia else "unit rotary inertia"
-            self.say(
-                f"\nLeft-most eigenvalues mu = omega^2 for {inertia} (without symmetry modes; errors not estimated)"
-            )
+            self.say(f"\nLeft-most eigenvalues mu = omega^2 for {inertia} (symmetry modes left out; no error bars)")
         for branch, s in rows:
             self.say(
                 f"  {branch.name:<12} {s.kind:<13} {s.point.load:<13.8g} "
