@@ -27,7 +27,7 @@ function values(b) {
     span.textContent = `${y ? "×" : x < 0 ? "▼" : "●"} ${digits(x, 4)}${y ? ` ${y > 0 ? "+" : "−"} ${digits(Math.abs(y), 4)} i` : ""}`;
     return span;
   });
-  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω²:" : "μ:", ...each] : []));
+  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω², no error bars:" : "μ, no error bars:", ...each] : []));
 }
 
 function line(list, name, text, code = false) {
