@@ -198,9 +198,10 @@ class Report(Observer):
         scene = system.scene
         self.say(f"\nSpecial points (in parentheses a bound of the error; ordinate: {scene.ordinate.name})")
         self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
+        scale = max([self.units.ordinate, *(abs(p.ordinate) for b in branches for p in b.points)])
         for branch in branches:
             for s in branch.special:
-                load, ordinate, index = in_words(s)
+                load, ordinate, index = in_words(s, scale)
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
                 self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {index}{zero}")
                 for mode in s.point.soft:
@@ -237,7 +238,7 @@ class Report(Observer):
         rows = [(b, s) for b in branches for s in b.special if s.point.spectrum]
         if rows:
             inertia = "the scene's inertia" if scene.has_inertia else "unit rotary inertia"
-            self.say(f"\nLeft-most eigenvalues mu = omega^2 for {inertia} (symmetry modes left out)")
+            self.say(f"\nLeft-most eigenvalues mu = omega^2 for {inertia} (symmetry modes left out; no error bars)")
         for branch, s in rows:
             self.say(
                 f"  {branch.name:<12} {s.kind:<13} {s.point.load:<13.8g} "
@@ -249,7 +250,9 @@ class Report(Observer):
         points = [p for b in branches for p in b.points if p.omega2]
         if not points:
             return
-        self.say(f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load}")
+        self.say(
+            f"\nFrequencies omega, the square roots of the left-most eigenvalues, against {load} (errors not estimated)"
+        )
         shown = points[:: max(1, (len(points) - 1) // (rows - 1))]
         columns = [_roots(p, self.units.omega2**0.5) for p in shown]
         widths = {

@@ -98,6 +98,8 @@ class Locus:
         State vector of each row, of the system on which the locus was computed; not saved.
     crossings
         Load and ordinate at the start, and wherever else the curve passes the second parameter's value there.
+    words
+        What the two parameters are, for the axes of pictures; empty where the scene does not say it.
     """
 
     scene: str
@@ -121,6 +123,7 @@ class Locus:
     discretization: dict[str, Any]
     states: list[PETSc.Vec] = field(default_factory=list)
     crossings: list[tuple[float, float]] = field(default_factory=list)
+    words: tuple[str, str] = ("", "")
 
     def passes(self, special: SpecialPoint) -> bool:
         """Whether the curve passes the line of its start again at another special point of that scene."""
@@ -140,6 +143,7 @@ class Locus:
         return out | {
             "parameters": list(self.names),
             "labels": list(self.labels),
+            "words": list(self.words),
             "bounds": [list(b) for b in self.bounds],
             "columns": columns,
             "without_estimate": np.flatnonzero(np.isinf(self.error[:, 0])).tolist(),
@@ -161,6 +165,7 @@ class Locus:
             **{name: data[name] for name in AS_THEY_ARE},
             names=(first, second),
             labels=tuple(data["labels"]),
+            words=tuple(data.get("words", ("", ""))),
             bounds=(tuple(data["bounds"][0]), tuple(data["bounds"][1])),
             values=np.array([columns[first], columns[second]]).T,
             index=np.array(columns["index"]),
@@ -186,7 +191,7 @@ class Locus:
         shown = sorted({0, n - 1, self.start, *marks, *np.linspace(0, n - 1, min(rows, n)).astype(int).tolist()})
         lines = [
             f"\nLocus of the {self.kind} in {self.names[0]} and {self.names[1]} (in parentheses the estimated error "
-            "of the discretisation across the curve)",
+            "of the discretisation across the curve, where it was asked for; of the ordinate it was not)",
             f"  {self.names[0]:<24} {self.names[1]:<24} {'ordinate':<14} index",
         ]
         for i in shown:
@@ -285,6 +290,7 @@ def locus(
         discretization=mesh_of(system),
         states=[n.x for n in nodes],
         crossings=crossings,
+        words=(scene.parameters[scene.load].words, scene.parameters[parameter].words),
     )
 
 

@@ -247,7 +247,8 @@ class Branch:
     branch: a branch point there, if it is one, is not located.  ``name`` is unique in the diagram; ``parent`` is the
     branch and the number of its special point that this one left, and ``depth`` the number of such switches.
     ``points`` and ``special`` are in order of arclength, ``ended`` says why no more follow, and ``unexplained`` lists
-    changes of index without a special point.
+    changes of index without a special point.  ``image`` names the symmetry of the scene that carries the branch to one
+    with the opposite ordinate, which is not traced; it is empty where there is none.
     """
 
     name: str
@@ -259,6 +260,7 @@ class Branch:
     unexplained: list[Unexplained] = field(default_factory=list)
     begins: int | None = None
     singular_start: int = 0
+    image: str = ""
 
     def __repr__(self) -> str:
         """Name, size and end."""

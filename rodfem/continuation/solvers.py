@@ -25,6 +25,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.fields import LOAD
 from rodfem.fem.newton import TOLERANCE, NewtonResult, correct, relax
+from rodfem.fem.resultants import Resultants
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
@@ -76,6 +77,11 @@ class StaticSolver:
         undeformed = np.array([1.0 if i == 2 else 0.0 for i in system.scene.free_strains])
         named = {f.turning.name: turned.reshape(*x.shape, -1), "v": undeformed, LOAD: load}
         return self.shape.with_centreline(NodalValues(f, f.filled(named), system.line))
+
+    @cached_property
+    def resultants(self) -> Resultants:
+        """Strains, contact forces and moments of the states, compiled when they are first asked for."""
+        return Resultants(self.shape)
 
     @property
     def units(self) -> Units:

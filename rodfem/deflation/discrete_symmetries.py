@@ -39,6 +39,13 @@ class Mirror:
         words = "diag(" + ", ".join(f"{s:+d}" for s in self.signs) + ")"
         return words + " and reversal of the rod" if self.reversal else words
 
+    def in_words(self) -> str:
+        """Say the same for people."""
+        axes = [f"e{i + 1}" for i, sign in enumerate(self.signs) if sign < 0]
+        kept = [f"e{i + 1}" for i, sign in enumerate(self.signs) if sign > 0]
+        words = {1: f"reflection along {axes[0]}", 2: f"half turn about {''.join(kept)}", 3: "inversion"}[len(axes)]
+        return words + (", ends exchanged" if self.reversal else "")
+
     def weights(self, field: str, components: tuple[int, ...], normal: int | None = None) -> np.ndarray:
         """Signs of the components of a field, or of scalar contact forces (``n``); ``normal`` that of the plane."""
         s = np.array(self.signs, dtype=float)
@@ -123,7 +130,12 @@ def generic_state(system: System, like: PETSc.Vec, amplitude: float, seed: int) 
 
 
 def mirrors(system: System, x: PETSc.Vec) -> list[Mirror]:
-    """Discrete symmetries of the equations at the load of ``x``, the identity left out."""
+    """Discrete symmetries of the equations at the load of ``x``, the identity left out.
+
+    None of a scene with constraints all along the rod: what a mirror does to their multipliers is not known.
+    """
+    if any(block.along for block in system.fields.blocks):
+        return []
     system.set_phase(None)
     base = generic_state(system, x, 0.2, 1)
     beside = generic_state(system, base, 0.2, 2)

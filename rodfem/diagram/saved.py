@@ -126,6 +126,7 @@ def _branch(entry: dict[str, Any], solvers: Sequence[StaticSolver], states: Path
     branch.depth = len(entry["name"].split(".")) if parent else 0
     branch.special = [_special(s, points, solvers) for s in entry["special"]]
     branch.singular_start = entry.get("singular_start", 0)
+    branch.image = entry.get("image", "")
     return branch
 
 

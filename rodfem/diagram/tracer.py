@@ -21,6 +21,7 @@ from rodfem.diagram.bookkeeper import Bookkeeper, Recalled
 from rodfem.diagram.branch_ends import closes, end_at_zero_stretch, last_admissible, meeting, singular_end
 from rodfem.diagram.equivalence import equivalent
 from rodfem.diagram.finders import FINDERS
+from rodfem.diagram.images import image_of
 from rodfem.diagram.journal import Journal
 from rodfem.diagram.persistent_zeros import PersistentZeros
 from rodfem.diagram.plan import Plan
@@ -321,6 +322,7 @@ class Tracer:
             self._error_bars(branch)
             merge_doubles(branch)
         self._soft_modes(branch)
+        branch.image = image_of(branch, self.solver)
         for unexplained in branch.unexplained:
             self.observer.warn(str(unexplained))
         self.observer.finished(branch)

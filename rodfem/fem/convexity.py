@@ -33,7 +33,7 @@ class Convexity:
         self.system = system
         e, f, scene = system.equations, system.fields, system.scene
         u, free = e.unknowns, scene.free_strains
-        values = e._components(u.v, len(free))
+        values = e.components(u.v, len(free))
         k = curvature(u.q, u.q.dx(0))
         x = ufl.variable(ufl.as_vector([*values, *(k[i] for i in range(3))]))
         v = strain(free, [x[i] for i in range(len(free))])

@@ -88,11 +88,11 @@ class Equations:
 
         f = self.unknowns = self._named(ufl.split(u))
         c = self.constants = self._constants(f.load)
-        v = strain(scene.free_strains, self._components(f.v, len(scene.free_strains)))
+        v = strain(scene.free_strains, self.components(f.v, len(scene.free_strains)))
         along = self._along(f, c, v)
         W = scene.energy(v, along.k, c)
         a, b = self._named(ufl.split(test), f.turned), self._named(ufl.split(trial), f.turned)
-        sites = [(part.of, *self._site(part, f, (a, b), along)) for part in scene.parts]
+        sites = [(part.of, *self.site(part, f, (a, b), along)) for part in scene.parts]
         inside = [(of, site) for of, site, measure in sites if measure is None and not of.nodal]
         rod = fields.formulation.integrand(self, f, c, W, along)
         L = (rod + sum(term for of, site in inside for term in of.lagrangian(site))) * dx
@@ -143,8 +143,11 @@ class Equations:
         slope = {} if r is None else {"dr": r.dx(0)}
         return place(f.q, R, c.s, r, v=v, k=k, length=self.fields.scene.length, **slope)
 
-    def _site(self, part: Part, f: Any, variations: Any, along: Place) -> tuple[Site, Any]:
-        """State where a part of the scene is, and the measure of its terms, None along the rod."""
+    def site(self, part: Part, f: Any, variations: Any, along: Place) -> tuple[Site, Any]:
+        """State where a ``part`` of the scene is, and the measure of its terms, None along the rod.
+
+        ``f`` are fields and scalars by name, ``variations`` two changes of them, ``along`` is the place along the rod.
+        """
         fields, scene = self.fields, self.fields.scene
         names = [x.name for x in part.of.unknowns(part.number, scene.normal, fields.formulation.centreline)]
         blocks = [f.fields[b.name] for b in part.of.blocks(part.number, fields.discretization.degree)]
@@ -193,7 +196,7 @@ class Equations:
         where the field is ``at``.
         """
         fields = {block.name: part for block, part in zip(self.fields.blocks, parts, strict=False)}
-        values = self._components(parts[-1], len(self.fields.unknown_scalars) + 1)
+        values = self.components(parts[-1], len(self.fields.unknown_scalars) + 1)
         scalars = {x.name: value for x, value in zip(self.fields.unknown_scalars, values, strict=False)}
         named = {name: fields.get(name) for name in ("eta", "v", "r", "n")}
         turning = self.fields.turning
@@ -202,7 +205,8 @@ class Equations:
         return SimpleNamespace(**named, q=q, turned=turned, fields=fields, scalars=scalars, load=values[-1])
 
     @staticmethod
-    def _components(part: Any, size: int) -> list[Any]:
+    def components(part: Any, size: int) -> list[Any]:
+        """Components of a part of a mixed function, of so many; none where there is no such part."""
         return [] if part is None else [part] if size == 1 else [part[i] for i in range(size)]
 
     def _constants(self, load: Any, s: float | None = None) -> Constants:

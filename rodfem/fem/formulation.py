@@ -65,6 +65,10 @@ class Formulation(ABC):
         """
 
     @abstractmethod
+    def contact_force(self, equations: Equations, f: Any, c: Constants) -> list[Any]:
+        """Components of the contact force in space (3,); ``equations``, ``f`` and ``c`` as for :meth:`integrand`."""
+
+    @abstractmethod
     def position(self, equations: Equations, f: Any, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
         """Position (3,) where ``at`` restricts a field to, None where there is none.
 

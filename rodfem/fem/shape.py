@@ -125,12 +125,12 @@ class Shape:
         """
         system, f, state = self.system, self.system.fields, self.system.at(x)
         out: dict[str, Any] = {"elements": f.discretization.elements}
-        start = self._from_left(self.start)[:, None, None]
+        start = self.from_left(self.start)[:, None, None]
         h = np.diff(start, axis=0, append=system.scene.interval[1])
         out["s"] = unique(start + h * self.nodes[None, :, None])[:, 0]
         for block in f.blocks:
             values = state.values(block.name)[self.cells][:, np.argsort(compat.nodes(block.degree)), :]
-            out[block.name] = self.joined(values) if block.continuous else self._from_left(values)
+            out[block.name] = self.joined(values) if block.continuous else self.from_left(values)
         r, chord = f.formulation.nodal(self, state)
         out["r"] = r + f.formulation.offset(f, state, out["s"], chord)
         out["q"] = f.turning.quaternion(out[f.turning.name])
@@ -189,13 +189,13 @@ class Shape:
         """Rows of all ranks, one for each element, in the order of the ranks."""
         return values if self.system.comm.size == 1 else np.concatenate(self.system.comm.allgather(values))
 
-    def _from_left(self, values: np.ndarray) -> np.ndarray:
+    def from_left(self, values: np.ndarray) -> np.ndarray:
         """Rows of all ranks, one for each element, from left to right."""
         return self.gather(values)[self._sequence]
 
     def joined(self, values: np.ndarray) -> np.ndarray:
         """Values of a continuous field at its nodes from left to right, (cells, nodes, ...) -> (m, ...)."""
-        return unique(self._from_left(values))
+        return unique(self.from_left(values))
 
     def nodal(self, values: np.ndarray) -> np.ndarray:
         """The same, of nodal values of a field of the degree of the rotation."""
@@ -208,7 +208,7 @@ class Shape:
         """
         pieces = np.einsum("g,cgi,c->ci", self.gauss.weights, values, self.size)
         inside = np.einsum("ng,cgi,c->cni", self._to_nodes, values, self.size)
-        before = np.vstack([np.zeros(3), np.cumsum(self._from_left(pieces), axis=0)])
+        before = np.vstack([np.zeros(3), np.cumsum(self.from_left(pieces), axis=0)])
         return before[self._first][:, None, :], inside, before[-1]
 
     def slopes(self, state: NodalValues) -> np.ndarray:

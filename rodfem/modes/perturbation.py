@@ -74,7 +74,7 @@ class Motions(Shape):
         """Weights (m,) of the nodes in an integral over the rod: Gauss-Lobatto quadrature in each element."""
         at_gauss = self._q_at_gauss[:, self.order]
         each = self.gauss.weights @ at_gauss
-        sizes = self._from_left(self.size)
+        sizes = self.from_left(self.size)
         out = np.zeros(len(sizes) * (len(each) - 1) + 1)
         for node, weight in enumerate(each):
             out[node : len(out) - len(each) + node + 1 : len(each) - 1] += weight * sizes

@@ -86,6 +86,7 @@ BRANCH: Kinds = {
     "columns": (_named(lambda x: isinstance(x, list)), "lists by name"),
     "special": OBJECTS,
     "singular_start": COUNT,
+    "image": TEXT,
     "unexplained": OBJECTS,
 }
 COLUMN: Kinds = {

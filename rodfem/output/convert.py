@@ -16,7 +16,7 @@ from rodfem.errors import InputError
 from rodfem.file_format import STATES, UNREADABLE
 from rodfem.modes.modes import load_modes, rows_with_modes
 from rodfem.output.contents import read_diagram
-from rodfem.output.strains import strains
+from rodfem.output.profiles import POINTS, PROFILES, profiles_of
 from rodfem.output.vtkhdf import write_curves
 from rodfem.problem.quaternions import directors
 from rodfem.whole_files import write_whole
@@ -37,8 +37,9 @@ class Rows:
     columns
         Numbers of the rows, by name (rows,): load, ordinate, index, ...
     fields
-        At the nodes, by name, an array (m, k) for each row: ``s``, ``r``, ``q``, directors ``d1`` to ``d3``, strains
-        ``v``, curvatures ``k``, and the nodal unknowns of the scene.
+        At the nodes, by name, an array (m, k) for each row: ``s``, ``r``, ``q``, directors ``d1`` to ``d3``, the nodal
+        unknowns of the scene, and, along the directors, strains ``v``, curvatures ``k``, contact force ``n`` and moment
+        ``m``, which a file of an earlier version lacks.
     """
 
     name: str
@@ -79,14 +80,17 @@ def _columns(columns: Mapping[str, list[Any]], stored: Mapping[str, Floats]) -> 
 def _fields(stored: Mapping[str, Floats]) -> dict[str, list[Floats]]:
     """Nodal values of each row, without the nodes that only rows of finer meshes have."""
     s = stored["s"]
-    nodal = {name: x for name, x in stored.items() if x.ndim > 1 and x.shape[:2] == s.shape and name not in ("v", "k")}
-    out: dict[str, list[Floats]] = {name: [] for name in (*nodal, "d1", "d2", "d3", "v", "k")}
+    others = {POINTS, *PROFILES, *PROFILES.values()}
+    nodal = {name: x for name, x in stored.items() if x.ndim > 1 and x.shape[:2] == s.shape and name not in others}
+    out: dict[str, list[Floats]] = {}
     for row, there in enumerate(np.isfinite(s)):
         here = {name: x[row, there] for name, x in nodal.items()}
         frames = directors(here["q"])
-        v, k = strains(here["s"], here["r"], here["q"], int(stored["elements"][row]))
-        for name, values in (here | {f"d{i + 1}": frames[:, :, i] for i in range(3)} | {"v": v, "k": k}).items():
-            out[name].append(values)
+        here |= {f"d{i + 1}": frames[:, :, i] for i in range(3)}
+        if (profiles := profiles_of(stored, row)) is not None:
+            here |= {symbol: profiles.at_nodes(symbol, here["s"]) for symbol in PROFILES}
+        for name, values in here.items():
+            out.setdefault(name, []).append(values)
     return out
 
 

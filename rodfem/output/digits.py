@@ -22,14 +22,15 @@ def rounded_up(error: float) -> float:
     return float(f"{ceil(error / 10.0**power * (1 - NEGLIGIBLE))}e{power}")
 
 
-def number(value: float, error: float, resolved: bool | None = True) -> str:
-    """Write a number with the digits that its error supports, and its bar: ``0.3216501 (3e-07)``.
+def number(value: float, error: float, resolved: bool | None = True, scale: float = 0.0) -> str:
+    """Write a ``value`` with the digits that its error supports, and its bar: ``0.3216501 (3e-07)``.
 
     The bar is rounded up; to the error it adds what the digits left out amount to.  ``(at least 3e-02)`` where the mesh
-    has not ``resolved`` what the number is of.
+    has not ``resolved`` what the number is of.  Without an ``error`` that is finite it says so, and is zero where it is
+    round-off of numbers of the ``scale``.
     """
     if not isfinite(error):
-        return f"{value:.8g} (no estimate)"
+        return f"{0.0 if abs(value) <= NEGLIGIBLE * scale else value:.8g} (no estimate)"
     digits = min(max(-floor(log10(rounded_up(error)) + WHOLE), 0), 13) if error > 0 else 13
     least = "at least " if resolved is False else ""
     if (error > 0 and error < FINEST) or abs(value) >= LARGEST:  # of a rod whose units are far from its own size
@@ -47,12 +48,15 @@ def in_decimals(value: float, decimals: int, one: float) -> str:
     return "0" if abs(value) < 10.0**-decimals * one else f"{value:.{max(decimals - 4, 3)}e}"
 
 
-def in_words(special: SpecialPoint) -> tuple[str, str, str]:
-    """Load, ordinate and index of a special point, as tables have them; a load that is given is exact."""
+def in_words(special: SpecialPoint, scale: float = 0.0) -> tuple[str, str, str]:
+    """Load, ordinate and index of a special point, as tables have them; a load that is given is exact.
+
+    ``scale`` is the size of ordinates of the diagram.
+    """
     point = special.point
     exact = special.kind.given and special.test_function != "stretch"
     load = f"{point.load:.10g}" if exact else number(point.load, special.error_estimate, special.resolved)
-    return load, number(point.ordinate, special.ordinate_error, special.resolved), index_in_words(special)
+    return load, number(point.ordinate, special.ordinate_error, special.resolved, scale), index_in_words(special)
 
 
 def index_in_words(special: SpecialPoint) -> str:

@@ -152,6 +152,7 @@ def _branch_data(branch: Branch) -> dict[str, Any]:
         "columns": columns,
         "special": [_special_data(s) for s in branch.special],
         "singular_start": branch.singular_start,
+        "image": branch.image,
         "unexplained": [{"row": rows[id(u.a)], "before": u.before, "after": u.after} for u in branch.unexplained],
     }
 
@@ -236,11 +237,12 @@ def states_of(
     """Contents of an HDF5 file with the states of ``branches`` added, on rank 0; collective.
 
     Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
-    every further field and scalar with P rows, and under ``special/<i>`` the null vectors of its special points:
-    displacement ``r``, ``rotation`` in the space frame, and the change of ``q``.  Below it are the groups of
-    :func:`rodfem.problem.supports.write`, for pictures; the file has the name of the ``first`` branch and the bending
-    stiffness under ``section``.  ``solvers`` are those of the meshes that points name; the rows of a mesh with fewer
-    nodes end in nan.  ``path`` is that of the file, which stays as it is; ``run`` names the run that it is of.
+    every further field and scalar with P rows, strains, forces and moments (:mod:`rodfem.fem.resultants`), and under
+    ``special/<i>`` the null vectors of its special points: displacement ``r``, ``rotation`` in the space frame, and the
+    change of ``q``.  Below it are the groups of :func:`rodfem.problem.supports.write`, for pictures; the file has the
+    name of the ``first`` branch and the bending stiffness under ``section``.  ``solvers`` are those of the meshes that
+    points name; the rows of a mesh with fewer nodes end in nan.  ``path`` is that of the file, which stays as it is;
+    ``run`` names the run that it is of.
     """
     sampled = [_sampled(branch, solvers) for branch in branches]
     system = solvers[0].system
@@ -266,7 +268,7 @@ def states_of(
 
 def _sampled(branch: Branch, solvers: Sequence[StaticSolver]) -> tuple[list[dict[str, np.ndarray]], list[list[Motion]]]:
     """Samples of the states of a branch, and the null vectors of its special points as motions; collective."""
-    samples = [solvers[p.mesh].shape.sample(p.x) for p in branch.points]
+    samples = [solvers[p.mesh].shape.sample(p.x) | solvers[p.mesh].resultants.at(p.x) for p in branch.points]
     motions = {i: Motions(solvers[i].system) for i in sorted({s.point.mesh for s in branch.special})}
     return samples, [[motions[s.point.mesh].at(s.point.x, v) for v in s.null_vectors] for s in branch.special]
 

@@ -188,6 +188,13 @@ ENTRIES = {
         "Side of a locus of branch points on which the branch has the index 0; shaded next to the curve only, as far "
         "as the index was counted."
     ),
+    "stable, as far as these curves tell": (
+        "Between the stable side of a locus and the next one, or the bound of the load: stable unless a special point "
+        "that no locus follows lies between."
+    ),
+    "image, not traced": (
+        "Branch that a symmetry of the scene makes of a traced one, with the opposite ordinate: as stable as that."
+    ),
     "start": "Where a locus was started: the special point of the diagram.",
     "turning point | turns": "Where a locus turns back in the second parameter.",
     "cusp": "Where two folds meet and vanish: beyond it there is no hysteresis.",

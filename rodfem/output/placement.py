@@ -23,8 +23,12 @@ ROOM = 100.0
 """Cost of a place above which there is no room for a word."""
 MOST_INSIDE = 8
 """Branches up to which the legend may stand inside the axes."""
+LARGEST, HIGH = 8.5, 195.0
+"""Size of the font of a legend at most, and that of all its lines together, in points."""
 HEIGHT = FONT * DPI / 72.0
 """Height of a line of text in pixels."""
+GAPS = (6.0, 10.0, 16.0)
+"""Distances of a word from its curve, in pixels: beyond its halo."""
 NAME = 0.8
 """Size of the name of a branch relative to that of an index."""
 
@@ -57,7 +61,7 @@ def place_words(
     for handles in (others, branches + others) if few else (branches + others,):
         box, obstacles = _place_legend(axes, handles, pieces, points, few)
         words = _Words(axes, [box], obstacles)
-        words.indices(pieces)
+        words.indices(pieces, all_of_them=few)
         if handles is not others or words.names(pieces):
             return
         words.remove()
@@ -76,14 +80,17 @@ class _Words:
         for text in self.texts:
             text.remove()
 
-    def indices(self, pieces: Sequence[Piece]) -> None:
-        """Write the index beside each piece, near its middle and off everything else."""
+    def indices(self, pieces: Sequence[Piece], *, all_of_them: bool) -> None:
+        """Write the index beside each piece, near its middle and off everything else.
+
+        ``all_of_them``: each index of a branch once even where there is no room.
+        """
         seen = set()
         for curve, length, piece in self._longest_first(pieces):
             needed = (piece.branch, piece.label) not in seen
             seen.add((piece.branch, piece.label))
             cost, box = self._best(curve, piece.label, 1.0)
-            if needed or (cost < ROOM and length > 1.6 * HEIGHT):  # else no room
+            if (needed and all_of_them) or (cost < ROOM and length > 1.6 * HEIGHT):  # else no room
                 self._write(box, piece.label, piece.colour, weight="bold")
 
     def names(self, pieces: Sequence[Piece]) -> bool:
@@ -105,7 +112,7 @@ class _Words:
         """Cost and box of the best place for a word of a relative size beside a curve (k, 2), in pixels."""
         half = np.array([0.33 * size * HEIGHT * len(word) + 6.0, 0.38 * size * HEIGHT + 6.0])
         best, chosen = math.inf, self.taken[0]
-        for share, gap, side in product(np.linspace(0.1, 0.9, 13), (2.0, 8.0, 16.0), (1.0, -1.0)):
+        for share, gap, side in product(np.linspace(0.1, 0.9, 13), GAPS, (1.0, -1.0)):
             middle = round(share * (len(curve) - 1))
             tangent = curve[min(middle + 4, len(curve) - 1)] - curve[max(middle - 4, 0)]
             normal = side * np.array([-tangent[1], tangent[0]]) / max(math.hypot(*tangent), POINT)
@@ -141,7 +148,8 @@ def _place_legend(
     corners = ("upper left", "upper right", "lower left", "lower right") if inside else ()
     beside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.015, 1.0), "borderaxespad": 0.0}
     for style in (*({"loc": corner} for corner in corners), beside):
-        legend = axes.legend(handles=handles, fontsize=min(8.5, 195.0 / len(handles)), **style)
+        font = min(LARGEST, HIGH / len(handles))
+        legend = axes.legend(handles=handles, fontsize=font, markerscale=font / LARGEST, **style)
         axes.figure.draw_without_rendering()
         box = legend.get_window_extent().padded(8.0)
         lines = [dense(axes, piece.curve)[0] for piece in pieces]

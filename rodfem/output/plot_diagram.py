@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,25 @@ from numpy.typing import NDArray
 from rodfem.continuation.kinds import IMPERFECT, KINDS
 from rodfem.file_format import DIAGRAM
 from rodfem.output.contents import read_diagram
+from rodfem.output.endings import endings
 from rodfem.output.placement import dense, place_words
+from rodfem.output.plot_images import draw_images
 from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
 from rodfem.output.program import status_of, terse
-from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, axis_label, mesh_in_words, save, tex
+from rodfem.output.sheet import (
+    DPI,
+    FONT,
+    HALO,
+    PALETTE,
+    SIZE,
+    STYLE,
+    at_most,
+    axis_label,
+    mesh_in_words,
+    ordinate_in_words,
+    save,
+    tex,
+)
 from rodfem.output.view import POINT
 
 __all__ = ["draw_diagram", "main"]
@@ -41,8 +56,6 @@ MARKERS: dict[str, Mapping[str, Any]] = {
 ENDS = "ends: "
 """Beginning of the words for the end of a branch before the range ends."""
 END_MARKER = {"marker": "X", "ms": 8.5, "mfc": "white", "mec": "#B3123E", "mew": 1.3}
-COMPLETE = ("end of range", "closed loop", "not traced")
-"""Ends of branches that need no mark."""
 SHAPES = ("", "^", "<", "v", ">", "p", "h")
 """Marks along the curves of branches, another one whenever the hues are used up."""
 HUES, APART, TINY_MARK = 7, 0.08, 5.0
@@ -60,7 +73,8 @@ def draw_diagram(diagram: Mapping[str, Any], path: Path) -> Path:
     planar rod that are stable in its plane but not in space are dashed, those whose stability is undecided dashes and
     dots, with the least and the greatest index.  Where a stable and another part lie on each
     other, the other one is drawn inside the stable one.  A segment in which the index changes without a special point
-    that says so has a mark of warning, and so has a first state that is singular.
+    that says so has a mark of warning, and so has a first state that is singular.  Images of branches by a symmetry of
+    the scene, of the opposite ordinate, are thin lines: they were not traced.
 
     Parameters
     ----------
@@ -109,7 +123,7 @@ def figure_of(diagram: Mapping[str, Any]) -> Figure:
                     **NOTE,
                 )
         axes.set_xlabel(axis_label(diagram), fontsize=FONT + 1)
-        axes.set_ylabel(tex(diagram.get("ordinate_label") or diagram["ordinate"]))
+        axes.set_ylabel(tex(ordinate_in_words(diagram)))
         title = figure.suptitle(tex(diagram["title"]), fontsize=FONT + 2)
         footer = figure.text(0.012, 0.013, _footer(diagram), color="0.4", fontsize=FONT - 3)
         for text in (title, footer):  # one line each: shrink what is too long
@@ -126,13 +140,6 @@ def _is_flat(branches: Sequence[Mapping[str, Any]]) -> bool:
     bars = [point.get("ordinate_error_estimate") for branch in branches for point in branch.get("special", [])]
     error = max((bar for bar in bars if bar is not None), default=0.0)
     return all(abs(x) <= error for branch in branches for x in branch["columns"]["ordinate"])
-
-
-def _ends(branch: Mapping[str, Any]) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Why a branch ends before the range does, in a few words, and its last load and ordinate."""
-    reason = str(branch.get("ended", "")).split(" at ")[0].split(":")[0].split(" any more")[0]
-    if reason and reason not in COMPLETE and not reason.startswith("meets"):
-        yield f"{ENDS}{reason}", tuple(branch["columns"][key][-1] for key in ("load", "ordinate"))
 
 
 def _draw_branches(
@@ -155,8 +162,9 @@ def _draw_branches(
         for point in branch.get("special", []):
             found.setdefault(point["kind"], []).append((point["load"], point["ordinate"]))
         found.setdefault(UNEXPLAINED, []).extend(_unexplained(branch))
-        for reason, place in _ends(branch):
-            found.setdefault(reason, []).append(place)
+        for row, reason in endings(branch):
+            place = tuple(branch["columns"][key][row] for key in ("load", "ordinate"))
+            found.setdefault(f"{ENDS}{reason}", []).append(place)
         if branch.get("singular_start"):
             found.setdefault(SINGULAR, []).append(tuple(branch["columns"][key][0] for key in ("load", "ordinate")))
     for piece in sorted(pieces, key=lambda piece: -piece.negative):  # the stable ones on top: see _uncover
@@ -166,6 +174,7 @@ def _draw_branches(
     in_space = any(piece.in_space is not None for piece in pieces)
     text = "negative eigenvalues" + (" in the plane (in space)" if in_space else "")
     handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=text))
+    handles += draw_images(axes, branches, [PALETTE[i % len(PALETTE)] for i in range(len(branches))])
     kinds = [*MARKERS, *(kind for kind in found if kind.startswith(ENDS))]
     points = {kind: np.unique(np.array(found[kind], float), axis=0) for kind in kinds if found.get(kind)}
     for kind, places in points.items():

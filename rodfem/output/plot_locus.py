@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rodfem.continuation.kinds import BRANCH_POINT, FOLD, KINDS, USER
+from rodfem.continuation.kinds import BRANCH_POINT, KINDS, USER
 from rodfem.file_format import LOCUS
-from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, save, tex
+from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, named, save, tex
 from rodfem.output.view import POINT
 
 LINES = {name: (PALETTE[kind.line[0]], kind.line[1]) for name, kind in KINDS.items() if kind.line is not None}
@@ -29,6 +29,10 @@ POINTS: dict[str, dict[str, Any]] = {
 STABLE_SIDE, BAND, STEEP = "#CDE9DF", 60.0, 0.05
 """Colour and width, in pixels, of the shade on the stable side of a curve; vertical component of the unit normal at the
 start below which that has no side of the load."""
+STABLE_REGION = "#EBF6F1"
+"""Colour of what lies between the stable side of a curve and the next one, or the bound of the load."""
+AFTER, ASIDE = 0.3, 30.0
+"""Share of its rows after which the indices of a curve stand, and their distance from it, in pixels."""
 ROOM = 0.1
 """Share of the height above and below the curves, for the indices that stand beside them."""
 
@@ -37,7 +41,8 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     """Draw loci of one scene in the plane of its two parameters, one over the other.
 
     The first parameter, the load, is upwards.  Beside each curve stand the indices of the equilibria on its two sides
-    where they were counted, as ``0|1``; the stable side of a curve of branch points is shaded next to it.
+    where they were counted, as ``0|1``; the stable side of a curve of branch points is shaded next to it, and paler as
+    far as the next curve: there stability is known as far as these curves tell, as no other one was looked for.
 
     Parameters
     ----------
@@ -79,22 +84,72 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
                 style = POINTS.get("ends" if BRANCH_POINT in what else what.split()[0])
                 if style:
                     axes.plot(x[row], y[row], linestyle="none", zorder=5, path_effects=HALO, **style)
-            low, high = columns["index"][len(x) // 2]
-            if low >= 0:
-                place = (x[len(x) // 2], y[len(x) // 2])
-                aside = (8, -18) if kind == FOLD else (6, 6)
-                text = axes.annotate(f"{low}|{high}", place, aside, textcoords="offset points", color=colour)
-                text.set(weight="bold", path_effects=HALO)
+        for one in loci:
+            _fill_stable_region(axes, one, loci)
         figure.draw_without_rendering()
         for one in loci:
             _shade_stable_side(axes, one)
-        axes.set_xlabel(tex(loci[0]["labels"][1], always=True), fontsize=FONT + 3)
-        axes.set_ylabel(tex(loci[0]["labels"][0], always=True), fontsize=FONT + 3)
+            _write_indices(axes, one)
+        load, other = (named(*pair) for pair in zip(loci[0].get("words", ("", "")), loci[0]["labels"], strict=True))
+        axes.set_xlabel(other, fontsize=FONT + 1)
+        axes.set_ylabel(load, fontsize=FONT + 1)
         axes.set_title(tex(loci[0]["title"]))
-        handles = {handle.get_label(): handle for handle in (*axes.get_lines(), *axes.patches)}
+        handles = {handle.get_label(): handle for handle in (*axes.get_lines(), *axes.patches, *axes.collections)}
         axes.legend(handles=list(handles.values()), fontsize=8.5)
         figure.supxlabel(_footer(loci), fontsize=FONT - 3, color="0.4", x=0.012, ha="left")
     return save(figure, path)
+
+
+def _write_indices(axes: Axes, one: Mapping[str, Any]) -> None:
+    """Write the indices on both sides beside a curve, off its start."""
+    row = round(AFTER * (len(one["columns"]["index"]) - 1))
+    low, high = one["columns"]["index"][row]
+    if low < 0:
+        return
+    places = axes.transData.transform(np.column_stack([one["columns"][name] for name in reversed(one["parameters"])]))
+    tangent = places[min(row + 1, len(places) - 1)] - places[max(row - 1, 0)]
+    normal = np.array([-tangent[1], tangent[0]]) / max(np.hypot(*tangent), POINT)
+    normal *= -1.0 if normal[1] < 0.0 else 1.0
+    at = axes.transData.inverted().transform(places[row] + ASIDE * np.array([1.5, 1.0]) * normal)
+    colour = LINES[one["kind"]][0]
+    text = axes.text(*at, f"{low}|{high}", color=colour, weight="bold", ha="center", va="center", zorder=6)
+    text.set(path_effects=HALO)
+
+
+def _fill_stable_region(axes: Axes, one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> None:
+    """Fill what lies between the stable side of a locus of branch points and the next locus, or the load's bound.
+
+    Only of a curve with one load for each value of the other parameter.
+    """
+    columns, (load, other) = one["columns"], one["parameters"]
+    x, y = (np.asarray(columns[name], dtype=float) for name in (other, load))
+    side, low = one.get("lower"), [pair[0] for pair in columns["index"]]
+    steps = np.diff(x)
+    if not side or any(low) or len(x) < 2 or not ((steps > 0).all() or (steps < 0).all()):
+        return
+    order = np.argsort(x)
+    grid = np.linspace(x.min(), x.max(), 400)
+    edge = np.interp(grid, x[order], y[order])
+    end = np.full(len(grid), float(one["bounds"][0][int(side > 0)]))
+    for another in loci:
+        if another is not one:
+            for level in _levels(another, grid):
+                between = side * (level - edge) > 0
+                end = np.where(between & (side * (level - end) < 0), level, end)
+    axes.fill_between(
+        grid, edge, end, color=STABLE_REGION, lw=0, zorder=-1, label="stable, as far as these curves tell"
+    )
+
+
+def _levels(one: Mapping[str, Any], grid: np.ndarray) -> list[np.ndarray]:
+    """Loads (len(grid),) at which each segment of a locus has these values of the second parameter; nan where none."""
+    load, other = one["parameters"]
+    x, y = (np.asarray(one["columns"][name], dtype=float) for name in (other, load))
+    found = []
+    for i in np.flatnonzero(np.diff(x) != 0):
+        share = (grid - x[i]) / (x[i + 1] - x[i])
+        found.append(np.where((share >= 0) & (share <= 1), y[i] + share * (y[i + 1] - y[i]), np.nan))
+    return found
 
 
 def _shade_stable_side(axes: Axes, one: Mapping[str, Any]) -> None:

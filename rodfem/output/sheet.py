@@ -45,9 +45,20 @@ def tex(text: str, always: bool = False) -> str:
 
 def axis_label(diagram: Mapping[str, Any]) -> str:
     """Load of a diagram for its axis: in words, where the scene has some, and its symbol."""
-    symbol = tex(diagram["parameter_label"], always=True)
-    words = str(diagram.get("parameter_words") or "").replace("$", "")
+    return named(str(diagram.get("parameter_words") or ""), diagram["parameter_label"])
+
+
+def named(words: str, label: str) -> str:
+    """A parameter for its axis: in words, where there are some, and its symbol in TeX."""
+    symbol, words = tex(label, always=True), words.replace("$", "")
     return f"{words} {symbol}" if words else symbol
+
+
+def ordinate_in_words(diagram: Mapping[str, Any]) -> str:
+    """Ordinate of a diagram for its axis: its label, after its name where that is a symbol alone."""
+    name, label = diagram["ordinate"], diagram.get("ordinate_label") or ""
+    symbol = label.startswith("$") and label.endswith("$") and label.count("$") == 2
+    return f"{name} {label}" if symbol else label or name
 
 
 def mesh_in_words(d: Mapping[str, Any]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from rodfem.continuation.kinds import KINDS
 from rodfem.output.digits import number
+from rodfem.output.endings import endings
 from rodfem.output.plot_pieces import pieces_of
 from rodfem.report.packing import plain
 from rodfem.report.shapes import Shapes
@@ -37,6 +38,7 @@ def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str) -> dict[
         "colour": colour,
         "parent": branch["parent"],
         "ended": branch["ended"],
+        "endings": [list(ending) for ending in endings(branch)],
         "load": columns["load"],
         "negative": columns["negative"],
         "ordinates": {name: plain(np.array(columns[name], dtype=float)) for name in _listed(columns)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,11 @@ def loci_of(folder: Path, data: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Loci of a folder in the order of their numbers; raises :class:`InputError` for one of another load."""
     files = sorted(folder.glob("locus-*.json"), key=lambda path: (len(path.name), path.name))
     return [_locus(path, data) for path in files]
+
+
+def _words(one: Mapping[str, Any]) -> str:
+    """The second parameter in words; none in a file that lacks them."""
+    return str((one.get("words") or ("", ""))[1]).replace("$", "")
 
 
 def _locus(path: Path, data: Mapping[str, Any]) -> dict[str, Any]:
@@ -43,6 +49,6 @@ def _locus(path: Path, data: Mapping[str, Any]) -> dict[str, Any]:
         "index": index,
         "marks": [{"row": row, "kind": kind} for row, kind in marks],
         "parameter": other,
-        "label": html_of(str(one["labels"][1]), always=True),
+        "label": " ".join(filter(None, (escape(_words(one)), html_of(str(one["labels"][1]), always=True)))),
         "here": data["constants"][other],
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import h5py
 from rodfem.errors import InputError
 from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.contents import check_run, read_diagram
-from rodfem.output.sheet import mesh_in_words
+from rodfem.output.sheet import mesh_in_words, ordinate_in_words
 from rodfem.report.branches import DERIVED, ordinates_of
 from rodfem.report.labels import html_of, plain_of
 from rodfem.report.loaded import Loaded
@@ -39,14 +40,14 @@ def payload_of(folder: Path) -> dict[str, Any]:
 
 def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Titles, labels, constants and origin."""
-    label = data.get("ordinate_label") or data["ordinate"]
+    label, words = ordinate_in_words(data), str(data.get("parameter_words") or "").replace("$", "")
     names = {"ordinate": data["ordinate"], **DERIVED}
     return {
         "scene": data["scene"],
         "title": plain_of(data.get("title") or data["scene"]),
         "parameter": data["parameter"],
         "symbol": plain_of(data["parameter_label"], always=True),
-        "label": html_of(data["parameter_label"], always=True),
+        "label": " ".join(filter(None, (escape(words), html_of(data["parameter_label"], always=True)))),
         "ordinates": [
             {"key": key, "name": name, "label": html_of(label if key == "ordinate" else name)}
             for key, name in ((key, names.get(key, key)) for key in ordinates_of(data))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rodfem.errors import InputError
 from rodfem.modes.modes import rows_with_modes
 from rodfem.output.glyphs import glyphs_of
+from rodfem.output.plot_images import is_traced
 from rodfem.output.sheet import PALETTE
 from rodfem.output.solids import profile_of
 from rodfem.problem.setting import read as read_setting
@@ -20,6 +21,7 @@ from rodfem.report.bodies import FLAT, Shelf
 from rodfem.report.branches import branch_data
 from rodfem.report.motions import motions_of
 from rodfem.report.packing import packed
+from rodfem.report.profiles import profiles_data
 from rodfem.report.shapes import Shapes, shapes_of, stations
 from rodfem.report.stage import Stage, stage_of
 
@@ -39,6 +41,7 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
     Raises :class:`InputError` where they are not of the diagram ``data``.
     """
     shapes = _shapes(data, groups, folder)
+    states = sum(len(each.r) for each in shapes.values())
     stage = stage_of(data, shapes, groups)
     shelf, with_modes, branches = Shelf(stage.radius), rows_with_modes(folder / "modes.h5"), []
     for branch, colour in zip(data["branches"], cycle(PALETTE), strict=False):
@@ -50,7 +53,11 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
         for row in rows:
             setting = read_setting(group, row)
             modes[row] = motions_of(folder / "modes.h5", (name, row), here, setting, stage, shelf, found[row][0])
-        branches.append(branch_data(branch, here, colour) | _drawn(here, found) | {"modes": modes})
+        along = profiles_data(group, states)
+        image = "" if is_traced(branch, data["branches"]) else branch.get("image", "")
+        branches.append(
+            branch_data(branch, here, colour) | _drawn(here, found) | along | {"modes": modes, "image": image}
+        )
     return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": _solids(shelf)}
 
 
@@ -74,7 +81,6 @@ def _drawn(shapes: Shapes, found: list[tuple[list[int], list[Floats]]]) -> dict[
     maps = [placed for _, each in found for placed in each]
     return {
         "shape": packed(np.concatenate([shapes.r, shapes.q], axis=2)),
-        "strain": packed(np.concatenate([shapes.v, shapes.k], axis=2)),
         "bodies": [numbers for numbers, _ in found],
         "maps": packed(np.array(maps).reshape(-1, 12)),
     }

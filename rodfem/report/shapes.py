@@ -1,4 +1,4 @@
-"""States of a branch at equal stations along the rod: centreline, directors and strains, from ``states.h5``."""
+"""States of a branch at equal stations along the rod: centreline and directors, from ``states.h5``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rodfem.errors import InputError
-from rodfem.problem.quaternions import CONJUGATE, directors, product
+from rodfem.problem.quaternions import directors
 
 Floats = NDArray[np.float64]
 
@@ -38,15 +38,11 @@ class Shapes:
         Arclengths (S,).
     r, q
         Centreline (P, S, 3) and unit quaternions (P, S, 4), continuous along the rod.
-    v, k
-        Strains ``R^t r'`` and curvatures, the axial vector of ``R^t R'``, along the directors, (P, S, 3).
     """
 
     s: Floats
     r: Floats
     q: Floats
-    v: Floats
-    k: Floats
 
     def __getitem__(self, row: int) -> tuple[Floats, Floats]:
         """Centreline (S, 3) and directors (S, 3, 3), columns of each matrix, of a state."""
@@ -67,15 +63,12 @@ def shapes_of(group: Any, count: int) -> Shapes:
 
 
 def _state(nodes: tuple[Floats, Floats, Floats], count: int, group: Any) -> tuple[Floats, ...]:
-    """Arclengths, centreline, quaternions, strains and curvatures at the stations."""
+    """Arclengths, centreline and quaternions at the stations."""
     s, r, q = nodes
     if len(s) < FEWEST_NODES or not np.isfinite(r).all() or not np.isfinite(q).all() or not (np.diff(s) > 0).all():
         raise InputError(f"{group.file.filename} has a state that is no curve in {group.name}: run the scene again.")
     opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
     signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
-    at, centreline = np.linspace(s[0], s[-1], count), CubicSpline(s, r)
-    turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])
-    q, slope = turned(at), turned(at, 1)
-    v = np.einsum("nji,nj->ni", directors(q), centreline(at, 1))
-    k = 2.0 * product(q * CONJUGATE, slope)[:, 1:] / np.sum(q * q, axis=1, keepdims=True)
-    return at, centreline(at), q / np.linalg.norm(q, axis=1, keepdims=True), v, k
+    at = np.linspace(s[0], s[-1], count)
+    turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])(at)
+    return at, CubicSpline(s, r)(at), turned / np.linalg.norm(turned, axis=1, keepdims=True)

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rodfem.continuation.kinds import KINDS
+from rodfem.stability.soft_mode import index_range
 
-STABLE, PLANAR, UNSTABLE, CRITICAL = "stable", "planar", "unstable", "critical"
+STABLE, PLANAR, UNSTABLE, CRITICAL, UNDECIDED = "stable", "planar", "unstable", "critical", "undecided"
 
 
 @dataclass(frozen=True)
 class Words:
-    """``verdict`` is one of the four above; ``index`` short, as ``0`` or ``0→1``; ``sentence`` says both in full."""
+    """``verdict`` is one of the five above; ``index`` short, as ``0`` or ``0→1``; ``sentence`` says both in full."""
 
     verdict: str
     index: str
@@ -47,6 +48,11 @@ def _verdict(columns: Mapping[str, Sequence[Any]], row: int, specials: Sequence[
     negative, space = columns["negative"][row], (columns.get("negative_in_space") or {row: None})[row]
     zero = columns["zero"][row]
     neutral = f" {_many(zero, 'eigenvalue')} {'is' if zero == 1 else 'are'} zero." if zero else ""
+    if undecided := (columns.get("undecided") or {row: 0})[row]:
+        found = f"{_many(undecided, 'eigenvalue')} too near zero for {'its' if undecided == 1 else 'their'} sign"
+        verdict = f"Unstable: {_many(negative, 'negative eigenvalue')}, and" if negative else "Stability undecided:"
+        sentence = f"{verdict} {found} to be known on this mesh.{neutral}"
+        return Words(UNSTABLE if negative else UNDECIDED, index_range(negative, undecided), sentence)
     if negative:
         return Words(UNSTABLE, _pair(negative, space), f"Unstable: {_many(negative, 'negative eigenvalue')}.{neutral}")
     if space:

@@ -309,9 +309,9 @@ def by_hand(system: System, w: fem.Function) -> Any:
     e, f, scene = system.equations, system.fields, system.scene
     u, d = e.unknowns, e._named(ufl.split(w))
     c, free = e._constants(u.load), scene.free_strains
-    v = strain(free, e._components(u.v, len(free)))
+    v = strain(free, e.components(u.v, len(free)))
     zero = ufl.as_vector([0.0] * 3)
-    change = dict(zip(free, e._components(d.v, len(free)), strict=True))
+    change = dict(zip(free, e.components(d.v, len(free)), strict=True))
     dv = ufl.as_vector([change.get(i, 0.0) for i in range(3)])
     if u.n is None:
         n = [scene.known_force(i, c) for i in range(3)]

@@ -23,7 +23,13 @@ pytestmark = pytest.mark.alone
 
 def test_every_word_has_an_entry() -> None:
     words = {*KINDS, *MEANING, *COLUMNS, *OPTIONAL, *SPECIAL, *MARKERS, *STYLES, *PARTS, *COLORS}
-    words |= {"stable side", "range of flutter", "range of divergence"}
+    words |= {
+        "image, not traced",
+        "stable side",
+        "stable, as far as these curves tell",
+        "range of flutter",
+        "range of divergence",
+    }
     words |= {str(style["label"]) for style in POINTS.values()}
     words |= {kind.code for kind in KINDS.values()}
     headings = {"load", "ordinate", "int W ds", "index", "zero", "located to", "unstable"}  # of the terminal

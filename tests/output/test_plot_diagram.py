@@ -198,6 +198,27 @@ def test_the_stable_side_of_a_locus_is_shaded(folder: Path, monkeypatch: pytest.
         assert not drawn[-1].axes[0].patches
 
 
+@pytest.mark.alone
+def test_what_is_stable_beside_loci_ends_at_the_next_one(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Below a line at P = 2 as far as another one from (0, 0) to (1, 1), which ends there, and then to the bound -1."""
+    mesh = {"formulation": "reduced", "elements": 1, "degree": 1, "unknowns": 1}
+    about = {"labels": ["P", "A"], "words": ["force", ""], "title": "by hand", "discretization": mesh}
+    about |= {"kind": "branch point", "parameters": ["P", "A"], "marks": [], "start": 1, "bounds": [[-1, 3], [0, 2]]}
+
+    def locus(P: list[float], A: list[float], index: list[int], lower: int) -> dict[str, Any]:
+        columns = {"P": P, "A": A, "index": [index] * len(P), "error": [[None, None]] * len(P)}
+        return about | {"columns": columns, "lower": lower, "format": LOCUS.mark()}
+
+    drawn: list[Figure] = []
+    monkeypatch.setattr("rodfem.output.plot_locus.save", lambda figure, path: drawn.append(figure))
+    draw_locus([locus([2, 2, 2], [0, 1, 2], [0, 1], -1), locus([0, 0.5, 1], [0, 0.5, 1], [1, 2], -1)], folder / "a.png")
+    axes = drawn[0].axes[0]
+    (region,) = (x for x in axes.collections if "as far as" in str(x.get_label()))
+    places = ((0.5, 1.0), (0.5, 0.4), (0.9, 0.8), (1.5, -0.9), (1.5, 2.1))
+    assert [region.get_paths()[0].contains_point(place) for place in places] == [True, False, False, True, False]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$A$", "force $P$")
+
+
 def test_twist_of_a_ring_is_its_link_less_its_writhe() -> None:
     """The ordinate, an integral of the discretised strains, beside the writhe of polygons (Klenin & Langowski)."""
     demo = scene("ring", twisting=1.5, span=(1.0, 1.2))

@@ -1,20 +1,26 @@
 """The page of a report in Chromium: what clicks, keys and the slider do, with an empty console.
 
 It needs Debian's ``chromium`` and ``chromium-driver``, and ``pip install "rodfem[browser]"``; without them it is
-skipped.  ``python -m pytest -s tests/report/test_browser.py`` prints the frame times.
+skipped, unless ``RODFEM_BROWSER=required`` says, as in ``.ci/run``, that it must run.
+``python -m pytest -s tests/report/test_browser.py`` prints the frame times.
 """
 
 from __future__ import annotations
 
+import io
+import os
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from output.test_formats import MESH, RUNS
+from PIL import Image
 from problem.test_docs import scenes
+from scipy.ndimage import uniform_filter
 
 from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
@@ -23,7 +29,9 @@ from rodfem.report.packing import packed
 from rodfem.report.page import page_of
 from rodfem.report.payload import payload_of
 
-selenium = pytest.importorskip("selenium", reason='needs pip install "rodfem[browser]"')
+REQUIRED = os.environ.get("RODFEM_BROWSER") == "required"
+if not REQUIRED:
+    pytest.importorskip("selenium", reason='needs pip install "rodfem[browser]"')
 from selenium import webdriver  # noqa: E402
 from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
@@ -34,24 +42,32 @@ CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 OPTIONS = (
     *("--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking"),
     *("--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+    "--disable-dev-shm-usage",  # a container may have little of it
 )
 SIZES = [(1280, 720), (1920, 1080)]
 PATIENCE = 90.0
 """Seconds that a page may take on a busy machine."""
-POINTS, FRAMES = 5000, 120
+POINTS, FRAMES = 5000, 40
 """States of the long branch, and how many of them the arrow key runs through."""
 FLUENT = 50.0
 """Milliseconds of a processor in each frame up to which the page's own work leaves it fluent, drawing apart."""
+GOLDEN = Path(__file__).with_name("golden.png")
+"""The page of a run as it should look, reduced."""
+BLOCK, FORGIVEN, MOST = 8, 16.0, 12
+"""Pixels of a block, grey levels by which it may differ, and how many may differ by more."""
 
 pytestmark = [
     pytest.mark.alone,
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs apt-get install chromium chromium-driver"),
+    pytest.mark.skipif(
+        not (REQUIRED or (CHROMIUM and DRIVER)), reason="needs apt-get install chromium chromium-driver"
+    ),
 ]
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     options = webdriver.ChromeOptions()
+    options.add_argument(f"--user-data-dir={tmp_path_factory.mktemp('profile')}")
     options.binary_location = CHROMIUM
     for option in OPTIONS:
         options.add_argument(option)
@@ -123,8 +139,9 @@ def click_at(browser: Any, branch: int, row: int) -> None:
         browser.execute_cdp_cmd("Input.dispatchMouseEvent", given)
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("name", ["pinned", "locus", "follower"])
+@pytest.mark.parametrize(
+    ("name", "size"), [("pinned", SIZES[0]), ("pinned", SIZES[1]), ("locus", SIZES[0]), ("follower", SIZES[1])]
+)
 def test_all_parts_fit_into_the_window(opened: Callable[..., Any], name: str, size: tuple[int, int]) -> None:
     page = opened(name, size)
     script = "return [document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
@@ -183,7 +200,7 @@ def test_the_slider_shows_all_states_of_a_load(opened: Callable[..., Any]) -> No
 def test_modes_move(opened: Callable[..., Any]) -> None:
     page = opened("pinned")
     page.execute_script("import('report/store').then((store) => store.select(0, 0))")
-    until(page, lambda: "modes at" in page.find_element(By.ID, "modes").text)
+    until(page, lambda: shown(page) == ("straight", 0) and "modes at" in page.find_element(By.ID, "modes").text)
     page.find_element(By.CSS_SELECTOR, "#modes button").click()
     until(page, lambda: "grows" in page.find_element(By.ID, "modes").text)
     page.find_element(By.CSS_SELECTOR, "#modes button").click()
@@ -191,6 +208,25 @@ def test_modes_move(opened: Callable[..., Any]) -> None:
     until(page, lambda: picture(page) != first)
     press(page, Keys.HOME)
     until(page, lambda: shown(page)[1] == 0)
+
+
+def test_strains_forces_and_moments_are_curves_with_names(opened: Callable[..., Any]) -> None:
+    """Of a pinned column under the load P: the force has the size P, and the moment vanishes at the ends."""
+    page = opened("pinned")
+    page.execute_script("import('report/store').then((store) => store.select(1, 8))")
+    until(page, lambda: shown(page) == ("branch 1", 8))
+    load = page.execute_script("return import('report/data').then(({ data }) => data.branches[1].load[8])")
+    found = {}
+    for tab in page.find_elements(By.CSS_SELECTOR, "#profile-tabs button"):
+        tab.click()
+        script = "return document.getElementById('profile').data.map((trace) => Array.from(trace.y))"
+        found[tab.text] = np.array(page.execute_script(script)), page.find_element(By.ID, "profile-legend").text
+    assert list(found) == ["curvature", "strain", "moment", "force"]
+    assert "tension" in found["force"][1] and "torque" in found["moment"][1] and "twist" in found["curvature"][1]
+    assert np.allclose(np.linalg.norm(found["force"][0], axis=0), load, rtol=1e-5) and (found["force"][0][2] < 0).any()
+    size = np.linalg.norm(found["moment"][0], axis=0)
+    assert size[[0, -1]].max() < 1e-2 * size.max() and size.argmax() in range(len(size) // 3, 2 * len(size) // 3)
+    assert np.allclose(found["strain"][0][2], 1.0)
 
 
 def test_loci_ordinates_views_and_exports_work(opened: Callable[..., Any]) -> None:
@@ -209,6 +245,13 @@ def test_loci_ordinates_views_and_exports_work(opened: Callable[..., Any]) -> No
             .then(done)"""
         url = page.execute_async_script(script, format)
         assert url.startswith(f"data:image/{format}") and len(url) > 5000
+    svg = page.execute_async_script("import('report/rod').then((rod) => arguments[0](rod.vector()))")
+    lines = ElementTree.fromstring(svg).findall("{*}path[@fill='none']")
+    assert len(lines) > 500 and [x.text for x in ElementTree.fromstring(svg).findall("{*}text")][:3] == [
+        "e₁",
+        "e₂",
+        "e₃",
+    ]
     page.find_element(By.ID, "about-button").click()
     assert "dolfinx" in page.find_element(By.ID, "origin").text
 
@@ -229,11 +272,12 @@ def long(payload: dict[str, Any]) -> dict[str, Any]:
         "words": [0] * POINTS,
         "told": branch["told"][:1],
         "shape": packed(shape),
-        "strain": packed(np.zeros((POINTS, stations, 6)) + POINT),
+        "profile": packed(np.zeros((POINTS, 40, 13)) + np.linspace(0.0, 1.0, 40)[:, None]),
+        "jumps": {symbol: [POINT] * POINTS for symbol in "vknm"},
         "bodies": [numbers] * POINTS,
         "maps": packed(maps),
         **dict.fromkeys(("estimate", "error", "spectrum", "omega2", "motion")),
-        **{"special": [], "unexplained": [], "modes": {}},
+        **{"special": [], "unexplained": [], "modes": {}, "endings": [], "image": ""},
     }
     return payload | {"branches": [branch], "start": [0, 0], "loci": []}
 
@@ -264,3 +308,34 @@ def test_a_long_branch_stays_fluent(opened: Callable[..., Any]) -> None:
     print(f"\n{POINTS} points, frame times: {text}; {work:.1f} ms of work of the page in each")
     assert shown(page)[1] >= FRAMES - 2
     assert work < FLUENT, text
+
+
+def small(png: bytes) -> np.ndarray:
+    """A screenshot as one sees it with half-closed eyes: colours of blocks of pixels, blurred (rows, columns, 3)."""
+    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=float)
+    height, width = (size // BLOCK for size in pixels.shape[:2])
+    blocks = pixels[: height * BLOCK, : width * BLOCK].reshape(height, BLOCK, width, BLOCK, 3).mean(axis=(1, 3))
+    return np.asarray(uniform_filter(blocks, (3, 3, 0), mode="nearest"))
+
+
+def differing(one: np.ndarray, other: np.ndarray) -> int:
+    """Number of blocks whose colours differ by more than a glance forgives."""
+    return int(np.count_nonzero(abs(one - other).max(axis=2) > FORGIVEN))
+
+
+def test_the_page_looks_as_it_did(opened: Callable[..., Any]) -> None:
+    """``RODFEM_GOLDEN=write`` in the environment takes the page as it is now for the one to compare with."""
+    page = opened("pinned")
+    page.execute_script("import('report/store').then((store) => store.select(1, 8))")
+    until(page, lambda: shown(page) == ("branch 1", 8) and page.find_elements(By.CSS_SELECTOR, "#states canvas"))
+    until(page, lambda: page.execute_script("return document.querySelectorAll('#profile .trace').length") == 3)
+    page.execute_async_script("setTimeout(arguments[0], 400)")
+    seen = small(page.get_screenshot_as_png())
+    if os.environ.get("RODFEM_GOLDEN") == "write":
+        Image.fromarray(seen.round().astype("u1")).save(GOLDEN)
+    golden = np.asarray(Image.open(GOLDEN), dtype=float)
+    assert differing(seen, golden) <= MOST
+    for part in ("rod", "overlay", "diagram", "spectrum", "profile", "legend", "states"):
+        page.execute_script("document.getElementById(arguments[0]).style.visibility = 'hidden'", part)
+        assert differing(small(page.get_screenshot_as_png()), seen) > 2 * MOST, part
+        page.execute_script("document.getElementById(arguments[0]).style.visibility = ''", part)

@@ -1,4 +1,4 @@
-"""What a report says and shows, against closed forms: labels, words, writhe, strains, placed bodies, packed arrays."""
+"""What a report says and shows, against closed forms: labels, words, writhe, shapes, placed bodies, packed arrays."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from rodfem.errors import InputError
+from rodfem.output.digits import number
+from rodfem.output.endings import endings
 from rodfem.output.first_loss import first_loss
 from rodfem.output.solids import ball, box, coil
 from rodfem.report.bodies import CLOSE, Shelf
@@ -145,14 +147,16 @@ def helix(s: np.ndarray, radius: float, rise: float) -> tuple[np.ndarray, np.nda
     return r, q
 
 
-def test_strains_of_a_helix() -> None:
+def test_shapes_of_a_helix() -> None:
     s, radius, rise = np.linspace(0, 7, 80), 0.7, 0.4
     r, q = helix(s, radius, rise)
     signs = np.where(np.arange(80) % 3, 1.0, -1.0)[:, None]  # q and -q are the same rotation
     shapes = shapes_of(group_of(s=s, r=r, q=3.0 * signs * q), 49)
-    size2 = radius**2 + rise**2
-    assert np.allclose(shapes.v, [0, 0, 1], atol=3e-4)
-    assert np.allclose(shapes.k, [0, -radius / size2, rise / size2], atol=3e-4)
+    exact, _ = helix(shapes.s, radius, rise)
+    d3 = np.array([shapes[0][1][i, :, 2] for i in range(len(shapes.s))])
+    tangent = np.gradient(exact, shapes.s, axis=0, edge_order=2)
+    assert np.allclose(shapes.r[0], exact, atol=1e-5)
+    assert np.allclose(d3, tangent / np.linalg.norm(tangent, axis=1)[:, None], atol=2e-2)
     assert (
         np.allclose(np.linalg.norm(shapes.q, axis=2), 1.0) and (np.sum(shapes.q[0, 1:] * shapes.q[0, :-1], 1) > 0).all()
     )
@@ -206,3 +210,23 @@ def test_packed_arrays_and_texts() -> None:
     hostile = {"a": "</script><!-- <img src=x onerror=alert(1)> & \u2028"}
     text = script_json(hostile)
     assert json.loads(text) == hostile and not set(text) & set("<>&\u2028")
+
+
+def test_undecided_stability_is_not_called_stable() -> None:
+    words = words_of(branch([0, 0, 1], undecided=[0, 1, 1]))
+    assert [w.verdict for w in words] == ["stable", "undecided", "unstable"]
+    assert [w.index for w in words] == ["0", "0 or 1", "1 or 2"]
+    assert "too near zero for its sign" in words[1].sentence and "too near zero" in words[2].sentence
+
+
+def test_ends_before_the_range_have_reasons() -> None:
+    end = {"kind": "end", "row": 0, "note": "begins here: stretch reaches zero"}
+    one = branch([0, 0, 0]) | {"ended": "no convergence: steps of 1e-6", "special": [end]}
+    assert list(endings(one)) == [(0, "stretch reaches zero"), (2, "no convergence")]
+    for whole in ("end of range", "closed loop", "meets another branch at P = 3", "meets circle"):
+        assert not list(endings(branch([0, 0]) | {"ended": whole}))
+
+
+def test_round_off_without_an_error_bar_is_zero() -> None:
+    assert number(1.8e-17, np.inf, scale=0.4) == "0 (no estimate)" != number(1.8e-17, np.inf)
+    assert number(0.25, np.inf, scale=0.4) == "0.25 (no estimate)"

@@ -32,18 +32,19 @@ def lines(data: Mapping[str, Any]) -> Iterator[str]:
     for mesh in data["meshes"]:
         yield f"  {mesh['elements']} elements of degree {mesh['degree']}, {mesh['unknowns']} unknowns"
     yield f"  {'branch':<12} {'kind':<13} {data['parameter']:<24} {data['ordinate'][:24]:<24} index"
+    scale = max((abs(x) for branch in data["branches"] for x in branch["columns"]["ordinate"]), default=0.0)
     for branch in data["branches"]:
         for special in branch["special"]:
-            yield f"  {branch['name']:<12} {special['kind']:<13} {_values(special)}"
+            yield f"  {branch['name']:<12} {special['kind']:<13} {_values(special, scale)}"
         yield f"  {branch['name']:<12} {len(branch['columns']['load'])} points; ended: {branch['ended']}"
     yield from (f"  {sentence}" for sentence in in_sentences(data))
 
 
-def _values(special: Mapping[str, Any]) -> str:
-    """Load, ordinate and index of a special point; a load that was given is exact."""
+def _values(special: Mapping[str, Any], scale: float) -> str:
+    """Load, ordinate and index of a special point; a load that was given is exact; ``scale`` is that of ordinates."""
     bars = [special.get(name) for name in ("error_estimate", "ordinate_error_estimate")]
     load, ordinate = (
-        number(special[name], inf if bar is None else bar, special.get("resolved"))
+        number(special[name], inf if bar is None else bar, special.get("resolved"), scale * (name == "ordinate"))
         for name, bar in zip(("load", "ordinate"), bars, strict=True)
     )
     if KINDS[special["kind"]].given:

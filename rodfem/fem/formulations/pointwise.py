@@ -33,6 +33,10 @@ class Pointwise(Formulation):
         """With ``r' = R v`` at each point."""
         return lagrangian.pointwise(W, along.R, along.v, along.dr, f.n)
 
+    def contact_force(self, equations: Equations, f: Any, c: Constants) -> list[Any]:
+        """A field."""
+        return [f.n[i] for i in range(3)]
+
     def position(self, equations: Equations, f: Any, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
         """Known everywhere."""
         return at(f.r) + equations.lift(c)

@@ -73,10 +73,15 @@ class Reduced(Formulation):
     def integrand(self, equations: Equations, f: Any, c: Constants, W: Any, along: Place) -> Any:
         """With the integral of ``r' = R v``."""
         scene = equations.fields.scene
-        force = [f.scalars.get(f"n{i + 1}", scene.known_force(i, c) or 0.0) for i in range(3)]
+        force = self.contact_force(equations, f, c)
         left, right = end_positions(scene, c, f.scalars)
         chord = [0.0 if x is None or y is None else y - x for x, y in zip(left, right, strict=True)]
         return lagrangian.reduced(W, along.R, along.v, ufl.as_vector(force), ufl.as_vector(chord) / equations.length)
+
+    def contact_force(self, equations: Equations, f: Any, c: Constants) -> list[Any]:
+        """Unknown scalars, and what dead forces prescribe."""
+        scene = equations.fields.scene
+        return [f.scalars.get(f"n{i + 1}", scene.known_force(i, c) or 0.0) for i in range(3)]
 
     def position(self, equations: Equations, f: Any, c: Constants, at: Callable[[Any], Any], side: int | None) -> Any:
         """Known at an end that is held or whose position is a scalar unknown."""

@@ -5,7 +5,7 @@ import { select, state, subscribe } from "report/store";
 import { between, pointsOf } from "report/curve";
 import { listeners, makeRod, makeStripe, ROD, shapeOf, stage as main } from "report/rod";
 import { framed, Stage } from "report/stage";
-import { PLANAR, STABLE } from "report/styles";
+import { PLANAR, STABLE, UNDECIDED } from "report/styles";
 
 const slider = document.getElementById("load"), value = document.getElementById("load-value"), list = document.getElementById("states");
 const loads = data.branches.flatMap((b) => b.load), low = Math.min(...loads), high = Math.max(...loads);
@@ -28,7 +28,7 @@ function statesAt(load) {
 }
 
 const nearest = ({ row, t }) => row + (t > 0.5 ? 1 : 0);
-const verdict = (kind) => (kind === STABLE ? "stable" : kind === PLANAR ? "planar" : "unstable");
+const verdict = (kind) => (kind === STABLE ? "stable" : kind === PLANAR ? "planar" : kind === UNDECIDED ? "undecided" : "unstable");
 
 function card(found) {
   const b = data.branches[found.number], button = document.createElement("button"), name = document.createElement("span");

@@ -4,7 +4,7 @@ import { data, digits, escaped } from "report/data";
 import { select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
 import { draw, layout } from "report/plotting";
-import { DASHES, SYMBOLS, UNEXPLAINED, WIDTHS } from "report/styles";
+import { DASHES, ENDS, SYMBOLS, UNEXPLAINED, WIDTHS } from "report/styles";
 
 const plot = document.getElementById("diagram");
 const choice = document.getElementById("ordinate");
@@ -21,7 +21,8 @@ function hover(branch, row) {
     `<b>${escaped(branch.name)}</b>, row ${row}`,
     `${escaped(data.symbol)} = ${special ? escaped(special.load) : digits(branch.load[row], 8)}`,
     `${escaped(ordinate.name)} = ${digits(heights(branch)[row], 8)}`,
-    `index ${escaped(words.index)}, ${words.verdict === "planar" ? "stable in the plane only" : words.verdict}`,
+    `index ${escaped(words.index)}, ${words.verdict === "planar" ? "stable in the plane only" : words.verdict === "undecided" ? "stability undecided" : words.verdict}`,
+    ...branch.endings.filter(([at]) => at === row).map(([, reason]) => `<b>ends here: ${escaped(reason)}</b>`),
     special ? `<b>${escaped(special.kind)}</b>${special.law ? `, ${escaped(special.law)}` : ""}` : "",
     special ? "" : error === null || error === undefined ? "error not estimated at this row" : `error at most ${error.toExponential(0)}`,
   ];
@@ -39,6 +40,12 @@ function line(branch, number, piece) {
     mode: "lines",
     line: { color: branch.colour, width: WIDTHS[piece.kind], dash: DASHES[piece.kind], simplify: false },
   };
+}
+
+// The image of a piece by a symmetry of the scene, which takes the scene's ordinate to its opposite.
+function image(branch, number, piece) {
+  const { x, y, customdata, line: { color, dash } } = line(branch, number, piece), words = `image of ${escaped(branch.name)}, not traced: ${escaped(branch.image)}`;
+  return { x, y: y.map((value) => (value === null ? null : -value)), customdata, hovertemplate: `${words}<extra></extra>`, mode: "lines", opacity: 0.75, line: { color, width: 1.1, dash, simplify: false } };
 }
 
 function marks(branch, number, kind) {
@@ -83,10 +90,12 @@ function traces() {
   const each = data.branches.map((branch, number) => [branch, number]);
   const thick = (trace) => -trace.line.width;
   const lines = each.flatMap(([b, i]) => b.pieces.map((piece) => line(b, i, piece))).sort((a, b) => thick(a) - thick(b));
+  const images = ordinate.key === "ordinate" ? each.filter(([b]) => b.image).flatMap(([b, i]) => b.pieces.map((piece) => image(b, i, piece))) : [];
   const single = each.filter(([b]) => !b.pieces.length).map(([b, i]) => points(b, i, [0], { size: 7, color: b.colour }));
   const special = Object.keys(SYMBOLS).flatMap((kind) => each.map(([b, i]) => marks(b, i, kind)));
   const doubts = each.map(([b, i]) => points(b, i, b.unexplained, UNEXPLAINED));
-  return [...lines, ...single, ...[...special, ...doubts].filter((trace) => trace.x.length)];
+  const ends = each.map(([b, i]) => points(b, i, b.endings.map(([row]) => row), ENDS));
+  return [...images, ...lines, ...single, ...[...special, ...ends, ...doubts].filter((trace) => trace.x.length)];
 }
 
 function redraw() {

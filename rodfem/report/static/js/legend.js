@@ -3,7 +3,7 @@
 import { data } from "report/data";
 import { select, state, subscribe } from "report/store";
 import { item, lineIcon, symbol } from "report/icons";
-import { DASHES, SYMBOLS, UNEXPLAINED, WIDTHS } from "report/styles";
+import { DASHES, ENDS, SYMBOLS, UNEXPLAINED, WIDTHS } from "report/styles";
 
 function swatch(colour) {
   const drawn = document.createElement("i");
@@ -31,6 +31,8 @@ export function start() {
       item(lineIcon("#555", WIDTHS[kind], DASHES[kind]), kind),
     ),
     ...Object.keys(SYMBOLS).filter((kind) => special.has(kind)).map((kind) => item(symbol(SYMBOLS[kind]), names[kind] ?? kind)),
+    ...[...new Set(data.branches.map((b) => b.image).filter(Boolean))].map((words) => item(lineIcon("#555", 1.1), `image, not traced: ${words}`)),
+    ...[...new Set(data.branches.flatMap((b) => b.endings.map(([, reason]) => reason)))].map((reason) => item(symbol(ENDS), `ends: ${reason}`)),
     ...(data.branches.some((b) => b.unexplained.length) ? [item(symbol(UNEXPLAINED), "index change unexplained")] : []),
   );
   subscribe(() => buttons.forEach((button, i) => button.setAttribute("aria-pressed", i === state.branch)));

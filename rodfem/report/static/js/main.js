@@ -57,13 +57,13 @@ for (const button of document.querySelectorAll("[data-export]"))
     const shown = document.getElementById("diagram").hidden ? "loci" : "diagram";
     save(document.getElementById(shown), button.dataset.export, shown);
   });
-document.getElementById("rod-png").addEventListener("click", () =>
-  rod.picture().toBlob((blob) => {
-    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: `${data.scene}-rod.png` });
-    link.click();
-    URL.revokeObjectURL(link.href);
-  }),
-);
+function download(blob, format) {
+  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: `${data.scene}-rod.${format}` });
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+document.getElementById("rod-png").addEventListener("click", () => rod.picture().toBlob((blob) => download(blob, "png")));
+document.getElementById("rod-svg").addEventListener("click", () => download(new Blob([rod.vector()], { type: "image/svg+xml" }), "svg"));
 
 text.start();
 legend.start();

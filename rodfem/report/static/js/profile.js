@@ -1,21 +1,26 @@
-// Strains along the rod: curvatures k and strains v along the directors, each by colour and dashes.
+// Strains, contact forces and moments along the rod, components along the directors, each by colour and dashes.
 
-import { data, entry, values } from "report/data";
+import { entry, values } from "report/data";
 import { branch, state, subscribe } from "report/store";
 import { item, lineIcon } from "report/icons";
-import { draw, layout } from "report/plotting";
+import { draw, empty, layout } from "report/plotting";
 
-const plot = document.getElementById("profile");
+const plot = document.getElementById("profile"), legend = document.getElementById("profile-legend"), error = document.getElementById("profile-error");
+const SIZE = 13; // of a point: arclength, v, k, n, m
 const TABS = {
-  "curvatures k": { first: 3, names: ["k<sub>1</sub>", "k<sub>2</sub>", "k<sub>3</sub>"] },
-  "strains v": { first: 0, names: ["v<sub>1</sub>", "v<sub>2</sub>", "v<sub>3</sub>"] },
+  curvature: { symbol: "k", first: 4, names: ["bending about d₁", "bending about d₂", "twist"] },
+  strain: { symbol: "v", first: 1, names: ["shear along d₁", "shear along d₂", "stretch"] },
+  moment: { symbol: "m", first: 10, names: ["bending about d₁", "bending about d₂", "torque"] },
+  force: { symbol: "n", first: 7, names: ["shear along d₁", "shear along d₂", "tension"] },
 };
+const BELOW = ["₁", "₂", "₃"];
 const LINES = [
   { color: "#0072b2", width: 2.4 },
   { color: "#d55e00", width: 2.4, dash: "7px,3px" },
   { color: "#009e73", width: 2.4, dash: "2px,2px" },
 ];
 const LEAST = 1e-4; // difference of values up to which a quantity is drawn as constant
+const ROUND_OFF = 1e-13; // jumps, relative, below which a quantity is continuous by its discretisation
 const PAUSE = 120; // milliseconds
 let waiting = 0, last = 0;
 let tab = Object.keys(TABS)[0];
@@ -24,29 +29,42 @@ let tab = Object.keys(TABS)[0];
 function range(b, first) {
   const key = `range${first}`;
   if (!b[key]) {
-    const all = values(b.strain);
+    const all = values(b.profile);
     let [low, high] = [Infinity, -Infinity];
-    for (let i = 0; i < all.length; i += 6)
-      for (let k = first; k < first + 3; k++) [low, high] = [Math.min(low, all[i + k]), Math.max(high, all[i + k])];
-    const room = high - low > LEAST ? 0.06 * (high - low) : 0.5;
+    for (let i = 0; i < all.length; i += SIZE)
+      for (let k = first; k < first + 3; k++) if (!Number.isNaN(all[i + k])) [low, high] = [Math.min(low, all[i + k]), Math.max(high, all[i + k])];
+    const room = high - low > LEAST * Math.max(1, Math.abs(low)) ? 0.06 * (high - low) : 0.5;
     b[key] = [low - room, high + room];
   }
   return b[key];
 }
 
 function redraw() {
-  const b = branch(), { first, names } = TABS[tab], strain = entry(b.strain, state.row), s = Array.from(values(data.s));
+  const b = branch(), { symbol, first, names } = TABS[tab];
+  if (!b.profile) {
+    error.textContent = "";
+    return empty(plot, "The files of this run have no strains, forces and moments:\nrun the scene again.");
+  }
+  const all = entry(b.profile, state.row), s = [];
+  for (let i = 0; i < all.length && !Number.isNaN(all[i]); i += SIZE) s.push(all[i]);
   const traces = names.map((name, i) => ({
     x: s,
-    y: s.map((_, n) => strain[n * 6 + first + i]),
+    y: s.map((_, n) => all[n * SIZE + first + i]),
     name,
     mode: "lines",
     line: LINES[i],
-    hovertemplate: `s = %{x:.4g}<br>${name} = %{y:.5g}<extra></extra>`,
+    hovertemplate: `s = %{x:.4g}<br>${symbol}${BELOW[i]} = %{y:.5g}, ${name}<extra></extra>`,
   }));
-  const how = layout("s", "", { margin: { l: 46, r: 10, t: 6, b: 34 }, uirevision: tab });
+  const how = layout("arclength s", `${tab} ${symbol}`, { margin: { l: 46, r: 10, t: 6, b: 34 }, uirevision: tab });
   how.yaxis.range = range(b, first);
-  draw(plot, traces, how);
+  const jump = b.jumps[symbol][state.row], size = Math.max(...how.yaxis.range.map(Math.abs));
+  error.textContent = jump > ROUND_OFF * size ? `error ≈ ${jump.toExponential(0)}` : "error not estimated";
+  return draw(plot, traces, how);
+}
+
+function explain() {
+  const { symbol, names } = TABS[tab];
+  legend.replaceChildren(...LINES.map((line, i) => item(lineIcon(line.color, line.width, line.dash), `${symbol}${BELOW[i]} ${names[i]}`)));
 }
 
 // Redraw at once, but not more often than PAUSE while states follow each other quickly.
@@ -69,13 +87,14 @@ export function start() {
     button.addEventListener("click", () => {
       tab = name;
       mark();
+      explain();
       redraw();
     });
     return button;
   });
   const mark = () => buttons.forEach((button) => button.setAttribute("aria-selected", button.textContent === tab));
   tabs.append(...buttons);
-  document.getElementById("profile-legend").append(...LINES.map((line, i) => item(lineIcon(line.color, line.width, line.dash), `${i + 1}`)));
   mark();
+  explain();
   subscribe(soon);
 }

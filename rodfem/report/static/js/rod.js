@@ -11,6 +11,7 @@ import { Solids } from "report/solids";
 import { framed, Stage } from "report/stage";
 import { BLUE, GREEN, VERMILION } from "report/styles";
 import { Tube } from "report/tube";
+import { svgOf } from "report/vector";
 import { VIEWS } from "report/views";
 
 export const ROD = "#9cc4e6", STRIPE = "#1f3a5f", FIRST = "#b9bec5";
@@ -117,6 +118,13 @@ export function picture(scale = 3) {
   stage.resize(width, height);
   redraw();
   return out;
+}
+
+// The same as SVG, without a mode.
+export function vector() {
+  const rods = [{ shape: shapeOf(branch(), state.row), colour: ROD, radius: data.radius, stripe: STRIPE }];
+  if (show.first.checked) rods.unshift({ shape: shapeOf(data.branches[0], 0), colour: FIRST, radius: data.radius, stripe: null });
+  return svgOf(stage, rods, solids.visible ? solids.children.filter((mesh) => mesh.visible) : []);
 }
 
 function resize() {

@@ -1,9 +1,10 @@
-// Left-most eigenvalues along the branch, by sign: negative ones are triangles, positive ones circles.
+// Left-most eigenvalues along the branch, by sign: negative ones are triangles, positive ones circles. Where none are
+// recorded, how many are negative.
 
 import { data, digits, escaped } from "report/data";
 import { branch, select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
-import { draw, empty, layout } from "report/plotting";
+import { draw, layout } from "report/plotting";
 import { BLUE, VERMILION } from "report/styles";
 
 const plot = document.getElementById("spectrum");
@@ -29,15 +30,38 @@ function range(b, all) {
   return [low - room, high + room];
 }
 
+// The index of each piece against the load.
+function counts(b) {
+  const traces = b.pieces.map(({ rows: [first, last], index }) => {
+    const rows = Array.from({ length: last - first + 1 }, (_, i) => first + i), count = parseInt(index);
+    return {
+      x: rows.map((row) => b.load[row]),
+      y: rows.map(() => count),
+      customdata: rows,
+      text: rows.map((row) => `row ${row}, ${escaped(data.symbol)} = ${digits(b.load[row])}<br>negative eigenvalues: ${escaped(index)}`),
+      hovertemplate: "%{text}<extra></extra>",
+      mode: "lines",
+      line: { color: count ? VERMILION : BLUE, width: 5 },
+    };
+  });
+  const note = { xref: "paper", yref: "paper", x: 1, y: 1, xanchor: "right", yanchor: "top", showarrow: false, text: "their values: run with --spectrum 4", font: { color: "#66707c" }, bgcolor: "rgba(255,255,255,0.8)" };
+  const how = layout(data.label, "index", { margin: { l: 60, r: 8, t: 4, b: 34 }, uirevision: b.name, annotations: [note] });
+  const most = Math.max(1, ...b.pieces.map((piece) => parseInt(piece.index)));
+  Object.assign(how.yaxis, { range: [-0.2 * most, 1.4 * most], dtick: Math.ceil(most / 4) });
+  finish(traces, how);
+}
+
+function finish(traces, how) {
+  draw(plot, traces, how);
+  if (cursor) return;
+  cursor = cursorOf(plot);
+  plot.on("plotly_click", (event) => select(state.branch, event.points[0].customdata));
+}
+
 function redraw() {
   const b = branch(), all = recorded(b);
   shown = b;
-  if (!all.length) {
-    cursor = null;
-    empty(plot, "Eigenvalues are not recorded:\nrun the scene with --spectrum 4.");
-    return;
-  }
-  if (!cursor) plot.replaceChildren();
+  if (!all.length) return counts(b);
   const words = ({ row, value: [x, y] }) => `row ${row}, ${escaped(data.symbol)} = ${digits(b.load[row])}<br>${b.omega2 ? "ω²" : "μ"} = ${digits(x)}${y ? ` ± ${digits(Math.abs(y))} i` : ""}`;
   const traces = KINDS.map(({ name, test, marker }) => {
     const found = all.filter((each) => test(each.value));
@@ -54,11 +78,7 @@ function redraw() {
   const title = b.omega2 ? "Re ω²" : "μ";
   const how = layout(data.label, title, { margin: { l: 60, r: 8, t: 4, b: 34 }, uirevision: b.name });
   how.yaxis.range = range(b, all);
-  draw(plot, traces, how);
-  if (!cursor) {
-    cursor = cursorOf(plot);
-    plot.on("plotly_click", (event) => select(state.branch, event.points[0].customdata));
-  }
+  finish(traces, how);
 }
 
 export function start() {

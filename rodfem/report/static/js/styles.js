@@ -1,8 +1,8 @@
 // Dashes and symbols, as in the pictures that matplotlib draws; stability never shows by colour alone.
 
-export const STABLE = "stable", PLANAR = "stable in the plane, unstable in space", UNSTABLE = "unstable";
-export const DASHES = { [STABLE]: "solid", [PLANAR]: "8px,3px", [UNSTABLE]: "2.2px,2.8px" };
-export const WIDTHS = { [STABLE]: 3.6, [PLANAR]: 2.8, [UNSTABLE]: 2.2 };
+export const STABLE = "stable", PLANAR = "stable in the plane, unstable in space", UNSTABLE = "unstable", UNDECIDED = "stability undecided";
+export const DASHES = { [STABLE]: "solid", [PLANAR]: "8px,3px", [UNDECIDED]: "9px,3px,2.5px,3px", [UNSTABLE]: "2.2px,2.8px" };
+export const WIDTHS = { [STABLE]: 3.6, [PLANAR]: 2.8, [UNDECIDED]: 2.8, [UNSTABLE]: 2.2 };
 export const BLUE = "#0072b2", VERMILION = "#d55e00", GREEN = "#009e73";
 
 const edge = (width) => ({ color: "black", width });
@@ -15,4 +15,5 @@ export const SYMBOLS = {
   event: { symbol: "cross-thin", size: 10, line: edge(1.8) },
   user: { symbol: "x-thin", size: 8, line: edge(1.8) },
 };
+export const ENDS = { symbol: "x", size: 9, color: "white", line: { color: "#b3123e", width: 1.6 } };
 export const UNEXPLAINED = { symbol: "triangle-up", size: 13, color: "#f0e442", line: { color: "#b3123e", width: 2 } };

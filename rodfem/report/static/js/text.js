@@ -5,7 +5,7 @@ import { branch, state, subscribe, words } from "report/store";
 
 const at = (id) => document.getElementById(id);
 const MOST = 4; // eigenvalues in words
-const NAMES = { stable: "STABLE", unstable: "UNSTABLE", planar: "STABLE IN PLANE", critical: "CRITICAL" };
+const NAMES = { stable: "STABLE", unstable: "UNSTABLE", planar: "STABLE IN PLANE", critical: "CRITICAL", undecided: "UNDECIDED" };
 
 function redraw() {
   const b = branch(), { verdict, index, sentence } = words(b, state.row), special = b.special.find((x) => x.row === state.row);
@@ -27,7 +27,7 @@ function values(b) {
     span.textContent = `${y ? "×" : x < 0 ? "▼" : "●"} ${digits(x, 4)}${y ? ` ${y > 0 ? "+" : "−"} ${digits(Math.abs(y), 4)} i` : ""}`;
     return span;
   });
-  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω²:" : "μ:", ...each] : []));
+  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω², no error bars:" : "μ, no error bars:", ...each] : []));
 }
 
 function line(list, name, text, code = false) {
@@ -47,8 +47,8 @@ function about() {
   line(list, "discretisation", data.mesh);
   for (const [name, value] of Object.entries(data.constants)) line(list, name, digits(value, 17));
   line(list, "this page", `rodfem view ${data.folder}`, true);
-  line(list, "shapes", "Rods and strains are splines through the nodes of the mesh; states between rows are interpolated for their pictures.");
-  line(list, "forces", "The files have no contact forces n and moments m along the rod, so that they are not shown.");
+  line(list, "shapes", "Rods are splines through the nodes of the mesh; states between rows are interpolated for their pictures.");
+  line(list, "forces", "Contact force n and moment m are what the part of the rod to the right exerts on that to the left, along the directors. Curves along the rod are those of the elements; where nothing acts they jump as much as they are accurate.");
   line(list, "libraries", "plotly.js and three.js, both under the MIT licence; the page needs no network.");
   at("about-button").addEventListener("click", () => at("about").showModal());
 }

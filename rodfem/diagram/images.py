@@ -1,0 +1,41 @@
+"""Mirror images of branches: of the two sides of a symmetric pitchfork only one is traced, and here is the other.
+
+A discrete symmetry of the equations (:mod:`rodfem.deflation.discrete_symmetries`) carries a branch to another one, of
+the same energies and indices, at the same loads.  A diagram shows that image where its ordinate has the opposite sign.
+"""
+
+from __future__ import annotations
+
+from rodfem.continuation.branch import Branch
+from rodfem.continuation.solvers import StaticSolver
+from rodfem.deflation.discrete_symmetries import Mirror, mirrors
+from rodfem.tolerances import NEGLIGIBLE
+
+ZERO = 1e-9
+"""Ordinate, relative to the greatest one, below which it has no side."""
+SHARES = (0.5, 1.0)
+"""Places along a branch, as shares of its rows, at whose states an image is asked for."""
+
+
+def image_of(branch: Branch, solver: StaticSolver) -> str:
+    """The symmetry, in words, that carries a branch to one with the opposite ordinate; empty where there is none.
+
+    It is one of the equations at the loads of two states, one within the ``branch`` and its last one, and takes the
+    ordinates of both to their opposites, to round-off.  States of other meshes than that of ``solver`` are left out.
+    """
+    points = [point for point in branch.points if point.mesh == solver.mesh]
+    chosen = [points[round(share * (len(points) - 1))] for share in SHARES] if points else []
+    size = max([solver.units.ordinate, *(abs(point.ordinate) for point in points)])
+    if any(abs(point.ordinate) <= ZERO * size for point in chosen) or not chosen:
+        return ""
+    system, phase, known = solver.system, solver.system.phase, list[set[Mirror]]()
+    for point in chosen:
+        taken = {
+            mirror
+            for mirror in mirrors(system, point.x)
+            if abs(solver.shape.ordinate(mirror(system, point.x)) + point.ordinate) <= NEGLIGIBLE * size
+        }
+        known.append(taken)
+    system.phase = phase
+    found = sorted(set.intersection(*known), key=lambda mirror: (mirror.reversal, -sum(mirror.signs), mirror.signs))
+    return found[0].in_words() if found else ""
