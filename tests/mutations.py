@@ -46,6 +46,9 @@ DIAGRAM = "tests/diagram/test_diagram.py"
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "jumps-to-another-branch": Fault(
+        f"{CONTINUATION}jumping.py", "return moved > FAR or off > SHARE * moved", "return False", HARD
+    ),
     # location
     "location-is-blunt": Fault(f"{CONTINUATION}locate.py", "SHARP = 1e-11", "SHARP = 1e-4", f"{HEMITROPIC} {GOLDEN}"),
     "location-at-another-zero": Fault(
