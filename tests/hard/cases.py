@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hard import bifurcations, isolas, published, ranges, snapping, springy_rings, stiffness
+from hard import bifurcations, endurance, isolas, published, ranges, snapping, springy_rings, stiffness
 from hard.case import Case
 
 EXACT = "all special points, each within its error bar, with the index on either side"
@@ -172,4 +172,17 @@ PUBLISHED = (
         "Goto, Watanabe, Kasugai & Obata 1992", "B1/B2", published.deployed_ring, (9.0,), (100.0, 9.0, 4.0),
     ),
 )  # fmt: skip
-CASES = {"stiffness": STIFFNESS, "bifurcations": BIFURCATIONS, "published": PUBLISHED}
+ENDURANCE = (
+    Case(
+        "long branches", "memory or time that grows with what has been done",
+        "at most 8 kB a row, time of a row within a factor 2, no file or communicator left open", "measured in between",
+        "rows", endurance.rows, (300,), (300, 3000, 10_000),
+    ),
+    Case(
+        "many scenes in one process", "forms, factors and communicators of each have to go with it",
+        "the heap stays within 4 MB and 0.5 kB a scene, time of a scene within a factor 2, no file or communicator "
+        "left open; each with its buckling load", "Euler, B pi^2/4; measured in between", "scenes",
+        endurance.scenes, (20,), (100, 1000),
+    ),
+)  # fmt: skip
+CASES = {"stiffness": STIFFNESS, "bifurcations": BIFURCATIONS, "published": PUBLISHED, "endurance": ENDURANCE}
