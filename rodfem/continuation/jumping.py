@@ -7,8 +7,8 @@ one branch; if the rows are on two branches it is at least of the size of their 
 lessens (Allgower & Georg, Introduction to Numerical Continuation Methods, 2003, 6.1, on path jumping).
 
 A step is suspected if its defect is not small beside the correction of its prediction: on one branch both are of the
-same order, with ratios 1/24 and less.  Then the piece is halved, and the worse half again, by equilibria in between,
-until the defect vanishes or is no smaller than a part of the chord: there the rows are not joined.
+same order, with ratios 1/24 and less.  Then the piece is halved, by equilibria in between, until the defects of all
+halves vanish or one is no smaller than a part of its chord: there the rows are not joined.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ APART = 0.25
 """Defect, relative to the chord, of two rows that are not joined."""
 HALVINGS = 14
 """How many times a piece is halved: a bend of a smaller part of a step is taken for a jump."""
-STEADY = 4
-"""Halvings after which the defect of a jump, over the length of its piece, has at least doubled."""
-GROWN = 3.0
+STEADY, PROPORTIONAL = 4, 1.5
+"""A defect is in proportion to its piece if over so many halvings their ratio changes by less than that factor."""
+GROWN = 1.5
 """Defect over length, relative to that of the step before, from which on a step is suspected."""
 PLACES = (0.5, 0.43)
 """Where a piece is divided; at the second place if no equilibrium is found at the first, which may be singular."""
@@ -67,25 +67,27 @@ def suspected(solver: BranchSolver, rows: Sequence[Point]) -> bool:
     return off / _length(known[-1], b) > GROWN * before
 
 
-def joined(solver: BranchSolver, a: Point, b: Point) -> bool:
+def joined(solver: BranchSolver, a: Point, b: Point, rates: tuple[float, ...] = ()) -> bool:
     """Whether equilibria join two rows that have tangents on the mesh of ``solver``.
 
-    The half with the larger defect is halved again.  On one branch its defect decreases with its length, and faster;
-    that of a jump stays, or becomes two of about half its size where an equilibrium between two branches is met.
+    Halves whose defects do not vanish are halved again.  On one branch a defect decreases faster than its piece; that
+    of a jump stays.  One in proportion to its piece is that of a tangent along a symmetry, by which states do not move.
+    ``rates`` are defects over lengths of the pieces that this is a half of.
     """
-    rates: list[float] = []
-    for _ in range(HALVINGS):
-        middle = _between(solver, a, b)
-        if middle is None:
-            return False
-        halves = (a, middle), (middle, b)
-        off, (a, b) = max(((defect(solver.system, (a, middle, b), *half), half) for half in halves), key=lambda x: x[0])
-        rates.append(off / _length(a, b))
-        if off <= NEAR or (len(rates) > STEADY and rates[-1] < 2 * rates[-1 - STEADY]):
-            return True
-        if rates[-1] > APART:
-            return False
-    return False
+    middle = _between(solver, a, b) if len(rates) < HALVINGS else None
+    if middle is None:
+        return False
+    rows = (a, middle, b)
+    off = defect(solver.system, rows, a, b)
+    rates = (*rates, off / _length(a, b))
+    recent = rates[-STEADY:]
+    if off <= NEAR or (len(recent) == STEADY and max(recent) < PROPORTIONAL * min(recent)):
+        return True
+    if rates[-1] > APART:
+        return False
+    return all(
+        defect(solver.system, rows, p, q) <= NEAR or joined(solver, p, q, rates) for p, q in ((a, middle), (middle, b))
+    )
 
 
 def _length(a: Point, b: Point) -> float:
