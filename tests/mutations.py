@@ -47,7 +47,7 @@ CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
     "jumps-to-another-branch": Fault(
-        f"{CONTINUATION}jumping.py", "return moved > FAR or off > SHARE * moved", "return False", HARD
+        f"{CONTINUATION}jumping.py", "if moved <= FAR and off <= SHARE * moved", "if True", HARD
     ),
     # location
     "location-is-blunt": Fault(f"{CONTINUATION}locate.py", "SHARP = 1e-11", "SHARP = 1e-4", f"{HEMITROPIC} {GOLDEN}"),

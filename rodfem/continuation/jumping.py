@@ -68,7 +68,7 @@ def suspected(solver: BranchSolver, rows: Sequence[Point]) -> bool:
 
 
 def joined(solver: BranchSolver, a: Point, b: Point, rates: tuple[float, ...] = ()) -> bool:
-    """Whether equilibria join two rows that have tangents on the mesh of ``solver``.
+    """Whether equilibria join two rows ``a``, ``b`` that have tangents on the mesh of ``solver``.
 
     Halves whose defects do not vanish are halved again.  On one branch a defect decreases faster than its piece; that
     of a jump stays.  One in proportion to its piece is that of a tangent along a symmetry, by which states do not move.
