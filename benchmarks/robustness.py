@@ -30,6 +30,7 @@ TITLES = {
     "stiffness": "Stiffness, meshes, rotations",
     "bifurcations": "Bifurcations",
     "published": "Cases of the literature",
+    "endurance": "Endurance",
 }
 
 

@@ -47,6 +47,9 @@ DIAGRAM = "tests/diagram/test_diagram.py"
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "jumps-to-another-branch": Fault(
+        f"{CONTINUATION}jumping.py", "if moved <= FAR and off <= SHARE * moved", "if True", HARD
+    ),
     # location
     "location-is-blunt": Fault(f"{CONTINUATION}locate.py", "SHARP = 1e-11", "SHARP = 1e-4", f"{HEMITROPIC} {GOLDEN}"),
     "location-at-another-zero": Fault(

@@ -12,11 +12,12 @@ from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.index_chain import Row, chained
+from rodfem.continuation.jumping import joined, suspected
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.special_points import COUPLED, find_special, midpoint, same_point
 from rodfem.continuation.touching import Touching
-from rodfem.errors import ConvergenceError
+from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.stability.round_off import resolve
 
 HALVINGS = 4
@@ -59,11 +60,12 @@ class SpecialSearch:
         self._open = [history[-1]]
         self._touching.restart(history)
 
-    def after(self, a: Point, b: Point) -> list[SpecialPoint]:
+    def after(self, a: Point, b: Point, rows: Sequence[Point] = ()) -> list[SpecialPoint]:
         """Special points that the row ``b`` after ``a`` shows, in order of arclength.
 
         An eigenvalue within the tolerance of zero has no sign yet: rows with one wait until it has.  One that stays
-        zero to working accuracy belongs to a family of equilibria at one load, and is not waited for.
+        zero to working accuracy belongs to a family of equilibria at one load, and is not waited for.  The ``rows`` are
+        those that the step to ``b`` was predicted from.
 
         Raises
         ------
@@ -73,7 +75,18 @@ class SpecialSearch:
             If shorter steps are to be tried.
         """
         self._on(b)
-        rows, settled = [self._here(p) for p in self._open], self._open[0]
+        settled = self._open[0]
+        try:
+            found = self._shown_by(a, b)
+            self._check_step([*rows, b])
+        except (Gap, Unresolved):
+            self._open = [settled]
+            raise
+        return found
+
+    def _shown_by(self, a: Point, b: Point) -> list[SpecialPoint]:
+        """Special points that the row ``b`` shows; raises as :meth:`after`."""
+        rows = [self._here(p) for p in self._open]
         self.level = min(rows[0].zero, b.zero)
         if b.zero > self.level:  # the sign of an eigenvalue within the tolerance is settled by the rows that follow
             self._open.append(b)
@@ -83,11 +96,24 @@ class SpecialSearch:
         self._open = [b]
         between = [] if changed else self._touching.between(self.solver, a, b)
         self._touching.add(b, told=changed or any(row.arclength > a.arclength for row in between))
-        try:
-            return self._examined(self._among([*rows, *between, b]))
-        except (Gap, Unresolved):
-            self._open = [settled]
-            raise
+        return self._examined(self._among([*rows, *between, b]))
+
+    def _check_step(self, rows: Sequence[Point]) -> None:
+        """Raise :class:`Unresolved` if the step to the last of the ``rows`` has jumped to another branch.
+
+        Where shorter steps do not help it is said.  Along a family of equilibria at one load neither the path nor its
+        tangent is determined, and nothing is checked.
+        """
+        if len(rows) < 2 or self.solver.system.damping or any(p.tangent is None for p in rows):
+            return
+        a, b = rows[-2:]
+        if not suspected(self.solver, rows) or joined(self.solver, a, b):
+            return
+        self._shorten(a, b)
+        self.observer.warn(
+            f"Between loads {a.load:.8g} and {b.load:.8g} the branch may have been left for another one beside it: no "
+            f"equilibria were found that join them; {SMALLER_STEPS}."
+        )
 
     @property
     def settled(self) -> float:

@@ -140,7 +140,7 @@ class Tracer:
     def _follow(self, branch: Branch) -> None:
         """Follow a branch to its end; where its mesh is too coarse, from there on with another."""
         special = {id(s.point) for s in branch.special}
-        history, begun = [p for p in branch.points if id(p) not in special], False
+        history, begun = [p for p in branch.points if id(p) not in special] or branch.points[-1:], False
         first = history[-1].arclength
         if branch.parent and 0 < first < FIRST / 2:  # it begins near something: see start_branch
             self.specials.begin(history[-1], short=first, until=NEAR_START * first)
@@ -195,7 +195,7 @@ class Tracer:
                 branch.ended = self._rest(branch) or why
                 return
             try:
-                reason = self._between(branch, previous, item)
+                reason = self._between(branch, previous, item, self._own(branch, history[-4:]))
             except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
                 branch.cut(self.specials.settled)
                 self._advance(branch, [p for p in history if p.arclength <= self.specials.settled])
@@ -210,10 +210,18 @@ class Tracer:
                 branch.ended = self._rest(branch) or "closed loop"
                 return
 
-    def _between(self, branch: Branch, a: Point, b: Point) -> str:
-        """Insert special points between two points; a reason if the branch ends there."""
+    @staticmethod
+    def _own(branch: Branch, rows: Sequence[Point]) -> list[Point]:
+        """Rows but for the branch point that a branch leaves, at which it has another tangent than its own."""
+        return [row for row in rows if branch.parent is None or row is not branch.points[0]]
+
+    def _between(self, branch: Branch, a: Point, b: Point, rows: Sequence[Point] = ()) -> str:
+        """Insert special points between two points; a reason if the branch ends there.
+
+        The ``rows`` are those that the step to ``b`` was predicted from.
+        """
         with self.solver.system.clock.scope("location"):
-            specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b)
+            specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b, rows)
             step = Step(self.solver, a, b, specials, begins=a is branch.points[0])
             return self._insert(branch, specials + [s for finder in self.finders for s in finder.between(step)])
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hard import bifurcations, published, ranges, stiffness
+from hard import bifurcations, endurance, isolas, published, ranges, snapping, springy_rings, stiffness
 from hard.case import Case
 
 EXACT = "all special points, each within its error bar, with the index on either side"
@@ -78,6 +78,16 @@ BIFURCATIONS = (
         (1e-3, 1e-6, 1e-9, 1e-12, 1e-13),
     ),
     Case(
+        "branches beside each other", "what steps land on is stable, too, and its tangent is the same",
+        "every row on the branch begun with, to 1e-8", "u = g(P) + (0, d, 2 d)", "distance d", bifurcations.beside,
+        (1e-2, 1e-3), (0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4),
+    ),
+    Case(
+        "an isola", "a closed branch that no other one meets, and is the smaller the less the load exceeds its fold",
+        SAID, "elastica by elliptic integrals", "greatest excess of the thrust", isolas.isola, (1e-2, 1e-6),
+        (1e-1, 1e-2, 1e-4, 1e-6, 1e-7, 1e-8),
+    ),
+    Case(
         "a range about a branch point", "every row has a zero eigenvalue to the tolerance", SAID,
         "Euler, pi^2/4", "half width", ranges.about, (1e-6, 1e-9), (1e-12, 1e-9, 1e-6, 1e-3, 1.0),
     ),
@@ -141,9 +151,38 @@ PUBLISHED = (
         "the same arch as a rod in space", "C/B", published.arch_in_space, (1.0,), (2.0, 1.0, 0.5, 0.2),
     ),
     Case(
+        "snapping strips", "the state that is lost is far from any unbent one", EXACT,
+        "Cazzolli & Dal Corso 2019; folds by shooting", "distance of the clamps, ratio of their angles",
+        lambda given: snapping.snapping(*given), ((0.9, 0.0),),
+        ((0.9, 0.0), (0.9, 0.5), (0.9, -0.5), (0.6, 0.0), (0.6, 0.5)),
+    ),
+    Case(
+        "a hysteresis", "the load turns back twice; two stable states in between", EXACT,
+        "Dhanakoti 2024; extremes of an explicit angle by shooting", "tip load of a cantilever whose clamp turns",
+        snapping.hysteresis, (5.0,), (3.0, 5.0, 8.0),
+    ),
+    Case(
+        "pressed rings on springs that repeat n times", "multiple branch points by symmetry: pairs, single ones, and "
+        "four modes at one load for n = 0 and 7", EXACT, "Fourier coefficients of the second variation", "n",
+        springy_rings.ring, (4, 7), (0, 3, 4, 5, 6, 7),
+    ),
+    Case(
         "a ring deployed by 4 pi", "rotations of an end past 2 pi; the ends far from where they were",
         "a third of the ring after 2 pi, the ring after 4 pi, stable throughout",
         "Goto, Watanabe, Kasugai & Obata 1992", "B1/B2", published.deployed_ring, (9.0,), (100.0, 9.0, 4.0),
     ),
 )  # fmt: skip
-CASES = {"stiffness": STIFFNESS, "bifurcations": BIFURCATIONS, "published": PUBLISHED}
+ENDURANCE = (
+    Case(
+        "long branches", "memory or time that grows with what has been done",
+        "at most 8 kB a row, time of a row within a factor 2, no file or communicator left open", "measured in between",
+        "rows", endurance.rows, (300,), (300, 3000, 10_000),
+    ),
+    Case(
+        "many scenes in one process", "forms, factors and communicators of each have to go with it",
+        "the heap stays within 4 MB and 0.5 kB a scene, time of a scene within a factor 2, no file or communicator "
+        "left open; each with its buckling load", "Euler, B pi^2/4; measured in between", "scenes",
+        endurance.scenes, (20,), (100, 1000),
+    ),
+)  # fmt: skip
+CASES = {"stiffness": STIFFNESS, "bifurcations": BIFURCATIONS, "published": PUBLISHED, "endurance": ENDURANCE}
