@@ -39,7 +39,8 @@ EXACT, ALONG = 1e-15, 1e-11
 """Arclength, in the metric, to which a load is located before it is set, and to which a stretch vanishes."""
 SAME_END = 1e-6
 """A special point nearer to the end of the range than this, in spans, is the last state."""
-
+NO_CONVERGENCE = "no convergence"
+"""How the reason begins for which a branch ends that no step leads on from."""
 NEAR_START = 8
 """Steps of a branch that begins near another special point are as short as its first for so many times their length."""
 
@@ -112,7 +113,7 @@ class Tracer:
             with as_failure(self.solver.system.comm):
                 self._follow(branch)
         except ConvergenceError as trouble:
-            branch.ended = f"no convergence: {trouble}"
+            branch.ended = f"{NO_CONVERGENCE}: {trouble}"
             self.observer.warn(str(trouble))
 
     def without(self, what: str) -> AbstractContextManager[None]:
@@ -190,6 +191,8 @@ class Tracer:
         for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self.specials.reach):
             if isinstance(item, str):
                 branch.ended = self._rest(branch) or item
+                if branch.ended.startswith(NO_CONVERGENCE):
+                    self.observer.warn(f"{branch.name} ends: {branch.ended}; use more elements or smaller steps.")
                 return
             previous = history[-1]
             self._check_symmetry(item)
