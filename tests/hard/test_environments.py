@@ -11,6 +11,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +27,6 @@ from rodfem.linalg import compiled
 pytestmark = pytest.mark.alone
 RUN = "import sys; from rodfem.app.console import main; main(sys.argv[1:])"
 SMALL = ("--quick", "--elements", "4", "--degree", "2", "--depth", "0")
-NOBODY = 65534
 
 
 def run(*words: str, before: tuple[str, ...] = (), **environment: str | None) -> subprocess.CompletedProcess[str]:
@@ -73,35 +74,47 @@ def test_a_cache_that_cannot_be_made(rod: Path) -> None:
     assert "set XDG_CACHE_HOME" in said
 
 
-@pytest.mark.skipif(os.getuid() != 0 or shutil.which("setpriv") is None, reason="needs another user")
-def test_another_user() -> None:
-    """One without a home folder and without a right to write into that of the output."""
-    other = ("setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups")
-    python = [*other, sys.executable, "-c", "import dolfinx, numpy"]
-    if subprocess.run(python, capture_output=True, check=False).returncode:
-        pytest.skip("another user does not reach this Python")
+@contextmanager
+def open_to_all() -> Iterator[Path]:
+    """A folder that other users see, which those of pytest are not, with a scene and a folder that they may write."""
     with tempfile.TemporaryDirectory() as name:
         place = Path(name)
-        place.chmod(0o755)  # the folders of pytest are closed to others
+        place.chmod(0o755)
         (place / "rod.py").write_text(SCENE)
-        words = ("run", str(place / "rod.py"), *SMALL)
         (place / "open").mkdir()
         (place / "open").chmod(0o777)
+        yield place
+
+
+def as_user(number: int) -> tuple[str, ...]:
+    """What goes before a command that another user runs; skips the test where that is not possible."""
+    if os.getuid() != 0 or shutil.which("setpriv") is None:
+        pytest.skip("needs another user")
+    before = ("setpriv", f"--reuid={number}", f"--regid={number}", "--clear-groups")
+    reached = [*before, sys.executable, "-c", "import numpy, ufl"]
+    if subprocess.run(reached, capture_output=True, check=False).returncode:
+        pytest.skip("another user does not reach this Python")
+    return before
+
+
+def test_another_user() -> None:
+    """One whose home folder does not exist, and without a right to write into that of the output."""
+    nobody = as_user(65534)
+    with open_to_all() as place:
+        words = ("run", str(place / "rod.py"), *SMALL)
         out = ("--output", str(place / "open" / "rod"))
-        said = one_sentence(run(*words, *out, before=other, HOME="/nonexistent", XDG_CACHE_HOME=None))
+        said = one_sentence(run(*words, *out, before=nobody, HOME="/nonexistent", XDG_CACHE_HOME=None))
         assert "The folder /nonexistent/.cache/fenics, which keeps compiled code, cannot be written" in said
-        said = one_sentence(run(*words, "--output", str(place / "none"), before=other))
+        said = one_sentence(run(*words, "--output", str(place / "none"), before=nobody))
         assert "cannot be written (Permission denied)" in said
 
 
-@pytest.mark.skipif(os.getuid() != 0 or shutil.which("setpriv") is None, reason="needs another user")
-def test_a_user_without_a_home(rod: Path) -> None:
-    other = ("setpriv", "--reuid=12345", "--regid=12345", "--clear-groups")
-    command = [*other, sys.executable, "-c", "import dolfinx"]
-    if b"home" not in subprocess.run(command, env={}, capture_output=True, check=False).stderr:
-        pytest.skip("that user has a home, or does not reach this Python")
-    said = one_sentence(run("run", str(rod), before=other, HOME=None, XDG_CACHE_HOME=None))
-    assert "This user has no home folder" in said and "set XDG_CACHE_HOME" in said
+def test_a_user_without_a_home() -> None:
+    unknown = as_user(12345)
+    with open_to_all() as place:
+        words = ("run", str(place / "rod.py"), *SMALL, "--output", str(place / "open" / "rod"))
+        said = one_sentence(run(*words, before=unknown, HOME=None, XDG_CACHE_HOME=None))
+        assert "This user has no home folder" in said and "set XDG_CACHE_HOME" in said
 
 
 def test_nobody_at_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
