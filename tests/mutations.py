@@ -144,6 +144,9 @@ FAULTS = {
         "others[others.imag >= 0]",
         "tests/literature/test_follower.py tests/diagram/test_sweep.py",
     ),
+    "the-mesh-slides-for-nothing": Fault(
+        f"{STABILITY}sliding.py", "out[self._ends] = 0.0", "out[:] = 0.0", "tests/stability/test_soft_modes.py"
+    ),
     # error bars
     "bound-without-what-is-left": Fault(
         "rodfem/adaptivity/error_estimate.py", "abs(richer - value) / (1 - rho) + left", "abs(richer - value)", ERRORS
@@ -173,6 +176,12 @@ FAULTS = {
         "rodfem/adaptivity/zero_stretch.py", "else 0.25", "else 0.0025", f"{ERRORS} {HEMITROPIC} {BUCKLED}"
     ),
     # files
+    "code-is-taken-for-whole": Fault(
+        "rodfem/code_cache.py",
+        "return bool(size >= place + entry * number)",
+        "return size >= 64",
+        "tests/hard/test_environments.py",
+    ),
     "no-drafts": Fault(
         "rodfem/whole_files.py",
         'draft = path.with_name(f".{path.stem}.part{path.suffix}")',

@@ -91,8 +91,9 @@ def as_user(number: int) -> tuple[str, ...]:
     if os.getuid() != 0 or shutil.which("setpriv") is None:
         pytest.skip("needs another user")
     before = ("setpriv", f"--reuid={number}", f"--regid={number}", "--clear-groups")
-    reached = [*before, sys.executable, "-c", "import numpy, ufl"]
-    if subprocess.run(reached, capture_output=True, check=False).returncode:
+    reached = [*before, sys.executable, "-c", "import numpy, ufl, rodfem.errors"]
+    env = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    if subprocess.run(reached, env=env, cwd="/", capture_output=True, check=False).returncode:
         pytest.skip("another user does not reach this Python")
     return before
 
