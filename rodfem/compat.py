@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import inspect
 import logging
+import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import module_from_spec, spec_from_file_location
@@ -21,9 +22,14 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from forms.importing import without_pkg_resources
+from rodfem import code_cache
 from rodfem.beside import Job
 from rodfem.errors import SetupError
 
+try:
+    code_cache.have_home()
+except RuntimeError as homeless:
+    raise SetupError(code_cache.HOMELESS) from homeless
 try:
     with without_pkg_resources():
         import basix
@@ -45,6 +51,8 @@ _COMPILE = jit._compile_objects
 """What FFCx calls for objects that its cache lacks, once it has locked their place in it."""
 _SEARCH = jit.get_cached_module
 """How FFCx looks for a module in its cache: it lists that folder, which takes 10 ms where it has thousands of files."""
+PATIENCE = 60.0
+"""Seconds after which a module that is locked in the cache, and not written to, is taken for one of a killed run."""
 _LISTENERS: list[Callable[[], None]] = []
 """Who is told of it."""
 ALONE = MPI.COMM_WORLD.size == 1
@@ -61,10 +69,40 @@ def _by_name(module_name: str, object_names: Sequence[str], cache_dir: str | Pat
     """
     place = Path(cache_dir)
     file = next((f for f in (place / f"{module_name}{end}" for end in EXTENSION_SUFFIXES) if f.is_file()), None)
-    if file is None or not (place / f"{module_name}.c.cached").is_file():
-        return _SEARCH(module_name, object_names, cache_dir, timeout)
+    if file is None or not code_cache.is_whole(file) or not (place / f"{module_name}.c.cached").is_file():
+        try:
+            _remove_broken(place / f"{module_name}.c", file)
+            return _awaited(module_name, object_names, place, timeout)
+        except TimeoutError:
+            raise
+        except OSError as error:
+            raise SetupError(code_cache.refused(error)) from error
     module = _loaded(module_name, file)
     return [getattr(module.lib, name) for name in object_names], module
+
+
+def _remove_broken(lock: Path, file: Path | None) -> None:
+    """Remove a module that is marked as ready, and is cut short or lost: the ``lock``, its code in C, before it."""
+    mark = lock.with_suffix(".c.cached")
+    if mark.is_file():
+        for broken in (mark, lock, file):
+            if broken is not None:
+                broken.unlink(missing_ok=True)
+
+
+def _awaited(module_name: str, object_names: Sequence[str], place: Path, timeout: int) -> Any:
+    """What FFCx finds, which may be nothing; what another process compiles is awaited while it may be at work.
+
+    Raises :class:`TimeoutError` where nobody has worked at the module for :data:`PATIENCE`.
+    """
+    lock = place / f"{module_name}.c"
+    while True:
+        try:
+            return _SEARCH(module_name, object_names, place, timeout)
+        except TimeoutError:
+            with suppress(FileNotFoundError):
+                if time.time() - lock.stat().st_mtime > PATIENCE:
+                    raise
 
 
 @cache
@@ -218,7 +256,7 @@ def compile_forms(forms: Sequence[Any]) -> list[Any]:
     except TimeoutError as locked:
         raise SetupError(
             "A compiled form never became ready, most likely because an earlier run was killed while compiling: "
-            "delete the folder ~/.cache/fenics (or $XDG_CACHE_HOME/fenics) and run again."
+            f"delete the folder {code_cache.folder()} and run again."
         ) from locked
 
 

@@ -1,8 +1,9 @@
 """Soft modes along a branch that has been traced: at which of its points the index is not decided, and by what.
 
 Rows that one factorisation decided have none.  A mesh may make an eigenvalue of its own of one that is exponentially
-small: it pins what slides along the rod.  At the loads asked for and at the ends of branches, and all along a branch
-with a special point that a richer mesh does not have, indices are therefore compared with those of a richer mesh.
+small: it pins what slides along the rod.  That shows at every row, on the mesh itself
+(:mod:`rodfem.stability.sliding`).  At the loads asked for and at the ends of branches, and all along a branch with a
+special point that a richer mesh does not have, indices are besides compared with those of a richer mesh.
 """
 
 from __future__ import annotations

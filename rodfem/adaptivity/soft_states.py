@@ -12,16 +12,19 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import Enriched
+from rodfem.adaptivity.error_estimate import STEADY, Enriched
 from rodfem.continuation.branch import Point
+from rodfem.continuation.corrector import NEAR
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.inertia import NULL
 from rodfem.stability.motion_names import SHARE, MotionNames
-from rodfem.stability.near_zero import NearZero, judge, near_zero
+from rodfem.stability.near_zero import NearZero, judge, near_zero, soft_limit
 from rodfem.stability.round_off import SPARE, quotient_error
+from rodfem.stability.sliding import Sliding
 from rodfem.stability.soft_mode import Judgement, SoftMode
 
 REFINEMENTS = 2
@@ -39,6 +42,7 @@ class SoftStates:
     def __init__(self, solver: BranchSolver, richer: Callable[[], Enriched] | None) -> None:
         """Nothing is computed before a state is given."""
         self.solver, self.names = solver, MotionNames(solver.system, solver.inertia.metric)
+        self.sliding = Sliding(self.names)
         self._richer = [richer] if richer is not None else []
         self._companions: list[Enriched] = []
 
@@ -49,10 +53,13 @@ class SoftStates:
         ``compare`` the index there is asked for; eigenvalues that have another sign are soft, too.  Raises
         :class:`ConvergenceError` where constraints that depend on each other leave less than no negative eigenvalue.
         """
+        inertia, clear = self.solver.inertia, self._is_clear(point)
         differing = self._differing(point, fixed_load) if compare and self._richer else 0
-        if not differing and self._is_clear(point):
+        sliding = self.sliding.suspects(inertia, point.x, NEAR * inertia.scale if clear else soft_limit(inertia))
+        if clear and not differing and not sliding:
             return False
-        near = near_zero(self.solver.inertia.at(point.x), least=differing)
+        least = max(differing, sliding + 1 if sliding else 0)  # another eigenvalue may be nearer to zero
+        near = self._with_the_mesh(point, near_zero(inertia.at(point.x), least=least), differing)
         found = self.judgement(point, near, fixed_load=fixed_load)
         if found.negative < 0:
             raise ConvergenceError(
@@ -62,6 +69,17 @@ class SoftStates:
         point.negative, point.zero, point.undecided = found.negative, found.zero, found.undecided
         point.soft = list(found.soft)
         return bool(found.soft)
+
+    def _with_the_mesh(self, point: Point, near: NearZero, least: int) -> NearZero:
+        """Eigenvalues with what the mesh makes of the motion along the rod in their uncertainty.
+
+        Those that are neither soft nor doubtful by that are left out, but for the ``least`` number of them.
+        """
+        uncertainty = near.uncertainty + self.sliding.parts(point.x, near.vectors)
+        limit = soft_limit(self.solver.inertia)
+        away = abs(near.values)
+        chosen = (away < limit) | (away <= uncertainty) | (np.argsort(np.argsort(away)) < least)
+        return near.chosen(chosen, uncertainty, self.solver.inertia.tolerance)
 
     def _is_clear(self, point: Point) -> bool:
         """Whether no eigenvalue is near zero, by one factorisation."""
@@ -164,7 +182,8 @@ def _on(richer: Enriched, point: Point, fixed_load: bool) -> tuple[Point, float]
 def _nearest(solver: BranchSolver, point: Point, number: int, left_out: int) -> tuple[np.ndarray, np.ndarray]:
     """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``.
 
-    The first ``left_out`` of them at the ``point`` are no part of that number.
+    The first ``left_out`` of them at the ``point`` are no part of that number.  What arithmetic leaves open of the
+    state, one more step of Newton's method tells, by the factors of the last one.
     """
     found = solver.inertia.at(point.x)
     found.count()
@@ -174,5 +193,15 @@ def _nearest(solver: BranchSolver, point: Point, number: int, left_out: int) -> 
     values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
     floor = TOLERANCE * solver.inertia.scale
     rounding = np.array([max(quotient_error(found.matrix, v), floor) for v in vectors])
+    stepped = solver.inertia.at(_stepped(solver, point.x))
+    moved = abs(np.array([v.dot(stepped.matrix * v).real for v in vectors]) - values)
     order = np.argsort(values)
-    return values[order], rounding[order]
+    return values[order], (rounding + STEADY * moved)[order]
+
+
+def _stepped(solver: BranchSolver, x: PETSc.Vec) -> PETSc.Vec:
+    """Equilibrium after one more step of Newton's method, by the factors of the last one."""
+    system = solver.system
+    equations, step = system.new_vector(), system.new_vector()
+    system.at(x).residual(equations)
+    return x - step if system.solve(equations, step) else x

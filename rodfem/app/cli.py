@@ -7,6 +7,7 @@ module is missing.  From then on an interrupt is one sentence and status 130 (:m
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import signal
 import sys
@@ -36,6 +37,8 @@ def check_installation() -> None:
 
 
 check_installation()
+# Open MPI 4 starts a daemon otherwise, in 0.2 s, which needs a home folder; a file with a rod may start MPI when read
+os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
 listen()
 
 

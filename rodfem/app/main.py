@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -48,7 +47,6 @@ def main(
     program
         Name for the help, by default that of the script.
     """
-    os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")  # Open MPI 4 starts a daemon otherwise, 0.2 s
     given = list(sys.argv[1:] if arguments is None else arguments)
     ours, petsc = (given[: given.index("--")], given[given.index("--") + 1 :]) if "--" in given else (given, [])
     try:

@@ -103,17 +103,21 @@ class StaticSolver:
     def first(self, load: float) -> tuple[PETSc.Vec, NewtonResult]:
         """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill.
 
-        Also where Newton's method ends at an unstable one that is nowhere near the start.
+        Also where Newton's method ends at an unstable one that is nowhere near the start.  Of a family of equilibria
+        it is the one next to the start, whatever round-off would make of it.
         """
         guess = self.start(load)
         x, outcome = self.at_load(guess, load)
-        if outcome.converged and (self._turned(guess, x) < STRAYED or self.is_stable(x)):
+        good = outcome.converged and (self._turned(guess, x) < STRAYED or self.is_stable(x))
+        if good and not self.may_move(x):
             return x, outcome
         damping, self.system.damping = self.system.damping, STILL * self.system.stiffness_scale
         still, found = self.at_load(guess, load)  # the start may be one of a family, along which it need not move
         self.system.damping = damping
         if found.converged and self._turned(guess, still) < STRAYED:
             return still, found
+        if good:
+            return x, outcome
         other = self.downhill(load)
         return other if other[1].converged else (x, outcome)
 
@@ -172,6 +176,10 @@ class StaticSolver:
         """Whether an equilibrium is stable, as far as is known without counting."""
         return True
 
+    def may_move(self, x: PETSc.Vec) -> bool:
+        """Whether an equilibrium is one of a family that no symmetry explains, as far as is known without counting."""
+        return False
+
     def energy(self, x: PETSc.Vec) -> float:
         """Stored energy of the state ``x``."""
         return self.system.at(x).energy()
@@ -215,6 +223,11 @@ class BranchSolver(StaticSolver):
     def is_stable(self, x: PETSc.Vec) -> bool:
         """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
         return self.inertia.at(x).count().negative == 0
+
+    def may_move(self, x: PETSc.Vec) -> bool:
+        """Whether an equilibrium has more zero eigenvalues than symmetries that it breaks."""
+        found = self.inertia.at(x)
+        return found.count().zero > found.drifts
 
     def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, NewtonResult]:
         """As for any equilibrium, with the symmetric factors unless they are too near singular."""

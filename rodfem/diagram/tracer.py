@@ -31,6 +31,8 @@ from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without
 from rodfem.tolerances import DRIFT
 
+NO_CONVERGENCE = "no convergence"
+"""How the reason begins for which a branch ends that no step leads on from."""
 NEAR_START = 8
 """Steps of a branch that begins near another special point are as short as its first for so many times their length."""
 
@@ -103,7 +105,7 @@ class Tracer:
             with as_failure(self.solver.system.comm):
                 self._follow(branch)
         except ConvergenceError as trouble:
-            branch.ended = f"no convergence: {trouble}"
+            branch.ended = f"{NO_CONVERGENCE}: {trouble}"
             self.observer.warn(str(trouble))
 
     def without(self, what: str) -> AbstractContextManager[None]:
@@ -181,6 +183,8 @@ class Tracer:
         for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self.specials.reach):
             if isinstance(item, str):
                 branch.ended = self._rest(branch) or item
+                if branch.ended.startswith(NO_CONVERGENCE):
+                    self.observer.warn(f"{branch.name} ends: {branch.ended}; use more elements or smaller steps.")
                 return
             previous = history[-1]
             self._check_symmetry(item)

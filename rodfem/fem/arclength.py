@@ -23,6 +23,8 @@ class Arclength:
     derivative
         Matrix (local size, local size) of the derivative at nodes, the mean of the cells that share one; zero for
         scalars and at clamped degrees of freedom.
+    everywhere
+        The same, at clamped degrees of freedom, too.
     jumps
         Matrix (shared nodes, local size) of its jumps between cells, of rotation and centreline.
     """
@@ -35,12 +37,13 @@ class Arclength:
             slopes, dofs = _slopes(fields, block), fields.dofs[block.name].ravel()
             sums = sp.csr_matrix((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(size, len(dofs)))
             shared = np.maximum(np.asarray(sums.sum(axis=1)).ravel(), 1.0)
-            mean += sp.diags(np.where(fields.number < 0, 0.0, 1.0 / shared)) @ sums @ slopes
+            mean += sp.diags(1.0 / shared) @ sums @ slopes
             if block.name in (fields.turning.name, "r"):
                 order = np.argsort(dofs, kind="stable")
                 twins = np.flatnonzero(np.diff(dofs[order]) == 0)
                 jumps.append(slopes[order[twins + 1]] - slopes[order[twins]])
-        self.derivative, self.jumps = mean.tocsr(), sp.vstack(jumps).tocsr()
+        self.everywhere, self.jumps = mean.tocsr(), sp.vstack(jumps).tocsr()
+        self.derivative = sp.diags(np.where(fields.number < 0, 0.0, 1.0)) @ self.everywhere
 
 
 def _slopes(fields: Fields, block: Block) -> sp.csr_matrix:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import os
 import platform
 import sys
 import tempfile
@@ -13,15 +12,12 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
 
+from rodfem import code_cache
 from rodfem.beside import Job
+from rodfem.errors import SetupError
 
 FLAGS = ["-O3", "-march=native"]
 """Of the compiler: fast loops, and no -ffast-math, which would hide what is no number."""
-
-
-def _cache() -> Path:
-    """Folder in which FFCx keeps its kernels."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fenics"
 
 
 def _processor() -> str:
@@ -49,7 +45,8 @@ def compile_ahead(name: str, declarations: str, beside: Path = _HERE) -> None:
 def module(name: str, declarations: str, beside: Path = _HERE) -> Any:
     """The compiled module of ``name.c`` in the folder ``beside``, with ``lib`` and ``ffi`` of cffi.
 
-    ``declarations`` are its functions in C.  Raises what the compiler raises.
+    ``declarations`` are its functions in C.  Raises what the compiler raises, and :class:`SetupError` where the cache
+    lacks the module and cannot be written.
     """
     full, code = _named(name, declarations, beside)
     if full in _JOBS:
@@ -71,8 +68,9 @@ def _named(name: str, declarations: str, beside: Path) -> tuple[str, str]:
 
 def _found(full: str) -> Path | None:
     """Compiled module in the cache, by its name: to list that folder takes long where it has thousands of files."""
-    files = (_cache() / f"{full}{suffix}" for suffix in EXTENSION_SUFFIXES)
-    return next((file for file in files if file.is_file()), None)
+    place = code_cache.folder()
+    files = (place / f"{full}{suffix}" for suffix in EXTENSION_SUFFIXES)
+    return next((file for file in files if code_cache.is_whole(file)), None)
 
 
 def _compile(full: str, code: str, declarations: str) -> Path:
@@ -82,8 +80,12 @@ def _compile(full: str, code: str, declarations: str) -> Path:
     builder = FFI()
     builder.cdef(declarations)
     builder.set_source(full, code, extra_compile_args=FLAGS, libraries=["m"])
-    folder = _cache()
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder) as room:
-        made = Path(builder.compile(tmpdir=room))
+    folder = code_cache.folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        room = tempfile.TemporaryDirectory(dir=folder)
+    except OSError as error:
+        raise SetupError(code_cache.refused(error)) from error
+    with room as inside:
+        made = Path(builder.compile(tmpdir=inside))
         return made.replace(folder / made.name)

@@ -49,20 +49,27 @@ class MotionNames:
         if not vectors:
             return []
         state = self.system.at(x)
-        turning, rigid = (self._generators(x, state, motions) for motions in (self._turning, self._rigid))
-        sliding = "slipping along itself" if self.system.scene.closed else "sliding along the rod"
-        along = self._generators(x, state, {sliding: self._along})
+        turning, rigid, along = self.generators(x, state)
         return [self._name(state, v, turning, rigid, along) for v in vectors]
 
+    def generators(self, x: PETSc.Vec, state: State) -> tuple[Group, Group, Group]:
+        """Turning of the cross-sections, rigid motions, and the motion along the rod at a ``state``, which is ``x``.
+
+        They are of metric norm 1 and across the symmetries of the state; those that vanish are left out.
+        """
+        turning, rigid = (self._generators(x, state, motions) for motions in (self._turning, self._rigid))
+        sliding = "slipping along itself" if self.system.scene.closed else "sliding along the rod"
+        return turning, rigid, self._generators(x, state, {sliding: self._along})
+
     def _name(self, state: State, v: PETSc.Vec, turning: Group, rigid: Group, along: Group) -> str:
-        share, weights = self._share(v, rigid)
+        share, weights = self.share(v, rigid)
         if share > SHARE:
             named = abs(weights) > LARGEST_PART * abs(weights).max()
             return " with ".join(name for (name, _), chosen in zip(rigid, named, strict=True) if chosen)
         for motion in turning:
-            if self._share(v, [motion])[0] > SHARE:
+            if self.share(v, [motion])[0] > SHARE:
                 return motion[0]
-        if along and self._share(v, [*along, *turning, *rigid])[0] > SHARE:
+        if along and self.share(v, [*along, *turning, *rigid])[0] > SHARE:
             return along[0][0]
         return mode_type.name(mode_type.shares(self.system, state.turned, [v.array_r.real]))
 
@@ -83,8 +90,8 @@ class MotionNames:
     def _square(self, g: PETSc.Vec) -> float:
         return float(g.dot(self.metric * g).real)
 
-    def _share(self, v: PETSc.Vec, group: Group) -> tuple[float, np.ndarray]:
-        """Share of ``v`` in the span of a group, and the weights of the members in its projection."""
+    def share(self, v: PETSc.Vec, group: Group) -> tuple[float, np.ndarray]:
+        """Share of ``v`` (metric norm 1) in the span of a group, and the weights of the members in its projection."""
         if not group:
             return 0.0, np.zeros(0)
         images = [self.metric * g for _, g in group]

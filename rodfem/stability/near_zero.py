@@ -2,8 +2,8 @@ r"""The eigenvalues near zero at a state, and what round-off leaves open of each
 
 The uncertainty on one mesh is the larger of two numbers: the round-off of the Rayleigh quotient
 (:func:`~rodfem.stability.round_off.quotient_error`), and that of the state itself, which Newton's method solves for to
-:data:`~rodfem.fem.newton.TOLERANCE`.  What the mesh adds is known from a richer one
-(:mod:`rodfem.adaptivity.soft_states`).
+:data:`~rodfem.fem.newton.TOLERANCE`.  What the mesh makes of sliding along the rod
+:mod:`rodfem.stability.sliding` knows, what it adds to all of them a richer mesh (:mod:`rodfem.adaptivity.soft_states`).
 """
 
 from __future__ import annotations
@@ -38,6 +38,20 @@ class NearZero:
     uncertainty: np.ndarray
     firm: int
     zero: int
+
+    def chosen(self, which: np.ndarray, uncertainty: np.ndarray, tolerance: float) -> NearZero:
+        """Those that are marked in ``which`` (number,), with their part of another ``uncertainty`` (number,).
+
+        The others count as a count with that ``tolerance`` has them.
+        """
+        others = self.values[~which]
+        return NearZero(
+            self.values[which],
+            [v for v, kept in zip(self.vectors, which, strict=True) if kept],
+            uncertainty[which],
+            self.firm + int((others < -tolerance).sum()),
+            self.zero + int((abs(others) <= tolerance).sum()),
+        )
 
 
 def soft_limit(inertia: Inertia) -> float:

@@ -35,7 +35,7 @@ MATRICES = {
 COMMAND_LINE = ("rodfem.app.cli", "rodfem.app.options", "rodfem.app.constants", "rodfem.app.main")
 COMMAND_LINE += ("rodfem.app.console", "rodfem.app.commands.")
 """Beginnings of the names of modules that know options."""
-BELOW_MATRICES = {"rodfem.errors", "rodfem.compat", "rodfem.tolerances", "rodfem.beside"}
+BELOW_MATRICES = {"rodfem.errors", "rodfem.compat", "rodfem.tolerances", "rodfem.beside", "rodfem.code_cache"}
 """Other modules that they may import."""
 MATHEMATICS = {"ufl", "forms", "__future__", "collections", "dataclasses", "typing"}
 """All that the mathematics in ``forms`` may import; ``forms.importing`` has none, and UFL but the standard library."""

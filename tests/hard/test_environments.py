@@ -1,0 +1,201 @@
+"""Folders that cannot be written, a cache of compiled code that is broken or shared, locales, names with spaces.
+
+Each is either no trouble, or one sentence.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import ufl
+from app.test_run_command import SCENE
+from ffcx.codegeneration import jit
+
+import rodfem
+from rodfem import code_cache, compat
+from rodfem.linalg import compiled
+
+pytestmark = pytest.mark.alone
+RUN = "import sys; from rodfem.app.console import main; main(sys.argv[1:])"
+SMALL = ("--quick", "--elements", "4", "--degree", "2", "--depth", "0")
+
+
+def run(*words: str, before: tuple[str, ...] = (), **environment: str | None) -> subprocess.CompletedProcess[str]:
+    """Run ``rodfem`` with these words in a process of its own, whose environment differs in this; None unsets."""
+    env = {name: value for name, value in (os.environ | environment).items() if value is not None}
+    env["PYTHONPATH"] = str(Path(__file__).parents[2])
+    command = [*before, sys.executable, "-c", RUN, *words]
+    return subprocess.run(command, env=env, capture_output=True, encoding="utf-8", timeout=300, check=False)
+
+
+def one_sentence(ended: subprocess.CompletedProcess[str]) -> str:
+    """The only line that it complains in, of status 2."""
+    assert (ended.returncode, ended.stderr.count("\n"), ended.stderr[:7]) == (2, 1, "error: ")
+    return ended.stderr
+
+
+@pytest.fixture
+def rod(folder: Path) -> Path:
+    """A scene in a file whose name, and whose folder's, has spaces and letters that are not English."""
+    place = folder / "Stäbe und Ström"
+    place.mkdir(exist_ok=True)
+    (place / "ein Stab.py").write_text(SCENE)
+    return place / "ein Stab.py"
+
+
+# --- names, locales -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("locale", ["C", "de_DE.UTF-8"])
+def test_names_and_locales(locale: str, rod: Path) -> None:
+    out = rod.parent / f"Ergebnisse é {locale}"
+    ended = run("run", str(rod), *SMALL, "--output", str(out), LC_ALL=locale, LC_NUMERIC=locale)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert out.name in ended.stdout and "2.467" in ended.stdout  # pi^2/4, with a point
+    assert (out / "diagram.json").is_file()
+
+
+# --- what cannot be written -----------------------------------------------------------------------------------------
+
+
+def test_a_cache_that_cannot_be_made(rod: Path) -> None:
+    """A file stands where the cache would be."""
+    said = one_sentence(run("run", str(rod), *SMALL, XDG_CACHE_HOME=str(rod)))
+    assert f"The folder {rod}/fenics, which keeps compiled code, cannot be written" in said
+    assert "set XDG_CACHE_HOME" in said
+
+
+@contextmanager
+def open_to_all() -> Iterator[Path]:
+    """A folder that other users see, which those of pytest are not, with a scene and a folder that they may write."""
+    with tempfile.TemporaryDirectory() as name:
+        place = Path(name)
+        place.chmod(0o755)
+        (place / "rod.py").write_text(SCENE)
+        (place / "open").mkdir()
+        (place / "open").chmod(0o777)
+        yield place
+
+
+def as_user(number: int) -> tuple[str, ...]:
+    """What goes before a command that another user runs; skips the test where that is not possible."""
+    if os.getuid() != 0 or shutil.which("setpriv") is None:
+        pytest.skip("needs another user")
+    before = ("setpriv", f"--reuid={number}", f"--regid={number}", "--clear-groups")
+    reached = [*before, sys.executable, "-c", f"import ufl, rodfem; assert rodfem.__file__ == {rodfem.__file__!r}"]
+    env = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    if subprocess.run(reached, env=env, cwd="/", capture_output=True, check=False).returncode:
+        pytest.skip("another user does not reach this Python")
+    return before
+
+
+def test_another_user() -> None:
+    """One whose home folder does not exist, and without a right to write into that of the output."""
+    nobody = as_user(65534)
+    with open_to_all() as place:
+        words = ("run", str(place / "rod.py"), *SMALL)
+        out = ("--output", str(place / "open" / "rod"))
+        said = one_sentence(run(*words, *out, before=nobody, HOME="/nonexistent", XDG_CACHE_HOME=None))
+        assert "The folder /nonexistent/.cache/fenics, which keeps compiled code, cannot be written" in said
+        said = one_sentence(run(*words, "--output", str(place / "none"), before=nobody))
+        assert "cannot be written (Permission denied)" in said
+
+
+def test_a_user_without_a_home() -> None:
+    unknown = as_user(12345)
+    with open_to_all() as place:
+        words = ("run", str(place / "rod.py"), *SMALL, "--output", str(place / "open" / "rod"))
+        said = one_sentence(run(*words, before=unknown, HOME=None, XDG_CACHE_HOME=None))
+        assert "This user has no home folder" in said and "set XDG_CACHE_HOME" in said
+
+
+def test_nobody_at_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def homeless() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(code_cache.Path, "home", homeless)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setenv("HOME", "")
+    with pytest.raises(RuntimeError):
+        code_cache.have_home()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    code_cache.have_home()
+    assert os.environ["HOME"] == str(tmp_path)
+
+
+# --- a cache that is broken -----------------------------------------------------------------------------------------
+
+
+def form() -> Any:
+    """A form of a cell, of no rod."""
+    domain = compat.interval_mesh(compat.MPI.COMM_SELF, 1, 0.0, 1.0)
+    return ufl.SpatialCoordinate(domain)[0] ** 3 * ufl.dx(domain=domain)
+
+
+def cut(file: Path, part: float) -> None:
+    """Leave a part of a file, which is another file then: the old one may be in use."""
+    data = file.read_bytes()
+    file.unlink()
+    file.write_bytes(data[: int(part * len(data))])
+
+
+@pytest.mark.parametrize("part", [0.0, 0.001, 0.5, 0.999])
+def test_own_code_that_is_cut_short_is_compiled_again(
+    part: float, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "seven.c").write_text("int seven(void) { return 7; }\n")
+    monkeypatch.setattr(compiled, "FLAGS", ["-O0"])
+    module, given = compiled.module.__wrapped__, ("seven", "int seven(void);", tmp_path)
+    assert module(*given).lib.seven() == 7
+    (made,) = (tmp_path / "cache" / "fenics").glob("rodfem_seven*")
+    assert code_cache.is_whole(made)
+    cut(made, part)
+    assert not code_cache.is_whole(made)
+    assert module(*given).lib.seven() == 7
+    assert code_cache.is_whole(made)
+
+
+@pytest.mark.parametrize("broken", ["cut", "lost"])
+def test_a_form_that_is_cut_short_is_compiled_again(broken: str, tmp_path: Path) -> None:
+    asked = form()
+    jit.compile_forms([asked], cache_dir=tmp_path)
+    (made,) = (f for f in tmp_path.iterdir() if f.suffix not in (".c", ".o", ".cached"))
+    cut(made, 0.5)
+    if broken == "lost":
+        made.unlink()
+    compat._loaded.cache_clear()
+    objects, *_ = jit.compile_forms([asked], cache_dir=tmp_path)
+    assert len(objects) == 1 and code_cache.is_whole(made)
+
+
+def test_what_another_process_compiles_is_awaited(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """FFCx gives up after ten seconds: a compiler on a busy machine takes longer."""
+    tries: list[int] = []
+
+    def search(*_: object) -> str:
+        tries.append(1)
+        if len(tries) < 3:
+            raise TimeoutError
+        return "found"
+
+    monkeypatch.setattr(compat, "_SEARCH", search)
+    lock = tmp_path / "some.c"
+    lock.touch()
+    assert compat._by_name("some", [], tmp_path, 10) == "found" and len(tries) == 3
+    tries.clear()
+    long_ago = time.time() - 2 * compat.PATIENCE
+    os.utime(lock, (long_ago, long_ago))
+    with pytest.raises(TimeoutError):
+        compat._by_name("some", [], tmp_path, 10)
+    assert len(tries) == 1
