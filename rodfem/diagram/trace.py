@@ -109,7 +109,7 @@ def traced(
             mesh = journal.first_mesh or _mesh(scene, discretization, plan, recorder, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
             if plan.accuracy is None:
-                check_waves(found, plan.over(scene))
+                check_waves(found, plan.over(scene), recorder.warn)
         asked = as_asked(scene, discretization, plan) | {"equations": fingerprint(found.system)}
         recorder.asked(asked)
         recorder.system(found.system, plan.accuracy)

@@ -1,45 +1,70 @@
 """Half-waves along a rod under the loads of a range: whether a mesh can hold them, told before anything is traced.
 
 A rod of bending stiffness B under a compression N has half-waves of the length ``pi sqrt(B / N)``, under a moment M
-such of ``pi B / M``.  Where the loads of a range are so large that a mesh has few nodes for each, the index of the
-scene's start at that load is counted: one not far from the number of nodes is that of the mesh, not of the rod.
+such of ``pi B / M``; a rod whose start is twisted turns its sections.  Where a mesh has few nodes for each half-wave or
+half turn, the index of the scene's start is counted: one not far from the number of nodes, or another one than on twice
+as many elements, is that of the mesh, not of the rod.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import pi
 
 import numpy as np
 
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
-from rodfem.diagram.solver import check_index
+from rodfem.diagram.solver import Solver, check_index
 from rodfem.problem.roles import functions_of
 from rodfem.problem.scene import Scene
 
 FEW = 4
 """Nodes for each half-wave below which the index is counted."""
+SAMPLES = 2001
+"""Places along the rod at which the turning of its start is looked at."""
 SMALL = 1e-6
 """Curvature times length of the differences that give the moment of the undeformed rod."""
 
 
-def check_waves(solver: StaticSolver, span: tuple[float, float]) -> None:
-    """Raise :class:`InputError` where a solver's mesh cannot hold the half-waves at an end of a range of loads.
+def check_waves(solver: StaticSolver, span: tuple[float, float], warn: Callable[[str], None]) -> None:
+    """Compare the index at the ends of a range of loads with that on twice as many elements, where a mesh has few.
 
-    ``span`` is the range; collective.
+    ``span`` is the range, and ``warn`` hears of an index that is the mesh's.  Raises :class:`InputError` where the mesh
+    of the ``solver`` cannot hold the half-waves at all.  Collective.
     """
     if not isinstance(solver, BranchSolver):
         return
     fields = solver.system.fields
-    scene, nodes = fields.scene, fields.discretization.elements * fields.discretization.degree
+    scene, mesh = fields.scene, fields.discretization
+    nodes, finer = mesh.elements * mesh.degree, None
     for load in span:
-        if FEW * half_waves(scene, load) > nodes:
-            x, outcome = solver.at_load(solver.start(load), load)
-            if outcome.converged:
-                check_index(scene, load, solver.inertia.at(x).count().negative, nodes)
+        if FEW * half_waves(scene, load) <= nodes:
+            continue
+        index = _index(solver, load)
+        if index is None:
+            continue
+        check_index(scene, load, index, nodes)
+        finer = finer or Solver(scene, mesh.finer(2), solver.system.comm).equilibria
+        there = _index(finer, load)
+        if there not in (None, index):
+            warn(
+                f"At {scene.load} = {load:g} the index of the first state is {index} on {mesh.elements} elements and "
+                f"{there} on {2 * mesh.elements}: indices may be the mesh's; use more elements or a higher degree."
+            )
+
+
+def _index(solver: StaticSolver, load: float) -> int | None:
+    """Index of the scene's start at a load; None where that leads to no equilibrium."""
+    assert isinstance(solver, BranchSolver)
+    x, outcome = solver.at_load(solver.start(load), load)
+    return solver.inertia.at(x).count().negative if outcome.converged else None
 
 
 def half_waves(scene: Scene, load: float) -> float:
-    """Number of half-waves along the rod under its loads at ``load``, as forces and moments given by numbers tell."""
+    """Number of half-waves along the rod at ``load``: of its loads, as forces and moments given by numbers tell them.
+
+    Or the number of half turns of its start, where those are more.
+    """
     stiffness, c = scene.stiffness(), scene.constants(load)
     softest = float(np.linalg.eigvalsh(stiffness[-3:, -3:])[0])
     force, moment = 0.0, float(np.linalg.norm(_moment(scene, load)))
@@ -52,7 +77,16 @@ def half_waves(scene: Scene, load: float) -> float:
         apart = np.linalg.norm(np.array(right, dtype=float) - np.array(left, dtype=float))
         axial = scene.free_strains.index(2)
         force += abs(float(apart) / scene.length - 1) * float(stiffness[axial, axial])
-    return scene.length / pi * max((force / softest) ** 0.5, moment / softest)
+    return max(scene.length / pi * max((force / softest) ** 0.5, moment / softest), _turned(scene) / pi)
+
+
+def _turned(scene: Scene) -> float:
+    """Angle by which the sections turn along the rod at its start, in all."""
+    if scene.start is None:
+        return 0.0
+    q = np.asarray(scene.start(np.linspace(*scene.interval, SAMPLES)), dtype=float)
+    cosines = abs((q[1:] * q[:-1]).sum(axis=1)) / (np.linalg.norm(q[1:], axis=1) * np.linalg.norm(q[:-1], axis=1))
+    return float(2 * np.arccos(np.clip(cosines, 0.0, 1.0)).sum())
 
 
 def _moment(scene: Scene, load: float) -> np.ndarray:

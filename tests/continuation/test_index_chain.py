@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
-from math import cos, pi, sin
+from math import cos, pi, sin, sqrt
 from typing import Any
 
 import demo_cases
@@ -61,6 +61,17 @@ def localised(turns: int = 27) -> Scene:
         start=lambda s: np.stack([np.cos(turns * pi * s), 0 * s, 0 * s, np.sin(turns * pi * s)], axis=1),
         ordinate=Ordinate("end shortening", s=1.0, of=lambda r, q: 1 - r[2]),
     )  # fmt: skip
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize(("elements", "told"), [(16, True), (40, False)])
+def test_a_mesh_too_coarse_for_the_turns_of_a_rod_is_told(elements: int, told: bool) -> None:
+    """The straight rod is stable under a high tension: m < 2 sqrt(T), whatever a mesh says."""
+    assert 27 * 2 * pi * 0.789 / 1.345 < 2 * sqrt(3200.0)
+    plan = Plan((3200.0, 3190.0), depth=0, error_bars=False)
+    diagram = trace(localised(), Discretization("reduced", elements, 6), plan)
+    assert any(f"on {elements} elements and" in warning for warning in diagram.warnings) == told
+    assert (diagram[0].points[0].negative == 0) != told
 
 
 @pytest.mark.alone
