@@ -110,13 +110,15 @@ class Explorer(Tracer):
         return 0 < self.plan.most_branches <= len(self.branches)
 
     def _primary(self) -> Branch:
-        """First branch: its first state.  Where none is found constraints that repeat each other are named."""
+        """First branch: its first state.  Constraints that repeat each other are named."""
         start = self.span[0]
         try:
             point = self._first()
         except ConvergenceError:
             self._check_rank(self.solver.start(start))
             raise
+        if self.scene.constraints:  # of those that follow from others a matrix tells nothing: its factors are round-off
+            self._check_rank(point.x)
         if point.stretch < COLLAPSED:
             raise SceneError(
                 f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
