@@ -422,19 +422,15 @@ def pack_constants(form: Any) -> np.ndarray:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the compilers' own chatter off the terminal."""
+    """Keep the compilers' own chatter off the terminal: FFCx's, and that of setuptools, which runs the C compiler."""
     root = logging.getLogger()
-    level = root.level
-    root.addFilter(_is_warning)
+    level, disabled = root.level, root.manager.disable
+    logging.disable(max(disabled, logging.INFO))
     try:
         yield
     finally:
-        root.removeFilter(_is_warning)
+        logging.disable(disabled)
         root.setLevel(level)
-
-
-def _is_warning(record: logging.LogRecord) -> bool:
-    return record.levelno > logging.INFO
 
 
 @contextmanager

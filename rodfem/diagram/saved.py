@@ -103,7 +103,7 @@ def _check_equations(data: dict[str, Any], system: System, folder: Path) -> None
     before = (data.get("asked") or {}).get(EQUATIONS)
     if before is not None and not same(before, fingerprint(system)):
         raise InputError(
-            f"{folder} was computed with other equations than those of the scene {system.scene.name!r} (at one and the "
+            f"{folder} was run with other equations than those of the scene {system.scene.name!r} (at one and the "
             "same state their residual, energy or ordinate differ): give the scene that was run."
         )
 

@@ -116,7 +116,7 @@ def test_files_of_another_scene(diagram: Diagram, folder: Path) -> None:
     with pytest.raises(InputError, match=r"was computed with k0 = 9.42\d+, and the scene has 3: give the scene that"):
         rodfem.load(saved, other)
     softer = replace(diagram.scene, energy=lambda v, k, c: 0.5 * diagram.scene.energy(v, k, c))
-    with pytest.raises(InputError, match="was computed with other equations than those of the scene 'cord'"):
+    with pytest.raises(InputError, match="was run with other equations than those of the scene 'cord'"):
         rodfem.load(saved, softer)
     with pytest.raises(InputError, match="is no rodfem diagram"):
         rodfem.load(folder, diagram.scene)
