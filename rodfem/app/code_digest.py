@@ -13,6 +13,8 @@ from inspect import unwrap
 from types import CodeType, FunctionType, MethodType
 from typing import Any
 
+import numpy as np
+
 VALUES = (bool, int, float, complex, str, bytes, type(None))
 """Types of values that are part of what a function does; objects of others may change while it runs."""
 
@@ -28,6 +30,8 @@ def _of(value: Any, seen: set[int]) -> Iterator[str]:
     """Parts of a function, each once, or of a value."""
     if isinstance(value, VALUES):
         yield repr(value)
+    elif isinstance(value, np.ndarray):
+        yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
     elif isinstance(value, (tuple, frozenset)):
         for x in sorted(value, key=repr) if isinstance(value, frozenset) else value:
             yield from _of(x, seen)
@@ -54,5 +58,7 @@ def _of_function(function: FunctionType, seen: set[int]) -> Iterator[str]:
         yield from _of(cell.cell_contents, seen)
     known = (function.__globals__.get(name) for name in function.__code__.co_names)
     for value in known:
-        if isinstance(value, VALUES) or (isinstance(value, FunctionType) and value.__module__ == function.__module__):
+        if isinstance(value, (*VALUES, np.ndarray)) or (
+            isinstance(value, FunctionType) and value.__module__ == function.__module__
+        ):
             yield from _of(value, seen)

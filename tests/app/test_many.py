@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from demo_cases import scene
 from mpi4py import MPI
@@ -58,6 +59,8 @@ def test_another_energy_or_other_work_is_computed_anew(folder: Path) -> None:
         many(others, work, folder, MPI.COMM_SELF if COMM.size == 1 else COMM)
         assert COMM.allreduce(done[0]) == count
     assert many(rods, lambda rod: {"name": rod.name.upper()}, folder) == [{"name": "CORD"}]
+    for loads in (np.array([1.0, 2.0]), np.array([3.0])):
+        assert many(rods, lambda rod, loads=loads: {"last": loads[-1]}, folder) == [{"last": loads[-1]}]
 
 
 @pytest.mark.short
