@@ -21,7 +21,7 @@ from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.modes import Modes
-from rodfem.output.digits import in_decimals, in_words, index_in_words, number, rounded_up
+from rodfem.output.digits import in_decimals, in_words, index_in_words, number, rounded_up, with_unit
 from rodfem.output.summary import in_sentences
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
@@ -196,8 +196,10 @@ class Report(Observer):
     def table(self, branches: Sequence[Branch], system: System, most: int = 0) -> None:
         """Print the final table: every special point with its error bar; ``most`` is the plan's number of branches."""
         scene = system.scene
-        self.say(f"\nSpecial points (in parentheses a bound of the error; ordinate: {scene.ordinate.name})")
-        self.say(f"  {'branch':<12} {'kind':<13} {scene.load:<24} {'ordinate':<24} {self.count}")
+        load, ordinate = (with_unit(scene.load, scene.parameters[scene.load].unit),
+                          with_unit(scene.ordinate.name, scene.ordinate.unit))  # fmt: skip
+        self.say(f"\nSpecial points (in parentheses a bound of the error; ordinate: {ordinate})")
+        self.say(f"  {'branch':<12} {'kind':<13} {load:<24} {'ordinate':<24} {self.count}")
         scale = max([self.units.ordinate, *(abs(p.ordinate) for b in branches for p in b.points)])
         for branch in branches:
             for s in branch.special:

@@ -100,6 +100,8 @@ class Locus:
         Load and ordinate at the start, and wherever else the curve passes the second parameter's value there.
     words
         What the two parameters are, for the axes of pictures; empty where the scene does not say it.
+    units
+        Names of their units; empty where they have none.
     """
 
     scene: str
@@ -124,6 +126,7 @@ class Locus:
     states: list[PETSc.Vec] = field(default_factory=list)
     crossings: list[tuple[float, float]] = field(default_factory=list)
     words: tuple[str, str] = ("", "")
+    units: tuple[str, str] = ("", "")
 
     def passes(self, special: SpecialPoint) -> bool:
         """Whether the curve passes the line of its start again at another special point of that scene."""
@@ -144,6 +147,7 @@ class Locus:
             "parameters": list(self.names),
             "labels": list(self.labels),
             "words": list(self.words),
+            "units": list(self.units),
             "bounds": [list(b) for b in self.bounds],
             "columns": columns,
             "without_estimate": np.flatnonzero(np.isinf(self.error[:, 0])).tolist(),
@@ -166,6 +170,7 @@ class Locus:
             names=(first, second),
             labels=tuple(data["labels"]),
             words=tuple(data.get("words", ("", ""))),
+            units=tuple(data.get("units", ("", ""))),
             bounds=(tuple(data["bounds"][0]), tuple(data["bounds"][1])),
             values=np.array([columns[first], columns[second]]).T,
             index=np.array(columns["index"]),
@@ -291,6 +296,7 @@ def locus(
         states=[n.x for n in nodes],
         crossings=crossings,
         words=(scene.parameters[scene.load].words, scene.parameters[parameter].words),
+        units=(scene.parameters[scene.load].unit, scene.parameters[parameter].unit),
     )
 
 

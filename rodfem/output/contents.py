@@ -67,7 +67,8 @@ OBJECT, OBJECTS = (_is_object, "an object"), (_all(_is_object), "a list of objec
 PLACE = (_or_none(_is_place), "a name and a number, or null")
 LENGTHS = (_or_none(_all(_is_number)), "a list of numbers, or null")
 Kinds = Mapping[str, tuple[Test, str]]
-WORDS = ("scene", "title", "parameter", "parameter_label", "parameter_words", "ordinate", "ordinate_label")
+OF_PARAMETER = ("parameter", "parameter_label", "parameter_words", "parameter_unit")
+WORDS = ("scene", "title", *OF_PARAMETER, "ordinate", "ordinate_label", "ordinate_unit")
 TOP: Kinds = {
     **dict.fromkeys(WORDS, TEXT),
     "constants": (_named(_is_number), "numbers by name"),

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from math import ceil, floor, isfinite, log10
+from typing import TYPE_CHECKING
 
-from rodfem.continuation.branch import SpecialPoint
 from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import NEGLIGIBLE
+
+if TYPE_CHECKING:
+    from rodfem.continuation.branch import SpecialPoint
 
 FINEST, LARGEST = 9e-15, 1e12
 """Least error, and greatest number, that are written without an exponent."""
@@ -66,3 +69,8 @@ def index_in_words(special: SpecialPoint) -> str:
     index = f"{before}->{after}" if before != after else index_range(point.negative, point.undecided)
     space = point.negative_in_space
     return index if space is None else f"{index} (in space {space})"
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A number in words, with the name of its unit if it has one."""
+    return f"{text} [{unit.replace('$', '')}]" if unit else text

@@ -90,7 +90,8 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
         for one in loci:
             _shade_stable_side(axes, one)
             _write_indices(axes, one)
-        load, other = (named(*pair) for pair in zip(loci[0].get("words", ("", "")), loci[0]["labels"], strict=True))
+        words, units = (loci[0].get(name, ("", "")) for name in ("words", "units"))
+        load, other = (named(*axis) for axis in zip(words, loci[0]["labels"], units, strict=True))
         axes.set_xlabel(other, fontsize=FONT + 1)
         axes.set_ylabel(load, fontsize=FONT + 1)
         axes.set_title(tex(loci[0]["title"]))

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
 from matplotlib.patheffects import withStroke
 
+from rodfem.output.digits import with_unit
 from rodfem.tolerances import NEGLIGIBLE
 from rodfem.whole_files import draft_of
 
@@ -44,21 +45,22 @@ def tex(text: str, always: bool = False) -> str:
 
 
 def axis_label(diagram: Mapping[str, Any]) -> str:
-    """Load of a diagram for its axis: in words, where the scene has some, and its symbol."""
-    return named(str(diagram.get("parameter_words") or ""), diagram["parameter_label"])
+    """Load of a diagram for its axis: in words, where the scene has some, its symbol, and its unit if it has one."""
+    words, unit = (str(diagram.get(f"parameter_{what}") or "") for what in ("words", "unit"))
+    return named(words, diagram["parameter_label"], unit)
 
 
-def named(words: str, label: str) -> str:
-    """A parameter for its axis: in words, where there are some, and its symbol in TeX."""
+def named(words: str, label: str, unit: str = "") -> str:
+    """A parameter for its axis: in words, where there are some, its symbol in TeX, and its ``unit`` if it has one."""
     symbol, words = tex(label, always=True), words.replace("$", "")
-    return f"{words} {symbol}" if words else symbol
+    return with_unit(f"{words} {symbol}" if words else symbol, unit)
 
 
 def ordinate_in_words(diagram: Mapping[str, Any]) -> str:
-    """Ordinate of a diagram for its axis: its label, after its name where that is a symbol alone."""
+    """Ordinate of a diagram for its axis: its label, after its name where that is a symbol alone, and its unit."""
     name, label = diagram["ordinate"], diagram.get("ordinate_label") or ""
     symbol = label.startswith("$") and label.endswith("$") and label.count("$") == 2
-    return f"{name} {label}" if symbol else label or name
+    return with_unit(f"{name} {label}" if symbol else label or name, str(diagram.get("ordinate_unit") or ""))
 
 
 def mesh_in_words(d: Mapping[str, Any]) -> str:

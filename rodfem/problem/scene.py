@@ -50,14 +50,15 @@ class Parameter:
     """A named constant of a scene.
 
     ``value`` is where it starts, ``label`` its TeX name without dollars, ``admissible`` the open interval that makes
-    sense for it, ``words`` what it is, for the axes of pictures ("end shortening").  Any parameter can be the one that
-    a continuation varies.
+    sense for it, ``words`` what it is, for the axes of pictures ("end shortening"), and ``unit`` the name of its unit
+    ("N"), where it has one.  Any parameter can be the one that a continuation varies.
     """
 
     value: float
     label: str = ""
     admissible: tuple[float, float] = (-inf, inf)
     words: str = ""
+    unit: str = ""
 
     def check(self, name: str, value: float) -> None:
         """Raise :class:`SceneError` unless ``value`` is a finite number inside the admissible interval."""
@@ -108,12 +109,15 @@ class Ordinate:
         pi)``.
     label
         The number in TeX, for the axis of a figure.
+    unit
+        Name of its unit ("m"), where it has one.
     """
 
     name: str
     s: float | None
     of: Callable[[Any, Any], Any] = field(metadata={"role": _role_of_ordinate})
     label: str = ""
+    unit: str = ""
 
     @property
     def places(self) -> tuple[float, ...]:

@@ -63,7 +63,9 @@ def check_kinds(scene: Scene) -> None:
         raise SceneError(f"The inertia is {scene.inertia!r}: give one, as in Inertia(rho_A=lambda c: 1.0).")
     if not (is_object(scene.ordinate) and hasattr(scene.ordinate, "places")):
         raise SceneError(f"The ordinate is {scene.ordinate!r}: give an Ordinate(name, s, of).")
-    for what, words in (("name", scene.ordinate.name), ("label", scene.ordinate.label)):
+    for what, words in (
+        ("name", scene.ordinate.name), ("label", scene.ordinate.label), ("unit", scene.ordinate.unit),
+    ):  # fmt: skip
         if not isinstance(words, str):
             raise SceneError(f"The {what} of the ordinate is {words!r}: give a text.")
     check_places_are_numbers(scene)
@@ -77,11 +79,11 @@ def check_kinds(scene: Scene) -> None:
 
 
 def check_parameter(name: object, parameter: Any) -> None:
-    """Raise :class:`SceneError` for a parameter whose name, value, label, words or bounds make no sense."""
+    """Raise :class:`SceneError` for a parameter whose name, value, label, words, unit or bounds make no sense."""
     if not isinstance(name, str) or not name.isidentifier() or iskeyword(name) or name == "s" or name.startswith("__"):
         raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
     value = getattr(parameter, "value", parameter)
-    texts = [getattr(parameter, text, "") for text in ("label", "words")]
+    texts = [getattr(parameter, text, "") for text in ("label", "words", "unit")]
     try:
         real(name, value, 0.0)
         bounds = reals(name, getattr(parameter, "admissible", (0.0, 1.0)), (0.0, 1.0), 2)

@@ -9,6 +9,7 @@ from typing import Any
 
 from rodfem.errors import InputError
 from rodfem.file_format import LOCUS, read_json
+from rodfem.output.digits import with_unit
 from rodfem.output.plot_locus import LINES
 from rodfem.report.labels import html_of
 
@@ -21,9 +22,11 @@ def loci_of(folder: Path, data: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [_locus(path, data) for path in files]
 
 
-def _words(one: Mapping[str, Any]) -> str:
-    """The second parameter in words; none in a file that lacks them."""
-    return str((one.get("words") or ("", ""))[1]).replace("$", "")
+def _label(one: Mapping[str, Any]) -> str:
+    """The second parameter for its axis: in words and with its unit, which a file may lack, and its symbol."""
+    words, unit = (str((one.get(name) or ("", ""))[1]).replace("$", "") for name in ("words", "units"))
+    symbol = html_of(str(one["labels"][1]), always=True)
+    return " ".join(filter(None, (escape(words), symbol, escape(with_unit("", unit).strip()))))
 
 
 def _locus(path: Path, data: Mapping[str, Any]) -> dict[str, Any]:
@@ -49,6 +52,6 @@ def _locus(path: Path, data: Mapping[str, Any]) -> dict[str, Any]:
         "index": index,
         "marks": [{"row": row, "kind": kind} for row, kind in marks],
         "parameter": other,
-        "label": " ".join(filter(None, (escape(_words(one)), html_of(str(one["labels"][1]), always=True)))),
+        "label": _label(one),
         "here": data["constants"][other],
     }

@@ -12,6 +12,7 @@ import h5py
 from rodfem.errors import InputError
 from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.contents import check_run, read_diagram
+from rodfem.output.digits import with_unit
 from rodfem.output.sheet import mesh_in_words, ordinate_in_words
 from rodfem.report.branches import DERIVED, ordinates_of
 from rodfem.report.labels import html_of, plain_of
@@ -41,13 +42,14 @@ def payload_of(folder: Path) -> dict[str, Any]:
 def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Titles, labels, constants and origin."""
     label, words = ordinate_in_words(data), str(data.get("parameter_words") or "").replace("$", "")
+    unit = with_unit("", str(data.get("parameter_unit") or "")).strip()
     names = {"ordinate": data["ordinate"], **DERIVED}
     return {
         "scene": data["scene"],
         "title": plain_of(data.get("title") or data["scene"]),
         "parameter": data["parameter"],
         "symbol": plain_of(data["parameter_label"], always=True),
-        "label": " ".join(filter(None, (escape(words), html_of(data["parameter_label"], always=True)))),
+        "label": " ".join(filter(None, (escape(words), html_of(data["parameter_label"], always=True), escape(unit)))),
         "ordinates": [
             {"key": key, "name": name, "label": html_of(label if key == "ordinate" else name)}
             for key, name in ((key, names.get(key, key)) for key in ordinates_of(data))

@@ -30,6 +30,8 @@ DEPENDENT = 1e-12
 """A singular value below this, relative to the greatest column of ``C``, is zero."""
 DIRECTION = 1e-6
 """Relative tolerance of ARPACK for the vector of the least singular value."""
+PASSES = 8
+"""Number of times that rows and columns are scaled by the roots of their norms: each halves what is left in digits."""
 SMALL = 300
 """Number of columns up to which the singular values are computed by LAPACK."""
 NAMES = {"eta": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
@@ -62,6 +64,24 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     return float(np.linalg.norm(C @ vector)), vector
 
 
+def _norms(C: sp.spmatrix, axis: int) -> np.ndarray:
+    """Norms of columns (``axis`` 0) or rows; one for those that are zero."""
+    squares = np.asarray(C.multiply(C).sum(axis=axis)).ravel()
+    return np.asarray(np.sqrt(np.where(squares > 0, squares, 1.0)))
+
+
+def _greatest(C: sp.spmatrix, axis: int) -> float:
+    return float(_norms(C, axis).max())
+
+
+def _equilibrated(C: sp.spmatrix) -> sp.spmatrix:
+    """Matrix of the same rank whose rows and columns have norms near one (D. Ruiz, RAL-TR-2001-034)."""
+    for _ in range(PASSES):
+        rows, columns = (1 / np.sqrt(_norms(C, axis)) for axis in (1, 0))
+        C = sp.diags(rows) @ C @ sp.diags(columns)
+    return C
+
+
 def rank_of(pencil: Pencil, scalars: Sequence[str] = ()) -> float:
     """``sigma_min(C)`` of a pencil; infinite without constraints.  ``scalars`` are words for its scalar multipliers.
 
@@ -71,7 +91,11 @@ def rank_of(pencil: Pencil, scalars: Sequence[str] = ()) -> float:
     if not C.shape[1]:
         return np.inf
     sigma, vector = smallest_singular(C)
-    if sigma > DEPENDENT * np.sqrt(np.asarray(C.multiply(C).sum(axis=0)).max()):
+    if sigma > DEPENDENT * _greatest(C, 0):
+        return sigma
+    equal = _equilibrated(C)  # in metres and newtons of a molecule, say, columns are of very different sizes
+    least, vector = smallest_singular(equal)
+    if least > DEPENDENT * _greatest(equal, 0):
         return sigma
     comm = pencil.K.comm.tompi4py()
     shares = {}

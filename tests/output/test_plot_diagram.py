@@ -177,6 +177,9 @@ def test_the_load_is_named_in_words() -> None:
     plain = branch("a", [0.0, 1.0], [0, 0])
     assert figure_of(diagram(plain)).axes[0].get_xlabel() == "$P$"
     assert figure_of(diagram(plain) | {"parameter_words": "dead force"}).axes[0].get_xlabel() == "dead force $P$"
+    units = {"parameter_words": "dead force", "parameter_unit": "N", "ordinate_unit": "m"}
+    axes = figure_of(diagram(plain) | units).axes[0]
+    assert axes.get_xlabel() == "dead force $P$ [N]" and axes.get_ylabel().endswith(" [m]")
 
 
 @pytest.mark.alone
