@@ -13,7 +13,8 @@ function redraw() {
   at("badge").textContent = `${NAMES[verdict]} · index ${index}`;
   const height = b.ordinates[data.ordinates[0].key][state.row];
   at("state-load").textContent = `${data.symbol} = ${special ? special.load : digits(b.load[state.row], 6)}`;
-  at("state").textContent = `${b.name}, row ${state.row} of ${b.load.length}; ${data.ordinates[0].name} = ${digits(height, 5)}`;
+  at("state").textContent = `${data.ordinates[0].name} = ${digits(height, 5)}; ${b.name}, row ${state.row} of ${b.load.length}`;
+  at("state").title = at("state").textContent;
   values(b);
   at("sentence").textContent = sentence + (special?.law ? ` ${special.law[0].toUpperCase()}${special.law.slice(1)}.` : "");
 }
