@@ -243,29 +243,39 @@ def cell_coordinates(mesh: Any, cells: int) -> np.ndarray:
     return np.asarray(mesh.geometry.x)[_vertices(mesh, cells)]
 
 
-def compile_forms(forms: Sequence[Any]) -> list[Any]:
-    """Compile UFL forms: the first, which takes the longest, and all others together, at once.
-
-    Raises :class:`SetupError` where the cache is locked by a killed run.
-    """
+@contextmanager
+def _from_cache() -> Iterator[None]:
+    """Raise :class:`SetupError` where the folder of compiled code is locked, or cannot be written."""
     try:
-        compiled = compile_ahead(forms)
-        _wait()
-        with _quiet():
-            return [f for g in _groups(forms) for f in _compiled(g)] if None in compiled else compiled
+        yield
     except TimeoutError as locked:
         raise SetupError(
             "A compiled form never became ready, most likely because an earlier run was killed while compiling: "
             f"delete the folder {code_cache.folder()} and run again."
         ) from locked
+    except OSError as error:
+        raise SetupError(code_cache.refused(error)) from error
+
+
+def compile_forms(forms: Sequence[Any]) -> list[Any]:
+    """Compile UFL forms: the first, which takes the longest, and all others together, at once.
+
+    Raises :class:`SetupError` where the cache is locked by a killed run, or cannot be written.
+    """
+    with _from_cache():
+        compiled = compile_ahead(forms)
+        _wait()
+        with _quiet():
+            return [f for g in _groups(forms) for f in _compiled(g)] if None in compiled else compiled
 
 
 def expression(form: Any, points: np.ndarray, mesh: Any, cells: int) -> Callable[[], np.ndarray]:
     """Compile a UFL vector to be evaluated at reference ``points`` (m, 1) of the first cells: (cells, m * size).
 
-    ``form`` is the vector, on cells of ``mesh``, of which the first ``cells`` are evaluated.
+    ``form`` is the vector, on cells of ``mesh``, of which the first ``cells`` are evaluated.  Raises as
+    :func:`compile_forms` does.
     """
-    with _quiet():
+    with _from_cache(), _quiet():
         compiled = fem.Expression(form, points, dtype=REAL)
     chosen = np.arange(cells, dtype=np.int32)
     takes_mesh = "mesh" in inspect.signature(compiled.eval).parameters
