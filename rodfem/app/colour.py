@@ -7,6 +7,7 @@ import re
 from typing import TextIO
 
 from rodfem.continuation.kinds import KINDS
+from rodfem.launcher import RANK
 
 BOLD, RED, GREEN, YELLOW, CYAN = "1", "31", "32", "33", "36"
 """Codes of ANSI terminals."""
@@ -22,8 +23,12 @@ PATTERNS = (
 
 
 def wanted(stream: TextIO) -> bool:
-    """Whether a stream is a terminal that shows colours, and nobody has asked for none (https://no-color.org)."""
-    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    """Whether a stream is a terminal that shows colours, and nobody has asked for none (https://no-color.org).
+
+    What Open MPI gives its ranks is a terminal of its own, even where its output goes into a file: no colours there.
+    """
+    refused = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    return stream.isatty() and not refused and not any(name in os.environ for name in RANK)
 
 
 def painted(line: str) -> str:

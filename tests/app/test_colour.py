@@ -13,6 +13,7 @@ from hemitropic_cases import run_demo
 from rodfem import Discretization, Plan, trace
 from rodfem.app.colour import painted, wanted
 from rodfem.app.terminal import Report
+from rodfem.launcher import RANK
 
 pytestmark = pytest.mark.alone
 MESH = Discretization("reduced", 6, 3)
@@ -27,13 +28,14 @@ class Terminal(io.StringIO):
 
 def test_colour_is_for_terminals_and_can_be_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.delenv("NO_COLOR", raising=False)
+    for name in ("NO_COLOR", *RANK):
+        monkeypatch.delenv(name, raising=False)
     assert wanted(Terminal()) and not wanted(io.StringIO())
-    monkeypatch.setenv("TERM", "dumb")
-    assert not wanted(Terminal())
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setenv("NO_COLOR", "1")
-    assert not wanted(Terminal())
+    # ranks write into a terminal of mpirun's, wherever that writes
+    for name, value in (("TERM", "dumb"), ("NO_COLOR", "1"), ("OMPI_COMM_WORLD_RANK", "0")):
+        with monkeypatch.context() as changed:
+            changed.setenv(name, value)
+            assert not wanted(Terminal())
 
 
 @pytest.mark.parametrize(
