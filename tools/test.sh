@@ -10,7 +10,8 @@
 set -eu
 cd "$(dirname "$0")/.."
 marks="not alone or short" serial=
-case "${quick-}" in
+quick=${quick-}
+case "$quick" in
     yes) serial="short or versions" marks=short ;;
     short) serial=short marks=short ;;
     *) quick= ;;
@@ -41,6 +42,19 @@ run() {
 }
 
 run "serially, in two processes" "$python" -m pytest -n 2 --dist loadfile -m "$serial" "$@"
-run "on two ranks ($marks)" $mpirun -n 2 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m "$marks" "$@"
-[ -n "$quick" ] || run "on three ranks (the short ones)" $mpirun -n 3 sh -c "$rank" sh "$python" -m pytest --color=no -p no:cacheprovider -m short "$@"
+ranks() { # ranks NUMBER MARKS WHICH [options for pytest]
+    number=$1 chosen=$2 which=$3
+    shift 3
+    run "on $number ranks ($which)" $mpirun -n "$number" sh -c "$rank" sh "$python" -m pytest --color=no \
+        -p no:cacheprovider -m "$chosen" "$@"
+}
+if [ "$quick" = short ]; then
+    # On Debian sid PETSc 3.25.5 ended both ranks without a word (its error 63, by MPI_Abort) in or after
+    # tests/stability/test_inertia.py when all the other folders came before; that folder alone passes, the others too.
+    ranks 2 "$marks" "$marks, but tests/stability" --ignore=tests/stability "$@"
+    ranks 2 "$marks" "$marks, tests/stability" tests/stability "$@"
+else
+    ranks 2 "$marks" "$marks" "$@"
+fi
+[ -n "$quick" ] || ranks 3 short "the short ones" "$@"
 echo "== Passed"
