@@ -11,7 +11,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from time import strftime
 from typing import Any
@@ -21,8 +21,10 @@ from benchmarks.store import Store
 
 sys.path.append(str(ROOT / "tests"))
 
-from hard.case import Case
+from hard.case import Case, Measured
 from hard.cases import CASES
+
+from rodfem.errors import InputError
 
 LIMIT = 280.0
 """Seconds after which a process that measures a case is stopped."""
@@ -38,7 +40,10 @@ def measure(group: str, number: int) -> Iterator[dict[str, Any]]:
     """Verdict on each value of a case, the error over its bar, and what was said."""
     case = CASES[group][number]
     for value in case.all:
-        found = case.measure(value)
+        try:
+            found = case.measure(value)
+        except InputError as refused:
+            found = Measured(inf, 1.0, (str(refused),))
         ratio = found.error / found.bar
         row = {"verdict": found.verdict, "ratio": ratio if isfinite(ratio) else None}
         yield row | {"said": found.said, "why": found.wrong}
