@@ -128,7 +128,7 @@ _C_COMPILER = {
     for name in ("jit_options", "jit_params")  # dolfinx 0.5 calls them parameters
     if name in inspect.signature(fem.form).parameters
 }
-"""How the C code of forms is compiled: at -O1 in two thirds of the time of -O2, to kernels as fast, within 3 %."""
+"""How the C code of forms is compiled: at -O1 in three quarters of the time of -O2, to kernels as fast, within 3 %."""
 COMPLEX = bool(np.issubdtype(PETSc.ScalarType, np.complexfloating))
 """Whether this PETSc was built for complex numbers: forms and states are real all the same."""
 KINDS = CELL, BOUNDARY, INTERIOR = 1, 2, 4

@@ -23,12 +23,12 @@ CORRECTIONS = 3
 
 
 class RequestedLoads:
-    """The loads asked for of one branch."""
+    """Finds the states at the loads asked for, which are the same for all branches."""
 
     at_start = True
 
     def __init__(self, plan: Plan) -> None:
-        """They are the same for all branches."""
+        """Take the loads from the ``plan``."""
         self.loads = tuple(plan.at)
 
     def between(self, step: Step) -> list[SpecialPoint]:

@@ -230,7 +230,7 @@ class Tracer:
             return self._insert(branch, specials + [s for finder in self.finders for s in finder.between(step)])
 
     def _first_specials(self, branch: Branch) -> None:
-        """What is found between the special point that a branch leaves and its first point, if that is on it."""
+        """Insert special points between the branch point that a branch leaves and its first point."""
         if len(branch.points) != 2 or branch.parent is None:
             return
         a, b = map(self.here, branch.points)
