@@ -21,9 +21,8 @@ from rodfem.diagram.equivalence import equivalent, near
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
-from rodfem.stability.blocks import Blocks
 from rodfem.stability.bordered import Bordered
-from rodfem.stability.rank import rank_of
+from rodfem.stability.rank import require_independent_constraints
 from rodfem.tolerances import SAME_SPECIAL, SAME_STATE
 
 TAIL = 8
@@ -115,10 +114,10 @@ class Explorer(Tracer):
         try:
             point = self._first()
         except ConvergenceError:
-            self._check_rank(self.solver.start(start))
+            require_independent_constraints(self.solver.system, self.solver.start(start))
             raise
         if self.scene.constraints:  # of those that follow from others a matrix tells nothing: its factors are round-off
-            self._check_rank(point.x)
+            require_independent_constraints(self.solver.system, point.x)
         if point.stretch < COLLAPSED:
             raise SceneError(
                 f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
@@ -185,12 +184,6 @@ class Explorer(Tracer):
         system.set_load(tangent, 1.0)
         tangent.scale((1.0 if increasing else -1.0) / system.norm(tangent))
         point.tangent, point.slope = tangent, system.scalar(tangent)
-
-    def _check_rank(self, x: PETSc.Vec) -> None:
-        """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others."""
-        scalars = [u for u in self.solver.system.fields.unknown_scalars if u.multiplier]
-        names = [u.group.equation.format(u.component + 1) for u in scalars]
-        rank_of(Blocks(self.solver.system, "full").assemble(x), names)
 
     def _switch(self, parent: Branch, i: int, special: SpecialPoint) -> None:
         special.switched = True

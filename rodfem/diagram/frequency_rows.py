@@ -39,6 +39,8 @@ SHIFT = -10.0
 Far enough from it for a rod that floats, whose rigid motions are zero eigenvalues: what is nearest to the shift takes
 its digits from all others.
 """
+OTHER = 3.0
+"""Times this, the shift is another one, from which the same eigenvalues must be found."""
 BESIDE = 1e-4
 """Relative distance of a shift from the pair that is sought there."""
 AGAIN = 1e-7
@@ -173,6 +175,22 @@ def leftmost(pencil: NonsymmetricPencil, number: int, before: Frequencies = NONE
     for pair in (v for v in before.values if v.imag > 0 and abs(v) > reach):
         found = _joined(found, pencil.near(2, pair * (1 + BESIDE)))
     return in_order(found)
+
+
+def differ(pencil: NonsymmetricPencil, number: int) -> str:
+    """The eigenvalues, in words, that two shifts do not find alike; empty where they do.
+
+    Eigenvalues of a singular pencil, ``S x = M x = 0`` for some ``x``, are any numbers, with residuals of round-off; so
+    are those that round-off makes of the infinite ones of a pencil that is badly scaled.  Both change with the shift.
+    """
+    one = pencil.system.scene.units.omega2
+    found, other = (in_order(pencil.near(sought(number), shift * one)) for shift in (SHIFT, OTHER * SHIFT))
+    if agree(found, other):
+        return ""
+    first, second = (
+        ", ".join(f"{v:.6g}" if v.imag else f"{v.real:.6g}" for v in f.values[:2].tolist()) for f in (found, other)
+    )
+    return f"beginning with {first} from one shift and with {second} from another"
 
 
 def _joined(found: Frequencies, beside: Frequencies) -> Frequencies:

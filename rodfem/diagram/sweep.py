@@ -25,7 +25,7 @@ from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER, Kind
 from rodfem.continuation.locate import SHARP, real_root, zero_uncertainty
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import StaticSolver
-from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, SHIFT, FrequencyRows, Row, leftmost
+from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, SHIFT, FrequencyRows, Row, differ, leftmost
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.faults import as_failure, without
@@ -33,6 +33,7 @@ from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
 from rodfem.stability.nonsymmetric import MULTIPLE, REAL, Frequencies, NonsymmetricSolver
+from rodfem.stability.rank import require_independent_constraints
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 
 LOADS = 101
@@ -121,6 +122,13 @@ class Sweep:
         a, b = self.span
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
         x, _ = self.solver.first(a)
+        if self.solver.system.scene.constraints:  # others are independent
+            require_independent_constraints(self.solver.system, x)
+        if words := differ(self.eigensolver.at(x), self.number):
+            self.observer.warn(
+                f"The eigenvalues omega^2 of the first state are not well defined ({words}): do not trust any of this "
+                "sweep. Constraints may follow from others, or sizes of the rod's numbers may be too far apart."
+            )
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         try:

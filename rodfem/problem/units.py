@@ -2,7 +2,8 @@
 
 What is small is small beside them.  A scene whose numbers are of order one has the size one for each, and so has one
 that is not far from it: results do not depend on where a rod's length is between a tenth and ten.  Stated in metres and
-newtons the load of a DNA molecule is 1e-12, the stiffness of a steel bar 1e6: then the sizes are the rod's own.
+newtons the load of a DNA molecule is 1e-12, the stiffness of a steel bar 1e6: then all sizes are the rod's own, also
+those that happen to be about one, as only together they make its equations those of a rod of order one.
 """
 
 from __future__ import annotations
@@ -70,11 +71,12 @@ def units_of(scene: Scene) -> Units:
     length, stiffness = scene.length, float(np.linalg.eigvalsh(scene.stiffness()[-3:, -3:])[0])
     c = scene.constants()
     mass = max(float(scene.inertia.rho_A(c)), *(float(x) / length**2 for x in scene.inertia.rho_I(c)))
-    sizes = length, stiffness / length**2, stiffness / length, stiffness / length, max(map(abs, scene.span))
-    ordinary = all(size(x) == 1.0 for x in sizes)
-    ordinate = 1.0 if ordinary else _of_ordinate(scene)
     omega2 = stiffness / (mass * length**4) if mass > 0 else 1.0
-    return Units(*map(size, (*sizes, ordinate, omega2)))
+    sizes = length, stiffness / length**2, stiffness / length, stiffness / length, max(map(abs, scene.span)), omega2
+    if all(size(x) == 1.0 for x in sizes):
+        return ONES
+    length, force, moment, energy, load, omega2 = (1.0 if x == 0 or not isfinite(x) else float(x) for x in sizes)
+    return Units(length, force, moment, energy, load, size(_of_ordinate(scene)), omega2)
 
 
 def size(value: float) -> float:

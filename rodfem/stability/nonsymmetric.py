@@ -230,7 +230,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         """Frequencies from eigenvalues (k,) and vectors (n, k), complex, of the pencil in units of natural sizes."""
         units = self.system.scene.units
         if not units.ordinary:
-            values, vectors = values * units.omega2, vectors * self.system.sizes.array_r.real[:, None]
+            values, vectors = values * units.omega2, vectors * self.sizes.array_r.real[:, None]
         self._complete(values, vectors)
         kinds = self._kinds(values, vectors)
         order = np.lexsort((values.imag, np.round(values.real / units.omega2, 9)))

@@ -8,6 +8,7 @@ else ``-rodfem_lu_...`` (see :mod:`rodfem.linalg.factorization`).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -44,6 +45,13 @@ class PencilMatrices:
         self.matrix, self.mass = system.state_matrix(), system.metric_matrix()
         self.filled = 0
 
+    @cached_property
+    def sizes(self) -> PETSc.Vec:
+        """Natural size of each unknown; of a drift, the multiplier of ``g.Mx = 0`` with ``g.Mg = 1``, its own."""
+        units = self.system.scene.units
+        drift = float(np.sqrt(units.energy * units.omega2))
+        return self.system.vector(self.system.fields.sizes, [drift] * len(self.system.drifts))
+
 
 Matrices = TypeVar("Matrices", bound=PencilMatrices)
 
@@ -75,12 +83,17 @@ class StatePencil(Generic[Matrices]):
         """Kinetic metric ``M``."""
         return self._held().mass
 
+    @property
+    def sizes(self) -> PETSc.Vec:
+        """Natural size of each unknown."""
+        return self._held().sizes
+
     def in_units(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """The pencil for unknowns and eigenvalues in units of their natural sizes.
 
         Round-off makes finite eigenvalues of the infinite ones, among the others where multipliers have large units.
         """
-        units, sizes = self.system.scene.units, self.system.sizes
+        units, sizes = self.system.scene.units, self.sizes
         if units.ordinary:
             return self.matrix, self.mass
         scaled = self.matrix.copy(), self.mass.copy()

@@ -19,11 +19,13 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
+from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, SceneError
+from rodfem.fem.system import System
 from rodfem.linalg.matrices import gathered
 from rodfem.linalg.orthogonal import generic
-from rodfem.stability.blocks import Pencil
+from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.stability.projection import factored
 
 DEPENDENT = 1e-12
@@ -116,3 +118,9 @@ def rank_of(pencil: Pencil, scalars: Sequence[str] = ()) -> float:
         f"Constraints depend on one another ({' and '.join(words)}; smallest singular value {sigma:.1e}): "
         "remove those that follow from the others."
     )
+
+
+def require_independent_constraints(system: System, x: PETSc.Vec) -> None:
+    """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others."""
+    scalars = [u for u in system.fields.unknown_scalars if u.multiplier]
+    rank_of(Blocks(system, "full").assemble(x), [u.group.equation.format(u.component + 1) for u in scalars])

@@ -14,13 +14,18 @@ from closed_forms import column
 from hemitropic_cases import specials
 from matplotlib.figure import Figure
 from mpi4py import MPI
+from scipy.optimize import brentq
 
+from forms.energy import bending_and_twist
+from rodfem import Inertia, Ordinate, Plan, clamped, everywhere, free
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
+from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.output.plot_frequencies import curves, draw_frequencies
+from rodfem.problem.end import End
 from rodfem.problem.scene import Scene
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
@@ -110,6 +115,61 @@ def test_divergence_is_marked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
         for row in columns["omega2"]:  # all eigenvalues negative: there is no frequency to scale the axis by
             row[:] = [[-abs(mu), 0.0] for mu, _ in row]
         draw_frequencies(data, folder / "none.png")
+
+
+TURNING = brentq(lambda x: np.tan(x) - np.tanh(x), 3.8, 4.0)
+"""The first number of a beam that may turn at one end, the other one clamped or free: tan(b) = tanh(b)."""
+TWICE_HELD = replace(
+    classics.torque("follower_moment"),
+    ends=(clamped(), End(position=lambda c: (0.0, 0.0, None), follower_moment=lambda c: (0.0, 0.0, c.P))),
+    constraints=(everywhere(lambda x, c: x.k[0], strain=True),),
+    span=(0.0, 1.0),
+)
+"""A straight rod that bends about d2 alone, whose end is kept on the axis twice."""
+
+
+def test_constraints_that_follow_from_others_are_refused() -> None:
+    """Without it a singular pencil, with an eigenvalue that is any number, is what frequencies are computed of."""
+    with pytest.raises(SceneError, match="Constraints depend on one another"):
+        trace(TWICE_HELD, Discretization(elements=5, degree=6))
+
+
+@pytest.mark.parametrize(("elements", "degree"), [(4, 5), (6, 6), (5, 7)])
+def test_eigenvalues_that_change_with_the_shift_are_said(
+    elements: int, degree: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a look at its constraints round-off may add an eigenvalue to those of a beam, clamped and hinged: said."""
+    monkeypatch.setattr("rodfem.diagram.sweep.require_independent_constraints", lambda system, x: None)
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 2)
+    diagram = trace(TWICE_HELD, Discretization(elements=elements, degree=degree), Plan(error_bars=False))
+    said = any("are not well defined" in s and "do not trust" in s for s in diagram.warnings)
+    assert said or diagram[0].points[0].omega2[0] == pytest.approx([TURNING**4, 0.0], rel=1e-6)
+
+
+@pytest.mark.parametrize(("length", "stiffness"), [(1.0, 1.0), (1e-3, 7e-13), (1e-3, 3e-5), (1e4, 1e9)])
+def test_frequencies_of_a_rod_that_turns_freely_in_any_units(length: float, stiffness: float) -> None:
+    """A pinned and free beam, tan(b) = tanh(b): b = 3.92660231, 7.06858275, and rigid rotations left out.
+
+    Three multipliers hold the rotations: theirs is a size of their own, beside which round-off makes finite
+    eigenvalues of the infinite ones.
+    """
+    scene = Scene(
+        name="pinned",
+        interval=(0.0, length),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist(k, (c.EI, c.EI, c.EI)),
+        parameters={"P": 0.0, "EI": stiffness},
+        load="P",
+        ends=(End(position=lambda c: (0.0, 0.0, 0.0)), free(follower=lambda c: (0.0, 0.0, -c.P))),
+        ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]),
+        span=(0.0, stiffness / length**2),
+        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0)),
+    )
+    branch = trace(scene, Discretization(elements=5, degree=7), Plan(error_bars=False))[0]
+    measured = np.array([mu for mu, _ in branch.points[0].omega2]) * length**4 / stiffness
+    b = TURNING, brentq(lambda x: np.tan(x) - np.tanh(x), 7.0, 7.1)
+    assert branch.points[0].negative == 0
+    assert np.allclose(measured[:4], np.repeat(b, 2) ** 4, rtol=1e-6)
 
 
 def test_long_pencil_on_any_number_of_ranks() -> None:

@@ -54,7 +54,7 @@ class Slicing(SymmetricMethod):
         vectors = [self.work.system.new_vector() for _ in order]
         for i, vector in zip(order, vectors, strict=True):
             solver.getEigenvector(int(i), vector)
-            vector.pointwiseMult(vector, self.work.system.sizes)
+            vector.pointwiseMult(vector, pencil.sizes)
         solver.destroy()
         values = values[order]
         return Found(values, vectors, pencil.backward_errors(values, vectors), complete, FACTORISATIONS)
