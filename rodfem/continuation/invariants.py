@@ -4,7 +4,8 @@ Newton's method ends with a small correction.  Here the equations themselves are
 balance of forces and moments, tested with every shape function, the constraints, and the phase conditions.  A rigid
 motion that the ends allow is a sum of shape functions, so that the balance of the whole rod is among them.  What is
 left must be round-off: below :data:`UNBALANCED` in units of the rod's own energy, or below the round-off of the
-product of the second variation with the state.
+product of the second variation with the state.  From row to row the potential energy changes by the work of the load
+(:mod:`rodfem.continuation.load_work`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
+from rodfem.continuation.load_work import LoadWork
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 
@@ -31,6 +33,7 @@ class Invariants:
     def __init__(self, solver: BranchSolver) -> None:
         """Allocate a vector for the residual."""
         self.solver, self.system = solver, solver.system
+        self.work = LoadWork(solver.system)
         self._equations = solver.system.new_vector()
 
     def __call__(self, point: Point) -> None:
