@@ -72,7 +72,7 @@ class Equations:
         self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
 
     def _derive(self, fields: Fields) -> list[Any]:
-        """Forms in UFL: the Lagrangian's derivatives, stored energy, Lagrangian, metric, mass, ordinate along the rod."""
+        """Forms in UFL: derivatives of the Lagrangian, stored energy, itself, metric, mass, ordinate along the rod."""
         self.fields, scene = fields, fields.scene
         mesh, k = fields.mesh, fields.discretization.degree
         self.names, self.line = list(scene.parameters), load_line(scene)
