@@ -85,29 +85,35 @@ def singular_end(
     return next((s for s in found if abs(s.point.load - load) < SAME_END * abs(span[1] - span[0])), None)
 
 
-def closes(
+def closing(
     solver: BranchSolver, branch: Branch, a: Point, b: Point, width: float, here: Callable[[Point], Point], alike: Alike
-) -> bool:
-    """Whether a ``branch`` passes its own beginning again between two points ``a``, ``b`` on the mesh of a ``solver``.
+) -> Point | None:
+    """Last point of a ``branch`` that is back at its beginning between two points ``a``, ``b``; None if it is not.
 
-    ``here`` carries a point to that mesh, ``width`` is that of the range of loads, and ``alike`` compares states.
+    It is the very state that the branch begins with.  One that leaves a branch point, a singular state, comes back to
+    its first row; where loads are equal it ends at ``b``.  Points are on the mesh of the ``solver``, ``here`` carries
+    one there; ``width`` is that of the range of loads, and ``alike`` compares states.
     """
     if len(branch.points) < LEAST:
-        return False
-    first = branch.points[1]
+        return None
     if max(abs(a.slope), abs(b.slope)) < VERTICAL * width:  # equal loads: compare the states
-        return distance(solver.system, b.x, here(branch.points[0]).x) < b.arclength - a.arclength
+        passed = distance(solver.system, b.x, here(branch.points[0]).x) < b.arclength - a.arclength
+        return b if passed else None
+    first = branch.points[0 if branch.parent is None else 1]
     if (
         (a.load - first.load) * (b.load - first.load) > 0
         or not near(first, a, solver.units, NEIGHBOUR)
         or a.slope * first.slope <= 0
+        or a.load == b.load
     ):
-        return False
+        return None
     s = a.arclength + (first.load - a.load) / (b.load - a.load) * (b.arclength - a.arclength)
     x, outcome = solver.at_load(hermite(a, b, s)[0], first.load, reach=1.0)
     if not outcome.converged:  # beside a fold, say: not there
-        return False
-    return alike(solver.point(x, s, None, outcome), first, SAME_STATE)
+        return None
+    s = a.arclength + distance(solver.system, a.x, x)
+    point = solver.point(x, s, solver.load_tangent(x, b.load > a.load), outcome)
+    return point if alike(point, first, SAME_STATE) else None
 
 
 def meeting(branch: Branch, special: SpecialPoint, branches: Sequence[Branch], alike: Alike, load: str) -> str:

@@ -40,7 +40,7 @@ class RequestedLoads:
             for load in self.loads
             if (p.load - load) * (q.load - load) < 0
             or (load == p.load and p is a and step.begins)
-            or (load == q.load and q is b)
+            or (load == q.load and q is b and not step.closed)
         ]
 
 

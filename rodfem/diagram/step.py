@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 class Step(NamedTuple):
     """From a point ``a`` of a branch to the next, ``b``, both on the mesh of a ``solver``.
 
-    ``singular`` has the folds and branch points between them; the branch ``begins`` at ``a``, or has come there.
+    ``singular`` has the folds and branch points between them; the branch ``begins`` at ``a``, or has come there; it is
+    ``closed`` at ``b``, a state that has been examined as its beginning.
     """
 
     solver: BranchSolver
@@ -23,6 +24,7 @@ class Step(NamedTuple):
     b: Point
     singular: Sequence[SpecialPoint] = ()
     begins: bool = False
+    closed: bool = False
 
     def pieces(self) -> Iterator[tuple[Point, Point]]:
         """Yield neighbours among ``a``, the folds and branch points, and ``b``: the load is monotone between them."""

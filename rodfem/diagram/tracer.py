@@ -18,7 +18,7 @@ from rodfem.continuation.observer import Observer, Recorder
 from rodfem.continuation.solvers import BranchSolver, follow
 from rodfem.continuation.special_points import FIRST
 from rodfem.diagram.bookkeeper import Bookkeeper, Recalled
-from rodfem.diagram.branch_ends import closes, end_at_zero_stretch, last_admissible, meeting, singular_end
+from rodfem.diagram.branch_ends import closing, end_at_zero_stretch, last_admissible, meeting, singular_end
 from rodfem.diagram.equivalence import equivalent
 from rodfem.diagram.finders import FINDERS
 from rodfem.diagram.images import image_of
@@ -187,6 +187,9 @@ class Tracer:
                     self.observer.warn(f"{branch.name} ends: {branch.ended}; use more elements or smaller steps.")
                 return
             previous = history[-1]
+            width = self.high - self.low
+            last = closing(self.solver, branch, previous, item, width, self.here, self.alike)
+            item = last or item
             self._check_symmetry(item)
             self._check_invariants(item)
             self.control.row(item, self.solver)
@@ -199,7 +202,7 @@ class Tracer:
                 branch.ended = self._rest(branch) or why
                 return
             try:
-                reason = self._between(branch, previous, item, self._own(branch, history[-4:]))
+                reason = self._between(branch, previous, item, self._own(branch, history[-4:]), closed=bool(last))
             except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
                 branch.cut(self.specials.settled)
                 self._advance(branch, [p for p in history if p.arclength <= self.specials.settled])
@@ -207,10 +210,11 @@ class Tracer:
             if reason:
                 branch.ended = reason
                 return
+            self._check_work(branch, [*history[-3:], item])
             history.append(item)
             branch.points.append(item)
             self.observer.progress(branch, item)
-            if closes(self.solver, branch, previous, item, self.high - self.low, self.here, self.alike):
+            if last:
                 branch.ended = self._rest(branch) or "closed loop"
                 return
 
@@ -219,14 +223,14 @@ class Tracer:
         """Rows but for the branch point that a branch leaves, at which it has another tangent than its own."""
         return [row for row in rows if branch.parent is None or row is not branch.points[0]]
 
-    def _between(self, branch: Branch, a: Point, b: Point, rows: Sequence[Point] = ()) -> str:
+    def _between(self, branch: Branch, a: Point, b: Point, rows: Sequence[Point] = (), *, closed: bool = False) -> str:
         """Insert special points between two points; a reason if the branch ends there.
 
-        The ``rows`` are those that the step to ``b`` was predicted from.
+        The ``rows`` are those that the step to ``b`` was predicted from; ``closed``: ``b`` is where the branch began.
         """
         with self.solver.system.clock.scope("location"):
             specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b, rows)
-            step = Step(self.solver, a, b, specials, begins=a is branch.points[0])
+            step = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=closed)
             return self._insert(branch, specials + [s for finder in self.finders for s in finder.between(step)])
 
     def _first_specials(self, branch: Branch) -> None:
@@ -318,6 +322,14 @@ class Tracer:
         if point.mesh not in self.invariants:
             self.invariants[point.mesh] = Invariants(self.meshes.solvers[point.mesh])
         self.invariants[point.mesh](point)
+
+    def _check_work(self, branch: Branch, rows: Sequence[Point]) -> None:
+        """Compare energies and the work of the load in the last step; what lies in it is dropped where they differ."""
+        try:
+            self.invariants[rows[-1].mesh].work(rows)
+        except ConvergenceError:
+            branch.cut(rows[-2].arclength)
+            raise
 
     def _finish(self, branch: Branch) -> None:
         branch.renumber()

@@ -6,15 +6,18 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+import numpy as np
 import pytest
 from classics import column, euler
 from petsc4py import PETSc
 
+from forms.symmetry import AXES, cross, left
 from rodfem import Discretization, Plan, Solver, clamped, free, trace
 from rodfem.continuation.branch import Point
 from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
+from rodfem.fem.symmetries import add_change
 from rodfem.fem.system import System
 
 SMALL = 1e-6
@@ -65,6 +68,29 @@ def test_mutations_are_caught(formulation: str) -> None:
     assert all("no equilibrium" in sentence for sentence in caught.values())
     if formulation == "pointwise":
         assert set(caught) >= {"r", "n", "eta"}
+
+
+@pytest.mark.alone
+def test_reactions_balance_the_load() -> None:
+    """Discrete balance of the whole rod: its equations, clamped ones included, tested with rigid motions.
+
+    Stored energy and constraints are invariant under them, also when discretised.  All rows but those of the clamp
+    vanish at an equilibrium, so that these are the reactions: the opposite of the force, and of its moment about the
+    origin.
+    """
+    solver, point = bent("pointwise")
+    state, fields = solver.system.at(point.x), solver.system.fields
+    equations, clamped_rows = state.covector(), fields.number < 0
+    assert abs(equations[~clamped_rows & (fields.number != solver.system.load_index)]).max() < 1e-9
+    force = point.load * np.array([1.0, 0.5, 1.0])
+    tip = solver.shape.sample(point.x)["r"][-1]
+    for i, axis in enumerate(AXES):
+        moved, turned = np.zeros((2, len(equations)))
+        add_change(state, "r", np.zeros((3, 3)), axis, moved)
+        for field, matrix in (("q", left(axis)), ("r", cross(axis)), ("n", cross(axis))):
+            add_change(state, field, np.array(matrix), (0.0,) * len(matrix), turned)
+        for motion, work in ((moved, force[i]), (turned, np.cross(tip, force)[i])):
+            assert equations[clamped_rows] @ motion[clamped_rows] == pytest.approx(-work, abs=1e-9)
 
 
 @pytest.mark.alone

@@ -79,7 +79,7 @@ def transcritical(slope: float) -> Measured:
 
 def fold_with_branch_point(gap: float) -> Measured:
     """The fold of ``P = -u^2`` at u = 0, and a pitchfork of the twist at u = ``gap``, at which P = -gap^2."""
-    model = scene(lambda u, f2, c: u**3 / 3 + c.P * u + 0.5 * (u - c.a) * f2 + f2**2, (-0.2, 0.1), start=0.4, a=gap)
+    model = scene(lambda u, f2, c: u**3 / 3 + c.P * u + 0.5 * (u - c.a) * f2 + f2**2, (-0.2, 0.1), a=gap)
     diagram = run(model, MESH)
     expected = (
         [Change(-gap * gap, 0, 1), Change(0.0, 1, 2)] if gap > 0 else [Change(0.0, 0, 1), Change(-(gap**2), 1, 2)]

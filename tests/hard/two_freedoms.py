@@ -20,11 +20,8 @@ STIFF = 1e4
 Potential = Callable[[Any, Any, Any], Any]
 
 
-def scene(potential: Potential, span: tuple[float, float], start: float = 0.0, **constants: float) -> Scene:
-    """Rod whose total energy is ``potential(u, f, c)``, even in the twist f (f^2 stands for 2 - 2 cos f).
-
-    The first state has about the stretch ``1 + start``.
-    """
+def scene(potential: Potential, span: tuple[float, float], **constants: float) -> Scene:
+    """Rod whose total energy is ``potential(u, f, c)``, even in the twist f (f^2 stands for 2 - 2 cos f)."""
 
     def at_end(x: Any, c: Any) -> Any:
         u, squared = x.r[2] - 1, 2 - 2 * x.d1[0]
