@@ -28,7 +28,7 @@ DERIVED = {
 
 
 def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str, natural: Mapping[str, float]) -> dict[str, Any]:
-    """A branch as the page has it; ``shapes`` are those of its rows, ``natural`` sizes those of load and ordinate."""
+    """A ``branch`` in a ``colour``; ``shapes`` are those of its rows, ``natural`` the sizes of load and ordinate."""
     columns = branch["columns"]
     words = words_of(branch)
     told = list(dict.fromkeys(words))
