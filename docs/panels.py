@@ -49,7 +49,7 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
 
 
 def _write(axes: Axes, text: str, colour: str, places: np.ndarray, distance: float) -> None:
-    """Write a ``text`` beside the middle of a curve of ``places`` (n, 2), at a ``distance`` in points, above if it can."""
+    """Write a ``text`` above the middle of a curve of ``places`` (n, 2), at a ``distance`` from it in points."""
     middle, on_paper = len(places) // 2, axes.transData.transform(places)
     x, y = on_paper[min(middle + 1, len(places) - 1)] - on_paper[max(middle - 1, 0)]
     normal = np.array([-y, x]) / max(np.hypot(x, y), LEAST) * (-1.0 if x < 0 else 1.0)
