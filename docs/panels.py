@@ -16,6 +16,8 @@ MARKERS: dict[str, dict[str, Any]] = {
     "fold": {"marker": "D", "mfc": "black"},
     "flutter": {"marker": "*", "mfc": "#F0E442"},
 }
+ROOM, LEAST = 0.15, 1e-9
+"""Share of the height that is kept free above and below, and pixels below which a curve has no direction."""
 
 
 def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), width: float = 2.4) -> None:
@@ -23,6 +25,7 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
 
     Lines of a ``width`` in points are solid where the index is zero, dashed where it is zero in the plane only.
     """
+    labels: list[tuple[str, str, np.ndarray]] = []
     for branch, colour in zip(found["branches"], 3 * PALETTE, strict=False):
         if branch["columns"].get("omega2"):
             frequencies(axes, branch, colour)
@@ -32,15 +35,26 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
             style = ":" if index else "--" if in_space else "-"
             for sign in signs if np.ptp(ordinate) else (1,):
                 axes.plot(load[rows], sign * ordinate[rows], style, color=colour, linewidth=width)
-            middle = (rows.start + rows.stop - 1) // 2
             text = f"{index} ({in_space})" if in_space != index else f"{index}"
-            place = {"xytext": (3 * width, 3 * width), "textcoords": "offset points"}
-            axes.annotate(text, (load[middle], ordinate[middle]), color=colour, path_effects=HALO, **place)
+            labels.append((text, colour, np.column_stack([load, ordinate])[rows]))
         for special in branch["special"]:
             for sign in signs if special["kind"] in MARKERS else ():
                 style = {"mec": "black", "mew": 0.6 * width, "ms": 3 * width} | MARKERS[special["kind"]]
                 axes.plot(special["load"], sign * special["ordinate"], ls="none", zorder=5, **style)
+    axes.margins(y=ROOM)
+    axes.autoscale_view()  # the directions of curves on paper depend on the limits
+    for text, colour, places in labels:
+        _write(axes, text, colour, places, 6 * width)
     axes.set_xlabel(tex(found["parameter_label"], always=True))
+
+
+def _write(axes: Axes, text: str, colour: str, places: np.ndarray, distance: float) -> None:
+    """Write a ``text`` above the middle of a curve of ``places`` (n, 2), at a ``distance`` from it in points."""
+    middle, on_paper = len(places) // 2, axes.transData.transform(places)
+    x, y = on_paper[min(middle + 1, len(places) - 1)] - on_paper[max(middle - 1, 0)]
+    normal = np.array([-y, x]) / max(np.hypot(x, y), LEAST) * (-1.0 if x < 0 else 1.0)
+    offset = {"xytext": tuple(distance * normal), "textcoords": "offset points", "ha": "center", "va": "center"}
+    axes.annotate(text, tuple(places[middle]), color=colour, path_effects=HALO, **offset)
 
 
 def pieces(branch: Mapping[str, Any]) -> list[tuple[slice, int, int]]:

@@ -99,8 +99,8 @@ def cable(length):
     )
 
 
-found, steps = {}, StepControl(largest=0.15)
-for length, elements in ((1.0, 40), (1.0, 60), (0.75, 40)):
+found, steps = {}, StepControl(first=0.1, largest=0.3, aim=0.01)
+for length, elements in ((1.0, 40), (1.0, 60), (0.75, 30)):
     slack = Event("slack", of=lambda state, length=length: length - 0.03 - state.r[-1, 2])
     plan = Plan(depth=1, events=(slack,), steps=steps)
     diagram = rodfem.trace(cable(length), Discretization("reduced", elements, 6), plan)
@@ -109,7 +109,7 @@ for length, elements in ((1.0, 40), (1.0, 60), (0.75, 40)):
     print(f"length {length}, {elements} elements: T = {event.point.load:.7f}, error below {event.error_estimate:.0e}")
 verdicts = [diagram.assess(event, method, number=2) for method in ("count", "slicing", "reduction")]
 print(*verdicts, sep="\n")  # three ways to count
-(other,) = diagram.again(Discretization("pointwise", 40, 6), error_bars=False).special("slack")
+(other,) = diagram.again(Discretization("pointwise", 30, 6), error_bars=False).special("slack")
 print(f"length 0.75 in the other formulation: T = {other.point.load:.7f}")
 
 # %% [markdown]

@@ -71,7 +71,7 @@ OF_PARAMETER = ("parameter", "parameter_label", "parameter_words", "parameter_un
 WORDS = ("scene", "title", *OF_PARAMETER, "ordinate", "ordinate_label", "ordinate_unit")
 TOP: Kinds = {
     **dict.fromkeys(WORDS, TEXT),
-    "constants": (_named(_is_number), "numbers by name"),
+    **dict.fromkeys(("constants", "natural"), (_named(_is_number), "numbers by name")),
     "range": (_all(_is_number, 2), "two finite numbers"),
     "accuracy": MAYBE,
     "discretization": OBJECT,

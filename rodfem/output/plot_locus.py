@@ -33,6 +33,8 @@ STABLE_REGION = "#EBF6F1"
 """Colour of what lies between the stable side of a curve and the next one, or the bound of the load."""
 AFTER, ASIDE = 0.3, 30.0
 """Share of its rows after which the indices of a curve stand, and their distance from it, in pixels."""
+LEGEND, BELOW = 3, (0.5, -0.14)
+"""Columns of the legend, and its place in shares of the axes: under them, as the whole plane may be shaded."""
 ROOM = 0.1
 """Share of the height above and below the curves, for the indices that stand beside them."""
 
@@ -86,18 +88,21 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
                     axes.plot(x[row], y[row], linestyle="none", zorder=5, path_effects=HALO, **style)
         for one in loci:
             _fill_stable_region(axes, one, loci)
-        figure.draw_without_rendering()
-        for one in loci:
-            _shade_stable_side(axes, one)
-            _write_indices(axes, one)
         words, units = (loci[0].get(name, ("", "")) for name in ("words", "units"))
         load, other = (named(*axis) for axis in zip(words, loci[0]["labels"], units, strict=True))
         axes.set_xlabel(other, fontsize=FONT + 1)
         axes.set_ylabel(load, fontsize=FONT + 1)
         axes.set_title(tex(loci[0]["title"]))
-        handles = {handle.get_label(): handle for handle in (*axes.get_lines(), *axes.patches, *axes.collections)}
-        axes.legend(handles=list(handles.values()), fontsize=8.5)
         figure.supxlabel(_footer(loci), fontsize=FONT - 3, color="0.4", x=0.012, ha="left")
+        figure.draw_without_rendering()
+        for one in loci:
+            _shade_stable_side(axes, one)
+        handles = {handle.get_label(): handle for handle in (*axes.get_lines(), *axes.patches, *axes.collections)}
+        place = {"ncols": LEGEND, "loc": "upper center", "bbox_to_anchor": BELOW}
+        axes.legend(handles=list(handles.values()), fontsize=8.5, **place)
+        figure.draw_without_rendering()  # the legend has taken its room: pixels are final
+        for one in loci:
+            _write_indices(axes, one)
     return save(figure, path)
 
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from math import inf
 from typing import Any
 
 import numpy as np
 
 from rodfem.continuation.kinds import KINDS
-from rodfem.output.digits import number
 from rodfem.output.endings import endings
 from rodfem.output.plot_pieces import pieces_of
 from rodfem.report.packing import plain
+from rodfem.report.readings import readings_of
 from rodfem.report.shapes import Shapes
 from rodfem.report.words import words_of
 from rodfem.report.writhe import writhe
@@ -28,8 +27,8 @@ DERIVED = {
 """Ordinates that follow from the shapes, in words."""
 
 
-def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str) -> dict[str, Any]:
-    """A branch as the page has it; ``shapes`` are those of its rows."""
+def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str, natural: Mapping[str, float]) -> dict[str, Any]:
+    """A ``branch`` in a ``colour``; ``shapes`` are those of its rows, ``natural`` the sizes of load and ordinate."""
     columns = branch["columns"]
     words = words_of(branch)
     told = list(dict.fromkeys(words))
@@ -43,8 +42,7 @@ def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str) -> dict[
         "negative": columns["negative"],
         "ordinates": {name: plain(np.array(columns[name], dtype=float)) for name in _listed(columns)}
         | _derived(shapes),
-        "estimate": columns.get("estimate"),
-        "error": columns.get("error"),
+        "readings": readings_of(branch, natural),
         "pieces": _pieces(branch, colour),
         "special": [_special(x) for x in branch["special"]],
         "words": [told.index(each) for each in words],
@@ -95,15 +93,10 @@ def _pieces(branch: Mapping[str, Any], colour: str) -> list[dict[str, Any]]:
 
 def _special(special: Mapping[str, Any]) -> dict[str, Any]:
     kind = KINDS[special["kind"]]
-    bar = special.get("error_estimate")
-    load = f"{special['load']:.10g}"
-    if not kind.given:
-        load = number(special["load"], inf if bar is None else bar, special.get("resolved"))
     before, after = special["negative_before"], special["negative_after"]
     return {
         "kind": special["kind"],
         "row": special["row"],
-        "load": load,
         "index": str(before) if before == after else f"{before}→{after}",
         "law": (special.get("law") or {}).get("kind", ""),
         "note": special.get("note") or "",

@@ -18,10 +18,14 @@ from rodfem.output.view import POINT
 from rodfem.problem.setting import Setting
 from rodfem.report.bodies import Shelf
 from rodfem.report.packing import packed
+from rodfem.report.readings import eigenvalue_in_words
 from rodfem.report.shapes import Shapes
 from rodfem.report.stage import Stage
 
 Floats = NDArray[np.float64]
+
+EXACT = "0 (exact)"
+"""Eigenvalue of a symmetry."""
 
 
 def motions_of(
@@ -74,14 +78,14 @@ def motions_of(
 
 
 def _about(modes: Modes, number: int) -> dict[str, Any]:
-    """Eigenvalue, its error, and what the motion does: ``zero``, ``grows`` or neither."""
+    """Eigenvalue, in words with its error, and what the motion does: ``zero``, ``grows`` or neither."""
     mu, error = complex(modes.value[number]), float(modes.error[number])
     known = bool(np.isfinite(error))
     root = np.sqrt(-mu)
     zero = modes.motion[number] == SYMMETRY or abs(mu) <= (error if known else 0.0)
     return {
         "value": [mu.real, mu.imag],
-        "error": error if known else None,
+        "words": EXACT if modes.motion[number] == SYMMETRY else eigenvalue_in_words(mu, error),
         "motion": modes.motion[number],
         "root": [float(root.real), float(root.imag)],
         "kind": "zero" if zero else "grows" if root.real > GROWTH * abs(root) else "swings",

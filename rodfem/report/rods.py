@@ -56,7 +56,10 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
         along = profiles_data(group, states)
         image = "" if is_traced(branch, data["branches"]) else branch.get("image", "")
         branches.append(
-            branch_data(branch, here, colour) | _drawn(here, found) | along | {"modes": modes, "image": image}
+            branch_data(branch, here, colour, data.get("natural") or {})
+            | _drawn(here, found)
+            | along
+            | {"modes": modes, "image": image}
         )
     return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": _solids(shelf)}
 

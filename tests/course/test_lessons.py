@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from mpi4py import MPI
 
 from rodfem.course.answers import answer_to, answers
 
@@ -20,8 +21,6 @@ LONGEST = 150
 """Lines of a lesson."""
 SLOWEST = 10.0
 """Processor time of a lesson in seconds, with its forms compiled."""
-CHEAP = ("01", "02")
-"""Lessons that also run on two ranks."""
 
 
 def question(path: Path) -> str:
@@ -35,19 +34,18 @@ def judged(path: Path) -> tuple[bool, str]:
     return answer_to(question(path)).judge(runpy.run_path(str(path))["answer"])
 
 
-@pytest.mark.parametrize(
-    "path", [pytest.param(p, marks=[] if p.name[:2] in CHEAP else pytest.mark.alone, id=p.stem) for p in LESSONS]
-)
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_a_lesson_ends_with_its_number(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    for _ in range(2):  # the first run may compile
+    alone = MPI.COMM_WORLD.size == 1  # ranks that wait for each other work, too: their time is not the lesson's
+    for _ in range(2 if alone else 1):  # the first run may compile
         start = time.process_time()
         right, sentence = judged(path)
         seconds = time.process_time() - start
         if seconds < SLOWEST:
             break
     assert right, sentence
-    assert seconds < SLOWEST
+    assert seconds < SLOWEST or not alone
     assert list((folder / "results" / "course").glob("*.png")), "a lesson has a picture"
 
 

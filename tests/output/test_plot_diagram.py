@@ -220,6 +220,8 @@ def test_what_is_stable_beside_loci_ends_at_the_next_one(folder: Path, monkeypat
     places = ((0.5, 1.0), (0.5, 0.4), (0.9, 0.8), (1.5, -0.9), (1.5, 2.1))
     assert [region.get_paths()[0].contains_point(place) for place in places] == [True, False, False, True, False]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("$A$", "force $P$")
+    legend = axes.get_legend()
+    assert legend is not None and legend.get_window_extent().y1 < axes.xaxis.label.get_window_extent().y0
 
 
 def test_twist_of_a_ring_is_its_link_less_its_writhe() -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -83,7 +84,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("locus", "follower"):
         scene, mesh, plan = RUNS[name]
         run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
-    plan = Plan((0.0, 12.0), at=(11.0,), depth=1, spectrum=2, modes=2, error_bars=False)
+    plan = Plan((0.0, 12.0), at=(11.0,), depth=1, spectrum=2, modes=2)
     run(scenes()["euler"], MESH, plan, folder / "pinned", figures=False, quiet=True)
     return folder
 
@@ -210,6 +211,31 @@ def test_modes_move(opened: Callable[..., Any]) -> None:
     until(page, lambda: shown(page)[1] == 0)
 
 
+def test_each_number_has_its_error_or_says_that_it_has_none(opened: Callable[..., Any]) -> None:
+    """Of Euler's column between hinges, which buckles at pi^2; rows without a special point have no estimates."""
+    page = opened("pinned")
+
+    def read(branch: str, row: int, *parts: str) -> list[str]:
+        number = ["straight", "branch 1"].index(branch)
+        page.execute_script(f"import('report/store').then((store) => store.select({number}, {row}))")
+        until(page, lambda: shown(page) == (branch, row))
+        return [page.find_element(By.ID, part).text for part in parts]
+
+    def row_of(kind: str, branch: int) -> int:
+        script = "return import('report/data').then(({ data }) => data.branches[arguments[0]].special)"
+        return int(next(x["row"] for x in page.execute_script(script, branch) if x["kind"] == kind))
+
+    load, numbers = read("straight", row_of("branch point", 0), "state-load", "numbers")
+    value, bound = map(float, load.removeprefix("P = ").removesuffix(")").split(" ("))
+    assert abs(value - np.pi**2) <= bound < 1e-9 and numbers.endswith("energy = ~0")
+    load, numbers, values, modes = read("branch 1", row_of("user", 1), "state-load", "numbers", "values", "modes")
+    assert load == "P = 11 (given)" and re.search(r"middle = 0\.2679\d+ \(\de-\d+\); energy = ~2\.1", numbers)
+    assert values == "" and len(re.findall(r"μ = \d\.\d+ \(\de-\d+\): ", modes)) == 2 and "0 (exact): symmetry" in modes
+    load, numbers, values = read("branch 1", 3, "state-load", "numbers", "values")
+    assert load.startswith("P = ~") and numbers.count("~") == numbers.count(" = ") == 2 == values.count("~")
+    assert "~: error not estimated" in page.find_element(By.ID, "errors").text
+
+
 def test_strains_forces_and_moments_are_curves_with_names(opened: Callable[..., Any]) -> None:
     """Of a pinned column under the load P: the force has the size P, and the moment vanishes at the ends."""
     page = opened("pinned")
@@ -276,8 +302,8 @@ def long(payload: dict[str, Any]) -> dict[str, Any]:
         "jumps": {symbol: [POINT] * POINTS for symbol in "vknm"},
         "bodies": [numbers] * POINTS,
         "maps": packed(maps),
-        **dict.fromkeys(("estimate", "error", "spectrum", "omega2", "motion")),
-        **{"special": [], "unexplained": [], "modes": {}, "endings": [], "image": ""},
+        **dict.fromkeys(("spectrum", "omega2", "motion")),
+        **{"special": [], "unexplained": [], "modes": {}, "readings": [], "endings": [], "image": ""},
     }
     return payload | {"branches": [branch], "start": [0, 0], "loci": []}
 

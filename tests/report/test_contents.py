@@ -18,6 +18,7 @@ from rodfem.output.solids import ball, box, coil
 from rodfem.report.bodies import CLOSE, Shelf
 from rodfem.report.labels import html_of, plain_of
 from rodfem.report.packing import packed, plain, script_json
+from rodfem.report.readings import eigenvalue_in_words, readings_of
 from rodfem.report.shapes import shapes_of, stations
 from rodfem.report.words import words_of
 from rodfem.report.writhe import writhe
@@ -230,3 +231,20 @@ def test_ends_before_the_range_have_reasons() -> None:
 def test_round_off_without_an_error_bar_is_zero() -> None:
     assert number(1.8e-17, np.inf, scale=0.4) == "0 (no estimate)" != number(1.8e-17, np.inf)
     assert number(0.25, np.inf, scale=0.4) == "0.25 (no estimate)"
+
+
+def test_readings_are_those_of_the_file() -> None:
+    """Bounds of special points are absolute, those of other rows relative, in parts of the natural size at least."""
+    known = [special(1, ordinate=0.25, ordinate_error_estimate=None), special(3, "user", ordinate=2.0)]
+    one = branch([0, 0, 1, 1], *known, ordinate=[0.5, 0.25, 0.125, 2.0], estimate=[1e-3, 1e-3, None, 1e-3])
+    first, second, third, fourth = readings_of(one | {"ended": ""}, {"load": 10.0, "ordinate": 1.0})
+    assert first == {"load": "0.00 (1e-02)", "ordinate": "0.500 (1e-03)"}
+    assert second == {"load": "1.000000 (1e-06)"} and third == {} and fourth == {"load": "3 (given)"}
+    squeezed = branch([0, 0], special(1, "end")) | {"ended": "stretch reaches zero"}
+    assert readings_of(squeezed, {})[1] == {"load": "1.000000 (1e-06)"}
+    assert readings_of(one, {})[0] == {}
+
+
+def test_eigenvalues_have_one_bound() -> None:
+    assert eigenvalue_in_words(complex(1.23456, -0.5), 1e-3) == "1.235 - 0.500 i (2e-03)"
+    assert eigenvalue_in_words(complex(1.23456), 1e-3) == "1.235 (2e-03)" and eigenvalue_in_words(1j, np.inf) == ""

@@ -35,6 +35,17 @@ export function escaped(text) {
   return String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
 }
 
+// A number of a row with the bound of its error, or marked where that is not estimated.
+export function reading(branch, row, name) {
+  const value = name === "load" ? branch.load[row] : branch.ordinates[name]?.[row];
+  return branch.readings[row]?.[name] ?? rough(value);
+}
+
+// A number whose error is not estimated.
+export function rough(x, count = 6) {
+  return x === null || x === undefined ? "unknown" : `~${digits(x, count)}`;
+}
+
 // A number with up to so many digits.
 export function digits(x, count = 6) {
   if (x === null || x === undefined) return "unknown";

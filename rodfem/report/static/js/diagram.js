@@ -1,6 +1,6 @@
 // The bifurcation diagram: a trace for each piece of one index, special points, and the state that is shown.
 
-import { data, digits, escaped } from "report/data";
+import { data, escaped, reading } from "report/data";
 import { select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
 import { draw, layout } from "report/plotting";
@@ -16,15 +16,13 @@ const heights = (branch) => branch.ordinates[ordinate.key];
 function hover(branch, row) {
   const words = branch.told[branch.words[row]];
   const special = branch.special.find((x) => x.row === row);
-  const error = branch.estimate?.[row];
   const lines = [
     `<b>${escaped(branch.name)}</b>, row ${row}`,
-    `${escaped(data.symbol)} = ${special ? escaped(special.load) : digits(branch.load[row], 8)}`,
-    `${escaped(ordinate.name)} = ${digits(heights(branch)[row], 8)}`,
+    `${escaped(data.symbol)} = ${escaped(reading(branch, row, "load"))}`,
+    `${escaped(ordinate.name)} = ${escaped(reading(branch, row, ordinate.key))}`,
     `index ${escaped(words.index)}, ${words.verdict === "planar" ? "stable in the plane only" : words.verdict === "undecided" ? "stability undecided" : words.verdict}`,
     ...branch.endings.filter(([at]) => at === row).map(([, reason]) => `<b>ends here: ${escaped(reason)}</b>`),
     special ? `<b>${escaped(special.kind)}</b>${special.law ? `, ${escaped(special.law)}` : ""}` : "",
-    special ? "" : error === null || error === undefined ? "error not estimated at this row" : `error at most ${error.toExponential(0)}`,
   ];
   return lines.filter(Boolean).join("<br>");
 }

@@ -1,6 +1,6 @@
 // Buttons of the modes that a state has, and of the states that have some.
 
-import { data, digits } from "report/data";
+import { data, digits, rough } from "report/data";
 import { branch, select, showMode, state, subscribe } from "report/store";
 
 const box = document.getElementById("modes");
@@ -20,7 +20,7 @@ const WORDS = { grows: "grows", swings: "swings", zero: "zero" };
 
 function words(mode) {
   const [x, y] = mode.value;
-  const value = mode.kind === "zero" ? "0" : `${digits(x, 5)}${y ? ` ${y > 0 ? "+" : "−"} ${digits(Math.abs(y), 5)} i` : ""}`;
+  const value = mode.words || `${rough(x, 5)}${y ? ` ${y > 0 ? "+" : "−"} ${digits(Math.abs(y), 5)} i` : ""}`;
   return `${mode.kind === "grows" ? "◌" : "●"} μ = ${value}: ${mode.motion}, ${WORDS[mode.kind]}`;
 }
 

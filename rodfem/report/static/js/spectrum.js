@@ -1,7 +1,7 @@
 // Left-most eigenvalues along the branch, by sign: negative ones are triangles, positive ones circles. Where none are
 // recorded, how many are negative.
 
-import { data, digits, escaped } from "report/data";
+import { data, digits, escaped, rough } from "report/data";
 import { branch, select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
 import { draw, layout } from "report/plotting";
@@ -62,7 +62,7 @@ function redraw() {
   const b = branch(), all = recorded(b);
   shown = b;
   if (!all.length) return counts(b);
-  const words = ({ row, value: [x, y] }) => `row ${row}, ${escaped(data.symbol)} = ${digits(b.load[row])}<br>${b.omega2 ? "ω²" : "μ"} = ${digits(x)}${y ? ` ± ${digits(Math.abs(y))} i` : ""}`;
+  const words = ({ row, value: [x, y] }) => `row ${row}, ${escaped(data.symbol)} = ${digits(b.load[row])}<br>${b.omega2 ? "ω²" : "μ"} = ${rough(x)}${y ? ` ± ${digits(Math.abs(y))} i` : ""}`;
   const traces = KINDS.map(({ name, test, marker }) => {
     const found = all.filter((each) => test(each.value));
     return {

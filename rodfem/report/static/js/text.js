@@ -1,34 +1,38 @@
 // The state in words: titles, verdict, and where the report comes from.
 
-import { data, digits } from "report/data";
+import { data, digits, reading, rough } from "report/data";
 import { branch, state, subscribe, words } from "report/store";
 
 const at = (id) => document.getElementById(id);
 const MOST = 4; // eigenvalues in words
+const SAME = 1e-6; // relative difference of eigenvalues that are one
+const READ = data.ordinates.filter(({ key }, i) => !i || key === "energy");
 const NAMES = { stable: "STABLE", unstable: "UNSTABLE", planar: "STABLE IN PLANE", critical: "CRITICAL", undecided: "UNDECIDED" };
 
 function redraw() {
   const b = branch(), { verdict, index, sentence } = words(b, state.row), special = b.special.find((x) => x.row === state.row);
   at("badge").className = `badge ${verdict}`;
   at("badge").textContent = `${NAMES[verdict]} · index ${index}`;
-  const height = b.ordinates[data.ordinates[0].key][state.row];
-  at("state-load").textContent = `${data.symbol} = ${special ? special.load : digits(b.load[state.row], 6)}`;
-  at("state").textContent = `${data.ordinates[0].name} = ${digits(height, 5)}; ${b.name}, row ${state.row} of ${b.load.length}`;
-  at("state").title = at("state").textContent;
+  at("state-load").textContent = `${data.symbol} = ${reading(b, state.row, "load")}`;
+  at("state").textContent = `${b.name}, row ${state.row} of ${b.load.length}`;
+  at("numbers").textContent = READ.map(({ key, name }) => `${name} = ${reading(b, state.row, key)}`).join("; ");
   values(b);
   at("sentence").textContent = sentence + (special?.law ? ` ${special.law[0].toUpperCase()}${special.law.slice(1)}.` : "");
 }
 
-// Left-most eigenvalues of the state, those of the chart.
+// Left-most eigenvalues of the state, those of the chart, but for those that buttons of modes have with an error.
 function values(b) {
-  const found = b.spectrum?.[state.row]?.map((x) => [x, 0]) ?? b.omega2?.[state.row] ?? [];
+  const known = (b.modes[state.row] ?? []).filter((mode) => mode.words).map((mode) => mode.value);
+  const same = (p, q) => Math.hypot(p[0] - q[0], p[1] - q[1]) <= SAME * Math.hypot(...q);
+  const all = b.spectrum?.[state.row]?.map((x) => [x, 0]) ?? b.omega2?.[state.row] ?? [];
+  const found = all.filter((value) => !known.some((other) => same(value, other)));
   const each = found.slice(0, MOST).map(([x, y]) => {
     const span = document.createElement("span");
     span.className = x < 0 || y ? "negative" : "positive";
-    span.textContent = `${y ? "×" : x < 0 ? "▼" : "●"} ${digits(x, 4)}${y ? ` ${y > 0 ? "+" : "−"} ${digits(Math.abs(y), 4)} i` : ""}`;
+    span.textContent = `${y ? "×" : x < 0 ? "▼" : "●"} ${rough(x, 4)}${y ? ` ${y > 0 ? "+" : "−"} ${digits(Math.abs(y), 4)} i` : ""}`;
     return span;
   });
-  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω², no error bars:" : "μ, no error bars:", ...each] : []));
+  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω²:" : "μ:", ...each] : []));
 }
 
 function line(list, name, text, code = false) {
