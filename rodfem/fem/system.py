@@ -192,7 +192,10 @@ class System:
         return float(max(self.workspace.dot(d).real, 0.0)) ** 0.5
 
     def at(self, x: PETSc.Vec, line: Line | None = None) -> State:
-        """State of the values ``x`` has now, with the parameters of a ``line``, :attr:`line` unless given."""
+        """State of the values ``x`` has now, with the parameters of a ``line``, :attr:`line` unless given.
+
+        On one rank the same object as last time where values and line are the same.
+        """
         gathered, line, last = self.gathered(x), line or self.line, self._last
         # each row is asked for the same state ten times over: what it has derived of itself is kept with it
         values = gathered.tobytes() if self.comm.size == 1 else b""
