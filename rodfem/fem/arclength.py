@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,34 +16,43 @@ if TYPE_CHECKING:
 
 
 class Arclength:
-    """Derivatives of states on the cells of one :class:`~rodfem.fem.fields.Fields`.
-
-    Attributes
-    ----------
-    derivative
-        Matrix (local size, local size) of the derivative at nodes, the mean of the cells that share one; zero for
-        scalars and at clamped degrees of freedom.
-    everywhere
-        The same, at clamped degrees of freedom, too.
-    jumps
-        Matrix (shared nodes, local size) of its jumps between cells, of rotation and centreline.
-    """
+    """Derivatives of states on the cells of one :class:`~rodfem.fem.fields.Fields`; each made when it is asked for."""
 
     def __init__(self, fields: Fields) -> None:
-        """Make the matrices."""
-        size = len(fields.number)
-        mean, jumps = sp.csr_matrix((size, size)), [sp.csr_matrix((0, size))]
+        """Keep the fields."""
+        self._fields = fields
+
+    @cached_property
+    def everywhere(self) -> sp.csr_matrix:
+        """Matrix (local size, local size) of the derivative at nodes, the mean of the cells that share one.
+
+        Zero for scalars.
+        """
+        fields, size = self._fields, len(self._fields.number)
+        mean = sp.csr_matrix((size, size))
         for block in fields.blocks:
             slopes, dofs = _slopes(fields, block), fields.dofs[block.name].ravel()
             sums = sp.csr_matrix((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(size, len(dofs)))
             shared = np.maximum(np.asarray(sums.sum(axis=1)).ravel(), 1.0)
             mean += sp.diags(1.0 / shared) @ sums @ slopes
-            if block.name in (fields.turning.name, "r"):
-                order = np.argsort(dofs, kind="stable")
-                twins = np.flatnonzero(np.diff(dofs[order]) == 0)
-                jumps.append(slopes[order[twins + 1]] - slopes[order[twins]])
-        self.everywhere, self.jumps = mean.tocsr(), sp.vstack(jumps).tocsr()
-        self.derivative = sp.diags(np.where(fields.number < 0, 0.0, 1.0)) @ self.everywhere
+        return mean.tocsr()
+
+    @cached_property
+    def derivative(self) -> sp.csr_matrix:
+        """The same, zero at clamped degrees of freedom, too."""
+        return sp.diags(np.where(self._fields.number < 0, 0.0, 1.0)) @ self.everywhere
+
+    @cached_property
+    def jumps(self) -> sp.csr_matrix:
+        """Matrix (shared nodes, local size) of its jumps between cells, of rotation and centreline."""
+        fields = self._fields
+        jumps = [sp.csr_matrix((0, len(fields.number)))]
+        for block in (b for b in fields.blocks if b.name in (fields.turning.name, "r")):
+            slopes, dofs = _slopes(fields, block), fields.dofs[block.name].ravel()
+            order = np.argsort(dofs, kind="stable")
+            twins = np.flatnonzero(np.diff(dofs[order]) == 0)
+            jumps.append(slopes[order[twins + 1]] - slopes[order[twins]])
+        return sp.vstack(jumps).tocsr()
 
 
 def _slopes(fields: Fields, block: Block) -> sp.csr_matrix:

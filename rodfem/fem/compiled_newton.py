@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.linalg.chain import Chain
+from rodfem.linalg.chain import Chain, Elimination
 from rodfem.linalg.compiled import module
 from rodfem.linalg.matrices import shared
 
@@ -86,6 +86,7 @@ class CompiledNewton:
         compiled = module("newton", declarations(), Path(__file__).parent)
         self.lib, self.ffi = compiled.lib, compiled.ffi
         self._kept: list[Any] = []
+        self._given: tuple[Any, ...] = (None, None, None)
         own, metric = shared(matrix), shared(system.metric)
         assert own is not None
         assert metric is not None
@@ -129,20 +130,26 @@ class CompiledNewton:
         """Use the parameters, the phase conditions and the factors that the system has now."""
         system, rod, equations = self.system, self.rod, self.system.equations
         equations.take(system.line)
+        self.factors.prepare(self.matrix)
+        given = (self.factors.elimination, equations.residual.constants, equations.jacobian.constants)
+        if any(mine is not new for mine, new in zip(self._given, given, strict=True)):
+            self._point(rod, given[0])
+            self._given = given
+        self._active[:], self._offsets[:] = 0, system.phase.offsets
+        for i, row in system.phase.rows.items():
+            self._active[i], self._conditions[i, : len(row)] = 1, row
+
+    def _point(self, rod: Any, elimination: Elimination) -> None:
+        """Let the ``rod`` point to the forms with their constants, and to the factors."""
+        system, equations = self.system, self.system.equations
         for name, form in (("residual", equations.residual), ("jacobian", equations.jacobian)):
             setattr(rod, name, form.pointer)
             setattr(rod, f"{name}_constants", self.ffi.cast("double *", form.constants.ctypes.data))
         assert system.equation_places is not None
         rod.equation_places = system.equation_places.pointer
         rod.entry_places = system.matrix_places(self._pattern, True).pointer
-        rod.assemble = equations.residual.function
-        self.factors.prepare(self.matrix)
-        elimination = self.factors.elimination
-        rod.factors = elimination.pointer
+        rod.assemble, rod.factors = equations.residual.function, elimination.pointer
         rod.factor, rod.solve, rod.negative, rod.zero = elimination.functions
-        self._active[:], self._offsets[:] = 0, system.phase.offsets
-        for i, row in system.phase.rows.items():
-            self._active[i], self._conditions[i, : len(row)] = 1, row
 
     def correct(self, x: PETSc.Vec, row: PETSc.Vec, limits: Limits) -> Ended:
         """Solve the equations on the plane through ``x`` across ``row``, in place.

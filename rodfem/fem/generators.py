@@ -11,6 +11,7 @@ from petsc4py import PETSc
 
 from rodfem.fem.fields import LOAD
 from rodfem.fem.values import NodalValues
+from rodfem.linalg.matrices import times
 
 if TYPE_CHECKING:
     from rodfem.fem.parameters import Line
@@ -53,15 +54,15 @@ class Generators:
         """All generators at a state, (count, own rows): see :meth:`vector`."""
         if not self.count:
             return np.zeros((0, len(self._rows)))
-        return (self._forth @ state.local[self._columns]).reshape(self.count, -1) + self._constant(state)
+        return times(self._forth, state.local[self._columns]).reshape(self.count, -1) + self._constant(state)
 
     def linear(self, d: PETSc.Vec) -> np.ndarray:
         """``A d`` of all generators for a change of state, (count, own rows)."""
-        return np.asarray(self._forth @ self._gathered(d)).reshape(self.count, -1)
+        return times(self._forth, self._gathered(d)).reshape(self.count, -1)
 
     def pulled_back(self, covector: PETSc.Vec) -> np.ndarray:
         """``A^t y`` of all generators, (count, own rows)."""
-        return np.asarray(self._back @ self._gathered(covector)).reshape(self.count, -1)
+        return times(self._back, self._gathered(covector)).reshape(self.count, -1)
 
     def _gathered(self, vector: PETSc.Vec) -> np.ndarray:
         return self.system.gathered(vector)[: len(self._columns)]

@@ -94,13 +94,14 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
     if count == len(dropped):
         return no_phase(system, reference)
     state: State = system.at(reference)
-    generators = system.generators.at(state)
+    generators = state.generators
     images = system.weighed(generators)
     gram = generators @ images.T
     if system.comm.size > 1:
         gram = system.comm.allreduce(gram, op=MPI.SUM)
     exact = [i for i, s in enumerate(symmetries) if not s.along and i not in dropped]
-    squares, turn = np.linalg.eigh(gram[exact][:, exact])
+    among = gram[exact][:, exact]
+    squares, turn = np.linalg.eigh(among) if len(exact) > 1 else (among.ravel(), np.ones(among.shape))
     combinations = np.zeros((len(exact), count))
     combinations[:, exact] = turn.T
     sizes, least = np.sqrt(np.maximum(squares, 0.0)), np.full(len(exact), SYMMETRIC_STATE)
@@ -115,7 +116,8 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
         size = system.norm(system.generators.vector(rest @ generators))
         combinations, sizes = np.vstack([combinations, rest]), np.append(sizes, size)
         least = np.append(least, max(MESH * mismatch(state), 10 * SYMMETRIC_STATE))
-    active = np.flatnonzero(sizes >= least)
+    broken = sizes >= least
+    active = np.flatnonzero(broken)
     weights = combinations[active] / sizes[active, None]
     rows, offsets = weights @ images, np.zeros(count)
     own = system.fields.free_owned
@@ -127,7 +129,7 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
         dict(zip(numbers, rows, strict=True)),
         offsets,
         dict(zip(numbers, weights, strict=True)),
-        np.delete(combinations, active, axis=0),
+        combinations[~broken],
         reference.copy(),
         system.generators.vector,
     )

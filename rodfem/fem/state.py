@@ -8,6 +8,7 @@ writes there: an evaluation puts its own values there first, unless they are the
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -168,7 +169,11 @@ class State(Evaluation):
         with system.clock("solve"):
             system.lu(matrix)
 
+    @cached_property
+    def generators(self) -> np.ndarray:
+        """Changes under all infinitesimal symmetries, (count, own rows)."""
+        return self.system.generators.at(self)
+
     def generator(self, symmetry: int) -> PETSc.Vec:
         """Change under the infinitesimal symmetry, in all fields and scalars that it moves."""
-        generators = self.system.generators
-        return generators.vector(generators.at(self)[symmetry])
+        return self.system.generators.vector(self.generators[symmetry])

@@ -19,6 +19,7 @@ from mpi4py import MPI
 
 from forms.symmetry import AXES, Matrix, cross, left, right
 from rodfem.fem.values import NodalValues
+from rodfem.linalg.matrices import times
 from rodfem.problem.contribution import Motion
 from rodfem.problem.scene import Scene
 
@@ -116,8 +117,9 @@ def mismatch(state: NodalValues) -> float:
 
     It measures how far the mesh is from the invariance under the motion along itself.
     """
-    worst = float(abs(state.fields.arclength.jumps @ state.local).max(initial=0.0))
-    return float(state.fields.comm.allreduce(worst, op=MPI.MAX))
+    worst = float(abs(times(state.fields.arclength.jumps, state.local)).max(initial=0.0))
+    comm = state.fields.comm
+    return worst if comm.size == 1 else float(comm.allreduce(worst, op=MPI.MAX))
 
 
 def may_slide(scene: Scene) -> bool:

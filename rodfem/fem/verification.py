@@ -83,7 +83,7 @@ class Verification:
         if not candidates:
             return []
         self.norm = self.norm or self.system.matrix_in_units(matrix).norm(PETSc.NormType.INFINITY)
-        generators = self.system.generators.at(state)
+        generators = state.generators
 
         def holds(chosen: list[int]) -> bool:
             return self._holds(matrix, generators, chosen, state, equations)

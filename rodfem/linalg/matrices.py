@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.sparse import _sparsetools
 
 
 def first_of(comm: MPI.Comm, count: int) -> int:
@@ -21,6 +22,17 @@ def block_matrix(blocks: np.ndarray, rows: np.ndarray, columns: np.ndarray, shap
     """Sparse matrix of a ``shape`` with dense ``blocks`` (b, r, c) at ``rows`` (b, r) and ``columns`` (b, c)."""
     i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
     return sp.csr_matrix((blocks.ravel(), (i.ravel(), j.ravel())), shape=shape)
+
+
+def times(matrix: sp.csr_matrix, vector: np.ndarray) -> np.ndarray:
+    """Product (m,) of real numbers, ``matrix`` (m, n) and ``vector`` (n,).
+
+    It is what ``@`` does, without the inspection of both that takes several times as long for a hundred unknowns.
+    """
+    rows, columns = matrix.shape
+    out = np.zeros(rows)
+    _sparsetools.csr_matvec(rows, columns, matrix.indptr, matrix.indices, matrix.data, vector, out)
+    return out
 
 
 def petsc_matrix(comm: MPI.Comm, local: sp.spmatrix) -> PETSc.Mat:

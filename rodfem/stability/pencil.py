@@ -129,7 +129,7 @@ def symmetry_modes(system: System, x: PETSc.Vec) -> dict[int, PETSc.Vec]:
     system.set_phase(x)
     if not system.phase.count:
         return {}
-    generators = system.generators.at(system.at(x))
+    generators = system.at(x).generators
     broken = system.phase.broken.items()
     return {system.drifts[i]: system.generators.vector(weights @ generators) for i, weights in broken}
 

@@ -49,6 +49,21 @@ def test_numbers_stay_when_another_state_is_evaluated(name: str) -> None:
         state.local[0] = 1.0
 
 
+def test_the_state_of_last_time_serves_the_same_values_and_line_alone() -> None:
+    system, x = plain("hemitropic", "reduced", 4, 3, 0.2)
+    x = x.copy()
+    x.array[:] += np.sin(np.arange(len(x.array)))  # the straight rod has the symmetry itself
+    first, generators = system.at(x), system.at(x).generators.copy()
+    x.scale(0.5)
+    second = system.at(x)
+    np.testing.assert_array_equal(second.generators, system.generators.at(second))
+    assert np.abs(second.generators - generators).max() > 1e-3
+    other = system.at(x, line(system.scene, {system.scene.load: 0.3}, {system.scene.load: 2.0}))
+    assert len({id(first), id(second), id(other)}) == 3
+    x.scale(2.0)
+    np.testing.assert_array_equal(system.at(x).generators, generators)
+
+
 @pytest.mark.short
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> None:
