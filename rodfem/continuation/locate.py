@@ -72,14 +72,18 @@ class Sample:
 
 def solve_at(solver: BranchSolver, curve: Curve, s: float) -> PETSc.Vec:
     """Equilibrium on the plane through ``curve(s)`` across its direction; raises :class:`ConvergenceError`."""
-    x, direction = curve(s)
-    outcome = correct(solver.system, x, solver.row(direction))
-    if not outcome.converged:
-        raise ConvergenceError(
-            f"No equilibrium near load {solver.system.scalar(x):.8g} while locating a special point",
-            SMALLER_STEPS,
-        )
-    return x
+    start, direction = curve(s)
+    system, row, before = solver.system, solver.row(direction), solver.system.damping
+    try:  # beside a state that may move freely, where Newton's method slides away: with damping
+        for system.damping in dict.fromkeys((before, before or solver.inertia.tolerance)):
+            x = start.copy()
+            if correct(system, x, row).converged:
+                return x
+    finally:
+        system.damping = before
+    raise ConvergenceError(
+        f"No equilibrium near load {system.scalar(start):.8g} while locating a special point", SMALLER_STEPS
+    )
 
 
 def solve_beside(solver: BranchSolver, curve: Curve, s: float, aside: float) -> tuple[PETSc.Vec, float]:

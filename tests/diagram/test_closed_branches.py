@@ -1,13 +1,15 @@
-"""A closed branch ends where it begins: the isola of a cantilever, whose folds are known in closed form."""
+"""Branches that end on a state known before: their own start, or that of another branch."""
 
 from __future__ import annotations
 
-from math import sqrt
+from math import pi, sqrt
 
+import numpy as np
 import pytest
 from hard.isolas import scene
 
-from rodfem import Discretization, Plan, trace
+from forms.energy import bending_and_twist
+from rodfem import Discretization, Ordinate, Plan, Ring, Scene, StepControl, trace
 
 EXCESS = 0.04
 
@@ -30,3 +32,30 @@ def test_a_closed_branch_ends_at_its_start(at: float) -> None:
     assert sorted(p.negative for p in asked) == [0, 1]
     inside = [p.ordinate for p in isola.points if p.load == first.load]
     assert len({round(x, 9) for x in inside}) == 2
+
+
+def test_two_states_of_a_twisted_ring_are_joined_at_any_step() -> None:
+    """Michell: rings twisted by none and by two turns lose stability where ``C |twist - t0| = sqrt 3``, both found.
+
+    At the second one the branch meets states with one more free motion, along which Newton's method slides away.
+    """
+    ring = Scene(
+        "ring",
+        (0.0, 2 * pi),
+        "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t0), (1.0, 1.0, 1.5)),
+        {"t0": 0.0},
+        "t0",
+        Ring(),
+        Ordinate("twist", s=None, of=lambda x, c: x.k[2] / (2 * pi)),
+        (0.0, 1.5),
+        start=lambda s: np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1),
+    )
+    plan = Plan(depth=1, error_bars=False, steps=StepControl(largest=0.025))
+    diagram = trace(ring, Discretization(elements=8, degree=6), plan)
+    first, last = diagram["straight"].special[0], diagram["branch 1"].special[-1]
+    assert first.point.load == pytest.approx(2 / sqrt(3), abs=1e-8)
+    assert last.point.load == pytest.approx(2 - 2 / sqrt(3), abs=1e-8)
+    assert last.point.ordinate == pytest.approx(2.0, abs=1e-9)
+    assert diagram["branch 1"].ended.startswith("meets another branch")
+    assert not diagram.warnings
