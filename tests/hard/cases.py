@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hard import bifurcations, endurance, isolas, published, ranges, snapping, springy_rings, stiffness
+from hard import bifurcations, endurance, isolas, published, ranges, snapping, springy_rings, stiffness, writhing
 from hard.case import Case
 
 EXACT = "all special points, each within its error bar, with the index on either side"
@@ -170,6 +170,17 @@ PUBLISHED = (
         "a ring deployed by 4 pi", "rotations of an end past 2 pi; the ends far from where they were",
         "a third of the ring after 2 pi, the ring after 4 pi, stable throughout",
         "Goto, Watanabe, Kasugai & Obata 1992", "B1/B2", published.deployed_ring, (9.0,), (100.0, 9.0, 4.0),
+    ),
+    Case(
+        "a planar elastica lost out of its plane", "a zero eigenvalue along the whole branch; ends up to 0.9 nearer",
+        EXACT, "van der Heijden, Neukirch, Goss & Thompson 2003; shooting in space, conjugate points", "C/B",
+        writhing.shortened, (1.0,), (1.25, 1.0, 0.75, 0.5),
+    ),
+    Case(
+        "writhing of a clamped rod", "the end turns by 4 pi, and back from one fold to the other; a zero eigenvalue "
+        "throughout", EXACT, "van der Heijden, Neukirch, Goss & Thompson 2003; shooting in space, conjugate points",
+        "end shortening, C/B", lambda given: writhing.turned(*given), ((0.5, 1.0),),
+        ((0.4, 1.0), (0.45, 1.0), (0.5, 1.0), (0.6, 1.0), (0.5, 0.75), (0.5, 2.0)),
     ),
 )  # fmt: skip
 ENDURANCE = (
