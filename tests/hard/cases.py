@@ -157,6 +157,16 @@ PUBLISHED = (
         ((0.9, 0.0), (0.9, 0.5), (0.9, -0.5), (0.6, 0.0), (0.6, 0.5)),
     ),
     Case(
+        "snapping strips, clamps turned oppositely", "a pitchfork shortly before the fold", EXACT,
+        "Cazzolli & Dal Corso 2019; shooting, conjugate points", "distance of the clamps", snapping.opposite, (0.9,),
+        (0.95, 0.9, 0.8, 0.6),
+    ),
+    Case(
+        "strips, clamps turned alike", "the arch ends in its mirror image; stable on either side, and no fold", EXACT,
+        "Cazzolli & Dal Corso 2019; shooting, conjugate points", "distance of the clamps", snapping.alike, (0.9,),
+        (0.95, 0.9, 0.8, 0.6),
+    ),
+    Case(
         "a hysteresis", "the load turns back twice; two stable states in between", EXACT,
         "Dhanakoti 2024; extremes of an explicit angle by shooting", "tip load of a cantilever whose clamp turns",
         snapping.hysteresis, (5.0,), (3.0, 5.0, 8.0),

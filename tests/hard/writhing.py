@@ -20,7 +20,7 @@ import ufl
 from classics import column
 from hard import shooting_plane, snapping
 from hard.case import Change, Measured, compare, run, said, singular
-from hard.shooting_space import M, Branch, R, Rod, about_e3, times
+from hard.shooting_space import Branch, M, R, Rod, about_e3, times
 
 from rodfem import Discretization, Ordinate, Scene, clamped
 
