@@ -142,8 +142,8 @@ def sigmoid(distance: float) -> list[Change]:
 
     t = sqrt(10 * (1 - FLAT))
     u = np.array([-6 * t, -12 * t, 0.0, t])
-    for nearer in np.linspace(FLAT, distance, 12):
-        u = solve(lambda u, D=nearer: half(u, D), u[:-1], sqrt(10 * (1 - nearer)))
+    for bow in np.linspace(sqrt(1 - FLAT), sqrt(1 - distance), 40):
+        u = solve(lambda u, D=1 - bow**2: half(u, D), u[:-1], sqrt(10) * bow)
     branch = Branch.follow(lambda u, pieces: half(u), u, (10.0, 50.0, 50.0, 1.0), (u[-1], 0.0))
     lost = pitchfork(branch, lambda u: determinant(misfit, u) / determinant(half, u))
     return [Change(lost, *(conjugate(u, 1.0) for u in (branch.points[0], branch.points[-1])))]
