@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hard import bifurcations, endurance, isolas, published, ranges, snapping, springy_rings, stiffness
+from hard import bifurcations, endurance, isolas, published, ranges, snapping, springy_rings, stiffness, writhing
 from hard.case import Case
 
 EXACT = "all special points, each within its error bar, with the index on either side"
@@ -157,6 +157,16 @@ PUBLISHED = (
         ((0.9, 0.0), (0.9, 0.5), (0.9, -0.5), (0.6, 0.0), (0.6, 0.5)),
     ),
     Case(
+        "snapping strips, clamps turned oppositely", "a pitchfork shortly before the fold", EXACT,
+        "Cazzolli & Dal Corso 2019; shooting, conjugate points", "distance of the clamps", snapping.opposite, (0.9,),
+        (0.95, 0.9, 0.8, 0.6),
+    ),
+    Case(
+        "strips, clamps turned alike", "the arch ends in its mirror image; stable on either side, and no fold", EXACT,
+        "Cazzolli & Dal Corso 2019; shooting, conjugate points", "distance of the clamps", snapping.alike, (0.9,),
+        (0.95, 0.9, 0.8, 0.6),
+    ),
+    Case(
         "a hysteresis", "the load turns back twice; two stable states in between", EXACT,
         "Dhanakoti 2024; extremes of an explicit angle by shooting", "tip load of a cantilever whose clamp turns",
         snapping.hysteresis, (5.0,), (3.0, 5.0, 8.0),
@@ -170,6 +180,17 @@ PUBLISHED = (
         "a ring deployed by 4 pi", "rotations of an end past 2 pi; the ends far from where they were",
         "a third of the ring after 2 pi, the ring after 4 pi, stable throughout",
         "Goto, Watanabe, Kasugai & Obata 1992", "B1/B2", published.deployed_ring, (9.0,), (100.0, 9.0, 4.0),
+    ),
+    Case(
+        "a planar elastica lost out of its plane", "a zero eigenvalue along the whole branch; ends up to 0.9 nearer",
+        EXACT, "van der Heijden, Neukirch, Goss & Thompson 2003; shooting in space, conjugate points", "C/B",
+        writhing.shortened, (1.0,), (1.25, 1.0, 0.75, 0.5),
+    ),
+    Case(
+        "writhing of a clamped rod", "the end turns by 4 pi, and back from one fold to the other; a zero eigenvalue "
+        "throughout", EXACT, "van der Heijden, Neukirch, Goss & Thompson 2003; shooting in space, conjugate points",
+        "end shortening, C/B", lambda given: writhing.turned(*given), ((0.5, 1.0),),
+        ((0.4, 1.0), (0.45, 1.0), (0.5, 1.0), (0.6, 1.0), (0.5, 0.75), (0.5, 2.0)),
     ),
 )  # fmt: skip
 ENDURANCE = (

@@ -2,6 +2,7 @@
 
 The ends of a strip are D apart; the last clamp is turned by t, the first one by ``ratio t``.  The arch that bends to
 one side is followed from t = 0 until it loses its stability (Cazzolli & Dal Corso 2019, Int. J. Solids Struct. 162).
+For the ratios -1 and 1 the clamps have a symmetry, and a pitchfork takes the place of the fold.
 
 A cantilever of natural curvature k0 carries a dead load P at its tip, against the direction of the clamp at t = 0.  By
 the angle b of the tip, where no moment acts, the angle t of the clamp is explicit: its extremes are the two folds of a
@@ -10,6 +11,7 @@ hysteresis (Dhanakoti 2024, arXiv 2407.07601).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf, pi, sqrt
 from typing import Any
 
@@ -17,7 +19,8 @@ import numpy as np
 import ufl
 from classics import column
 from hard.case import Change, Measured, compare, run, said, singular
-from hard.shooting_plane import ANGLE, STEP, Misfit, X, Z, determinant, fold, integrate, solve
+from hard.shooting_plane import ANGLE, MOMENT, STEP, Misfit, X, Z, determinant, fold, integrate, solve
+from hard.shooting_space import Branch
 from scipy.optimize import brentq
 
 from forms.energy import bending_and_twist
@@ -25,6 +28,8 @@ from rodfem import Discretization, Ordinate, Scene, clamped, free
 
 SHALLOW = 0.9
 """Distance at which moment and force of the shallow arch are a first guess."""
+FLAT = 0.99
+"""Distance at which those of the S are."""
 MARCH = 0.15
 """Steps of t of the reference, over the greatest angle of the arch."""
 
@@ -81,6 +86,88 @@ def snapping(distance: float, ratio: float) -> Measured:
     if not found:
         return Measured(inf, 1.0, said(diagram), f"{diagram[0]} without a loss of stability")
     return compare(found, [Change(snap(distance, ratio), 0, 1)], said(diagram))
+
+
+def conjugate(u: np.ndarray, ratio: float) -> int:
+    """Index of an arch in its plane: places where turns and shifts are singular in moment and force at the start."""
+    start = np.repeat(np.asarray(u[:3], dtype=complex)[:, None], 3, axis=1) + 1j * STEP * np.eye(3)
+    ends = (integrate((ratio * u[3], 0.0, 0.0, *start), length=s) for s in np.linspace(0.1, 0.99, 41))
+    signs = [np.linalg.slogdet(end[[ANGLE, X, Z]].imag / STEP)[0] for end in ends]
+    return int((np.diff(signs) != 0).sum())
+
+
+def pitchfork(branch: Branch, across: Callable[[np.ndarray], float]) -> float:
+    """Load at which perturbations across the symmetry are singular, on a branch of symmetric states."""
+    signs = np.sign([across(u) for u in branch.points])
+    (i,) = np.flatnonzero(np.diff(signs))
+    u, chord = branch.points[i], branch.points[i + 1] - branch.points[i]
+
+    def at(part: float) -> np.ndarray:
+        return branch.correct(u + part * chord, chord / branch.scale)[0]
+
+    return float(at(brentq(lambda part: across(at(part)), 0.0, 1.0, xtol=1e-13))[-1])
+
+
+def symmetric(distance: float) -> list[Change]:
+    """Clamps turned in opposite directions: pitchfork and fold of the arch without transverse force."""
+    misfit, most = between_clamps(distance, -1.0), 4 * sqrt(1 - distance)
+
+    def whole(u: np.ndarray) -> np.ndarray:
+        return np.array([u[0], 0 * u[0], u[1], u[2]])
+
+    def half(u: np.ndarray) -> np.ndarray:
+        end = integrate((-u[2], 0.0, 0.0, u[0], 0.0, u[1]), length=0.5)
+        return np.array([end[ANGLE], end[Z] - distance / 2])
+
+    def sideways(u: np.ndarray) -> float:
+        return determinant(misfit, whole(u)) / determinant(half, u)
+
+    u = np.array([4 * pi * sqrt(1 - SHALLOW), 0.0, -4 * pi * pi, 0.0])
+    for nearer in np.linspace(SHALLOW, distance, 6):
+        u = solve(between_clamps(nearer, -1.0), u[:-1], 0.0)
+    branch = Branch.follow(lambda u, pieces: half(u), u[[0, 2, 3]], (10.0, 50.0, 1.0), (0.0, most))
+    (top,) = branch.changes(lambda u: conjugate(whole(u), -1.0))
+    lost = pitchfork(branch, sideways)
+    ends = [conjugate(whole(u), -1.0) for u in (branch.points[0], branch.points[-1])]
+    return [Change(lost, ends[0], ends[0] + 1), Change(top.load, ends[1] - 1, ends[1])]
+
+
+def sigmoid(distance: float) -> list[Change]:
+    """Clamps turned alike: the S, downwards from where it has no thrust, x = t (s - 3 s^2 + 2 s^3) if it is flat."""
+    misfit = between_clamps(distance, 1.0)
+
+    def half(u: np.ndarray, distance: float = distance) -> np.ndarray:
+        end = integrate((u[3], 0.0, 0.0, u[0], u[1], u[2]), length=0.5)
+        return np.array([end[MOMENT], end[X], end[Z] - distance / 2])
+
+    t = sqrt(10 * (1 - FLAT))
+    u = np.array([-6 * t, -12 * t, 0.0, t])
+    for bow in np.linspace(sqrt(1 - FLAT), sqrt(1 - distance), 40):
+        u = solve(lambda u, D=1 - bow**2: half(u, D), u[:-1], sqrt(10) * bow)
+    branch = Branch.follow(lambda u, pieces: half(u), u, (10.0, 50.0, 50.0, 1.0), (u[-1], 0.0))
+    lost = pitchfork(branch, lambda u: determinant(misfit, u) / determinant(half, u))
+    return [Change(lost, *(conjugate(u, 1.0) for u in (branch.points[0], branch.points[-1])))]
+
+
+def opposite(distance: float) -> Measured:
+    """Ratio -1: the symmetric arch is lost at a pitchfork shortly before its fold."""
+    diagram = run(strip(distance, -1.0), Discretization("auto", 8, 6))
+    return compare(singular(diagram[0]), symmetric(distance), said(diagram))
+
+
+def alike(distance: float) -> Measured:
+    """Ratio 1: the arch ends, stable, in an S that is stable from there on, and is not before."""
+    (lost,) = sigmoid(distance)
+    diagram = run(strip(distance, 1.0), Discretization("auto", 8, 6), depth=1)
+    sides = {
+        (p.load > lost.load, p.negative)
+        for b in diagram.branches[1:]
+        for p in b.points
+        if abs(p.load - lost.load) > 1e-6
+    }
+    if len(diagram.branches) != 3 or sides != {(True, lost.before), (False, lost.after)}:
+        return Measured(inf, 1.0, said(diagram), f"{diagram.branches} where {lost} was expected")
+    return compare(singular(diagram[0]), [Change(lost.load, 0, 0)], said(diagram))
 
 
 CURVED = 0.5
