@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.solvers import lagrange
+from rodfem.continuation.prediction import lagrange
 from rodfem.errors import SceneError
 from rodfem.fem.parameters import Line, line
 from rodfem.fem.system import System

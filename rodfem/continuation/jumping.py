@@ -21,7 +21,8 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.locate import solve_at
-from rodfem.continuation.solvers import BranchSolver, distance, hermite, lagrange, predict
+from rodfem.continuation.prediction import hermite, lagrange, predict
+from rodfem.continuation.solvers import BranchSolver, distance
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine

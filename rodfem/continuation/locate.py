@@ -17,7 +17,8 @@ from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.solvers import BranchSolver, hermite
+from rodfem.continuation.prediction import hermite
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.system import System

@@ -20,6 +20,7 @@ from rodfem import compat
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.corrector import Corrector
 from rodfem.continuation.kinds import Kind
+from rodfem.continuation.prediction import across_orbit, predict
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
@@ -30,7 +31,6 @@ from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
 from rodfem.linalg.factorization import AlongRod, Factors
-from rodfem.linalg.orthogonal import combine
 from rodfem.problem.units import Units
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.out_of_plane import InSpace
@@ -356,54 +356,6 @@ def _bend(x: np.ndarray) -> np.ndarray:
     return np.outer(np.sin(np.pi * x), (0.6, 0.8, 0.3)) + np.outer(np.sin(2 * np.pi * x), (0.5, -0.4, 0.2))
 
 
-def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Weights of the values at ``nodes`` in their interpolating polynomial at ``s``, and in its derivative there."""
-    known = [float(x) for x in nodes]
-    value, slope = np.empty(len(known)), np.empty(len(known))
-    for j, node in enumerate(known):
-        p, dp, scale = 1.0, 0.0, 1.0
-        for i, other in enumerate(known):
-            if i != j:
-                dp = dp * (s - other) + p
-                p *= s - other
-                scale *= node - other
-        value[j], slope[j] = p / scale, dp / scale
-    return value, slope
-
-
-def predict(points: list[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """Extrapolate a branch to arclength ``s``: state and direction, from up to four points or one and its tangent.
-
-    Raises :class:`ValueError` for one point without a tangent.
-    """
-    last = points[-1]
-    if len(points) < 3:
-        if last.tangent is None:
-            raise ValueError("A branch of one point needs a tangent to be continued.")
-        x = last.x.copy()
-        x.axpy(s - last.arclength, last.tangent)
-        return x, last.tangent
-    recent = points[-4:]
-    value, slope = lagrange(np.array([p.arclength for p in recent]), s)
-    states = [p.x for p in recent]
-    return combine(states, value), combine(states, slope)
-
-
-def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """Cubic through two points with their tangents at arclength ``s`` between them: state and direction.
-
-    Raises :class:`ValueError` for a point without a tangent.
-    """
-    if a.tangent is None or b.tangent is None:
-        raise ValueError("Both ends of a piece of a branch need a tangent.")
-    h = b.arclength - a.arclength
-    t = (s - a.arclength) / h
-    parts = [a.x, a.tangent, b.x, b.tangent]
-    value = np.array([(1 + 2 * t) * (1 - t) ** 2, h * t * (1 - t) ** 2, t * t * (3 - 2 * t), h * t * t * (t - 1)])
-    slope = np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
-    return combine(parts, value), combine(parts, slope)
-
-
 def follow(
     solver: BranchSolver,
     points: list[Point],
@@ -431,6 +383,8 @@ def follow(
         if system.damping and last.tangent is not None:  # across a family, along which the path is not determined
             known = [replace(last, tangent=solver.tangent(solver.row(last.tangent), at=last.x))]
         x, direction = predict(known, last.arclength + step)
+        if system.symmetries:
+            across_orbit(system, last.x, x, direction)
         load, outcome, tangent, index = system.scalar(x), None, None, None
         if low <= load <= high:
             row = solver.row(direction)

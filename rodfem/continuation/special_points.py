@@ -18,7 +18,8 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.locate import Located, across, locate, locate_mode, solve_at
-from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance, hermite
+from rodfem.continuation.prediction import hermite
+from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import project_out

@@ -21,7 +21,8 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import BranchSolver, hermite
+from rodfem.continuation.prediction import hermite
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.deflation.deflated_newton import FLOW, MOST, DeflatedNewton
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
 from rodfem.deflation.guesses import turned_state

@@ -8,7 +8,8 @@ from rodfem.adaptivity.zero_stretch import LOCATED, zero_stretch
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.kinds import END
 from rodfem.continuation.locate import solve_at
-from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance, hermite
+from rodfem.continuation.prediction import hermite
+from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance
 from rodfem.diagram.equivalence import near
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import EVENT
 from rodfem.continuation.locate import event_at, locate_event
-from rodfem.continuation.solvers import BranchSolver, hermite
+from rodfem.continuation.prediction import hermite
+from rodfem.continuation.solvers import BranchSolver
 from rodfem.diagram.step import Step
 from rodfem.problem.events import Event
 from rodfem.tolerances import INSIDE, round_off

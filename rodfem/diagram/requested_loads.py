@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import USER
 from rodfem.continuation.locate import solve_at
-from rodfem.continuation.solvers import distance, hermite
+from rodfem.continuation.prediction import hermite
+from rodfem.continuation.solvers import distance
 from rodfem.diagram.step import Step
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between

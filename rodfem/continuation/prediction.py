@@ -1,0 +1,78 @@
+"""Predictions of a branch: polynomials in arclength through its last rows, or between two rows with their tangents.
+
+Of a scene with symmetries the rows are states of some orbits.  Where they are on these is arbitrary: a prediction stays
+where the last row is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.continuation.branch import Point
+from rodfem.fem.system import System
+from rodfem.linalg.orthogonal import combine
+
+
+def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of the values at ``nodes`` in their interpolating polynomial at ``s``, and in its derivative there."""
+    known = [float(x) for x in nodes]
+    value, slope = np.empty(len(known)), np.empty(len(known))
+    for j, node in enumerate(known):
+        p, dp, scale = 1.0, 0.0, 1.0
+        for i, other in enumerate(known):
+            if i != j:
+                dp = dp * (s - other) + p
+                p *= s - other
+                scale *= node - other
+        value[j], slope[j] = p / scale, dp / scale
+    return value, slope
+
+
+def predict(points: list[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """Extrapolate a branch to arclength ``s``: state and direction, from up to four points or one and its tangent.
+
+    Raises :class:`ValueError` for one point without a tangent.
+    """
+    last = points[-1]
+    if len(points) < 3:
+        if last.tangent is None:
+            raise ValueError("A branch of one point needs a tangent to be continued.")
+        x = last.x.copy()
+        x.axpy(s - last.arclength, last.tangent)
+        return x, last.tangent.copy()
+    recent = points[-4:]
+    value, slope = lagrange(np.array([p.arclength for p in recent]), s)
+    states = [p.x for p in recent]
+    return combine(states, value), combine(states, slope)
+
+
+def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """Cubic through two points with their tangents at arclength ``s`` between them: state and direction.
+
+    Raises :class:`ValueError` for a point without a tangent.
+    """
+    if a.tangent is None or b.tangent is None:
+        raise ValueError("Both ends of a piece of a branch need a tangent.")
+    h = b.arclength - a.arclength
+    t = (s - a.arclength) / h
+    parts = [a.x, a.tangent, b.x, b.tangent]
+    value = np.array([(1 + 2 * t) * (1 - t) ** 2, h * t * (1 - t) ** 2, t * t * (3 - 2 * t), h * t * t * (t - 1)])
+    slope = np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
+    return combine(parts, value), combine(parts, slope)
+
+
+def across_orbit(system: System, last: PETSc.Vec, x: PETSc.Vec, direction: PETSc.Vec) -> None:
+    """Take from a prediction ``x`` and its ``direction``, in place, what moves the ``last`` state along its symmetries.
+
+    The phase conditions of a row are those of its prediction, and leave such a part as it is; an extrapolation of rows
+    that have one hands it on, from row to row a little more, until it is most of a step.  The motions ``g`` of the
+    ``system`` are orthonormal in the metric: ``direction - g (Mg . direction)`` is what remains of the direction.
+    """
+    system.set_phase(last)
+    phase, generators = system.phase, system.at(last).generators
+    for i, weights in phase.broken.items():
+        motion, condition = system.generators.vector(weights @ generators), phase.conditions[i]
+        assert condition is not None
+        x.axpy(phase.offsets[i] - condition.dot(x), motion)
+        direction.axpy(-condition.dot(direction), motion)
