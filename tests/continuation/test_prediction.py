@@ -15,8 +15,8 @@ from rodfem import Discretization, Plan, trace
 def test_no_part_along_an_orbit_is_handed_on(formulation: str) -> None:
     """The loop of a turned rod: 350 rows, each of which may turn about the axis.
 
-    A rod turned by 4 pi has the states of one that is not: the loads of the folds have the sum 4 pi, and the branch goes
-    from the planar elastica to itself.
+    A rod turned by 4 pi has the states of one that is not: the loads of the folds have the sum 4 pi, and the branch
+    goes from the planar elastica to itself.
     """
     scene = clamped_rod(1.0, "phi", 0.45, (0.0, 4 * pi))
     (branch,) = trace(scene, Discretization(formulation, 10, 6), Plan(depth=0, error_bars=False))
