@@ -5,8 +5,7 @@ balance of forces and moments, tested with every shape function, the constraints
 motion that the ends allow is a sum of shape functions, so that the balance of the whole rod is among them; with one
 that they do not allow the equations of clamped nodes, which are none of the unknowns', give the reactions.  What is
 left must be round-off: below :data:`UNBALANCED` in units of the rod's own energy, or below the round-off of the
-product of the second variation with the state.  From row to row the potential energy changes by the work of the load
-(:mod:`rodfem.continuation.load_work`).
+product of the second variation with the state.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.load_work import LoadWork
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 
@@ -34,7 +32,6 @@ class Invariants:
     def __init__(self, solver: BranchSolver) -> None:
         """Allocate a vector for the residual."""
         self.solver, self.system = solver, solver.system
-        self.work = LoadWork(solver.system)
         self._equations = solver.system.new_vector()
 
     def __call__(self, point: Point) -> None:

@@ -17,7 +17,7 @@ from rodfem.continuation.solvers import ON_BOUND
 from rodfem.continuation.special_points import COUPLED, coupling_of, directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
-from rodfem.diagram.equivalence import equivalent, near
+from rodfem.diagram.equivalence import equally_stable, equivalent, near
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
@@ -259,7 +259,7 @@ class Explorer(Tracer):
         """
         units = self.solver.units
         if equivalent(a, b, units):
-            return True
+            return equally_stable(a, b)
         inner, outer = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
         piece = Branch("", None, 0, [replace(special.point, arclength=0.0), outer])
         try:

@@ -210,7 +210,6 @@ class Tracer:
             if reason:
                 branch.ended = reason
                 return
-            self._check_work(branch, [*history[-3:], item])
             history.append(item)
             branch.points.append(item)
             self.observer.progress(branch, item)
@@ -322,14 +321,6 @@ class Tracer:
         if point.mesh not in self.invariants:
             self.invariants[point.mesh] = Invariants(self.meshes.solvers[point.mesh])
         self.invariants[point.mesh](point)
-
-    def _check_work(self, branch: Branch, rows: Sequence[Point]) -> None:
-        """Compare energies and the work of the load in the last step; what lies in it is dropped where they differ."""
-        try:
-            self.invariants[rows[-1].mesh].work(rows)
-        except ConvergenceError:
-            branch.cut(rows[-2].arclength)
-            raise
 
     def _finish(self, branch: Branch) -> None:
         branch.renumber()

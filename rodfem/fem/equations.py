@@ -47,8 +47,8 @@ class Equations:
         Kinetic metric of the spectrum, ``int rho_A dr.dr + w . rho_I w`` with the spin ``w``.
     massless
         Whether that is without any term.
-    energy, potential
-        Stored energy ``int W ds``, and the Lagrangian: at an equilibrium the total potential energy.
+    energy
+        Stored energy ``int W ds``.
     ordinate
         Ordinate of the scene where that is an integral over the rod, else None.
     line
@@ -67,12 +67,12 @@ class Equations:
         self._taken: Line | None = None
         self.cells = Cells.of(fields)
         self._assemblers = [Assembler(form, self.cells) for form in compat.compile_forms(forms)]
-        self.jacobian, self.residual, self.energy, self.potential, self.metric, self.kinetic, *more = self._assemblers
+        self.jacobian, self.residual, self.energy, self.metric, self.kinetic, *more = self._assemblers
         self.ordinate = more[0] if more else None
         self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
 
     def _derive(self, fields: Fields) -> list[Any]:
-        """Forms in UFL: derivatives of the Lagrangian, stored energy, itself, metric, mass, ordinate along the rod."""
+        """Forms in UFL: second and first derivative of the Lagrangian, energy, metric, mass, ordinate along the rod."""
         self.fields, scene = fields, fields.scene
         mesh, k = fields.mesh, fields.discretization.degree
         self.names, self.line = list(scene.parameters), load_line(scene)
@@ -115,7 +115,7 @@ class Equations:
         kinetic += sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
         self.massless = apply_algebra_lowering(kinetic).empty()
         self.uniform = not extract_type(first, ufl.SpatialCoordinate) and not scene.joints
-        others = [W * dx, L, metric * dx, kinetic]
+        others = [W * dx, metric * dx, kinetic]
         if not scene.ordinate.places:
             others.append((0.0 * c.s + scene.ordinate.of(along, c)) * dx)
         return [second, first, *(with_constants(form, mesh) for form in others)]

@@ -70,15 +70,6 @@ class Evaluation(NodalValues):
         """Stored energy; collective."""
         return self.integral(self.equations.energy)
 
-    def potential(self) -> float:
-        """The Lagrangian, at an equilibrium the total potential energy; collective."""
-        return self.integral(self.equations.potential)
-
-    def load_derivative(self) -> float:
-        """Its partial derivative in the load, the rest of the state held; collective."""
-        own, comm = float(self.covector()[self.fields.copies[:, -1]].sum()), self.fields.comm
-        return own if comm.size == 1 else float(comm.allreduce(own, op=MPI.SUM))
-
     def evaluate(self, expression: Callable[[], np.ndarray]) -> np.ndarray:
         """Values of a compiled expression: see :func:`rodfem.compat.expression`."""
         self._register()
