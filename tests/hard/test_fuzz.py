@@ -18,8 +18,9 @@ from rodfem.errors import ConvergenceError, SceneError
 
 pytestmark = pytest.mark.alone
 
-SCENES = [(1, 9), (1, 21), (1, 37), (1, 50), (1, 57)]
-"""Seed and number: a clamp that turns; a thrust, with cosh; a load without a potential; a plane; a logarithm."""
+SCENES = [(1, 9), (1, 21), (1, 37), (1, 50), (1, 57), (4, 55)]
+"""Seed and number: a clamp that turns; a thrust, with cosh; a load without a potential; a plane; a logarithm;
+a rod of a millimetre that turns freely."""
 
 
 @pytest.mark.parametrize(("seed", "number"), SCENES)
@@ -32,6 +33,12 @@ def test_a_random_scene(seed: int, number: int) -> None:
     assert found.rows > found.unclear
     assert (found.wrong, found.differs, found.refused) == ([], [], [])
     assert not any("symmetry" in sentence for sentence in found.said)
+
+
+def test_sides_that_differ_across_their_plane_are_both_traced() -> None:
+    """A hinge askew: one side of the pitchfork has the index 0 where the other, in its plane the same, has 1."""
+    found = compared(scene(5, 29), 29, depth=1)
+    assert (found.wrong, found.differs, found.said) == ([], [], [])
 
 
 def test_dependent_constraints_have_no_index() -> None:
