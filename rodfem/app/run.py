@@ -135,7 +135,9 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
 
 
 def draw(output: Path, report: Report) -> None:
-    """Draw the diagram, and the shape of a stable state if there is one."""
+    """Draw the diagram, and beside it in a second process the shape of a stable state if there is one."""
+    from concurrent.futures import ThreadPoolExecutor
+
     from rodfem.output.files import load_json
     from rodfem.output.plot_diagram import draw_diagram
     from rodfem.output.plot_frequencies import draw_frequencies
@@ -146,11 +148,14 @@ def draw(output: Path, report: Report) -> None:
         draw_frequencies(data, output / "diagram.png")
         report.say(f"Picture in {output}{os.sep}: diagram.png")
         return
-    draw_diagram(data, output / "diagram.png")
     branch, row, words = typical_state(data)
     caption = f"{data['title']}, {branch}, {GREEK.get(data['parameter_label'], data['parameter'])} = {words}"
-    picture = output / "shape.png"
-    trouble = draw_shape_safely(output / "states.h5", branch, row, picture, caption=caption)
+    with ThreadPoolExecutor(1) as beside:  # the shape is drawn by a process of its own, for which the thread waits
+        shape = beside.submit(
+            draw_shape_safely, output / "states.h5", branch, row, output / "shape.png", caption=caption
+        )
+        draw_diagram(data, output / "diagram.png")
+    trouble = shape.result()
     report.say(f"Pictures in {output}{os.sep}: diagram.png" + ("" if trouble else ", shape.png"))
     if trouble:
         report.say(trouble)
