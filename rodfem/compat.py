@@ -8,22 +8,16 @@ from __future__ import annotations
 
 import inspect
 import logging
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
-from importlib.machinery import EXTENSION_SUFFIXES
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
 from forms.importing import without_pkg_resources
 from rodfem import code_cache
-from rodfem.beside import Job
 from rodfem.errors import SetupError
 
 try:
@@ -38,7 +32,6 @@ try:
         import dolfinx.mesh
         import ufl
         from dolfinx import fem
-        from ffcx.codegeneration import jit
     from petsc4py import PETSc
 except ModuleNotFoundError as missing:
     raise SetupError(
@@ -47,83 +40,9 @@ except ModuleNotFoundError as missing:
     ) from missing
 
 
-_COMPILE = jit._compile_objects
-"""What FFCx calls for objects that its cache lacks, once it has locked their place in it."""
-_SEARCH = jit.get_cached_module
-"""How FFCx looks for a module in its cache: it lists that folder, which takes 10 ms where it has thousands of files."""
-PATIENCE = 60.0
-"""Seconds after which a module that is locked in the cache, and not written to, is taken for one of a killed run."""
-_LISTENERS: list[Callable[[], None]] = []
-"""Who is told of it."""
-ALONE = MPI.COMM_WORLD.size == 1
-"""Whether there is one process alone: only then does anything work beside it."""
-_JOBS: list[Job] = []
-"""What is compiled beside this process."""
-
-
-def _by_name(module_name: str, object_names: Sequence[str], cache_dir: str | Path, timeout: int) -> Any:
-    """Objects of a module of FFCx's cache, and the module: found by its name, or else as FFCx does it.
-
-    ``module_name`` is that of the module, which has the ``object_names``; ``cache_dir`` is the folder, and ``timeout``
-    says how many seconds a module is awaited that another process compiles.
-    """
-    place = Path(cache_dir)
-    file = next((f for f in (place / f"{module_name}{end}" for end in EXTENSION_SUFFIXES) if f.is_file()), None)
-    if file is None or not code_cache.is_whole(file) or not (place / f"{module_name}.c.cached").is_file():
-        try:
-            _remove_broken(place / f"{module_name}.c", file)
-            return _awaited(module_name, object_names, place, timeout)
-        except TimeoutError:
-            raise
-        except OSError as error:
-            raise SetupError(code_cache.refused(error)) from error
-    module = _loaded(module_name, file)
-    return [getattr(module.lib, name) for name in object_names], module
-
-
-def _remove_broken(lock: Path, file: Path | None) -> None:
-    """Remove a module that is marked as ready, and is cut short or lost: the ``lock``, its code in C, before it."""
-    mark = lock.with_suffix(".c.cached")
-    if mark.is_file():
-        for broken in (mark, lock, file):
-            if broken is not None:
-                broken.unlink(missing_ok=True)
-
-
-def _awaited(module_name: str, object_names: Sequence[str], place: Path, timeout: int) -> Any:
-    """What FFCx finds, which may be nothing; what another process compiles is awaited while it may be at work.
-
-    Raises :class:`TimeoutError` where nobody has worked at the module for :data:`PATIENCE`.
-    """
-    lock = place / f"{module_name}.c"
-    while True:
-        try:
-            return _SEARCH(module_name, object_names, place, timeout)
-        except TimeoutError:
-            with suppress(FileNotFoundError):
-                if time.time() - lock.stat().st_mtime > PATIENCE:
-                    raise
-
-
-@cache
-def _loaded(name: str, file: Path) -> Any:
-    spec = spec_from_file_location(name, file)
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-jit.get_cached_module = _by_name
-
-
-class _Begun(BaseException):
-    """A form is compiled elsewhere; no Exception, for which FFCx would unlock its place in the cache."""
-
-
 REAL: Any = np.float64
 """Numbers of states and forms, whatever those of PETSc."""
-_C_COMPILER = {
+C_COMPILER = {
     name: {"cffi_extra_compile_args": ["-O1", "-g0"]}
     for name in ("jit_options", "jit_params")  # dolfinx 0.5 calls them parameters
     if name in inspect.signature(fem.form).parameters
@@ -188,7 +107,7 @@ def mixed_space(mesh: Any, parts: Sequence[tuple[bool, int, int]]) -> Any:
         element = ufl.MixedElement(
             [ufl.VectorElement(e, dim=p[2]) if p[2] > 1 else e for e, p in zip(single, parts, strict=True)]
         )
-    with _quiet():  # the element itself is compiled
+    with quiet():  # the element itself is compiled
         return fem.functionspace(mesh, element) if hasattr(fem, "functionspace") else fem.FunctionSpace(mesh, element)
 
 
@@ -243,51 +162,6 @@ def cell_coordinates(mesh: Any, cells: int) -> np.ndarray:
     return np.asarray(mesh.geometry.x)[_vertices(mesh, cells)]
 
 
-@contextmanager
-def _from_cache() -> Iterator[None]:
-    """Raise :class:`SetupError` where the folder of compiled code is locked, or cannot be written."""
-    try:
-        yield
-    except TimeoutError as locked:
-        raise SetupError(
-            "A compiled form never became ready, most likely because an earlier run was killed while compiling: "
-            f"delete the folder {code_cache.folder()} and run again."
-        ) from locked
-    except OSError as error:
-        raise SetupError(code_cache.refused(error)) from error
-
-
-def compile_forms(forms: Sequence[Any]) -> list[Any]:
-    """Compile UFL forms: the first, which takes the longest, and all others together, at once.
-
-    Raises :class:`SetupError` where the cache is locked by a killed run, or cannot be written.
-    """
-    with _from_cache():
-        compiled = compile_ahead(forms)
-        _wait()
-        with _quiet():
-            return [f for g in _groups(forms) for f in _compiled(g)] if None in compiled else compiled
-
-
-def expression(form: Any, points: np.ndarray, mesh: Any, cells: int) -> Callable[[], np.ndarray]:
-    """Compile a UFL vector to be evaluated at reference ``points`` (m, 1) of the first cells: (cells, m * size).
-
-    ``form`` is the vector, on cells of ``mesh``, of which the first ``cells`` are evaluated.  Raises as
-    :func:`compile_forms` does.
-    """
-    with _from_cache(), _quiet():
-        compiled = fem.Expression(form, points, dtype=REAL)
-    chosen = np.arange(cells, dtype=np.int32)
-    takes_mesh = "mesh" in inspect.signature(compiled.eval).parameters
-    takes_entities = "entities" in inspect.signature(compiled.eval).parameters
-
-    def evaluate() -> np.ndarray:
-        values = compiled.eval(mesh, chosen) if takes_mesh or takes_entities else compiled.eval(chosen)
-        return np.asarray(values).reshape(cells, -1)
-
-    return evaluate
-
-
 def assemble_matrix(matrix: PETSc.Mat, form: Any, rows: np.ndarray, columns: np.ndarray) -> None:
     """Add a real form to a PETSc matrix, without the final exchange between ranks.
 
@@ -319,78 +193,6 @@ def local_table(form: Any) -> sp.csr_matrix:
     local = fem.assemble_matrix(form)  # PETSc brings the parts of other ranks' rows there
     size = int(np.asarray(local.indptr)[-1])
     return sp.csr_matrix((local.data[:size], local.indices[:size], local.indptr), shape=(len(local.indptr) - 1,) * 2)
-
-
-def compile_ahead(forms: Sequence[Any]) -> list[Any]:
-    """Compiled forms; None for those that the cache lacks, which are now compiled into it beside this process.
-
-    One of several ranks begins nothing: there dolfinx compiles on the first rank, while the others wait.
-    """
-    if not ALONE:
-        return [None] * len(forms)
-    _wait()
-    with _quiet():
-        return [form for group in _groups(forms) for form in _compiled_or_begun(group)]
-
-
-def _groups(forms: Sequence[Any]) -> list[Sequence[Any]]:
-    """Forms that share a module of C, one half of the compiler's work in each module."""
-    return [group for group in (forms[:1], forms[1:]) if group]
-
-
-def _compiled_or_begun(group: Sequence[Any]) -> list[Any]:
-    def begin(*arguments: Any, **options: Any) -> None:
-        given = inspect.signature(_COMPILE).bind(*arguments, **options).arguments
-        lock = Path(given["cache_dir"]) / f"{given['module_name']}.c"
-
-        def work() -> None:
-            try:
-                _COMPILE(*arguments, **options)
-            except BaseException:
-                lock.unlink()  # this process compiles it then, and says what is wrong
-                raise
-
-        _say()
-        _JOBS.append(Job(work))
-        raise _Begun
-
-    try:
-        with _instead("_compile_objects", begin):
-            return _compiled(group)
-    except _Begun:
-        return [None] * len(group)
-
-
-def _compiled(group: Sequence[Any]) -> list[Any]:
-    """Forms of dolfinx for UFL forms that share one module of C."""
-    compile_all = jit.compile_forms
-    made: list[Any] = []
-
-    def compile_one(forms: Any, *arguments: Any, **options: Any) -> Any:
-        if not made:
-            made.extend(compile_all(list(group), *arguments, **options))
-        objects, *rest = made
-        return [next(found for form, found in zip(group, objects, strict=True) if form is forms[0])], *rest
-
-    with _instead("compile_forms", compile_one):
-        return [fem.form(form, dtype=REAL, **_C_COMPILER) for form in group]
-
-
-def _wait() -> None:
-    """Await all that is compiled beside this process."""
-    while _JOBS:
-        _JOBS.pop().wait()
-
-
-@contextmanager
-def _instead(name: str, function: Callable[..., Any]) -> Iterator[None]:
-    """Have ``function`` in the place of one of FFCx's."""
-    usual = getattr(jit, name)
-    setattr(jit, name, function)
-    try:
-        yield
-    finally:
-        setattr(jit, name, usual)
 
 
 class Integral(NamedTuple):
@@ -431,7 +233,7 @@ def pack_constants(form: Any) -> np.ndarray:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Keep the compilers' own chatter off the terminal: FFCx's, and that of setuptools, which runs the C compiler."""
     root = logging.getLogger()
     level, disabled = root.level, root.manager.disable
@@ -466,31 +268,3 @@ def destroy_garbage(comm: Any) -> None:
     if hasattr(PETSc, "garbage_cleanup"):
         for communicator in (comm, PETSc.COMM_SELF):
             PETSc.garbage_cleanup(communicator)
-
-
-@contextmanager
-def announce_compilation(say: Callable[[], None]) -> Iterator[list[bool]]:
-    """Call ``say`` once if forms are compiled inside the block; yields a list that is empty until then."""
-    said: list[bool] = []
-
-    def once() -> None:
-        if not said:
-            said.append(True)
-            say()
-
-    def compile_aloud(*arguments: Any, **options: Any) -> Any:
-        _say()
-        return _COMPILE(*arguments, **options)
-
-    _LISTENERS.append(once)
-    try:
-        with _instead("_compile_objects", compile_aloud):
-            yield said
-    finally:
-        _LISTENERS.remove(once)
-
-
-def _say() -> None:
-    """Say that something is compiled."""
-    for listener in _LISTENERS:
-        listener()

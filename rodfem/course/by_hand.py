@@ -16,6 +16,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from rodfem import compat
+from rodfem.fem import form_compiler
 
 ELEMENTS, DEGREE = 8, 4
 """Discretisation of an angle."""
@@ -54,7 +55,7 @@ def assemble(form: ufl.Form) -> Any:
 @lru_cache(maxsize=LATEST)
 def _compiled(form: ufl.Form) -> Any:
     """Compiled form, which reads its functions and constants when it is assembled."""
-    return compat.compile_forms([form])[0]
+    return form_compiler.compile_forms([form])[0]
 
 
 def fields(number: int, a: float = 0.0, b: float = 1.0) -> tuple[fem.Function, NDArray[np.int32]]:

@@ -19,7 +19,7 @@ from rodfem.deflation.search import find_equilibria
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
-from rodfem.fem import assembly, compiled_newton
+from rodfem.fem import assembly, compiled_newton, form_compiler
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.linalg import chain
@@ -108,7 +108,7 @@ class Solver:
         Plan(scene.span, spectrum=spectrum).check(scene, discretization or Discretization())
         if scene.conservative:
             compat.require_real_petsc()
-        if compat.ALONE:
+        if form_compiler.ALONE:
             compile_ahead("chain", chain.DECLARATIONS)
             compile_ahead("assembly", assembly.DECLARATIONS, Path(assembly.__file__).parent)
             compile_ahead("newton", compiled_newton.declarations(), Path(compiled_newton.__file__).parent)

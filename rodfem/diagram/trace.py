@@ -20,6 +20,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, RANKS, SCENE, Solver
 from rodfem.diagram.sweep import Sweep
 from rodfem.diagram.waves import check_waves
+from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
 from rodfem.fem.fingerprint import fingerprint
 from rodfem.fem.transfer import compile_richer
@@ -104,7 +105,7 @@ def traced(
     end_together()
     journal = journal or Journal()
     recorder, clock = Recorder(observer), Clock()
-    with compat.announce_compilation(recorder.compiling) as compiled:
+    with form_compiler.announce_compilation(recorder.compiling) as compiled:
         with clock("setup"):
             mesh = journal.first_mesh or _mesh(scene, discretization, plan, recorder, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
@@ -115,7 +116,7 @@ def traced(
         recorder.system(found.system, plan.accuracy)
         if doubt := round_off_of_strains(scene):
             recorder.warn(doubt)
-        if compiled and plan.error_bars and compat.ALONE:
+        if compiled and plan.error_bars and form_compiler.ALONE:
             compile_richer(found.system)
 
         def complete() -> None:

@@ -17,7 +17,7 @@ from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from forms.kinematics import curvature, strain
-from rodfem import compat
+from rodfem.fem import form_compiler
 from rodfem.fem.literals import with_constants
 from rodfem.fem.system import System
 
@@ -49,7 +49,7 @@ class Convexity:
         inside = (np.polynomial.legendre.leggauss(f.discretization.degree + 1)[0] + 1) / 2
         points = np.array([0.0, *inside, 1.0])
         vector = with_constants(ufl.as_vector(entries), f.mesh)
-        self.evaluate = compat.expression(vector, points.reshape(-1, 1), f.mesh, f.owned_cells)
+        self.evaluate = form_compiler.expression(vector, points.reshape(-1, 1), f.mesh, f.owned_cells)
 
     def lowest(self, x: PETSc.Vec) -> float:
         """Least eigenvalue over the whole rod at the state ``x``, relative to the largest one; 1 if it is constant."""

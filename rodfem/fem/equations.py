@@ -16,7 +16,7 @@ from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from forms import inertia, lagrangian
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
-from rodfem import compat
+from rodfem.fem import form_compiler
 from rodfem.fem.assembly import Assembler, Cells, vector_places
 from rodfem.fem.fields import Fields
 from rodfem.fem.literals import with_constants
@@ -66,7 +66,7 @@ class Equations:
         forms = self._derive(fields)
         self._taken: Line | None = None
         self.cells = Cells.of(fields)
-        self._assemblers = [Assembler(form, self.cells) for form in compat.compile_forms(forms)]
+        self._assemblers = [Assembler(form, self.cells) for form in form_compiler.compile_forms(forms)]
         self.jacobian, self.residual, self.energy, self.metric, self.kinetic, *more = self._assemblers
         self.ordinate = more[0] if more else None
         self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
@@ -123,7 +123,7 @@ class Equations:
     @classmethod
     def compile_ahead(cls, fields: Fields) -> None:
         """Begin to compile beside this process what another instance finds then in the cache."""
-        compat.compile_ahead(cls.__new__(cls)._derive(fields))
+        form_compiler.compile_ahead(cls.__new__(cls)._derive(fields))
 
     def take(self, line: Line) -> None:
         """Let the constants of the forms be the parameters of a ``line``."""

@@ -22,7 +22,7 @@ from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
-from rodfem import compat
+from rodfem.fem import form_compiler
 from rodfem.fem.literals import with_constants
 from rodfem.fem.shape import Shape
 from rodfem.problem.constraint import Constraint
@@ -41,7 +41,7 @@ class Resultants:
         count, mesh = fields.discretization.degree, fields.mesh
         self.places = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
         vector = apply_derivatives(apply_algebra_lowering(ufl.as_vector(self._components())))
-        self._evaluate = compat.expression(
+        self._evaluate = form_compiler.expression(
             with_constants(vector, mesh), self.places.reshape(-1, 1), mesh, fields.owned_cells
         )
 

@@ -71,7 +71,7 @@ class Evaluation(NodalValues):
         return self.integral(self.equations.energy)
 
     def evaluate(self, expression: Callable[[], np.ndarray]) -> np.ndarray:
-        """Values of a compiled expression: see :func:`rodfem.compat.expression`."""
+        """Values of a compiled expression: see :func:`rodfem.fem.form_compiler.expression`."""
         self._register()
         return expression()
 

@@ -369,11 +369,13 @@ class Scene(Contribution):
                 "the range of floats: give loads that differ by more, or choose other units."
             )
 
-    def plain(self, side: int) -> bool:
-        """Whether dead forces are all that loads an end (0: left, 1: right): they are the contact force there."""
-        end = self.interval[side]
-        here = [x.of for x in self.parts if x.s is not None and same_place(x.s, end, self.length)]
-        return self.sides[side].dead and len(here) == 1
+    @cached_property
+    def plain(self) -> tuple[bool, bool]:
+        """Whether dead forces are all that loads the left end, and the right: they are the contact force there."""
+        parts = [x.s for x in self.parts if x.s is not None]
+        here = [sum(bool(same_place(s, end, self.length)) for s in parts) for end in self.interval]
+        left, right = (side.dead and number == 1 for side, number in zip(self.sides, here, strict=True))
+        return left, right
 
     def known_force(self, component: int, c: Constants) -> Any | None:
         """Component of the contact force that a dead end force prescribes, or None where it is an unknown.
@@ -382,7 +384,7 @@ class Scene(Contribution):
         """
         for side, sign in ((1, 1), (0, -1)):
             force = self.sides[side].contact_force(c)[component]
-            if self.plain(side) and force is not None:
+            if self.plain[side] and force is not None:
                 return sign * force
         return None
 

@@ -16,6 +16,7 @@ from numpy.polynomial import legendre
 
 from rodfem import compat
 from rodfem.errors import SetupError
+from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 
@@ -102,7 +103,7 @@ def test_a_second_system_compiles_nothing() -> None:
     """Otherwise every run would compile again what is in the cache, and say so."""
     follower("reduced", 8, 6)
     said: list[str] = []
-    with compat.announce_compilation(lambda: said.append("compiling")):
+    with form_compiler.announce_compilation(lambda: said.append("compiling")):
         System(scene(), Discretization("reduced", 9, 6))
     assert COMM.allreduce(said, op=MPI.SUM) == []
 
@@ -117,10 +118,10 @@ def test_compilation_is_announced_once(folder: Path) -> None:
         forms = [fem.form(x**n * ufl.dx, **cache) for n in (1, 2)]
         return sum(COMM.allreduce(fem.assemble_scalar(form)) for form in forms)
 
-    with compat.announce_compilation(lambda: said.append("compiling")):
+    with form_compiler.announce_compilation(lambda: said.append("compiling")):
         assert integrate() == pytest.approx(1 / 2 + 1 / 3, rel=1e-14)
     assert COMM.allreduce(said, op=MPI.SUM) == ["compiling"]  # by the rank that compiles
-    with compat.announce_compilation(lambda: said.append("again")):
+    with form_compiler.announce_compilation(lambda: said.append("again")):
         assert integrate() == pytest.approx(1 / 2 + 1 / 3, rel=1e-14)
     assert COMM.allreduce(said, op=MPI.SUM) == ["compiling"]
 
@@ -128,26 +129,26 @@ def test_compilation_is_announced_once(folder: Path) -> None:
 @pytest.mark.alone
 def test_forms_are_compiled_beside_this_process(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """All that the cache lacks, in two modules; begun ahead, they are found there; and what fails says why."""
-    monkeypatch.setattr(compat, "_C_COMPILER", {KEYWORD: {"cache_dir": str(folder)}})
+    monkeypatch.setattr(compat, "C_COMPILER", {KEYWORD: {"cache_dir": str(folder)}})
     mesh = compat.interval_mesh(COMM, 4, 0.0, 1.0)
     x = ufl.SpatialCoordinate(mesh)[0]
     forms = [x**n * ufl.dx for n in (1, 2, 3)]
     said: list[str] = []
-    with compat.announce_compilation(lambda: said.append("compiling")) as compiled:
-        assert compat.compile_ahead(forms) == [None, None, None]
+    with form_compiler.announce_compilation(lambda: said.append("compiling")) as compiled:
+        assert form_compiler.compile_ahead(forms) == [None, None, None]
         assert said == ["compiling"]
         assert compiled
-        found = [fem.assemble_scalar(form) for form in compat.compile_forms(forms)]
+        found = [fem.assemble_scalar(form) for form in form_compiler.compile_forms(forms)]
     np.testing.assert_allclose(found, [1 / 2, 1 / 3, 1 / 4], rtol=1e-14)
     assert len(list(folder.glob("libffcx_forms_*.c"))) == 2
-    assert None not in compat.compile_ahead(forms)
+    assert None not in form_compiler.compile_ahead(forms)
 
     def broken(*_: object, **__: object) -> None:
         raise RuntimeError("no compiler")
 
     monkeypatch.setattr("cffi.FFI.compile", broken)
     with pytest.raises(RuntimeError, match="no compiler"):
-        compat.compile_forms([x**4 * ufl.dx])
+        form_compiler.compile_forms([x**4 * ufl.dx])
 
 
 @pytest.mark.short
@@ -171,4 +172,4 @@ def test_locked_cache_gives_one_sentence(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(compat.fem, "form", locked)
     with pytest.raises(SetupError, match="delete the folder"):
-        compat.compile_forms([None])
+        form_compiler.compile_forms([None])

@@ -12,6 +12,7 @@ from mpi4py import MPI
 from rodfem import compat
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
+from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
 from rodfem.fem.literals import with_constants
 from rodfem.problem.ends import clamped, free
@@ -39,7 +40,7 @@ def test_another_number_compiles_nothing() -> None:
     """And each column buckles at Euler's load of its own numbers."""
     said: list[str] = []
     for stiffness, weight in ((1.234, 0.7), (2.345, 1.7)):
-        with compat.announce_compilation(lambda: said.append("compiling")):
+        with form_compiler.announce_compilation(lambda: said.append("compiling")):
             diagram = trace(column(stiffness, weight), Discretization("reduced", 4, 4), Plan(depth=0, error_bars=False))
         (buckling,) = [s for s in diagram["straight"].special if s.kind == "branch point"]
         assert buckling.point.load == pytest.approx(pi**2 / 4 * stiffness / weight, rel=1e-9)
@@ -57,7 +58,7 @@ def test_values_are_those_of_the_numbers() -> None:
     form = (0.5 * (x + 1.7) ** 2.5 + ufl.conditional(ufl.lt(x, 0.375), 3.3 * x, 7 * x) + ufl.bessel_J(1, 2.9 * x)) * dx
     mapped = with_constants(form, mesh)
     assert sorted(float(c.value) for c in mapped.constants()) == [0.375, 1.7, 2.9, 3.3]
-    values = [fem.assemble_scalar(f) for f in compat.compile_forms([form, mapped])]
+    values = [fem.assemble_scalar(f) for f in form_compiler.compile_forms([form, mapped])]
     assert values[1] == pytest.approx(values[0], rel=1e-14)
     for nothing in (0, 0.5 * x * dx, 7 * x**1.5 * dx):
         assert not getattr(with_constants(nothing, mesh), "constants", list)()

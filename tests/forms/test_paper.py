@@ -20,6 +20,7 @@ from forms.kinematics import RODS, UNDEFORMED, curvature, strain
 from forms.lagrangian import pointwise, reduced
 from forms.rotation import product, rotation
 from rodfem import compat
+from rodfem.fem import form_compiler
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.blocks import Blocks
@@ -80,7 +81,7 @@ class Pointwise:
             ufl.dot(ufl.diff(paper.first_variation(state, r_s, one), x), self.numbers["along b"]),
         ]
         integrand = sum(self.numbers["which"][i] * f for i, f in enumerate(found))
-        (self.form,) = compat.compile_forms([integrand * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})])
+        (self.form,) = form_compiler.compile_forms([integrand * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})])
 
     def perturbation(self, name: str) -> paper.Perturbation:
         return paper.Perturbation(*(part(self.numbers[name], 3 * i, 3 * i + 3) for i in range(5)))
@@ -159,7 +160,7 @@ def test_they_agree_at_an_equilibrium_and_only_there() -> None:
     tau, theta = spin(0.3), spin(2.0)
     dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": 16})
     found = paper.linearized_balance(state, tau, theta), paper.second_variation(state, tau, theta)
-    forms = compat.compile_forms([f * dx for f in (*found, (found[0] - found[1]) ** 2)])
+    forms = form_compiler.compile_forms([f * dx for f in (*found, (found[0] - found[1]) ** 2)])
     balance, second, apart = (float(np.real(fem.assemble_scalar(f))) for f in forms)
     assert balance == pytest.approx(second, rel=1e-12)
     assert apart > 1e-6  # in the integral only, not pointwise
@@ -325,7 +326,7 @@ def by_hand(system: System, w: fem.Function) -> Any:
     state = paper.state(lambda v, k: scene.energy(v, k, c), rotation(u.q), v, curvature(u.q, u.q.dx(0)), force)
     p = paper.Perturbation(theta, theta.dx(0), dv, dforce, dr_s)
     degree = e.quadrature_degree(f.discretization.degree)
-    (form,) = compat.compile_forms(
+    (form,) = form_compiler.compile_forms(
         [paper.second_variation(state, p, p) * ufl.dx(domain=f.mesh, metadata={"quadrature_degree": degree})]
     )
     return form

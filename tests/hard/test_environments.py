@@ -20,9 +20,11 @@ import pytest
 import ufl
 from app.test_run_command import SCENE
 from ffcx.codegeneration import jit
+from mpi4py import MPI
 
 import rodfem
 from rodfem import code_cache, compat
+from rodfem.fem import form_compiler
 from rodfem.linalg import compiled
 
 pytestmark = pytest.mark.alone
@@ -138,7 +140,7 @@ def test_nobody_at_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None
 
 def form() -> Any:
     """A form of a cell, of no rod."""
-    domain = compat.interval_mesh(compat.MPI.COMM_SELF, 1, 0.0, 1.0)
+    domain = compat.interval_mesh(MPI.COMM_SELF, 1, 0.0, 1.0)
     return ufl.SpatialCoordinate(domain)[0] ** 3 * ufl.dx(domain=domain)
 
 
@@ -174,9 +176,39 @@ def test_a_form_that_is_cut_short_is_compiled_again(broken: str, tmp_path: Path)
     cut(made, 0.5)
     if broken == "lost":
         made.unlink()
-    compat._loaded.cache_clear()
+    form_compiler._loaded.cache_clear()
     objects, *_ = jit.compile_forms([asked], cache_dir=tmp_path)
     assert len(objects) == 1 and code_cache.is_whole(made)
+
+
+KILLED = """
+import sys, time
+from pathlib import Path
+from ffcx.codegeneration import jit
+sys.path.insert(0, {tests!r})
+from hard.test_environments import form
+from rodfem.fem import form_compiler
+def endless(*_, **__):
+    print("compiling", flush=True)
+    time.sleep(600.0)
+endless.__signature__ = form_compiler.inspect.signature(form_compiler._COMPILE)
+form_compiler._COMPILE = endless
+jit.compile_forms([form()], cache_dir=Path({folder!r}))
+"""
+
+
+def test_what_a_killed_process_was_compiling_is_compiled_at_once(tmp_path: Path) -> None:
+    """Nobody touches the module of a process that lives; FFCx by itself waits for one of a dead process, too."""
+    script = KILLED.format(tests=str(Path(__file__).parents[1]), folder=str(tmp_path))
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None and other.stdout.readline() == "compiling\n"
+        (code,) = tmp_path.glob("libffcx_forms_*.c")
+        assert not form_compiler._claim(tmp_path, code.stem) and code.is_file()
+        other.kill()
+    start = time.monotonic()
+    objects, *_ = jit.compile_forms([form()], cache_dir=tmp_path)
+    assert len(objects) == 1 and not list(tmp_path.glob("*.compiling"))
+    assert time.monotonic() - start < 9.0  # FFCx's own patience is 10 s
 
 
 def test_what_another_process_compiles_is_awaited(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -189,13 +221,13 @@ def test_what_another_process_compiles_is_awaited(monkeypatch: pytest.MonkeyPatc
             raise TimeoutError
         return "found"
 
-    monkeypatch.setattr(compat, "_SEARCH", search)
+    monkeypatch.setattr(form_compiler, "_SEARCH", search)
     lock = tmp_path / "some.c"
     lock.touch()
-    assert compat._by_name("some", [], tmp_path, 10) == "found" and len(tries) == 3
+    assert form_compiler._by_name("some", [], tmp_path, 10) == "found" and len(tries) == 3
     tries.clear()
-    long_ago = time.time() - 2 * compat.PATIENCE
+    long_ago = time.time() - 2 * form_compiler.PATIENCE
     os.utime(lock, (long_ago, long_ago))
     with pytest.raises(TimeoutError):
-        compat._by_name("some", [], tmp_path, 10)
+        form_compiler._by_name("some", [], tmp_path, 10)
     assert len(tries) == 1

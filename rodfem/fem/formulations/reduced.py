@@ -54,7 +54,7 @@ class Reduced(Formulation):
         )
         out = [Unknown(force, i, UNIT[i]) for i in inside if scene.known_force(i, c) is None]
         for side, end in enumerate(scene.sides):
-            if not scene.plain(side):
+            if not scene.plain[side]:
                 place = Group(LETTERS[side], f"position of the {SIDES[side]} end", "", Motion.POSITION, end.held)
                 out += [Unknown(place, i, UNIT[i]) for i in inside if end.held(c)[i] is None]
         return out
