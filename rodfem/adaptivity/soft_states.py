@@ -136,7 +136,7 @@ class SoftStates:
         for level in range(REFINEMENTS):
             richer = self._companion(level)
             try:
-                point, rho = _on(richer, point, fixed_load)
+                point, rho = _on(richer, point, fixed_load, soft=True)
                 finer, rounding = _nearest(richer.solver, point, len(modes), own)
             except ConvergenceError:
                 return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
@@ -159,19 +159,32 @@ class SoftStates:
         return self._companions[level]
 
 
-def _on(richer: Enriched, point: Point, fixed_load: bool) -> tuple[Point, float]:
+def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, float]:
     """Point on a richer mesh, and the part of the errors that is left there.
 
-    Near a soft mode Newton's method may slide away: then with damping.  Raises :class:`ConvergenceError` where it has
-    no such point; ``fixed_load`` as in :meth:`SoftStates.examine`.
+    Beside a soft mode Newton's method slides away, or ends by chance: there it is damped, and elsewhere where it fails.
+    Raises :class:`ConvergenceError` where the mesh has no such point.
+
+    Parameters
+    ----------
+    richer
+        Companion of the mesh.
+    point
+        Point on the mesh itself.
+    fixed_load
+        As in :meth:`SoftStates.examine`.
+    soft
+        Whether the point is known to have a soft mode.
     """
     system = richer.system
     given = system.damping
+    first, second = sorted((given, richer.solver.inertia.tolerance), reverse=soft)
     try:
         try:
+            system.damping = first
             again = richer.again(point, fixed_load=fixed_load)
         except ConvergenceError:
-            system.damping = richer.solver.inertia.tolerance
+            system.damping = second
             again = richer.again(point, fixed_load=fixed_load)
     finally:
         system.damping = given

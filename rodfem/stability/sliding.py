@@ -87,10 +87,16 @@ class _Along:
         """``c w . S s`` of a vector of metric norm 1, zero for one that is no motion along the rod."""
         if self.across is None or self.names.share(v, self.group)[0] <= SHARE:
             return 0.0
-        image = self.names.metric * self.across
-        c = v.dot(image).real / self._derivative.dot(image).real
-        own, comm = float(self.system.change(v).local @ self._covector), self.system.comm
-        return c * (own if comm.size == 1 else float(comm.allreduce(own, op=MPI.SUM)))
+        c, product = self._factors([v])
+        return float(c[0] * product[0])
+
+    def _factors(self, vectors: list[PETSc.Vec]) -> tuple[np.ndarray, np.ndarray]:
+        """``c`` and ``w . S s`` of vectors, each (number,)."""
+        assert self.across is not None
+        image, comm = self.names.metric * self.across, self.system.comm
+        c = np.array([v.dot(image).real for v in vectors]) / self._derivative.dot(image).real
+        own = np.array([self.system.change(v).local @ self._covector for v in vectors])
+        return c, own if comm.size == 1 else comm.allreduce(own, op=MPI.SUM)
 
     def suspects(self, found: Factored, nearest: float) -> int:
         """Number of motions along the rod that cost less than its bending, but for the mesh's part.
@@ -107,7 +113,8 @@ class _Along:
         squares, turn = np.linalg.eigh(gram)
         basis = turn[:, squares > DEPENDENT] / np.sqrt(squares[squares > DEPENDENT])
         theta, z = np.linalg.eigh(basis.T @ quadratic @ basis)
-        parts = np.array([abs(self.part(combine(vectors, y))) for y in (basis @ z).T])
+        c, product = ((basis @ z).T @ x for x in self._factors(vectors))
+        parts = abs(c * product)
         cheap = abs(abs(theta) - parts) < np.maximum(inertia.scale, MOSTLY * parts)
         return int((cheap & (AMPLE * parts > nearest)).sum())
 
