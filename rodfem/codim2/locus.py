@@ -255,19 +255,12 @@ def locus(
         criterion = _criterion(solver, plane, special.kind, guess)
         first = criterion.correct(p, special.point.x, (np.array([0.0, 1.0]) * plane.width, None), guess, 0.1)
         tracer = Tracer(criterion, plane, steps)
-        onwards = tracer.run(first)
-        backwards = Half([first], ended="closed curve")
-        if onwards.ended != "closed curve":
-            backwards = tracer.run(first.reversed())
-        nodes = backwards.nodes[:0:-1] + onwards.nodes
-        start = len(backwards.nodes) - 1
-        marks = {start - i: kind for i, kind in backwards.marks.items()} | {
-            start + i: kind for i, kind in onwards.marks.items()
-        }
+        nodes, marks, start, ended = _both_sides(tracer, first)
+        level = float(p[1])
         crossings = [(float(first.p[0]), first.ordinate)]
-        for a, b in (pair for half in (backwards, onwards) for pair in pairwise(half.nodes[1:])):
-            if (a.p[1] - p[1]) * (b.p[1] - p[1]) < 0:
-                crossings += [(float(n.p[0]), n.ordinate) for n in tracer.crossed(a, b, 1, float(p[1]))]
+        for a, b in (pair for side in (nodes[:start][::-1], nodes[start + 1 :]) for pair in pairwise(side)):
+            if (a.p[1] - level) * (b.p[1] - level) < 0:
+                crossings += [(float(n.p[0]), n.ordinate) for n in tracer.crossed(a, b, 1, level)]
         error = np.full((len(nodes), 2), np.nan)
         if error_bars:
             rows = np.linspace(0, len(nodes) - 1, error_bars).round().astype(int).tolist()
@@ -290,7 +283,7 @@ def locus(
         error=error,
         marks=[Mark(kind, row) for row, kind in sorted(marks.items())],
         start=start,
-        ended=(backwards.ended, onwards.ended),
+        ended=ended,
         constants={name: v.value for name, v in scene.parameters.items() if name not in plane.names},
         discretization=mesh_of(system),
         states=[n.x for n in nodes],
@@ -298,6 +291,18 @@ def locus(
         words=(scene.parameters[scene.load].words, scene.parameters[parameter].words),
         units=(scene.parameters[scene.load].unit, scene.parameters[parameter].unit),
     )
+
+
+def _both_sides(tracer: Tracer, first: LocusPoint) -> tuple[list[LocusPoint], dict[int, str], int, tuple[str, str]]:
+    """Points of the curve through the ``first`` one, marked rows, the row of the first, and why either side ends."""
+    onwards = tracer.run(first)
+    backwards = Half([first], ended="closed curve")
+    if onwards.ended != "closed curve":
+        backwards = tracer.run(first.reversed())
+    start = len(backwards.nodes) - 1
+    marks = {start - i: kind for i, kind in backwards.marks.items()}
+    marks |= {start + i: kind for i, kind in onwards.marks.items()}
+    return backwards.nodes[:0:-1] + onwards.nodes, marks, start, (backwards.ended, onwards.ended)
 
 
 def _guess(solver: StaticSolver, special: SpecialPoint, p: np.ndarray) -> LocusPoint:
