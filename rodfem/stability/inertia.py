@@ -34,6 +34,10 @@ ZERO_BAND = 1e-7
 """Half width of the band of eigenvalues that count as zero, over the lowest bending one, where round-off is below."""
 NULL, ROUGH = 1e-8, 1e-2
 """Relative change of eigenvalues nearest zero at which their vectors are null vectors, and first guesses of a mode."""
+EXPANDED, DEPTH = 4, 5
+"""Iterations of a block before a Krylov space takes its place, and blocks of that space."""
+DEPENDENT = 1e-10
+"""Part of a vector that is left across a space, below which it spans nothing new."""
 FRESH = 1e-3
 """Weight of a generic vector that is added to each vector of a block before it is iterated."""
 PIVOT = 1e-3
@@ -265,18 +269,20 @@ class Factored:
 
         Block inverse iteration from the vectors of the last call, with a Rayleigh-Ritz projection of ``S``, until the
         ``number`` wanted values change by less than ``accuracy`` relative to themselves (or by what the arithmetic
-        resolves).  The block has ``spare`` more vectors.  At most ``most`` iterations are made.
+        resolves).  The block has ``spare`` more vectors.  It converges as the ratio of the eigenvalues inside it to the
+        next one, slowly where these are close: every few iterations a Krylov space takes its place, where all converge
+        much faster.  At most ``most`` iterations are made.
         """
-        own, factors, block = self._own(), self.factors, number + spare
+        own, block = self._own(), number + spare
         vectors = own.vectors[:block] + [own.seed(i) for i in range(len(own.vectors), block)]
         values = np.full(block, np.inf)
         for i, v in enumerate(vectors):
             v.axpy(FRESH, own.seed(i))  # the old vectors may span an invariant space that misses the nearest one
         with own.system.clock("stability"):
-            for _ in range(most):
-                solved = [v.duplicate() for v in vectors]
-                for v, out in zip(vectors, solved, strict=True):
-                    factors.solve(own.metric * v, out)
+            for iteration in range(most):
+                if iteration and iteration % EXPANDED == 0:
+                    vectors = self._in_krylov_space(vectors)
+                solved = self._inverse(vectors)
                 orthonormalize(solved, own.metric)
                 images = [own.matrix * y for y in solved]
                 # Rayleigh-Ritz: the quotients of S - shift M on the block, whose basis is orthonormal in M
@@ -291,6 +297,43 @@ class Factored:
                     break
         own.vectors = vectors
         return values[:number], [v.copy() for v in vectors[:number]]
+
+    def _inverse(self, vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
+        """``S^-1 M`` of vectors."""
+        out = [v.duplicate() for v in vectors]
+        for v, solved in zip(vectors, out, strict=True):
+            self.factors.solve(self.inertia.metric * v, solved)
+        return out
+
+    def _in_krylov_space(self, block: list[PETSc.Vec]) -> list[PETSc.Vec]:
+        """As many Ritz vectors of ``A = S^-1 M`` in the space of ``block, A block, ...``, for its largest eigenvalues.
+
+        Block Lanczos with full orthogonalisation.  The projection is that of ``A``, whose eigenvalues of interest are
+        outermost: one of ``S`` would have values near zero that are nobody's.
+        """
+        metric = self.inertia.metric
+        basis: list[PETSc.Vec] = []
+        duals: list[PETSc.Vec] = []  # M times the basis
+        images: list[PETSc.Vec] = []
+        new = block
+        for _ in range(DEPTH):
+            first = len(basis)
+            for given in new:
+                v, size = given.copy(), np.sqrt(given.dot(metric * given).real)
+                for _ in range(2):
+                    v.maxpy([-dual.dot(v) for dual in duals], basis)
+                dual = metric * v
+                left = np.sqrt(max(v.dot(dual).real, 0.0))
+                if left > DEPENDENT * size:
+                    v.scale(1.0 / left)
+                    dual.scale(1.0 / left)
+                    basis.append(v)
+                    duals.append(dual)
+            new = self._inverse(basis[first:])
+            images += new
+        projection = np.array([[dual.dot(w).real for w in images] for dual in duals])
+        nu, z = np.linalg.eigh((projection + projection.T) / 2)
+        return [combine(basis, z[:, j]) for j in np.argsort(-abs(nu))[: len(block)]]
 
     def response(self, mode: PETSc.Vec) -> float:
         """Return ``1 / (mode . M S^-1 M mode)`` for a vector of metric norm 1: that of an eigenvector."""
