@@ -25,18 +25,35 @@ def project_out(vector: PETSc.Vec, basis: Sequence[PETSc.Vec], metric: PETSc.Mat
             vector.axpy(-(metric * other).dot(vector), other)
 
 
-def normalize(vector: PETSc.Vec, metric: PETSc.Mat) -> None:
-    """Give a vector unit length in a metric, in place."""
-    vector.scale(1.0 / max(np.sqrt(max(vector.dot(metric * vector), 0.0)), TINY))
-
-
 def orthonormalize(vectors: list[PETSc.Vec], metric: PETSc.Mat) -> None:
     """Make vectors orthonormal in a metric, in place, by Gram-Schmidt twice."""
-    for _ in range(2):
-        for i, v in enumerate(vectors):
-            normalize(v, metric)
-            project_out(v, vectors[:i], metric)
-            normalize(v, metric)
+    basis = Basis(metric)
+    for v in vectors:
+        basis.add(v)
+
+
+class Basis:
+    """Orthonormal vectors, one by one, with their ``duals``: the ``metric`` times each."""
+
+    def __init__(self, metric: PETSc.Mat) -> None:
+        """Begin with none."""
+        self.metric = metric
+        self.vectors: list[PETSc.Vec] = []
+        self.duals: list[PETSc.Vec] = []
+
+    def add(self, vector: PETSc.Vec, least: float = 0.0) -> None:
+        """Add what a vector has across the others, in place; nothing where less than ``least`` of it is left."""
+        size = np.sqrt(vector.dot(self.metric * vector).real) if least else 0.0
+        for _ in range(2):
+            if self.vectors:
+                vector.maxpy([-dual.dot(vector) for dual in self.duals], self.vectors)
+        dual = self.metric * vector
+        left = np.sqrt(max(vector.dot(dual).real, 0.0))
+        if left >= least * size:
+            vector.scale(1.0 / max(left, TINY))
+            dual.scale(1.0 / max(left, TINY))
+            self.vectors.append(vector)
+            self.duals.append(dual)
 
 
 def combine(vectors: list[PETSc.Vec], weights: np.ndarray) -> PETSc.Vec:

@@ -23,7 +23,7 @@ from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors
 from rodfem.linalg.matrices import local_rows
-from rodfem.linalg.orthogonal import combine, generic, orthonormalize
+from rodfem.linalg.orthogonal import Basis, combine, generic, orthonormalize
 from rodfem.linalg.selection import factors_of
 from rodfem.tolerances import TINY
 
@@ -311,29 +311,16 @@ class Factored:
         Block Lanczos with full orthogonalisation.  The projection is that of ``A``, whose eigenvalues of interest are
         outermost: one of ``S`` would have values near zero that are nobody's.
         """
-        metric = self.inertia.metric
-        basis: list[PETSc.Vec] = []
-        duals: list[PETSc.Vec] = []  # M times the basis
+        basis, new = Basis(self.inertia.metric), block
         images: list[PETSc.Vec] = []
-        new = block
         for _ in range(DEPTH):
-            first = len(basis)
-            for given in new:
-                v, size = given.copy(), np.sqrt(given.dot(metric * given).real)
-                for _ in range(2):
-                    v.maxpy([-dual.dot(v) for dual in duals], basis)
-                dual = metric * v
-                left = np.sqrt(max(v.dot(dual).real, 0.0))
-                if left > DEPENDENT * size:
-                    v.scale(1.0 / left)
-                    dual.scale(1.0 / left)
-                    basis.append(v)
-                    duals.append(dual)
-            new = self._inverse(basis[first:])
+            for v in new:
+                basis.add(v.copy(), DEPENDENT)
+            new = self._inverse(basis.vectors[len(images) :])
             images += new
-        projection = np.array([[dual.dot(w).real for w in images] for dual in duals])
+        projection = np.array([[dual.dot(w).real for w in images] for dual in basis.duals])
         nu, z = np.linalg.eigh((projection + projection.T) / 2)
-        return [combine(basis, z[:, j]) for j in np.argsort(-abs(nu))[: len(block)]]
+        return [combine(basis.vectors, z[:, j]) for j in np.argsort(-abs(nu))[: len(block)]]
 
     def response(self, mode: PETSc.Vec) -> float:
         """Return ``1 / (mode . M S^-1 M mode)`` for a vector of metric norm 1: that of an eigenvector."""
