@@ -22,7 +22,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.modes import Modes
 from rodfem.output.digits import in_decimals, in_words, index_in_words, number, rounded_up, with_unit
-from rodfem.output.summary import in_sentences
+from rodfem.output.summary import called, in_sentences
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
@@ -154,7 +154,7 @@ class Report(Observer):
     def branch(self, branch: Branch) -> None:
         """Head a new branch."""
         self.known.append(branch)
-        origin = f" from {branch.parent[0]}, special point {branch.parent[1] + 1}" if branch.parent else ""
+        origin = f" from {called(branch.parent[0])}, special point {branch.parent[1] + 1}" if branch.parent else ""
         self.say(f"\n{branch.name}{origin}")
         self.say(f"       load           ordinate       int W ds  {self.count:>6}  zero  located to")
 
