@@ -76,7 +76,10 @@ def check_kinds(scene: Scene) -> None:
         try:
             inspect.signature(function).bind(*range(role.arguments))
         except (TypeError, ValueError):  # ValueError for classes of Python's own, which have no signature
-            raise SceneError(f"The {what} is no function of {role.arguments} argument(s): give {role.call}.") from None
+            meanings = f", where {role.meanings}" if role.meanings else ""
+            raise SceneError(
+                f"The {what} is no function of {role.arguments} argument(s): give {role.call}{meanings}."
+            ) from None
 
 
 def check_parameter(name: object, parameter: Any) -> None:
