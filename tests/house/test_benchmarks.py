@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import fronts
 from benchmarks.auto.output import AutoError
 from benchmarks.auto.problems import PROBLEMS
 from benchmarks.auto.program import check, require_auto
@@ -62,6 +63,11 @@ def test_figures_are_drawn_from_the_page_alone(tmp_path: Path) -> None:
     (row,) = [r for r in tables["All branches"][0] if r[:3] == ["cord", "straight", "2 P8 reduced"]]
     assert [float(row[3]), float(row[4])] == [78, 25] and plots.discretisation(row[2]) == (2, 8, "reduced")
     assert not plots.draw(Path(shutil.copy(DOCS / "rods.md", tmp_path)))
+
+
+def test_the_picture_of_the_elimination_is_drawn(tmp_path: Path) -> None:
+    fronts.main(tmp_path / "fronts.png")
+    assert (tmp_path / "fronts.png").stat().st_size > 20_000
 
 
 def test_nothing_measured_is_lost(tmp_path: Path) -> None:
