@@ -11,6 +11,7 @@ from typing import Any
 
 from rodfem.continuation.branch import FIRST_BRANCH
 from rodfem.output.change_words import FEW, change_in_words, known_digits
+from rodfem.output.endings import MEETS
 from rodfem.output.intervals import Interval, coexisting, intervals_of, stable_ones, without_stable
 from rodfem.output.plot_pieces import PLANAR, STABLE, UNDECIDED
 
@@ -39,7 +40,7 @@ def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     intervals, load = intervals_of(branch), data["parameter"]
     name = _subject(branch, data)
     if not intervals:
-        return f"{name} has one state only; it ends there: {branch['ended'].rstrip('.')}."
+        return f"{name} has one state only; {_end(branch)}."
     parts, told = [], intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
     start, stop = (f"{x:.{FEW}g}" for x in (intervals[0].loads[0], intervals[-1].loads[1]))
     if len(intervals) == 1:
@@ -54,8 +55,14 @@ def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
         changes = _count(len(intervals) - 1 - len(told), "time", "times")
         parts.append(f"then its stability changes {changes} more before {load} = {stop}")
     if branch["ended"] != "end of range":
-        parts.append(f"it ends there: {branch['ended'].rstrip('.')}")
+        parts.append(_end(branch))
     return "; ".join(parts) + "."
+
+
+def _end(branch: Mapping[str, Any]) -> str:
+    """How a branch ends, in a clause."""
+    ended = str(branch["ended"]).rstrip(".")
+    return f"it ends where it {ended}" if ended.startswith(MEETS) else f"it ends there: {ended}"
 
 
 def _subject(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
