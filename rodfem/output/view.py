@@ -12,6 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rodfem.problem.quaternions import directors
+from rodfem.problem.setting import HELD, TURNS, Setting
+
 Floats = NDArray[np.float64]
 
 TILT, STEEP = np.radians([20.0, 55.0])
@@ -22,6 +25,8 @@ BESIDE = 0.87
 """Cosine of a load and the motion below which their plane is not that of the picture."""
 NEAR = 0.9
 """Cosine from which on a direction is taken for that of the nearest axis of space."""
+SIDEWAYS = 0.3
+"""Cosine of a rod's chord and the axis of its only support below which it leaves that sideways."""
 LEVEL = 0.1
 """Cosine below which an axis of space is across a direction, for its sense."""
 STRAIGHT = 1e-3
@@ -89,6 +94,20 @@ def view_of(
                 tilt = -tilt
     back = np.cross(right, up)
     return np.array([right, np.cos(tilt) * up - np.sin(tilt) * back, np.cos(tilt) * back + np.sin(tilt) * up])
+
+
+def axis_of(setting: Setting, reference: Floats) -> Floats:
+    """Direction (3,) of the axis of a rod in the state ``reference`` (n, 3): from one end to the other.
+
+    Of a rod that is held at one end alone it is that of its support, from which load bends the chord away, unless the
+    rod leaves it sideways, as a coil does.
+    """
+    chord, holding = reference[-1] - reference[0], [x for x in setting.supports if x.held.any() or x.turning != TURNS]
+    if len(holding) == 1 and holding[0].turning == HELD:
+        stem = directors(holding[0].frame)[:, 2]
+        if stem @ chord > SIDEWAYS * np.linalg.norm(chord):
+            return np.asarray(stem)
+    return np.asarray(chord)
 
 
 def _principal(moments: Floats, axis: Floats, least: float, other: Floats | None) -> Floats:
