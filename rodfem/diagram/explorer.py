@@ -125,7 +125,8 @@ class Explorer(Tracer):
                 f"{start:g}: write the energy of stretch in v[2] - 1 (zero in the undeformed rod), or push less."
             )
         if self.scene.closed:
-            number, Tw, Wr = link(self.solver.shape.sample(point.x))
+            number, *turns = link(self.solver.shape.sample(point.x))
+            Tw, Wr = (round(x, 4) + 0.0 for x in turns)  # no negative zero
             self.observer.note(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
         if point.negative:
             self.observer.note(

@@ -159,8 +159,7 @@ class Sweep:
         rank, size = self.eigensolver.at(last.x).asymmetry()
         self.observer.note(
             f"  the load makes the tangent matrix non-symmetric by a matrix of rank {rank} "
-            f"(largest entry {size:.1e} of |S|):\n"
-            f"  factors of the symmetric part and {rank} more solves would do for it (Sherman-Morrison-Woodbury)"
+            f"(largest entry {size:.1e} of |S|)"
         )
 
     def at(self, x: PETSc.Vec) -> Point:
