@@ -28,9 +28,14 @@ __all__ = ["draw_shape", "draw_shape_safely", "main"]
 
 Floats = NDArray[np.float64]
 SIZE, ROOM, HEAD = (1600, 1000), 0.84, 0.22  # pixels, shares of the height above the caption, and for the triad's line
-NARROW = 1.5  # width over height below which that line is kept free: beside a rod there is no room
+NARROW = 1.5  # width over height below which that line is always kept free: beside a rod there is no room
 ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
-TRIAD, ARROW, SUBSCRIPTS = np.array([-90.0, 125.0]), 70.0, "₁₂₃"  # the triad from the upper left corner, in pixels
+TRIAD, ARROW, AROUND = (
+    np.array([125.0, 130.0]),
+    70.0,
+    125.0,
+)  # the triad: from corners, its arrows, half its box; pixels
+FOOT, SUBSCRIPTS = 110.0, "₁₂₃"  # pixels of the lines at the foot
 FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 MPI_VARIABLES = ("OMPI_", "PMI", "MPI_LOCAL")  # the beginnings of their names, PMI_ and PMIX_ alike
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
@@ -95,7 +100,7 @@ def draw_shape(
         _add(pyvista, plotter, solid)
     _add_directors(pyvista, plotter, state.centres, state.directors, thickness)
     points = np.concatenate([solid.points for solid in solids])
-    corner, scale = _look(plotter, points, view, 5.0 * thickness, size)
+    corner, place, scale = _look(plotter, points, view, 5.0 * thickness, size)
     arrows, names = triad(view, corner, 2.0 * ARROW / size[1] * scale)
     for solid in arrows:
         _add(pyvista, plotter, solid)
@@ -104,7 +109,7 @@ def draw_shape(
     labels += [("d₂", 1.0 - 48.0 / size[0], top, SECOND)]
     labels += [("load", 1.0 - 184.0 / size[0], top, LOAD)] if any(solid.color == LOAD for solid in solids) else []
     share, down = ARROW / np.array(size), np.array([0.0, 15.0 / size[1]])
-    labels += [(name, *(_place_of_triad(size) - down + share * at), DARK) for name, at in names]
+    labels += [(name, *(place - down + share * at), DARK) for name, at in names]
     labels += [("not drawn: " + ", ".join(notes), 0.5, 0.095, DARK)] if (notes := state.setting.notes) else []
     for label, x, y, colour in filter(lambda item: item[0], labels):
         style = {"font_size": min(20, int(0.875 * size[0]) // len(label)), "color": colour, "font_file": font}
@@ -175,7 +180,7 @@ def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
                 raise ValueError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
             load = float(branches[branch]["load"][row])
             symbol = {"lam": "λ"}.get(file.attrs["parameter"], file.attrs["parameter"])
-            caption = f"{file.attrs['scene']} rod, {branch}, {symbol} = {load:.4g}"
+            caption = f"{file.attrs['scene']}, {branch}, {symbol} = {load:.4g}"
             first = file.attrs.get("first", branch)
             left = 0 if branch == first else int(np.argmin(abs(branches[first]["load"][:] - load)))
             s, centres, directors = _curve(branches[branch], row, count)
@@ -258,12 +263,16 @@ def triad(view: Floats, corner: Floats, size: float) -> tuple[list[Solid], list[
     return arrows, names
 
 
-def _place_of_triad(size: tuple[int, int]) -> Floats:
-    """Place of the triad as shares of width and height from the lower left corner of a picture of that size."""
-    return np.array([0.0, 1.0]) - TRIAD / np.array(size)
+def _corners(size: tuple[int, int]) -> list[Floats]:
+    """Places for the triad as shares of width and height (2,) from the lower left corner: above, then below."""
+    width, height = size
+    places = (TRIAD[0], height - TRIAD[1]), (TRIAD[0], FOOT + TRIAD[1]), (width - TRIAD[0], FOOT + TRIAD[1])
+    return [np.array(place) / np.array(size) for place in places]
 
 
-def _look(plotter: Any, points: Floats, view: Floats, margin: float, size: tuple[int, int]) -> tuple[Floats, float]:
+def _look(
+    plotter: Any, points: Floats, view: Floats, margin: float, size: tuple[int, int]
+) -> tuple[Floats, Floats, float]:
     """Set a camera without perspective that sees all points (n, 3), above the caption.
 
     Parameters
@@ -279,22 +288,33 @@ def _look(plotter: Any, points: Floats, view: Floats, margin: float, size: tuple
 
     Returns
     -------
-    corner, scale
-        The place of the triad in space (3,), and half the height of the picture there.
+    corner, place, scale
+        The place of the triad in space (3,) and as shares of the picture (2,), and half the height of the picture.
+        It is a corner with nothing in it, or else above all.
     """
     seen, aspect = points @ view.T, size[0] / size[1]
     low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
     middle, half = (low + high) / 2, (high - low) / 2
-    head = HEAD if aspect < NARROW else 0.0
-    scale = max(half[1] / (ROOM - head), half[0] / aspect)
-    middle[1] -= ((1.0 - ROOM) / 2 - 0.8 * head) * scale  # the caption's line, and that of the triad
-    focus = middle @ view
+    for head in (0.0, HEAD):
+        scale = max(half[1] / (ROOM - head), half[0] / aspect)
+        centre = middle[:2] - (0.0, ((1.0 - ROOM) / 2 - 0.8 * head) * scale)  # the caption's line, and the triad's
+        on_screen = ((seen[:, :2] - centre) / scale / np.array([aspect, 1.0]) + 1.0) / 2.0
+        free = [at for at in _corners(size) if not _covers(at, on_screen, size)]
+        if free and (head or aspect >= NARROW):
+            break
+    place = free[0] if free and not head else _corners(size)[0]
+    focus = np.append(centre, middle[2]) @ view
     plotter.camera_position = [tuple(focus + 4 * (half[2] + scale) * view[2]), tuple(focus), tuple(view[1])]
     plotter.camera.enable_parallel_projection()
     plotter.camera.parallel_scale = scale
     plotter.renderer.ResetCameraClippingRange()
-    shift = (2 * _place_of_triad(size) - 1) * scale * np.array([aspect, 1.0])
-    return focus + shift @ view[:2], scale
+    shift = (2 * place - 1) * scale * np.array([aspect, 1.0])
+    return focus + shift @ view[:2], place, scale
+
+
+def _covers(place: Floats, on_screen: Floats, size: tuple[int, int]) -> bool:
+    """Whether a triad at a place (2,) covers one of the points (n, 2), all as shares of the picture."""
+    return bool((abs(on_screen - place) * np.array(size) < AROUND).all(axis=1).any())
 
 
 def draw_shape_safely(

@@ -79,7 +79,8 @@ def view_of(
         up = -down / np.linalg.norm(down)
         spread = (reference - reference.mean(axis=0)).T @ (reference - reference.mean(axis=0)) / len(reference)
         right = _principal(shape + spread, up, STRAIGHT * size, side)
-        right = right * sign_of(right @ (moved[np.argmax(np.linalg.norm(moved, axis=1))] + 1e-3 * chord))
+        level = abs(right @ chord) < STRAIGHT * size  # an upright rod has no way of its own to go
+        right = right * sign_of(right @ (moved[np.argmax(np.linalg.norm(moved, axis=1))] if level else chord))
     else:
         right = _snapped(chord / np.linalg.norm(chord))
         up = upwards(_principal(shape, right, STRAIGHT * size, side))
