@@ -74,7 +74,7 @@ class Report(Observer):
         self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None, words: Callable[[str], str] = str
     ) -> None:
         """Print what ``words`` makes of each line to ``stream``, by default the terminal."""
-        self.count, self.words, self.units = INDEX, words, ONES
+        self.count, self.words, self.units, self.wide = INDEX, words, ONES, 6
         self.on = comm.rank == 0
         self.stream = stream or sys.stdout
         self.live = self.on and self.stream.isatty() and comm.size == 1
@@ -111,6 +111,7 @@ class Report(Observer):
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
         self.units = scene.units
         self.count = INDEX if scene.conservative else UNSTABLE
+        self.wide = len("0->1 (in space 2)") if scene.planar and scene.conservative else max(6, len(self.count))
         if not scene.conservative:
             loads = ", ".join(scene.without_potential())
             self.say(f"  not conservative ({loads}): stability is a matter of frequencies, not of an index")
@@ -156,7 +157,7 @@ class Report(Observer):
         self.known.append(branch)
         origin = f" from {called(branch.parent[0])}, special point {branch.parent[1] + 1}" if branch.parent else ""
         self.say(f"\n{branch.name}{origin}")
-        self.say(f"       load           ordinate       int W ds  {self.count:>6}  zero  located to")
+        self.say(f"       load           ordinate       int W ds  {self.count:>{self.wide}}  zero  located to")
 
     def progress(self, branch: Branch, point: Point) -> None:
         """Keep one line up to date while a branch is traced (on a terminal only)."""
@@ -178,7 +179,7 @@ class Report(Observer):
         return (
             f"{special.kind.code}   {in_decimals(p.load, 10, units.load):<14} "
             f"{in_decimals(p.ordinate, 9, units.ordinate):<14} {in_decimals(p.energy, 6, units.energy):<10} "
-            f"{index_in_words(special):>{max(6, len(self.count))}} {p.zero:>5}  {special.located_to:.0e}{connects_to}"
+            f"{index_in_words(special):>{self.wide}} {p.zero:>5}  {special.located_to:.0e}{connects_to}"
         )
 
     def law(self, special: SpecialPoint) -> None:
