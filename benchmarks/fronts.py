@@ -55,7 +55,7 @@ def draw(axes: Any, pattern: sp.csr_matrix, found: list[tuple[int, int, int]], i
     axes.set_title("The saddle matrix, unknowns along the rod", fontsize=10)
 
 
-PARTS = (("delayed", 1.0), ("vertex", 1.4), ("interior", 2.2), ("next\nvertex", 1.4), ("border", 1.0))
+PARTS = (("delayed", 1.5), ("vertex", 1.3), ("interior", 2.0), ("next\nvertex", 1.5), ("border", 1.4))
 ELIMINATED = 3
 """Number of the parts of a front that are fully summed, the first ones."""
 
@@ -72,7 +72,7 @@ def explain(axes: Any) -> None:
             axes.plot([left, left + size], [top + end] * 2, color=EDGE, lw=0.4)
             axes.plot([left + end] * 2, [top, top + size], color=EDGE, lw=0.4)
         for (name, _), a, b in zip(PARTS, ends, ends[1:], strict=False):
-            axes.text(left + (a + b) / 2, top - 0.12, name, ha="center", va="bottom", fontsize=7)
+            axes.text(left + (a + b) / 2, top - 0.12, name, ha="center", va="bottom", fontsize=7.5)
     axes.text(own / 2, own / 2, "eliminated", ha="center", va="center", fontsize=9)
     axes.text((own + size) / 2, (own + size) / 2, "Schur\ncomplement", ha="center", va="center", fontsize=8, color=EDGE)
     arrow = {"arrowstyle": "->", "color": EDGE, "lw": 1.5}
@@ -85,13 +85,15 @@ def explain(axes: Any) -> None:
 def main(path: Path = Path(__file__).parents[1] / "docs" / "fronts.png") -> None:
     """Draw the fronts of a short cord."""
     found: Any = Solver(scene("cord"), Discretization("reduced", ELEMENTS, DEGREE), MPI.COMM_SELF).equilibria
-    border = found.system.fields.dense_rows
     matrix = local_rows(found.inertia.at(found.start(20.0, 0.4)).matrix)
     matrix.eliminate_zeros()
-    order, begins = sequence(local_rows(found.inertia.matrix), border)
+    whole = local_rows(found.inertia.matrix)
+    n = whole.shape[0]
+    border = np.arange(n - found.system.fields.dense_rows, n)
+    order, begins = sequence(whole.indptr, whole.indices, border)
     pattern = matrix[order][:, order]
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4), width_ratios=(1, 1.5))
-    cells = fronts(local_rows(found.inertia.matrix)[order][:, order], order, begins)
+    cells = fronts(whole[order][:, order], order, begins)
     draw(left, pattern, cells, int(begins[-2]))
     explain(right)
     figure.tight_layout()

@@ -62,10 +62,14 @@ class Store:
                     out.setdefault(row["failed"], []).append(key)
         return out
 
-    def loads(self) -> tuple[float, float]:
-        """Least and greatest load of the machine beside the measurements."""
-        seen = [x for piece in self.pieces.values() for x in piece["load"]]
+    def loads(self, prefix: str = "") -> tuple[float, float]:
+        """Least and greatest load of the machine beside the measurements whose keys begin with ``prefix``."""
+        seen = [x for key, piece in self.pieces.items() if key.startswith(prefix) for x in piece["load"]]
         return min(seen), max(seen)
+
+    def day(self, prefix: str = "") -> str:
+        """Day of the first measurement whose key begins with ``prefix``."""
+        return next(str(piece["when"])[:10] for key, piece in self.pieces.items() if key.startswith(prefix))
 
     def took(self) -> float:
         """Seconds that all pieces took."""

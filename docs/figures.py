@@ -21,7 +21,7 @@ import matplotlib
 import matplotlib.image
 import numpy as np
 from matplotlib.figure import Figure
-from panels import draw
+from panels import draw, legend_of
 
 from rodfem.output.plot_diagram import draw_diagram
 from rodfem.output.plot_frequencies import draw_frequencies
@@ -38,7 +38,8 @@ SHAPES = {
     9: ("ruler", (("plane", 3.0), ("branch 1", 6.0), ("branch 1", 12.0))),
 }
 """Figure: demo, and the states whose shapes it has, by branch and load."""
-DPI = 150
+DPI, PANEL = 150, (600, 640)
+"""Dots per inch of a diagram, and pixels of the picture of one of three states."""
 
 
 def main() -> None:
@@ -64,10 +65,11 @@ def diagram(name: str) -> dict[str, Any]:
 def both_signs(found: dict[str, Any], label: str, path: Path) -> None:
     """Draw a diagram with both signs of its ordinate, which is ``label``."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.5, 5.0), dpi=DPI, layout="constrained")
+        figure = Figure(figsize=(9.0, 5.0), dpi=DPI, layout="constrained")
         axes = figure.subplots()
         draw(axes, found, signs=(1, -1))
         axes.set(ylabel=label, title=found["title"])
+        axes.legend(handles=legend_of(found), loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9)
         path.parent.mkdir(exist_ok=True)
         figure.savefig(path)
 
@@ -75,16 +77,15 @@ def both_signs(found: dict[str, Any], label: str, path: Path) -> None:
 def shapes(name: str, states: Sequence[tuple[str, float]], path: Path) -> None:
     """Draw states of a demo, each by its branch and load, beside each other."""
     file = RESULTS / name / "states.h5"
-    figure = Figure(figsize=(10.0, 2.4), dpi=DPI)
-    axes = figure.subplots(1, len(states), gridspec_kw={"wspace": 0.02, "left": 0, "right": 1, "bottom": 0, "top": 1})
+    panels = []
     with tempfile.TemporaryDirectory() as folder:
-        for place, (branch, load) in zip(axes, states, strict=True):
+        for branch, load in states:
             with h5py.File(file) as found:
                 row = int(np.argmin(abs(found[f"branches/{branch}/load"][:] - load)))
-            picture = draw_shape(file, branch, row, Path(folder, "shape.png"), caption=f"{branch}, λ = {load:g}")
-            place.imshow(matplotlib.image.imread(picture))
-            place.set_axis_off()
-        figure.savefig(path)
+            caption = f"{branch}, λ = {load:g}"
+            picture = draw_shape(file, branch, row, Path(folder, "shape.png"), caption=caption, size=PANEL)
+            panels.append(matplotlib.image.imread(picture))
+    matplotlib.image.imsave(path, np.concatenate(panels, axis=1))
 
 
 if __name__ == "__main__":

@@ -8,8 +8,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
-from rodfem.output.sheet import HALO, PALETTE, tex
+from rodfem.output.endings import endings
+from rodfem.output.plot_diagram import END_MARKER, ENDS
+from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE
+from rodfem.output.sheet import HALO, PALETTE, axis_label
 
 MARKERS: dict[str, dict[str, Any]] = {
     "branch point": {"marker": "o", "mfc": "white"},
@@ -37,6 +41,10 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
                 axes.plot(load[rows], sign * ordinate[rows], style, color=colour, linewidth=width)
             text = f"{index} ({in_space})" if in_space != index else f"{index}"
             labels.append((text, colour, np.column_stack([load, ordinate])[rows]))
+        for row, _ in endings(branch):
+            for sign in signs if ordinate[row] else (1,):
+                style = {"ls": "none", "zorder": 5} | END_MARKER | {"ms": 2.7 * width}
+                axes.plot(load[row], sign * ordinate[row], **style)
         for special in branch["special"]:
             for sign in signs if special["kind"] in MARKERS else ():
                 style = {"mec": "black", "mew": 0.6 * width, "ms": 3 * width} | MARKERS[special["kind"]]
@@ -45,7 +53,24 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
     axes.autoscale_view()  # the directions of curves on paper depend on the limits
     for text, colour, places in labels:
         _write(axes, text, colour, places, 6 * width)
-    axes.set_xlabel(tex(found["parameter_label"], always=True))
+    axes.set_xlabel(axis_label(found))
+
+
+def legend_of(found: Mapping[str, Any]) -> list[Line2D]:
+    """Entries of a legend for what :func:`draw` draws of a diagram."""
+    parts = [part for branch in found["branches"] for part in pieces(branch)]
+    if any(branch["columns"].get("omega2") for branch in found["branches"]):
+        return [Line2D([], [], ls="none", mec="black", ms=10, label="flutter", **MARKERS["flutter"])]
+    styles = {STABLE: "-", PLANAR: "--", UNSTABLE: ":"}
+    kinds = {UNSTABLE if index else PLANAR if in_space else STABLE for _, index, in_space in parts}
+    out = [Line2D([], [], color="0.3", ls=style, lw=2.0, label=kind) for kind, style in styles.items() if kind in kinds]
+    out.append(Line2D([], [], ls="none", marker="$n$", ms=6, color="0.3", label="negative eigenvalues"))
+    special = {special["kind"] for branch in found["branches"] for special in branch["special"]}
+    for kind, style in MARKERS.items():
+        if kind in special:
+            out.append(Line2D([], [], ls="none", mec="black", ms=7, label=kind, **style))
+    reasons = dict.fromkeys(reason for branch in found["branches"] for _, reason in endings(branch))
+    return out + [Line2D([], [], ls="none", label=f"{ENDS}{reason}", **END_MARKER) for reason in reasons]
 
 
 def _write(axes: Axes, text: str, colour: str, places: np.ndarray, distance: float) -> None:

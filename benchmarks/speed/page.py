@@ -10,6 +10,7 @@ from typing import Any
 from benchmarks.auto.settings import ACCURACIES
 from benchmarks.common import digits, exponent, machine, milliseconds, table, versions
 from benchmarks.speed import tables, words
+from benchmarks.speed.plots import FIGURES
 from benchmarks.store import Store
 
 Row = dict[str, Any]
@@ -28,6 +29,15 @@ def eigenvalues(store: Store) -> str:
                 out.append([name, f"{accuracy:.0e}", tables.what(best), str(best["unknowns"]), f"{best['error']:.0e}"])
                 out[-1].append(milliseconds(best["seconds"]))
     return table(["rod", "error asked", "fastest", "unknowns", "error", "ms"], out)
+
+
+def judgements(store: Store) -> str:
+    """Every judgement measured: what the figure is drawn from."""
+    rows = [
+        [r["name"], tables.what(r), str(r["unknowns"]), f"{r['error']:.1e}", milliseconds(r["seconds"])]
+        for r in store.rows("eigenvalues")
+    ]
+    return table(["rod", "discretisation", "unknowns", "error", "ms"], rows)
 
 
 def growth(store: Store) -> str:
@@ -130,7 +140,14 @@ def auto_version() -> str:
     return f"AUTO-07p {done.stdout.split()[-1]}" if done.returncode == 0 and done.stdout.split()[1:] else "no AUTO-07p"
 
 
-def write(store: Store, path: Path, figures: dict[str, str]) -> None:
+def another_day(store: Store, prefix: str) -> str:
+    """Sentence on measurements that are not of the day at the head of the page."""
+    low, high = store.loads(prefix)
+    same = store.day(prefix) == store.day()
+    return "" if same else f"Measured on {store.day(prefix)}; load of the machine between {low:.1f} and {high:.1f}."
+
+
+def write(store: Store, path: Path) -> None:
     """Write what there is of the page."""
     low, high = store.loads()
     found = versions("fenics-dolfinx", "petsc4py", "slepc4py", "numpy", "scipy")
@@ -139,16 +156,16 @@ def write(store: Store, path: Path, figures: dict[str, str]) -> None:
         "# Speed against error",
         f"Written by `make bench` (`python -m benchmarks.speed`) in {store.took() / 60:.0f} minutes on {machine()};\n"
         f"{found}, {auto_version()}; one thread;\nload of the machine between {low:.1f} and {high:.1f}; "
-        f"measured on {next(iter(store.pieces.values()))['when'][:10]}.",
+        f"measured on {store.day()}.",
         words.INTRODUCTION.format(runs="one run" if runs == 1 else f"{runs} runs"),
     ]
     if "references" in store.pieces:
         deviation = store.pieces["references"]["data"]
         lines += ["## References", tables.references(), words.REFERENCES.format(deviation=deviation)]
     if store.rows("branches"):
-        lines += ["## Equilibria", words.EQUILIBRIA, _figure(figures, "equilibria", "Error of equilibria against time")]
+        lines += ["## Equilibria", words.EQUILIBRIA, _figure("equilibria", "Error of equilibria against time")]
         lines += ["## Special points", words.SPECIAL]
-        lines += [_figure(figures, "special", "Error of special points against time")]
+        lines += [_figure("special", "Error of special points against time")]
         lines += ["## The paper's discretisation", words.PAPER, tables.paper(store)]
     if store.rows("auto") and store.rows("branches"):
         lines += ["## Goals", words.GOALS, tables.goals(store), words.SWEEPS, tables.sweeps(store)]
@@ -156,11 +173,11 @@ def write(store: Store, path: Path, figures: dict[str, str]) -> None:
     if store.rows("bvp"):
         lines += ["## Beside scipy", words.SCIPY, tables.beside_scipy(store)]
     if store.rows("eigenvalues"):
-        lines += ["## Eigenvalues", words.EIGENVALUES]
-        lines += [_figure(figures, "eigenvalues", "Error of eigenvalues against time"), eigenvalues(store)]
+        lines += ["## Eigenvalues", words.EIGENVALUES, another_day(store, "eigenvalues")]
+        lines += [_figure("eigenvalues", "Error of eigenvalues against time"), eigenvalues(store), judgements(store)]
     if store.rows("growth"):
         lines += ["## Growth", words.GROWTH.format(far=FAR)]
-        lines += [_figure(figures, "growth", "Cost against the number of unknowns"), growth(store)]
+        lines += [_figure("growth", "Cost against the number of unknowns"), growth(store)]
     if any(True for _ in store.under("scaling")):
         lines += ["### Ranks", words.RANKS, scaling(store), faster(store)]
     if store.rows("map"):
@@ -176,5 +193,5 @@ def write(store: Store, path: Path, figures: dict[str, str]) -> None:
     path.write_text("\n\n".join(line.strip() for line in lines if line) + "\n")
 
 
-def _figure(figures: dict[str, str], key: str, text: str) -> str:
-    return f"![{text}]({figures[key]})" if key in figures else ""
+def _figure(key: str, text: str) -> str:
+    return f"![{text}]({FIGURES[key]})"

@@ -1,29 +1,51 @@
-"""Figures of the page: error against time, and cost against size."""
+"""Figures of the page, drawn from its tables: error against time, and cost against size.
+
+The page is all that they need, so that they can be drawn anew without a measurement: ``python -m benchmarks.speed
+--pictures``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import ceil
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from benchmarks.speed.run import PAPER
 from benchmarks.store import Store
 from benchmarks.targets import TARGETS, Target
+from rodfem.output.sheet import STYLE
 
 Row = dict[str, Any]
+Table = list[list[str]]
+Page = Mapping[str, Sequence[Table]]
 
-COLOURS = {1: "#d55e00", 2: "#e69f00", 3: "#f0c000", 4: "#009e73", 5: "#3aa6a0", 6: "#0072b2", 8: "#7a3fa0"}
+FIGURES = {
+    "equilibria": "speed-equilibria.png", "special": "speed-special.png", "eigenvalues": "speed-eigenvalues.png",
+    "growth": "speed-growth.png",
+}  # fmt: skip
+"""Names of the files."""
+COLOURS = {1: "#d55e00", 2: "#e69f00", 3: "#a6a000", 4: "#009e73", 5: "#3aa6a0", 6: "#0072b2", 8: "#7a3fa0"}
 """Colour for each degree."""
-FLOOR = 1e-14
-"""An error of zero is drawn here."""
-COLUMNS = 4
-"""Columns of a legend."""
+FLOOR, LOWEST = 1e-15, 3e-16
+"""An error of zero is drawn here; the least error on the axes."""
+COLUMNS, WIDE, HIGH, DPI = 3, 3.9, 3.3, 110
+"""Panels side by side, the size of one in inches, dots per inch."""
+LINE = 0.24
+"""Height of a line of a legend in inches."""
 AUTO_NAMES = {"follower": ("flutter",), "hemitropic": ("hemitropic", "hemitropic-half")}
 PEER_BRANCH = {"flutter": "mu1, mu2"}
+REDUCED = "reduced"
+DEGREE = "rodfem, degree {}"
+HALF = "half the rod"
+JUDGED = "rod", "discretisation"
+"""First columns of the table of all judgements."""
 
 
 def peers(store: Store, scene: str, branch: str) -> dict[str, list[Row]]:
@@ -37,158 +59,221 @@ def peers(store: Store, scene: str, branch: str) -> dict[str, list[Row]]:
     return out
 
 
-def series(axes: Axes, rows: Iterable[Row], time: Callable[[Row], float], error: Callable[[Row], float | None]) -> None:
-    """A line for each formulation and degree: filled if reduced, hollow if pointwise; the paper's point is a star."""
-    groups: dict[tuple[str, int], list[Row]] = {}
-    for row in rows:
-        if error(row) is not None:
-            groups.setdefault((row["formulation"], row["degree"]), []).append(row)
-    for (formulation, degree), group in sorted(groups.items()):
-        group.sort(key=lambda r: r["elements"])
-        reduced, colour = formulation == "reduced", COLOURS[degree]
-        x, y = [1e3 * time(r) for r in group], [max(error(r) or 0.0, FLOOR) for r in group]
-        style = {"linestyle": "-" if reduced else ":", "marker": "o", "markersize": 4, "linewidth": 1}
-        label = f"rodfem P{degree}, {formulation}"
-        axes.loglog(x, y, color=colour, markerfacecolor=colour if reduced else "white", label=label, **style)
-        for a, b, row in zip(x, y, group, strict=True):
-            if (row["elements"], degree) == PAPER:
-                label = f"the paper's: 150 P1, midpoint rule ({formulation})"
-                face = colour if reduced else "white"
-                axes.loglog(a, b, "*", color=colour, markerfacecolor=face, markersize=12, label=label, linestyle="none")
+def read(text: str) -> dict[str, list[Table]]:
+    """Tables of a page in Markdown by the title of their section: rows of cells, the head first, without its rule."""
+    found: dict[str, list[Table]] = {}
+    title, last = "", ""
+    for line in text.splitlines():
+        if line.startswith("#"):
+            title = line.lstrip("# ")
+        if line.startswith("|"):
+            if not last.startswith("|"):
+                found.setdefault(title, []).append([])
+            cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
+            if not all(re.fullmatch(":?-+:?", cell) for cell in cells):
+                found[title][-1].append(cells)
+        last = line
+    return found
 
 
-def auto(axes: Axes, store: Store, scene: str, branch: str, x: Callable[[Row], float], target: str) -> None:
-    """AUTO's points for one target."""
-    for problem, rows in peers(store, scene, branch).items():
-        found = sorted(
-            (1e3 * x(r), max(r["errors"][target], FLOOR)) for r in rows if r["errors"].get(target) is not None
-        )
-        half = problem.endswith("-half")
+def rows_of(page: Page, section: str, *head: str) -> list[list[str]]:
+    """Rows of the table of a section whose first columns have these names; empty where there is none."""
+    return [row for table in page.get(section, ()) if tuple(table[0][: len(head)]) == head for row in table[1:]]
+
+
+def discretisation(words: str) -> tuple[int, int, str]:
+    """Elements, degree and formulation, as in ``10 P6 reduced``."""
+    elements, degree, formulation = words.split()
+    return int(elements), int(degree.removeprefix("P")), formulation
+
+
+def series(axes: Axes, points: Iterable[tuple[str, float, float]]) -> None:
+    """Errors against times by discretisation, those of one degree joined in the order of their elements.
+
+    The reduced formulation has filled marks; hollow ones are the pointwise formulation, and joined only where there is
+    no other.  The paper's discretisation is a star.
+    """
+    groups: dict[tuple[str, int], list[tuple[int, float, float]]] = {}
+    for words, time, error in points:
+        elements, degree, formulation = discretisation(words)
+        groups.setdefault((formulation, degree), []).append((elements, time, max(error, FLOOR)))
+    joined = REDUCED if any(formulation == REDUCED for formulation, _ in groups) else "pointwise"
+    for (formulation, degree), group in sorted(groups.items(), reverse=True):
+        places = [(time, error) for _, time, error in sorted(group)]
+        colour, line = COLOURS[degree], "-" if formulation == joined else "none"
+        face = colour if formulation == REDUCED else "white"
+        size = 5.0 if formulation == joined else 3.6
+        style = {"color": colour, "markerfacecolor": face, "zorder": 3 + (formulation == joined)}
+        label = DEGREE.format(degree) if formulation == REDUCED else "_"
+        axes.loglog(*zip(*places, strict=True), marker="o", linestyle=line, lw=1.5, ms=size, label=label, **style)
+        for elements, time, error in group:
+            if (elements, degree) == PAPER:
+                style |= {"mec": "black", "mew": 0.7, "ms": 13, "label": "_", "zorder": 6}
+                axes.loglog(time, error, "*", **style)
+
+
+def others(axes: Axes, page: Page, scene: str, branch: str, special: bool) -> None:
+    """AUTO's points of a branch, and for states those of scipy's solve_bvp."""
+    column, styles = (8 if special else 7), {"": ("s--", "black"), HALF: ("s:", "white")}
+    for half, (line, face) in styles.items():
+        rows = [r for r in rows_of(page, "Beside AUTO-07p", "scene") if r[0].split()[0] == scene and r[1] == branch]
+        found = sorted((float(r[column]), float(r[4])) for r in rows if r[3] and ("half" in r[0]) == bool(half))
         if found:
-            times, errors = zip(*found, strict=True)
-            face = "white" if half else "black"
-            label = "AUTO-07p, half the rod" if half else "AUTO-07p"
-            axes.loglog(times, errors, "s--", color="black", markerfacecolor=face, markersize=5, label=label)
-
-
-def scipy(axes: Axes, store: Store, scene: str, branch: str) -> None:
-    """Points of scipy's solve_bvp."""
-    rows = sorted((r for r in store.rows(f"bvp/{scene}/{branch}")), key=lambda r: -r["tolerance"])
+            style = {"color": "black", "markerfacecolor": face, "ms": 5.5, "lw": 1.3, "zorder": 5}
+            axes.loglog(*zip(*found, strict=True), line, label=", ".join(filter(None, ("AUTO-07p", half))), **style)
+    rows = [] if special else [r for r in rows_of(page, "Beside scipy", "scene") if r[:2] == [scene, branch]]
     if rows:
-        x, y = [1e3 * r["seconds"] for r in rows], [r["error"] for r in rows]
-        axes.loglog(x, y, "^-.", color="grey", markersize=5, label="scipy solve_bvp")
+        found = sorted((float(r[6]), float(r[3])) for r in rows)
+        axes.loglog(*zip(*found, strict=True), "^-.", color="0.45", ms=6, lw=1.3, label="scipy solve_bvp", zorder=5)
 
 
-def finish(figure: Figure, panels: Sequence[Axes], path: Path, time: str) -> str:
-    """Name the axes, one legend for all panels below them, save."""
-    entries: dict[str, Any] = {}
-    for axes in panels:
-        axes.grid(True, which="major", linewidth=0.4)
-        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.tick_params(labelsize=8)
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            entries.setdefault(label, handle)
-    figure.suptitle(f"Relative error against {time}", fontsize=11)
-    order = sorted(entries, key=lambda x: (not x.startswith("rodfem"), "pointwise" in x, x))
-    below = 0.2 * (1 + -(-len(order) // COLUMNS)) / figure.get_size_inches()[1]
-    figure.get_layout_engine().set(rect=(0, below, 1, 1 - below))
-    figure.legend([entries[x] for x in order], order, loc="lower center", ncols=COLUMNS, fontsize=8)
-    figure.savefig(path)
-    return path.name
+def targets(special: bool) -> list[tuple[str, str]]:
+    """Scene and branch of each panel: those with special points, or with states at a load."""
 
+    def wanted(target: Target) -> bool:
+        return (target.at is None) == special
 
-def targets(special: bool) -> list[tuple[str, str, Target]]:
-    """Scene, branch and target of each panel: special points, or states at a load."""
     return [
-        (scene, branch, target)
+        (scene, branch)
         for scene, branches in TARGETS.items()
         for branch, found in branches.items()
-        for target in found
-        if (target.at is None) == special and (special or scene != "follower")
+        if any(map(wanted, found)) and (special or scene != "follower")
     ]
 
 
-def work_precision(store: Store, path: Path, special: bool) -> str | None:
-    """Error of special points against the time of the branch, or of states against the time of an accepted point."""
-    panels = targets(special)
-    rows = store.rows("branches")
-    if not rows:
-        return None
-    columns = 4 if special else 3
-    lines = -(-len(panels) // columns)
-    figure = Figure(figsize=(4.0 * columns, 3.0 * lines + 1.2), dpi=110, layout="constrained")
-    grid = figure.subplots(lines, columns, squeeze=False).ravel()
-    for axes, (scene, branch, target) in zip(grid, panels, strict=False):
-        mine = [r for r in rows if r["scene"] == scene and r["branch"] == branch]
-        name = target.name
-
-        def cost(r: Row) -> float:
-            return float(r["seconds"] if special else r["following"] / r["points"])
-
-        series(axes, mine, cost, lambda r, name=name: r["errors"].get(name))  # type: ignore[misc]
-        auto(axes, store, scene, branch, cost, name)
-        if not special:
-            scipy(axes, store, scene, branch)
-        axes.set_title(f"{scene}, {branch}\n{name}", fontsize=9)
-    for axes in grid[len(panels) :]:
-        axes.set_visible(False)
-    words = (
-        "ms for the whole branch, special points and index included"
-        if special
-        else "ms per accepted point, index included"
-    )
-    return finish(figure, grid[: len(panels)], path, words)
+def ticks(axes: Axes) -> None:
+    """Times as plain numbers, as many as there is room for; one tick for two powers of ten of the error."""
+    low, high = axes.get_xlim()
+    subs = (1,) if high > 300 * low else (1, 2, 5) if high < 40 * low else (1, 3)
+    axes.xaxis.set_major_locator(LogLocator(subs=subs))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_major_locator(LogLocator(base=100.0, numticks=12))
+    axes.yaxis.set_minor_locator(NullLocator())
 
 
-def eigenvalues(store: Store, path: Path) -> str | None:
-    """Error of left-most eigenvalues against the time of one judgement."""
-    rows = store.rows("eigenvalues")
-    names = list(dict.fromkeys(r["name"] for r in rows))
-    if not names:
-        return None
-    figure = Figure(figsize=(13.0, 4.4), dpi=110, layout="constrained")
-    grid = figure.subplots(1, len(names), squeeze=False).ravel()
-    for axes, name in zip(grid, names, strict=True):
-        series(axes, [r for r in rows if r["name"] == name], lambda r: r["seconds"], lambda r: r["error"])
-        axes.set_title(name, fontsize=9)
-    return finish(figure, grid, path, "ms for one judgement")
+def sheet(
+    panels: Sequence[tuple[str, Callable[[Axes], None]]], path: Path, title: str, time: str, columns: int = COLUMNS
+) -> None:
+    """Draw error against time in panels side by side, with one scale of the error and one legend below.
+
+    Parameters
+    ----------
+    panels
+        Title of each, and what draws into its axes.
+    path
+        Picture to write.
+    title, time
+        Words for all of it, and for the axis of the time.
+    columns
+        Panels side by side.
+    """
+    lines = ceil(len(panels) / columns)
+    with matplotlib.rc_context(STYLE | {"font.size": 10.0}):
+        figure = Figure(figsize=(WIDE * columns, HIGH * lines + 1.1), dpi=DPI, layout="constrained")
+        grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
+        entries: dict[str, Any] = {}
+        for number, (axes, (name, draw_panel)) in enumerate(zip(grid.ravel(), panels, strict=False)):
+            draw_panel(axes)
+            axes.set_ylim(LOWEST, 3.0)
+            axes.set_title(name, fontsize=11)
+            ticks(axes)
+            if number % columns == 0:
+                axes.set_ylabel("largest relative error")
+            if number + columns >= len(panels):
+                axes.set_xlabel(time)
+            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+                entries.setdefault(label, handle)
+        for axes in grid.ravel()[len(panels) :]:
+            axes.set_axis_off()
+        for label, style in (
+            ("hollow: pointwise formulation", {"marker": "o", "ms": 4.5}),
+            ("the paper's: 150 linear elements", {"marker": "*", "ms": 13}),
+        ):
+            entries[label] = matplotlib.lines.Line2D([], [], ls="none", mfc="white", mec="0.2", **style)
+        order = sorted(entries, key=lambda label: [x in label for x in ("the paper", "hollow", "scipy", HALF, "AUTO")])
+        figure.suptitle(f"{title} (better: further down, and to the left)", fontsize=13)
+        empty = lines * columns - len(panels)
+        handles = [entries[label] for label in order]
+        if empty:
+            grid.ravel()[-1].legend(handles, order, loc="center", fontsize=10, frameon=False)
+        else:
+            legend_below(figure, handles, order, columns=columns + 1)
+        figure.savefig(path)
 
 
-def growth(store: Store, path: Path) -> str | None:
+def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str], columns: int) -> None:
+    """One legend for all panels in the room that it needs below them; ``handles`` and ``labels`` are its entries."""
+    room = LINE * (ceil(len(labels) / columns) + 0.5) / figure.get_size_inches()[1]
+    figure.get_layout_engine().set(rect=(0, room, 1, 1 - room))
+    figure.legend(handles, labels, loc="lower center", ncols=columns, fontsize=10, frameon=False)
+
+
+def work_precision(page: Page, path: Path, special: bool) -> None:
+    """Largest error of a branch's targets against the time of the branch, or of a point of it."""
+    found = rows_of(page, "All branches", "scene")
+
+    def panel(scene: str, branch: str) -> Callable[[Axes], None]:
+        def draw_panel(axes: Axes) -> None:
+            mine = [r for r in found if r[:2] == [scene, branch] and r[5]]
+            series(axes, [(r[2], float(r[9 if special else 7]), float(r[5])) for r in mine])
+            others(axes, page, scene, branch, special)
+
+        return draw_panel
+
+    panels = [(f"{scene}, {branch}", panel(scene, branch)) for scene, branch in targets(special)]
+    if special:
+        sheet(panels, path, "A whole branch, its special points located", "ms for the branch")
+    else:
+        sheet(panels, path, "Following a branch, with the index of every point", "ms for a point")
+
+
+def eigenvalues(page: Page, path: Path) -> None:
+    """Error of the left-most eigenvalues against the time of one judgement."""
+    found = rows_of(page, "Eigenvalues", *JUDGED)
+
+    def panel(name: str) -> Callable[[Axes], None]:
+        return lambda axes: series(axes, [(r[1], float(r[4]), float(r[3])) for r in found if r[0] == name])
+
+    panels = [(name, panel(name)) for name in dict.fromkeys(r[0] for r in found)]
+    sheet(panels, path, "Left-most eigenvalues of a straight rod", "ms for one judgement", columns=2)
+
+
+def growth(page: Page, path: Path) -> None:
     """Time and memory against the number of unknowns."""
-    rows = store.rows("growth")
-    if not rows:
-        return None
-    figure = Figure(figsize=(12.0, 4.0), dpi=110, layout="constrained")
-    grid = figure.subplots(1, 3)
-    for axes, key, words in zip(
-        grid,
-        ("equilibrium", "count", "memory"),
-        ("s for one equilibrium", "s for one index", "MB"),
-        strict=True,
+    rows = [r for r in rows_of(page, "Growth", "state") if not r[2].startswith("**")]
+    with matplotlib.rc_context(STYLE | {"font.size": 10.0}):
+        figure = Figure(figsize=(WIDE * COLUMNS, HIGH + 1.0), dpi=DPI, layout="constrained")
+        panels = figure.subplots(1, 3)
+        for axes, column, words in zip(
+            panels, (4, 6, 7), ("s for an equilibrium", "s for an index", "MB of memory"), strict=True
+        ):
+            for formulation, colour in ((REDUCED, "#0072b2"), ("pointwise", "#d55e00")):
+                for state, mark in (("straight", "o-"), ("buckled", "s--")):
+                    found = [(float(r[2]), float(r[column])) for r in rows if r[:2] == [state, formulation]]
+                    if found:
+                        label = f"{state}, {formulation}"
+                        axes.loglog(*zip(*sorted(found), strict=True), mark, color=colour, ms=5, lw=1.6, label=label)
+            low = min(float(r[2]) for r in rows), max(float(r[2]) for r in rows)
+            level = min(float(r[column]) for r in rows if float(r[2]) == low[1]) / low[1] / 2.5
+            ends = [10.0 * low[0], low[1]]
+            axes.loglog(ends, [level * n for n in ends], color="0.6", lw=1.0, label="proportional to the unknowns")
+            axes.set(xlabel="unknowns", ylabel=words)
+        figure.suptitle("Cost against the size of the problem", fontsize=13)
+        legend_below(figure, *panels[0].get_legend_handles_labels(), columns=5)
+        figure.savefig(path)
+
+
+def draw(path: Path) -> list[Path]:
+    """Draw what a page has tables for, beside it; returns the pictures."""
+    page, drawn = read(path.read_text()), []
+    for key, section, head, make in (
+        ("equilibria", "All branches", ("scene",), lambda to: work_precision(page, to, special=False)),
+        ("special", "All branches", ("scene",), lambda to: work_precision(page, to, special=True)),
+        ("eigenvalues", "Eigenvalues", JUDGED, lambda to: eigenvalues(page, to)),
+        ("growth", "Growth", ("state",), lambda to: growth(page, to)),
     ):
-        for formulation, colour in (("reduced", "#0072b2"), ("pointwise", "#d55e00")):
-            for state, mark in (("straight", "o-"), ("buckled", "s--")):
-                found = sorted(
-                    (r["unknowns"], r[key]) for r in rows if (r["formulation"], r["state"]) == (formulation, state)
-                )
-                if found:
-                    axes.loglog(*zip(*found, strict=True), mark, color=colour, label=f"{state}, {formulation}")
-        axes.grid(True, linewidth=0.4)
-        axes.set(xlabel="unknowns", ylabel=words)
-    grid[0].legend(fontsize=8)
-    figure.savefig(path)
-    return path.name
-
-
-def draw(store: Store, folder: Path) -> dict[str, str]:
-    """Draw what there are measurements for; names of the files."""
-    found = {
-        "equilibria": work_precision(store, folder / "speed-equilibria.png", special=False),
-        "special": work_precision(store, folder / "speed-special.png", special=True),
-        "eigenvalues": eigenvalues(store, folder / "speed-eigenvalues.png"),
-        "growth": growth(store, folder / "speed-growth.png"),
-    }
-    return {key: name for key, name in found.items() if name}
+        if rows_of(page, section, *head):
+            make(path.with_name(FIGURES[key]))
+            drawn.append(path.with_name(FIGURES[key]))
+    return drawn

@@ -10,11 +10,12 @@ All but the hemitropic rod's bent states (multiple shooting, `tests/reference_va
 run, and differ from the table by at most {deviation:.0e}: errors below that mean nothing.
 """
 EQUILIBRIA = """
-Time per accepted point of following a branch, index included, special points not, against the error of the ordinate
-at one load. A star is the discretisation of Kumar & Healey (2010).
+Time per accepted point of following a branch, index included, special points not, against the largest error of the
+branch's targets (the ordinate at a load, and the fold of a branch 2; of scipy the ordinate alone). Lines join meshes
+of one degree, from coarse to fine. A star is the discretisation of Kumar & Healey (2010).
 """
 SPECIAL = """
-Time of a whole branch, index included and special points located, against the error of their loads.
+Time of a whole branch, index included and special points located, against the largest error of the branch's targets.
 """
 PAPER = """
 150 linear elements with the midpoint rule, and the fastest discretisation that is at least as accurate on all targets

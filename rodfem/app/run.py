@@ -119,7 +119,7 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     terminal.spectra(branches, scene)
     terminal.frequencies(branches, scene.load)
     terminal.timing(clock, sum(len(b.points) for b in branches))
-    terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5")
+    terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5 (rodfem view {output} shows them)")
     if plan.method or plan.modes:
         from rodfem.app.assess_all import assess_all
 

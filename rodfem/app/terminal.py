@@ -21,8 +21,8 @@ from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.modes.modes import Modes
-from rodfem.output.digits import in_decimals, in_words, index_in_words, number, rounded_up, with_unit
-from rodfem.output.summary import in_sentences
+from rodfem.output.digits import NO_ESTIMATE, in_decimals, in_words, index_in_words, number, rounded_up, with_unit
+from rodfem.output.summary import called, in_sentences
 from rodfem.problem.scene import Scene
 from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
@@ -74,7 +74,7 @@ class Report(Observer):
         self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None, words: Callable[[str], str] = str
     ) -> None:
         """Print what ``words`` makes of each line to ``stream``, by default the terminal."""
-        self.count, self.words, self.units = INDEX, words, ONES
+        self.count, self.words, self.units, self.wide = INDEX, words, ONES, 6
         self.on = comm.rank == 0
         self.stream = stream or sys.stdout
         self.live = self.on and self.stream.isatty() and comm.size == 1
@@ -111,6 +111,7 @@ class Report(Observer):
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
         self.units = scene.units
         self.count = INDEX if scene.conservative else UNSTABLE
+        self.wide = len("0->1 (in space 2)") if scene.planar and scene.conservative else max(6, len(self.count))
         if not scene.conservative:
             loads = ", ".join(scene.without_potential())
             self.say(f"  not conservative ({loads}): stability is a matter of frequencies, not of an index")
@@ -154,9 +155,9 @@ class Report(Observer):
     def branch(self, branch: Branch) -> None:
         """Head a new branch."""
         self.known.append(branch)
-        origin = f" from {branch.parent[0]}, special point {branch.parent[1] + 1}" if branch.parent else ""
+        origin = f" from {called(branch.parent[0])}, special point {branch.parent[1] + 1}" if branch.parent else ""
         self.say(f"\n{branch.name}{origin}")
-        self.say(f"       load           ordinate       int W ds  {self.count:>6}  zero  located to")
+        self.say(f"       load           ordinate       int W ds  {self.count:>{self.wide}}  zero  located to")
 
     def progress(self, branch: Branch, point: Point) -> None:
         """Keep one line up to date while a branch is traced (on a terminal only)."""
@@ -178,14 +179,16 @@ class Report(Observer):
         return (
             f"{special.kind.code}   {in_decimals(p.load, 10, units.load):<14} "
             f"{in_decimals(p.ordinate, 9, units.ordinate):<14} {in_decimals(p.energy, 6, units.energy):<10} "
-            f"{index_in_words(special):>{max(6, len(self.count))}} {p.zero:>5}  {special.located_to:.0e}{connects_to}"
+            f"{index_in_words(special):>{self.wide}} {p.zero:>5}  {special.located_to:.0e}{connects_to}"
         )
 
     def law(self, special: SpecialPoint) -> None:
         """Print the local law of a branch point, if it has one."""
         if special.law is not None:
             law = _law(special.law, special.resolved)
-            self.say(f"\nAt load {special.point.load:.8g}: {law}; x is the change of the ordinate")
+            even = special.law.power == 1 and "pitchfork" in special.law.kind
+            what = "x is the change of the ordinate" + ", of second order in the amplitude" * even
+            self.say(f"\nAt load {special.point.load:.8g}: {law}; {what}")
 
     def finished(self, branch: Branch) -> None:
         """Close a branch: its last point and why it ended."""
@@ -198,12 +201,15 @@ class Report(Observer):
         scene = system.scene
         load, ordinate = (with_unit(scene.load, scene.parameters[scene.load].unit),
                           with_unit(scene.ordinate.name, scene.ordinate.unit))  # fmt: skip
-        self.say(f"\nSpecial points (in parentheses a bound of the error; ordinate: {ordinate})")
+        known = any(isfinite(s.error_estimate) for b in branches for s in b.special)
+        bars = "in parentheses a bound of the error" if known else "no estimate of the errors"
+        self.say(f"\nSpecial points ({bars}; ordinate: {ordinate})")
         self.say(f"  {'branch':<12} {'kind':<13} {load:<24} {'ordinate':<24} {self.count}")
         scale = max([self.units.ordinate, *(abs(p.ordinate) for b in branches for p in b.points)])
         for branch in branches:
             for s in branch.special:
                 load, ordinate, index = in_words(s, scale)
+                load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in (load, ordinate))
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
                 self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {index}{zero}")
                 for mode in s.point.soft:
@@ -223,7 +229,8 @@ class Report(Observer):
         missed = not_followed(branches)
         if missed:
             deepest = max(b.depth for b in branches if any(s.to_follow for s in b.special))
-            more, limit = Argument("Plan", "depth", deepest + 1), "at the depth of switches"
+            more = Argument("Plan", "depth", deepest + 1)
+            limit = f"as the depth is {deepest} (switches from the first branch)"
             if most and len(branches) >= most:
                 more, limit = Argument("Plan", "most_branches", 2 * most), f"as there are {len(branches)} branches"
             many = "s were" if missed > 1 else " was"
@@ -310,7 +317,8 @@ class Report(Observer):
     def timing(self, clock: Clock, points: int) -> None:
         """Print where the time went."""
         names = ("setup", *WORK, "location", "error bars", "files")
-        parts = [f"{name} {clock.seconds.get(name, 0.0):.2f} s" for name in names]
+        took = {name: f"{clock.seconds.get(name, 0.0):.2f} s" for name in names}
+        parts = [f"{name} {seconds}" for name, seconds in took.items() if seconds != "0.00 s"]
         self.say(f"\nTime: {', '.join(parts)}; {clock.total():.2f} s in all")
         known = "index" if self.count == INDEX else "frequencies"
         self.say(f"{points} points with their {known}, {clock.each(points):.2f} ms each ({', '.join(WORK)})")

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from rodfem.stability.cluster import Cluster
 
 NOT_TRACED = "not traced"
+FIRST_BRANCH = "first branch"
+"""Name of the branch of the start state, where neither the scene nor its shape gives another."""
 
 
 @dataclass(repr=False)

@@ -18,6 +18,7 @@ from rodfem.continuation.special_points import COUPLED, coupling_of, directions,
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
 from rodfem.diagram.equivalence import equally_stable, equivalent, near
+from rodfem.diagram.first_name import ahead, name_of_first
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
@@ -124,13 +125,15 @@ class Explorer(Tracer):
                 f"{start:g}: write the energy of stretch in v[2] - 1 (zero in the undeformed rod), or push less."
             )
         if self.scene.closed:
-            number, Tw, Wr = link(self.solver.shape.sample(point.x))
+            number, *turns = link(self.solver.shape.sample(point.x))
+            Tw, Wr = (round(x, 4) + 0.0 for x in turns)  # no negative zero
             self.observer.note(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
         if point.negative:
             self.observer.note(
                 f"  the first state is unstable already (index {point.negative}): stability was lost outside the range"
             )
-        return Branch(self.scene.states, None, 0, [point])
+        name = name_of_first(self.solver.shape, [point.x, ahead(point.x, point.tangent)])
+        return Branch(name, None, 0, [point])
 
     def _first(self) -> Point:
         start, stop = self.span

@@ -18,13 +18,14 @@ from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import bound, halved
-from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER, Kind
 from rodfem.continuation.locate import SHARP, real_root, zero_uncertainty
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import StaticSolver
+from rodfem.diagram.first_name import name_of_first
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, SHIFT, FrequencyRows, Row, differ, leftmost
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError
@@ -91,12 +92,10 @@ class Sweep:
 
     def run(self) -> list[Branch]:
         """Sweep, locate flutter, estimate errors."""
-        scene = self.solver.system.scene
-        branch = Branch(scene.states, None, 0)
+        branch, comm = Branch(FIRST_BRANCH, None, 0), self.solver.system.comm
         self.branches.append(branch)
-        self.observer.branch(branch)
         try:
-            with as_failure(self.solver.system.comm):
+            with as_failure(comm):
                 self._sweep(branch)
             branch.ended = "end of range"
         except ConvergenceError as trouble:
@@ -107,7 +106,7 @@ class Sweep:
         last = branch.points[-1]
         branch.special.append(self.solver.given(END, last))
         branch.renumber()
-        comm, warn = self.solver.system.comm, self.observer.warn
+        warn = self.observer.warn
         if self.plan.error_bars:
             with without("No errors were estimated", comm, warn):
                 self._error_bars(branch)
@@ -121,7 +120,10 @@ class Sweep:
         """Compute the points of a branch, load by load, and the special points between them."""
         a, b = self.span
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
+        loads = loads if a < b else loads[::-1]
         x, _ = self.solver.first(a)
+        branch.name = name_of_first(self.solver.shape, [x, self.solver.at_load(x, float(loads[1]))[0]])
+        self.observer.branch(branch)
         if self.solver.system.scene.constraints:  # others are independent
             require_independent_constraints(self.solver.system, x)
         if words := differ(self.eigensolver.at(x), self.number):
@@ -132,7 +134,7 @@ class Sweep:
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         try:
-            for load in loads if a < b else loads[::-1]:
+            for load in loads:
                 x = at_load(self.solver, x, float(load))
                 for notice in self.solver.notices():
                     self.observer.warn(notice)
@@ -157,8 +159,7 @@ class Sweep:
         rank, size = self.eigensolver.at(last.x).asymmetry()
         self.observer.note(
             f"  the load makes the tangent matrix non-symmetric by a matrix of rank {rank} "
-            f"(largest entry {size:.1e} of |S|):\n"
-            f"  factors of the symmetric part and {rank} more solves would do for it (Sherman-Morrison-Woodbury)"
+            f"(largest entry {size:.1e} of |S|)"
         )
 
     def at(self, x: PETSc.Vec) -> Point:

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 FINEST, LARGEST = 9e-15, 1e12
 """Least error, and greatest number, that are written without an exponent."""
+NO_ESTIMATE = " (no estimate)"
+"""Behind a number without an error bar."""
 WHOLE = 1e-9
 """Round-off of the logarithm of a power of ten."""
 
@@ -33,7 +35,7 @@ def number(value: float, error: float, resolved: bool | None = True, scale: floa
     round-off of numbers of the ``scale``.
     """
     if not isfinite(error):
-        return f"{0.0 if abs(value) <= NEGLIGIBLE * scale else value:.8g} (no estimate)"
+        return f"{0.0 if abs(value) <= NEGLIGIBLE * scale else value:.8g}{NO_ESTIMATE}"
     digits = min(max(-floor(log10(rounded_up(error)) + WHOLE), 0), 13) if error > 0 else 13
     least = "at least " if resolved is False else ""
     if (error > 0 and error < FINEST) or abs(value) >= LARGEST:  # of a rod whose units are far from its own size

@@ -8,6 +8,7 @@ from typing import Any
 
 from rodfem.continuation.kinds import KINDS
 from rodfem.output.digits import number
+from rodfem.output.summary import called
 
 
 def first_loss(data: Mapping[str, Any]) -> str:
@@ -35,7 +36,7 @@ def first_loss(data: Mapping[str, Any]) -> str:
         return f"{lost['kind']}{plane} at {data['parameter']} = {load}"
     if any(columns["negative"]):
         return f"unstable{plane} somewhere, without a special point"
-    return f"none{plane}: {branch['name']} is stable from {columns['load'][0]:.6g} to {columns['load'][-1]:.6g}"
+    return f"none{plane}: {called(branch['name'])} is stable from {columns['load'][0]:.6g} to {columns['load'][-1]:.6g}"
 
 
 def _loses(special: Mapping[str, Any]) -> bool:

@@ -154,6 +154,10 @@ ENTRIES = {
     "eta": "Multiplier of the unit norm of the quaternions, a field of unknowns.",
     # branches
     "branch": "A curve of equilibria, row by row along its arclength.",
+    "first branch | straight | ring": (
+        "The branch of the state from which a run starts. It is called straight where its states are, ring if the rod "
+        "is closed, or as the scene says (states=...), and first branch otherwise."
+    ),
     "detached": "A branch on the other side of a gap that an imperfection leaves: no step from the others reaches it.",
     "found": "A branch through an equilibrium that a search by deflation found.",
     "depth | branch_points_not_followed": (

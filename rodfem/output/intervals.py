@@ -12,6 +12,8 @@ import numpy as np
 from rodfem.output.plot_pieces import STABLE, STYLES, pieces_of
 from rodfem.tolerances import SAME_SPECIAL
 
+SHARES = (0.5, 0.31)
+"""Where in a range energies are compared: those of different states may be the same at one load, of symmetry, say."""
 SAME_ENERGY = 1e-3
 """Energies, interpolated linearly between rows, that differ by less than this, relative, may be those of one state."""
 
@@ -89,15 +91,15 @@ def without_stable(stable: Sequence[Interval], low: float, high: float) -> Itera
 def coexisting(stable: Sequence[Interval]) -> Iterator[tuple[Interval, Interval, float, float]]:
     """Pairs of stable intervals with a range of loads in common and other energies there: the pair and that range.
 
-    Those of one energy are mirror images of each other, or one branch traced twice.
+    Those of one energy, all along it, are mirror images of each other, or one branch traced twice.
     """
     for one, other in combinations(stable, 2):
         (a, b), (c, d) = one.covers, other.covers
         low, high = max(a, c), min(b, d)
         if high - low > SAME_SPECIAL * max(b - a, d - c):
-            middle = (low + high) / 2
-            first, second = one.energy(middle), other.energy(middle)
-            if abs(first - second) > SAME_ENERGY * max(abs(first), abs(second)):
+            places = [low + share * (high - low) for share in SHARES]
+            energies = [(one.energy(x), other.energy(x)) for x in places]
+            if any(abs(p - q) > SAME_ENERGY * max(abs(p), abs(q)) for p, q in energies):
                 yield one, other, low, high
 
 

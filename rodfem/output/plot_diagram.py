@@ -23,7 +23,7 @@ from rodfem.output.contents import read_diagram
 from rodfem.output.endings import endings
 from rodfem.output.placement import dense, place_words
 from rodfem.output.plot_images import draw_images
-from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, UNSTABLE, Piece, hidden, pieces_of
+from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, Piece, hidden, pieces_of
 from rodfem.output.program import status_of, terse
 from rodfem.output.sheet import (
     DPI,
@@ -169,11 +169,12 @@ def _draw_branches(
             found.setdefault(SINGULAR, []).append(tuple(branch["columns"][key][0] for key in ("load", "ordinate")))
     for piece in sorted(pieces, key=lambda piece: -piece.negative):  # the stable ones on top: see _uncover
         axes.plot(*piece.curve.T, color=piece.colour, **STYLES[piece.kind])
-    drawn = {piece.kind for piece in pieces} | {STABLE, UNSTABLE}
+    drawn = {piece.kind for piece in pieces}
     handles += [Line2D([], [], color="0.45", label=kind, **style) for kind, style in STYLES.items() if kind in drawn]
     in_space = any(piece.in_space is not None for piece in pieces)
     text = "negative eigenvalues" + (" in the plane (in space)" if in_space else "")
-    handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=text))
+    if pieces:
+        handles.append(Line2D([], [], ls="", marker="$n$", ms=6, color="0.3", label=text))
     handles += draw_images(axes, branches, [PALETTE[i % len(PALETTE)] for i in range(len(branches))])
     kinds = [*MARKERS, *(kind for kind in found if kind.startswith(ENDS))]
     points = {kind: np.unique(np.array(found[kind], float), axis=0) for kind in kinds if found.get(kind)}

@@ -161,7 +161,7 @@ class _Panel:
     def _look(self, span: float) -> None:
         """Choose the axes (see :func:`rodfem.output.view.view_of`), the limits, and the sign of the mode.
 
-        Upwards is a positive direction, and the mode goes there at its greatest amplitude.
+        It goes upwards at its greatest amplitude.
         """
         held, moved = self.setting, self.u.real
         if np.linalg.norm(self.u.imag) > np.linalg.norm(moved):
@@ -173,9 +173,8 @@ class _Panel:
         across = most if held.force is None and np.linalg.norm(most) > BENT * span else held.force
         chosen = {"axis": held.axis, "down": held.down, "load": across, "side": held.widest(self.frames[0])}
         self.view = view_of(self.r, moved, **chosen)
-        up = self.view[1]
-        if up[np.argmax(abs(up))] < 0.0 and held.down is None:
-            self.view = view_of(self.r, -moved, **chosen)
+        raised = moved @ self.view[1]
+        if raised[np.argmax(abs(raised))] < 0.0:
             self.u, self.w = -self.u, -self.w
         points = []
         for factor in (1.0, -1.0, 1.0j, -1.0j):

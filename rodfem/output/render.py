@@ -19,7 +19,7 @@ from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.glyphs import DARK, LOAD, glyphs_of
 from rodfem.output.program import status_of, terse
 from rodfem.output.solids import Solid, curve_of, profile_of, rod, straight_arrow
-from rodfem.output.view import POINT, view_of
+from rodfem.output.view import POINT, axis_of, view_of
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
 from rodfem.whole_files import draft_of
@@ -27,9 +27,15 @@ from rodfem.whole_files import draft_of
 __all__ = ["draw_shape", "draw_shape_safely", "main"]
 
 Floats = NDArray[np.float64]
-SIZE, ROOM = (1600, 1000), 0.84  # pixels, share of the height above the caption
+SIZE, ROOM, HEAD = (1600, 1000), 0.84, 0.22  # pixels, shares of the height above the caption, and for the triad's line
+NARROW = 1.5  # width over height below which that line is always kept free: beside a rod there is no room
 ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
-TRIAD, SUBSCRIPTS = np.array([0.085, 0.86]), "₁₂₃"  # place of the triad, as a share of width and height
+TRIAD, ARROW, AROUND = (
+    np.array([125.0, 130.0]),
+    70.0,
+    125.0,
+)  # the triad: from corners, its arrows, half its box; pixels
+FOOT, SUBSCRIPTS = 110.0, "₁₂₃"  # pixels of the lines at the foot
 FORMATS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 MPI_VARIABLES = ("OMPI_", "PMI", "MPI_LOCAL")  # the beginnings of their names, PMI_ and PMIX_ alike
 LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrender1 libxcursor1"
@@ -37,7 +43,7 @@ LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrend
 
 def draw_shape(
     states: Path, branch: str, row: int, path: Path,
-    *, caption: str | None = None, radius: float | None = None,
+    *, caption: str | None = None, radius: float | None = None, size: tuple[int, int] = SIZE,
 ) -> Path:  # fmt: skip
     """Draw one equilibrium: the rod with a stripe along d1, arrows along d1 and d2, what holds it and what loads it.
 
@@ -52,11 +58,13 @@ def draw_shape(
     branch, row
         Name of the branch, and row of the state in it, counted from 0.
     path
-        Picture to write, 1600 by 1000 pixels; the suffix decides the format (.png, .jpg, .bmp, .tif).
+        Picture to write; the suffix decides the format (.png, .jpg, .bmp, .tif).
     caption
         Line at the foot of the picture: scene, branch and load when None, nothing when empty.
     radius
         Mean radius of the rod, nondimensional; about 1/90 of its length when None.
+    size
+        Width and height of the picture in pixels; words keep theirs, so that a smaller picture has larger ones.
 
     Returns
     -------
@@ -86,22 +94,25 @@ def draw_shape(
     solids = state.solids(thickness, view)
     pyvista = _import_pyvista()
     font = str(Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf"))
-    plotter = pyvista.Plotter(off_screen=True, window_size=list(SIZE), lighting="light kit")
+    plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
     plotter.set_background("white")
     for solid in solids:
         _add(pyvista, plotter, solid)
     _add_directors(pyvista, plotter, state.centres, state.directors, thickness)
-    corner, scale = _look(plotter, np.concatenate([solid.points for solid in solids]), view, 5.0 * thickness)
-    arrows, names = triad(view, corner, 0.14 * scale)
+    points = np.concatenate([solid.points for solid in solids])
+    corner, place, scale = _look(plotter, points, view, 5.0 * thickness, size)
+    arrows, names = triad(view, corner, 2.0 * ARROW / size[1] * scale)
     for solid in arrows:
         _add(pyvista, plotter, solid)
-    labels = [(text, 0.5, 0.03, "black"), ("d₁", 0.935, 0.93, FIRST), ("d₂", 0.97, 0.93, SECOND)]
-    labels += [("load", 0.885, 0.93, LOAD)] if any(solid.color == LOAD for solid in solids) else []
-    share = 0.07 / np.array([SIZE[0] / SIZE[1], 1.0])
-    labels += [(name, *(TRIAD - (0.0, 0.015) + share * at), DARK) for name, at in names]
+    top = 1.0 - 70.0 / size[1]
+    labels = [(text, 0.5, 0.03, "black"), ("d₁", 1.0 - 104.0 / size[0], top, FIRST)]
+    labels += [("d₂", 1.0 - 48.0 / size[0], top, SECOND)]
+    labels += [("load", 1.0 - 184.0 / size[0], top, LOAD)] if any(solid.color == LOAD for solid in solids) else []
+    share, down = ARROW / np.array(size), np.array([0.0, 15.0 / size[1]])
+    labels += [(name, *(place - down + share * at), DARK) for name, at in names]
     labels += [("not drawn: " + ", ".join(notes), 0.5, 0.095, DARK)] if (notes := state.setting.notes) else []
     for label, x, y, colour in filter(lambda item: item[0], labels):
-        style = {"font_size": min(20, 1400 // len(label)), "color": colour, "font_file": font}
+        style = {"font_size": min(20, int(0.875 * size[0]) // len(label)), "color": colour, "font_file": font}
         actor = plotter.add_text(label, position=(x, y), viewport=True, **style)
         actor.GetTextProperty().SetJustificationToCentered()
     plotter.enable_anti_aliasing("ssaa")
@@ -141,7 +152,8 @@ class State:
         """Axes of the picture, (3, 3)."""
         held, moved = self.setting, self.centres - self.reference
         side = held.widest(self.directors[0])
-        return view_of(self.reference, moved, down=held.down, load=held.force, side=side)
+        axis = axis_of(held, self.reference)
+        return view_of(self.reference, moved, axis=axis, down=held.down, load=held.force, side=side)
 
     def solids(self, radius: float, view: Floats) -> list[Solid]:
         """The rod, its stripe, what holds it and what loads it."""
@@ -168,7 +180,7 @@ def _read(states: Path, branch: str, row: int, count: int = 800) -> State:
                 raise ValueError(f"row {row} of branch {branch!r} does not exist: try one of 0 to {last}")
             load = float(branches[branch]["load"][row])
             symbol = {"lam": "λ"}.get(file.attrs["parameter"], file.attrs["parameter"])
-            caption = f"{file.attrs['scene']} rod, {branch}, {symbol} = {load:.4g}"
+            caption = f"{file.attrs['scene']}, {branch}, {symbol} = {load:.4g}"
             first = file.attrs.get("first", branch)
             left = 0 if branch == first else int(np.argmin(abs(branches[first]["load"][:] - load)))
             s, centres, directors = _curve(branches[branch], row, count)
@@ -251,23 +263,58 @@ def triad(view: Floats, corner: Floats, size: float) -> tuple[list[Solid], list[
     return arrows, names
 
 
-def _look(plotter: Any, points: Floats, view: Floats, margin: float) -> tuple[Floats, float]:
+def _corners(size: tuple[int, int]) -> list[Floats]:
+    """Places for the triad as shares of width and height (2,) from the lower left corner: above, then below."""
+    width, height = size
+    places = (TRIAD[0], height - TRIAD[1]), (TRIAD[0], FOOT + TRIAD[1]), (width - TRIAD[0], FOOT + TRIAD[1])
+    return [np.array(place) / np.array(size) for place in places]
+
+
+def _look(
+    plotter: Any, points: Floats, view: Floats, margin: float, size: tuple[int, int]
+) -> tuple[Floats, Floats, float]:
     """Set a camera without perspective that sees all points (n, 3), above the caption.
 
-    Returns the place of the triad in space, and half the height of the picture there.
+    Parameters
+    ----------
+    plotter
+        Whose camera it is.
+    points, view
+        All that is to be seen, and the axes of the picture (3, 3).
+    margin
+        Length that is kept free around them.
+    size
+        Width and height of the picture in pixels.
+
+    Returns
+    -------
+    corner, place, scale
+        The place of the triad in space (3,) and as shares of the picture (2,), and half the height of the picture.
+        It is a corner with nothing in it, or else above all.
     """
-    seen = points @ view.T
+    seen, aspect = points @ view.T, size[0] / size[1]
     low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
     middle, half = (low + high) / 2, (high - low) / 2
-    scale = max(half[1] / ROOM, half[0] * SIZE[1] / SIZE[0])
-    middle[1] -= (1.0 - ROOM) * scale / 2  # the caption's line
-    focus = middle @ view
+    for head in (0.0, HEAD):
+        scale = max(half[1] / (ROOM - head), half[0] / aspect)
+        centre = middle[:2] - (0.0, ((1.0 - ROOM) / 2 - 0.8 * head) * scale)  # the caption's line, and the triad's
+        on_screen = ((seen[:, :2] - centre) / scale / np.array([aspect, 1.0]) + 1.0) / 2.0
+        free = [at for at in _corners(size) if not _covers(at, on_screen, size)]
+        if free and (head or aspect >= NARROW):
+            break
+    place = free[0] if free and not head else _corners(size)[0]
+    focus = np.append(centre, middle[2]) @ view
     plotter.camera_position = [tuple(focus + 4 * (half[2] + scale) * view[2]), tuple(focus), tuple(view[1])]
     plotter.camera.enable_parallel_projection()
     plotter.camera.parallel_scale = scale
     plotter.renderer.ResetCameraClippingRange()
-    shift = (2 * TRIAD - 1) * scale * np.array([SIZE[0] / SIZE[1], 1.0])
-    return focus + shift @ view[:2], scale
+    shift = (2 * place - 1) * scale * np.array([aspect, 1.0])
+    return focus + shift @ view[:2], place, scale
+
+
+def _covers(place: Floats, on_screen: Floats, size: tuple[int, int]) -> bool:
+    """Whether a triad at a place (2,) covers one of the points (n, 2), all as shares of the picture."""
+    return bool((abs(on_screen - place) * np.array(size) < AROUND).all(axis=1).any())
 
 
 def draw_shape_safely(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,12 @@ STYLE = {"font.size": FONT, "font.family": "DejaVu Sans", "axes.grid": True, "gr
 PALETTE = (  # after Okabe and Ito: hues safe for the colour-blind, then the same once more and darker
     *("#303030", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"),
     *("#003F62", "#753400", "#00573F", "#70435C", "#2F6380", "#7E5700"),
+)
+NAME = re.compile("([A-Za-z]+?)([0-9]*)")
+"""A name of letters with a number behind."""
+GREEK = (
+    *("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi", "pi"),
+    *("rho", "sigma", "tau", "phi", "chi", "psi", "omega"),
 )
 HALO = [withStroke(linewidth=3.2, foreground="white")]
 
@@ -52,8 +59,22 @@ def axis_label(diagram: Mapping[str, Any]) -> str:
 
 def named(words: str, label: str, unit: str = "") -> str:
     """A parameter for its axis: in words, where there are some, its symbol in TeX, and its ``unit`` if it has one."""
-    symbol, words = tex(label, always=True), words.replace("$", "")
+    symbol, words = tex(symbol_of(label), always=True), words.replace("$", "")
     return with_unit(f"{words} {symbol}" if words else symbol, unit)
+
+
+def symbol_of(label: str) -> str:
+    """TeX for a parameter whose label is its name alone: ``phi`` is a Greek letter, ``t0`` has an index."""
+    found = NAME.fullmatch(label)
+    if not found:
+        return label
+    letter, index = found.groups()
+    letter = "lambda" if letter == "lam" else letter
+    if letter.lower() in GREEK:
+        letter = f"\\{letter}"
+    elif len(letter) > 1:
+        return label
+    return f"{letter}_{{{index}}}" if index else letter
 
 
 def ordinate_in_words(diagram: Mapping[str, Any]) -> str:

@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from rodfem.continuation.branch import FIRST_BRANCH
 from rodfem.output.change_words import FEW, change_in_words, known_digits
+from rodfem.output.endings import MEETS
 from rodfem.output.intervals import Interval, coexisting, intervals_of, stable_ones, without_stable
 from rodfem.output.plot_pieces import PLANAR, STABLE, UNDECIDED
 
@@ -38,7 +40,7 @@ def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     intervals, load = intervals_of(branch), data["parameter"]
     name = _subject(branch, data)
     if not intervals:
-        return f"{name} has one state only; it ends there: {branch['ended'].rstrip('.')}."
+        return f"{name} has one state only; {_end(branch)}."
     parts, told = [], intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
     start, stop = (f"{x:.{FEW}g}" for x in (intervals[0].loads[0], intervals[-1].loads[1]))
     if len(intervals) == 1:
@@ -53,19 +55,30 @@ def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
         changes = _count(len(intervals) - 1 - len(told), "time", "times")
         parts.append(f"then its stability changes {changes} more before {load} = {stop}")
     if branch["ended"] != "end of range":
-        parts.append(f"it ends there: {branch['ended'].rstrip('.')}")
+        parts.append(_end(branch))
     return "; ".join(parts) + "."
+
+
+def _end(branch: Mapping[str, Any]) -> str:
+    """How a branch ends, in a clause."""
+    ended = str(branch["ended"]).rstrip(".")
+    return f"it ends where it {ended}" if ended.startswith(MEETS) else f"it ends there: {ended}"
 
 
 def _subject(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     """Name of a branch, and where it comes from, as the beginning of a sentence."""
     name, parent = _named(branch["name"]), branch["parent"]
     if branch is data["branches"][0]:
-        return f"The first branch, {branch['name']},"
+        return "The first branch" if branch["name"] == FIRST_BRANCH else f"The first branch, {branch['name']},"
     if parent is None:
         return f"{name}, which leaves none of the others,"
     special = next(b for b in data["branches"] if b["name"] == parent[0])["special"][parent[1]]
-    return f"{name}, which leaves {parent[0]} at {known_digits(special)},"
+    return f"{name}, which leaves {called(parent[0])} at {known_digits(special)},"
+
+
+def called(name: str) -> str:
+    """Name of a branch inside a sentence."""
+    return f"the {name}" if name == FIRST_BRANCH else name
 
 
 def _named(name: str) -> str:
@@ -98,7 +111,7 @@ def _ranges(data: Mapping[str, Any]) -> Iterator[str]:
         yield f"From {load} = {a:.{FEW}g} to {b:.{FEW}g} no stable state was found."
     pairs = list(coexisting(stable))
     for one, other, a, b in pairs[:MOST_NAMES]:
-        names = " and ".join(dict.fromkeys(interval.branch["name"] for interval in (one, other)))
+        names = " and ".join(dict.fromkeys(called(interval.branch["name"]) for interval in (one, other)))
         yield f"From {load} = {a:.{FEW}g} to {b:.{FEW}g} two stable states coexist, of {names}: hysteresis is possible."
     if more := pairs[MOST_NAMES:]:
         yield f"So do {_count(len(more), 'further pair', 'further pairs')} of stable states at other loads."
@@ -123,7 +136,7 @@ def _count(number: int, one: str, many: str) -> str:
 
 def _names(branches: Sequence[Mapping[str, Any]]) -> str:
     """Branches by name, or, where they are many, by number."""
-    names = [branch["name"] for branch in branches]
+    names = [called(branch["name"]) for branch in branches]
     if len(names) > MOST_NAMES:
         return f"{len(names)} other branches"
     return _named(" and ".join(filter(None, (", ".join(names[:-1]), names[-1]))))

@@ -1,4 +1,9 @@
-"""From where a picture shows a rod: along the axis across the plane in which it moves, a little from above."""
+"""From where a picture shows a rod: along the axis across the plane in which it moves, a little from above.
+
+What is upwards is decided here, for pictures, animations and the report alike.  Gravity is downwards.  Without it an
+axis of space points upwards, e1 before e2 before e3, never the opposite way, so that a weight that hangs along -e1
+pulls downwards.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rodfem.problem.quaternions import directors
+from rodfem.problem.setting import HELD, TURNS, Setting
 
 Floats = NDArray[np.float64]
 
@@ -17,6 +25,10 @@ BESIDE = 0.87
 """Cosine of a load and the motion below which their plane is not that of the picture."""
 NEAR = 0.9
 """Cosine from which on a direction is taken for that of the nearest axis of space."""
+SIDEWAYS = 0.3
+"""Cosine of a rod's chord and the axis of its only support below which it leaves that sideways."""
+LEVEL = 0.1
+"""Cosine below which an axis of space is across a direction, for its sense."""
 STRAIGHT = 1e-3
 """Displacement relative to the rod's size below which the rod has not moved."""
 CLOSED = 1e-6
@@ -52,10 +64,11 @@ def view_of(
     Returns
     -------
     axes
-        Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and upwards is the
-        principal direction of the displacement across it.  A load that is not nearly along that direction is upwards
-        instead, and the rod is seen from aside.  With gravity that is downwards.  A closed rod is shown in the plane
-        nearest to it.
+        Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and vertical is
+        the principal direction of the displacement across it.  A load that is not nearly along that direction is
+        vertical instead, and the rod is seen from aside.  Upwards is then where e1 points, or e2 or e3 where that is
+        horizontal (:func:`upwards`), whichever way the rod moves and the load pulls.  With gravity that is downwards.
+        A closed rod is shown in the plane nearest to it.
     """
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
     chord = reference[-1] - reference[0] if axis is None else axis
@@ -66,22 +79,36 @@ def view_of(
         up = -down / np.linalg.norm(down)
         spread = (reference - reference.mean(axis=0)).T @ (reference - reference.mean(axis=0)) / len(reference)
         right = _principal(shape + spread, up, STRAIGHT * size, side)
-        right = right * sign_of(right @ (moved[np.argmax(np.linalg.norm(moved, axis=1))] + 1e-3 * chord))
+        level = abs(right @ chord) < STRAIGHT * size  # an upright rod has no way of its own to go
+        right = right * sign_of(right @ (moved[np.argmax(np.linalg.norm(moved, axis=1))] if level else chord))
     else:
         right = _snapped(chord / np.linalg.norm(chord))
-        up = _principal(shape, right, STRAIGHT * size, side)
-        up = up * sign_of(up @ moved[np.argmax(np.linalg.norm(moved - np.outer(moved @ right, right), axis=1))])
+        up = upwards(_principal(shape, right, STRAIGHT * size, side))
         if load is not None:
             aside = load - (load @ right) * right
             if abs(up @ aside) < BESIDE * np.linalg.norm(aside):
                 up, tilt = _snapped(aside / np.linalg.norm(aside)), ABOVE
                 up = up - (up @ right) * right
-                up /= np.linalg.norm(up)
+                up = upwards(up / np.linalg.norm(up))
                 right = np.cos(ASIDE) * right + np.sin(ASIDE) * np.cross(right, up)  # the rod goes away, so upwards
             elif (up @ aside) * (np.cross(right, up) @ aside) > POINT * (aside @ aside):  # towards the load
                 tilt = -tilt
     back = np.cross(right, up)
     return np.array([right, np.cos(tilt) * up - np.sin(tilt) * back, np.cos(tilt) * back + np.sin(tilt) * up])
+
+
+def axis_of(setting: Setting, reference: Floats) -> Floats:
+    """Direction (3,) of the axis of a rod in the state ``reference`` (n, 3): from one end to the other.
+
+    Of a rod that is held at one end alone it is that of its support, from which load bends the chord away, unless the
+    rod leaves it sideways, as a coil does.
+    """
+    chord, holding = reference[-1] - reference[0], [x for x in setting.supports if x.held.any() or x.turning != TURNS]
+    if len(holding) == 1 and holding[0].turning == HELD:
+        stem = directors(holding[0].frame)[:, 2]
+        if stem @ chord > SIDEWAYS * np.linalg.norm(chord):
+            return np.asarray(stem)
+    return np.asarray(chord)
 
 
 def _principal(moments: Floats, axis: Floats, least: float, other: Floats | None) -> Floats:
@@ -102,7 +129,13 @@ def _plane(points: Floats) -> tuple[Floats, Floats]:
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     vectors = np.linalg.eigh(np.cov(points.T) + np.diag(size * np.array([3e-3, 2e-3, 1e-3])) ** 2)[1]
     right, up = vectors[:, 2], vectors[:, 1]
-    return right * sign_of(right @ np.array([3.0, 2.0, 1.0])), up * sign_of(up @ np.array([1.0, 2.0, 3.0]))
+    return upwards(right), upwards(up)
+
+
+def upwards(direction: Floats) -> Floats:
+    """The direction (3,) or its opposite, so that the first of e1, e2, e3 that is not nearly across it points along."""
+    components = direction[abs(direction) > LEVEL * np.linalg.norm(direction)]
+    return direction * sign_of(components[0])
 
 
 def _snapped(direction: Floats) -> Floats:

@@ -11,7 +11,7 @@ import ufl
 from forms.kinematics import UNDEFORMED
 from forms.rotation import IDENTITY, rotation
 from rodfem.errors import POINTWISE, SceneError
-from rodfem.problem.roles import functions_of
+from rodfem.problem.roles import Unknown, functions_of
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
@@ -24,10 +24,15 @@ class Constants(SimpleNamespace):
         """Name what is missing, and what there is."""
         if name.startswith("__"):
             raise AttributeError(name)
-        raise SceneError(
-            f"A function of the scene asks for a constant {name!r}: add it to the parameters, or choose one of "
-            f"{', '.join(sorted(vars(self)))}."
+        known = [f"c.{x}" for x in sorted(vars(self)) if x != "s"]
+        raise Unknown(
+            f"asks for a constant {name!r}: add it to the parameters, or choose one of "
+            f"{', '.join([*known, 'c.s (the arclength)'])}."
         )
+
+    def __getitem__(self, name: object) -> Any:
+        """Say how a constant is written."""
+        raise Unknown(f"asks for c[{name!r}]: constants are attributes, write c.{str(name).strip()}.")
 
 
 def watched(c: Constants) -> tuple[Constants, set[str]]:
@@ -60,8 +65,8 @@ class Known(SimpleNamespace):
         """Say what a place has."""
         if name.startswith("__"):
             raise AttributeError(name)
-        raise SceneError(
-            f"A function of a place asks for {name!r}: it has r, q, R, d1, d2, d3, s and length, and where it is the "
+        raise Unknown(
+            f"asks for {name!r} of a place: it has r, q, R, d1, d2, d3, s and length, and where it is the "
             "whole rod dr, v and k."
         )
 

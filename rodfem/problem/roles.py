@@ -22,6 +22,24 @@ Conversion = Callable[[Any], Any]
 UFL = "write it with UFL (ufl.cosh, ufl.conditional), without math, numpy and if"
 
 
+MEANINGS = {
+    "v": "v[0], v[1], v[2] are the strains",
+    "k": "k[0], k[1], k[2] the curvatures and the twist",
+    "x": "x has what is known of a place, as x.r",
+    "c": "c has the scene's parameters, as c.P, and the arclength, c.s: plain numbers",
+    "r": "r[0], r[1], r[2] are the position",
+    "q": "q[0] to q[3] the rotation's quaternion",
+}
+"""What the arguments of the functions of a scene are."""
+
+
+class Unknown(SceneError):
+    """A function of a scene asks for a name that there is not; its words lack the subject, which :func:`guarded` has.
+
+    A person reads ``The stored energy asks for a constant 'G': ...``.
+    """
+
+
 @dataclass(frozen=True)
 class Role:
     """Purpose of a function of a scene.
@@ -61,6 +79,12 @@ class Role:
         """Number of its arguments."""
         return self.call.count(",") + 1
 
+    @property
+    def meanings(self) -> str:
+        """What its arguments are, in words."""
+        letters = self.call.partition("(")[2].rstrip(")").split(", ")
+        return ", ".join(MEANINGS[letter] for letter in letters if letter in MEANINGS)
+
 
 def role_field(role: Role | Callable[[Any], Role], default: Any = None) -> Any:
     """Field of a dataclass for a function of this role, or of the role that it has for the object; optional."""
@@ -80,11 +104,15 @@ def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[...
         try:
             value = function(*arguments)
             return value if role.returns is None else role.returns(value)
+        except Unknown as trouble:
+            raise SceneError(f"The {what} {trouble}") from None
         except SceneError:
             raise
         except (Exception, SystemExit) as trouble:  # whatever a person's function may raise
             first = str(trouble).split("\n", 1)[0].rstrip(".")
-            raise SceneError(f"The {what} fails with {type(trouble).__name__}, {first!r}: {role.hint}.") from trouble
+            wrong = isinstance(trouble, AttributeError) or "subscriptable" in first
+            hint = role.meanings if wrong and role.meanings else role.hint
+            raise SceneError(f"The {what} fails with {type(trouble).__name__}, {first!r}: {hint}.") from trouble
 
     call.guards = what  # type: ignore[attr-defined]
     return call

@@ -185,7 +185,8 @@ class Scene(Contribution):
     span
         Default range of the load, from where the continuation starts to where it ends.
     states
-        Name of the first branch.
+        Name of the first branch; by default ``straight`` if its states are, ``ring`` for a closed rod, and
+        ``first branch`` for any other.
     """
 
     name: str
@@ -209,7 +210,7 @@ class Scene(Contribution):
     start: Callable[[np.ndarray], np.ndarray] | None = role_field(
         Role("start", "start(s)", hint=START, returns=real_array)
     )
-    states: str = field(default="straight")
+    states: str | None = None
 
     def __post_init__(self) -> None:
         """Check all that can be checked before any computation; raises :class:`SceneError`."""

@@ -38,8 +38,9 @@ SOFTEST, STIFFEST = 1e-8, 1e-15
 
 def check_kinds(scene: Scene) -> None:
     """Check the kind of all that a scene is made of; raises :class:`SceneError`."""
-    for words, name in (("scene", scene.name), ("first branch, states,", scene.states)):
-        check_file_name(words, name)
+    check_file_name("scene", scene.name)
+    if scene.states is not None:
+        check_file_name("first branch, states,", scene.states)
     if not isinstance(scene.title, str):
         raise SceneError(f"The title is {scene.title!r}: give a text.")
     if (
@@ -75,7 +76,10 @@ def check_kinds(scene: Scene) -> None:
         try:
             inspect.signature(function).bind(*range(role.arguments))
         except (TypeError, ValueError):  # ValueError for classes of Python's own, which have no signature
-            raise SceneError(f"The {what} is no function of {role.arguments} argument(s): give {role.call}.") from None
+            meanings = f", where {role.meanings}" if role.meanings else ""
+            raise SceneError(
+                f"The {what} is no function of {role.arguments} argument(s): give {role.call}{meanings}."
+            ) from None
 
 
 def check_parameter(name: object, parameter: Any) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodfem.output.typical import typical_state
-from rodfem.output.view import view_of
+from rodfem.output.view import axis_of, view_of
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
 from rodfem.report.shapes import Shapes
@@ -56,7 +56,8 @@ def stage_of(data: Mapping[str, Any], shapes: Mapping[str, Shapes], groups: Any)
     reference = shapes[first["name"]].r[0 if branch == first["name"] else left]
     (r, frames), setting = shapes[branch][row], read_setting(groups[branch], row)
     side = setting.widest(frames[0])
-    axes = view_of(reference, r - reference, down=setting.down, load=setting.force, side=side)
+    axis = axis_of(setting, reference)
+    axes = view_of(reference, r - reference, axis=axis, down=setting.down, load=setting.force, side=side)
     load = setting.force if setting.down is None else setting.down
     length = float(shapes[branch].s[-1] - shapes[branch].s[0])
     radius = min(length / SLENDER, float(np.linalg.norm(np.ptp(r, axis=0))) / COILED)

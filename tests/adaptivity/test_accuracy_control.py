@@ -147,12 +147,12 @@ def test_what_was_used_where(folder: Path) -> None:
     assert data["discretization"]["unknowns"] == max(m["unknowns"] for m in meshes)
     with h5py.File(folder / "states.h5") as file:
         for row, number in enumerate(rows["mesh"]):
-            s = file["branches/straight/s"][row]
+            s = file["branches/first branch/s"][row]
             s = s[np.isfinite(s)]
             assert s[:: meshes[number]["degree"]] == pytest.approx(meshes[number]["vertices"], abs=1e-14)
     other = Solver(scene, Discretization("auto", 40, 6)).equilibria
     for row in (0, len(rows["load"]) - 1):
-        x = load_state(folder / "states.h5", "straight", row, other)
+        x = load_state(folder / "states.h5", "first branch", row, other)
         assert other.shape.ordinate(x) == pytest.approx(rows["ordinate"][row], abs=1e-5)
 
 

@@ -150,7 +150,7 @@ def test_branch_points_below_the_depth_are_counted(folder: Path, capfd: pytest.C
     assert [branch["name"] for branch in data["branches"]] == ["straight"]
     assert data["branch_points_not_followed"] == 1
     assert [s["followed"] for s in data["branches"][0]["special"] if s["kind"] == "branch point"] == [False]
-    assert not FIRST or "1 branch point was not followed, at the depth of switches: --depth 1 follows" in out
+    assert not FIRST or "not followed, as the depth is 0 (switches from the first branch): --depth 1 follows" in out
     run_demo(*common, "--depth", "1")
     out = capfd.readouterr().out
     data = json.loads((folder / "diagram.json").read_text())

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
 
+from benchmarks import fronts
 from benchmarks.auto.output import AutoError
 from benchmarks.auto.problems import PROBLEMS
 from benchmarks.auto.program import check, require_auto
+from benchmarks.speed import plots
 from benchmarks.speed.scipy_bvp import RODS, solve
 from benchmarks.speed.tables import fastest
 from benchmarks.store import Store
 from benchmarks.targets import TARGETS
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 pytestmark = pytest.mark.alone
 
@@ -46,6 +51,23 @@ def test_an_error_that_is_small_by_chance_does_not_count() -> None:
     chosen = fastest(rows, 1e-6, lambda r: float(r["seconds"]))
     assert chosen is not None and chosen["elements"] == 12
     assert fastest(rows, 1e-10, lambda r: float(r["seconds"])) is None
+
+
+def test_figures_are_drawn_from_the_page_alone(tmp_path: Path) -> None:
+    page = tmp_path / "speed.md"
+    page.write_text((DOCS / "speed.md").read_text())
+    drawn = plots.draw(page)
+    assert [path.name for path in drawn] == list(plots.FIGURES.values())
+    assert all(path.stat().st_size > 20_000 and f"]({path.name})" in page.read_text() for path in drawn)
+    tables = plots.read(page.read_text())
+    (row,) = [r for r in tables["All branches"][0] if r[:3] == ["cord", "straight", "2 P8 reduced"]]
+    assert [float(row[3]), float(row[4])] == [78, 25] and plots.discretisation(row[2]) == (2, 8, "reduced")
+    assert not plots.draw(Path(shutil.copy(DOCS / "rods.md", tmp_path)))
+
+
+def test_the_picture_of_the_elimination_is_drawn(tmp_path: Path) -> None:
+    fronts.main(tmp_path / "fronts.png")
+    assert (tmp_path / "fronts.png").stat().st_size > 20_000
 
 
 def test_nothing_measured_is_lost(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def test_vtk_reads_the_steps(saved: Path, tmp_path: Path) -> None:
     path, modes = to_vtkhdf(saved, tmp_path)
     data = json.loads((saved / "diagram.json").read_text())["branches"][0]["columns"]
     with h5py.File(saved / "states.h5") as file:
-        r = file["branches/straight/r"][()]
+        r = file["branches/first branch/r"][()]
     reader = vtk.vtkHDFReader()
     reader.SetFileName(str(path))
     reader.UpdateInformation()
@@ -78,8 +78,10 @@ def test_netcdf(saved: Path, tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
     (path,) = to_netcdf(saved, tmp_path)
     with h5py.File(saved / "states.h5") as file, xarray.open_dataset(path, engine="scipy") as found:
-        assert np.array_equal(found["r"], file["branches/straight/r"]) and found.attrs["branch"] == "straight"
-        assert found["r"].dims[:2] == ("row", "node") and np.array_equal(found["load"], file["branches/straight/load"])
+        assert np.array_equal(found["r"], file["branches/first branch/r"]) and found.attrs["branch"] == "first branch"
+        assert found["r"].dims[:2] == ("row", "node") and np.array_equal(
+            found["load"], file["branches/first branch/load"]
+        )
 
 
 def test_command(saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -47,6 +47,14 @@ def pixels(path: Path, color: str, rows: slice = slice(None), columns: slice = s
     return np.asarray(np.all(abs(picture - np.array(to_rgb(color))) < 0.04, axis=2))
 
 
+def test_the_legend_has_nothing_that_is_not_drawn() -> None:
+    stable, unstable = branch("a", [0.0] * 3, [0] * 3), branch("b", [1.0] * 3, [1] * 3)
+    assert legend(stable) == ["a", "stable", "negative eigenvalues"]
+    assert legend(unstable) == ["b", "unstable", "negative eigenvalues"]
+    assert legend(stable, unstable)[2:4] == ["stable", "unstable"]
+    assert legend(branch("c", [0.0], [0])) == ["c"]
+
+
 @pytest.mark.alone
 def test_nothing_unstable_is_hidden_below_something_stable(folder: Path) -> None:
     """Two branches at the same place: in the pixels of their line both colours are seen."""

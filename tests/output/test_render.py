@@ -284,7 +284,7 @@ def test_view_shows_the_plane_of_the_motion_and_tilts_nothing() -> None:
     for way in (E1, E2, np.array([0.6, 0.8, 0.0]), -E2):
         right, up, _ = view_of(STRAIGHT["r"], 0.3 * bump * way)
         np.testing.assert_allclose(right, E3, atol=1e-12)  # clamps are not tilted
-        assert up @ way > 0.85
+        assert up @ abs(way) > 0.85  # upwards is a positive direction, wherever the rod moves
     right, up, _ = view_of(STRAIGHT["r"], 0.3 * bump * E1, down=-E3)
     np.testing.assert_allclose([abs(right @ E1), right @ E3, up @ E1], [1.0, 0.0, 0.0], atol=1e-12)
     assert up @ E3 > 0.9  # gravity is downwards
@@ -295,6 +295,21 @@ def test_view_shows_the_plane_of_the_motion_and_tilts_nothing() -> None:
     for a, b in combinations(seen, 2):
         assert abs(np.linalg.det([a, b])) > 0.4
     assert seen[0][0] == 0.0 < seen[0][1]  # the load is upwards
+
+
+def test_a_hanging_weight_pulls_downwards() -> None:
+    """Where the scene has no gravity e1 is upwards: whichever way a rod moves, and whatever force does it."""
+    bump = np.sin(pi * S)[:, None]
+    for moved, load in (
+        (-E1, -E1), (E1, -E1), (-E1, None), (E2, -E1), (-E2, -E1), (E2, E1), (np.array([-0.8, 0.6, 0.0]), None)
+    ):  # fmt: skip
+        view = view_of(STRAIGHT["r"], 0.3 * bump * moved, load=load)
+        assert view[1] @ E1 > 0.5 and np.linalg.det(view) == pytest.approx(1.0)
+        assert view[0] @ E3 > 0.5  # and the rod goes to the right
+    turn = 2 * pi * S[:, None]
+    for a, b in ((E1, E2), (E1, E3), (E2, E3), (-E1, E3)):
+        view = view_of(2 * np.cos(turn) * a + np.sin(turn) * b, np.zeros((len(S), 3)))
+        assert (view[:2] @ abs(a + b) > 0.5).all()  # a ring
 
 
 @pytest.mark.parametrize("way", [E1, E2, -E2, np.array([0.6, 0.8, 0.0])])

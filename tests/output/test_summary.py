@@ -96,6 +96,23 @@ def test_divergence_is_named() -> None:
     assert "then unstable (1 eigenvalue) to 4" in words
 
 
+def test_states_that_have_one_energy_at_one_load_alone_coexist() -> None:
+    """As a ring twisted by none and by two turns does, where its natural state is twisted by one."""
+    loads, turns = [0.0, 0.5, 1.0, 1.5, 2.0], (0.0, 2.0)
+    ring, twisted = (
+        branch(f"twist {turn:g}", loads, [0] * 5, energy=[(turn - load) ** 2 for load in loads]) for turn in turns
+    )
+    coexist = "From P = 0 to 2 two stable states coexist, of twist 0 and twist 2"
+    assert coexist in said(ring, twisted, span=(0.0, 2.0)) and "coexist" not in said(ring, ring, span=(0.0, 2.0))
+
+
+def test_how_a_branch_ends() -> None:
+    words = said(branch("straight", [0.0, 4.0], [0, 0], ended="meets another branch at P = 4"))
+    assert words.endswith("from P = 0 to 4; it ends where it meets another branch at P = 4.")
+    words = said(branch("straight", [0.0, 4.0], [0, 0], ended="stretch reaches zero"))
+    assert words.endswith("; it ends there: stretch reaches zero.")
+
+
 def test_a_diagram_says_it_itself() -> None:
     diagram = trace(demo_cases.scene("cord", span=(60.0, 55.0)), Discretization("reduced", 6, 3), Plan(depth=0))
     assert diagram.in_words() == "The first branch, straight, is stable on its whole range, from lam = 60 to 55."

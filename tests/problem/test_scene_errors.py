@@ -154,10 +154,17 @@ def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
     [
         # names
         ({"parameters": {"F": 0.0, "s": 1.0}}, "cannot have the name 's'"),
-        ({"parameters": {"F": Parameter(0.0)}}, "asks for a constant 'B': add it"),
+        ({"parameters": {"F": Parameter(0.0)}}, "^The stored energy asks for a constant 'B': add it"),
+        (
+            {"energy": lambda v, k, c: (1 - c.S) * k[0] ** 2},
+            r"^The stored energy asks for a constant 'S': .*, or choose one of c\.B, c\.F, c\.s \(the arclength\)",
+        ),
+        ({"energy": lambda v, k, c: c["B"] * k[0] ** 2}, r"stored energy asks for c\['B'\]: .* write c\.B\."),
+        ({"energy": lambda v, k, c: c.s.x * k[0] ** 2}, r"'x'\\?\".*: v\[0\].* the arclength, c\.s: plain numbers"),
+        ({"energy": lambda v, k, c, s: (1 - s) * k[0] ** 2}, r"give W\(v, k, c\), where .* the arclength, c\.s"),
         ({"potential": lambda x, c: c.G * x.r[0]}, "asks for a constant 'G'"),
-        ({"potential": lambda x, c: x.z}, "asks for 'z': it has"),
-        ({"constraints": (at(0.5, lambda x, c: x.k[0]),)}, "asks for 'k': it has"),
+        ({"potential": lambda x, c: x.z}, "potential along the rod asks for 'z' of a place: it has"),
+        ({"constraints": (at(0.5, lambda x, c: x.k[0]),)}, "asks for 'k' of a place: it has"),
         # functions
         (held(clamped(ZERO)), "position of the left end is .*: give a function"),  # type: ignore[arg-type]
         (held(right=free(ZERO)), "force on the right end is .*: give a function"),  # type: ignore[arg-type]

@@ -140,6 +140,30 @@ def click_at(browser: Any, branch: int, row: int) -> None:
         browser.execute_cdp_cmd("Input.dispatchMouseEvent", given)
 
 
+def test_the_page_is_drawn_without_a_frame(opened: Callable[..., Any], browser: Any) -> None:
+    """As for a screenshot in virtual time, or a page that is loaded in the background: no callback of a frame comes."""
+    source = {"source": "window.requestAnimationFrame = () => 0"}
+    made = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", source)
+    try:
+        page = opened("pinned")
+        size = SIZES[0][0] - 90, SIZES[0][1] - 60
+        for width, height in (SIZES[0], size):  # a canvas of another size is empty until it is drawn again
+            metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+            page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+            page.execute_async_script("setTimeout(arguments[0], 300)")
+            seen = np.asarray(Image.open(io.BytesIO(page.get_screenshot_as_png())).convert("RGB"), dtype=float)
+            for part, least in (("stage", 2000), ("diagram", 1000), ("states", 200)):
+                box = page.find_element(By.ID, part).rect
+                left, top, right, bottom = (
+                    round(x)
+                    for x in (box["x"] + 5, box["y"] + 5, box["x"] + box["width"] - 5, box["y"] + box["height"] - 5)
+                )
+                inside = seen[top:bottom, left:right]
+                assert np.count_nonzero(np.ptp(inside, axis=2) + abs(inside - 250).max(axis=2) > 60) > least, part
+    finally:
+        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", made)
+
+
 @pytest.mark.parametrize(
     ("name", "size"), [("pinned", SIZES[0]), ("pinned", SIZES[1]), ("locus", SIZES[0]), ("follower", SIZES[1])]
 )

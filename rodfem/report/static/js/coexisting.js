@@ -88,7 +88,8 @@ function redraw() {
 
 function later() {
   clearTimeout(waiting);
-  waiting = setTimeout(redraw, WAIT);
+  if (list.childNodes.length) waiting = setTimeout(redraw, WAIT);
+  else redraw();
 }
 
 // Keep to the branch that is shown, as far as it has the load.

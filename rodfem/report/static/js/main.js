@@ -1,7 +1,7 @@
 // Starts all parts, and listens to keys.
 
 import { data } from "report/data";
-import { branch, changed, select, state } from "report/store";
+import { branch, select, state, tell } from "report/store";
 import * as coexisting from "report/coexisting";
 import * as diagram from "report/diagram";
 import * as legend from "report/legend";
@@ -67,12 +67,13 @@ document.getElementById("rod-svg").addEventListener("click", () => download(new 
 
 text.start();
 legend.start();
+modes.start();
+tell(); // words leave the pictures their room
 rod.start();
 await diagram.start();
 await loci.start();
 spectrum.start();
 profile.start();
-modes.start();
 coexisting.start();
-changed();
+tell();
 document.body.dataset.ready = "yes";

@@ -44,9 +44,10 @@ export function layout(x, y, more = {}) {
   };
 }
 
-// Draw a plot anew; it follows the size of its box.
+// Draw a plot anew; it follows the size of its box at once (Plotly.Plots.resize waits for a time that may not come).
 export function draw(plot, traces, how) {
-  if (!plot.watched) new ResizeObserver(() => plot._fullLayout && plot.clientHeight && Plotly.Plots.resize(plot)).observe(plot);
+  const fit = () => plot._fullLayout && plot.clientHeight && Plotly.relayout(plot, { autosize: true });
+  if (!plot.watched) new ResizeObserver(fit).observe(plot);
   plot.watched = true;
   return Plotly.react(plot, traces, how, config);
 }

@@ -26,9 +26,16 @@ export const makeStripe = () => new Tube(data.stripe, values(data.stripe), stati
 export const shapeOf = (b, row) => entry(b.shape, row);
 export const stage = new Stage(document.getElementById("rod"));
 const rod = makeRod(ROD), stripe = makeStripe(), first = makeRod(FIRST, 0.55), solids = new Solids();
-let controls = null, pending = false;
+let controls = null, pending = false, turned = false;
 export const listeners = []; // of changes of the view
 
+// Draw now: what has another size is empty until it is drawn, and a hidden or printed page has no further frame.
+function draw() {
+  stage.render();
+  drawOverlay(overlay.getContext("2d"), stage, Math.min(window.devicePixelRatio, 2));
+}
+
+// Draw in the next frame.
 function redraw() {
   if (pending) return;
   pending = true;
@@ -38,9 +45,7 @@ function redraw() {
       update(time);
       redraw();
     }
-    stage.render();
-    const ratio = Math.min(window.devicePixelRatio, 2);
-    drawOverlay(overlay.getContext("2d"), stage, ratio);
+    draw();
   });
 }
 
@@ -69,6 +74,7 @@ function shown() {
 
 // Look along the chosen direction, or on in that of the picture, at the states that are shown.
 function look(kept = false) {
+  turned = kept && turned;
   const { camera, target } = stage, direction = camera.position.clone().sub(target).normalize();
   fit(shown(), kept ? { up: camera.up.clone(), direction } : VIEWS[choice.value]);
   controls?.dispose();
@@ -76,6 +82,7 @@ function look(kept = false) {
   controls.target.copy(stage.target);
   controls.update();
   controls.zoomToCursor = true;
+  controls.addEventListener("start", () => (turned = true));
   controls.addEventListener("change", () => {
     redraw();
     for (const listener of listeners) listener();
@@ -131,15 +138,15 @@ function resize() {
   const { width, height } = box.getBoundingClientRect(), ratio = Math.min(window.devicePixelRatio, 2);
   [overlay.width, overlay.height] = [width * ratio, height * ratio];
   stage.resize(width, height);
-  redraw();
+  if (!turned) look();
+  draw();
 }
 
 export function start() {
   for (const name of Object.keys(VIEWS)) choice.add(new Option(name, name));
   stage.scene.add(rod, stripe, first, solids);
-  resize();
   update();
-  look();
+  resize();
   new ResizeObserver(resize).observe(box);
   choice.addEventListener("change", () => look());
   document.getElementById("fit").addEventListener("click", () => look(true));

@@ -15,15 +15,18 @@ export function subscribe(listener) {
   listeners.push(listener);
 }
 
-export function changed() {
+// Tell all listeners at once: as the page is made, when no frame need ever follow.
+export function tell() {
+  waiting = false;
+  document.body.dataset.branch = branch().name;
+  document.body.dataset.row = state.row;
+  for (const listener of listeners) listener(state);
+}
+
+function changed() {
   if (waiting) return;
   waiting = true;
-  requestAnimationFrame(() => {
-    waiting = false;
-    document.body.dataset.branch = branch().name;
-    document.body.dataset.row = state.row;
-    for (const listener of listeners) listener(state);
-  });
+  requestAnimationFrame(tell);
 }
 
 // Show a row of a branch; the load follows unless it is the load that has chosen the row.

@@ -1,0 +1,61 @@
+"""The name of the first branch is true: whether a rod is straight is known from its mechanics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import classics
+import demo_cases
+import numpy as np
+import pytest
+
+from rodfem import Discretization, Plan, Scene, trace
+from rodfem.diagram.first_name import is_straight
+
+MESH = Discretization("auto", 6, 4)
+
+
+def heavy(share: float) -> Scene:
+    """A cantilever whose weight grows from nothing: along its axis, and a ``share`` of it across."""
+    return replace(classics.heavy(), distributed=lambda c: (-share * c.P, 0.0, -c.P), span=(0.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("scene", "name"),
+    [
+        (lambda: heavy(0.0), "straight"),
+        (lambda: heavy(1e-3), "first branch"),  # straight only as long as it has no weight
+        (lambda: demo_cases.scene("cord"), "straight"),  # of curvatures that vanish, and strains that do not
+        (lambda: demo_cases.scene("ruler"), "plane"),  # as the scene says
+        (lambda: replace(demo_cases.scene("ruler"), states=None), "first branch"),
+        (lambda: replace(demo_cases.scene("ring"), states=None), "ring"),
+        (lambda: classics.arch(0.5, dead=False), "first branch"),
+        (lambda: classics.spring(3.0, 2.0), "first branch"),
+        (lambda: classics.timoshenko(50.0), "straight"),
+        (classics.beck, "straight"),
+        (lambda: replace(classics.beck(), distributed=lambda c: (1e-3, 0.0, 0.0)), "first branch"),
+    ],
+)
+def test_only_what_is_straight_is_called_so(scene: Callable[[], Scene], name: str) -> None:
+    rod = scene()
+    start, stop = rod.span
+    plan = Plan((start, start + 0.02 * (stop - start)), depth=0, error_bars=False)
+    diagram = trace(rod, MESH, plan)
+    assert diagram.branches[0].name == name
+    sentence = diagram.in_words()
+    assert sentence.startswith("The first branch is " if name == "first branch" else f"The first branch, {name}, is ")
+
+
+def test_a_side_branch_leaves_the_first_branch() -> None:
+    diagram = trace(classics.arch(1.0, dead=False), Discretization("auto", 16, 6), Plan(depth=1, error_bars=False))
+    assert "Branch 1, which leaves the first branch at " in diagram.in_words()
+
+
+def test_straight_is_a_matter_of_shape_alone() -> None:
+    s = np.linspace(0.0, 1.0, 50)[:, None] ** 2
+    way = np.array([0.3, -0.2, 1.0])
+    for size in (1e-9, 1.0, 1e9):
+        assert is_straight(size * (1.0 + s * way))
+        assert not is_straight(size * (s * way + 1e-4 * s * (1.0 - s) * np.array([1.0, 0.0, 0.0])))
+    assert is_straight(s * way - 2.0 * s * (1.0 - s) * way)  # it goes back and forth
