@@ -118,7 +118,7 @@ BIFURCATIONS = (
 )  # fmt: skip
 PUBLISHED = (
     Case(
-        "critical loads with closed forms", "three meshes of degree 4 to 6, and both formulations", EXACT,
+        "critical loads with closed forms", "three meshes, from a coarse one, and both formulations", EXACT,
         "Euler, Haringx, Timoshenko, Greenhill, Michell, ...: tests/literature/test_classics.py", "problem",
         classical.critical, ("heavy", "greenhill"), classical.PROBLEMS,
     ),
