@@ -61,7 +61,7 @@ notebooks: setup ## the lessons of the course as notebooks, in results/notebooks
 		$(PYTHON) -m jupytext --quiet --to ipynb --output "results/notebooks/$$(basename "$$lesson" .py).ipynb" "$$lesson"; \
 	done; ls results/notebooks
 
-bench: setup ## measure speed, ways to judge a state, hard cases: docs/speed.md, stability.md, robustness.md (40 minutes)
+bench: setup ## measure speed, ways to judge a state, hard cases: docs/speed.md, stability.md, robustness.md (80 minutes)
 	$(PYTHON) -m benchmarks.speed
 	$(PYTHON) -m benchmarks.stability
 	$(PYTHON) -m benchmarks.robustness

@@ -204,8 +204,11 @@ class Enriched:
         curve = _straight(x, tangent)
         # few nodes tell where an eigenvalue crosses zero better than where the load has its extremum
         test_function = "mu" if special.kind == FOLD else special.test_function
+        # a pitchfork on one of its sides is passed where the bordered matrix is singular: the nearer the nodes lie to
+        # it, the fewer digits their loads have
+        narrow = NARROW if test_function == "mu" else 1.0
         try:
-            found = refine(solver, curve, 0.0, NARROW * WINDOW, mode, test_function, beside=point.load)
+            found = refine(solver, curve, 0.0, narrow * WINDOW, mode, test_function, beside=point.load)
         except ConvergenceError:  # it lies farther away
             found = refine(solver, curve, 0.0, WINDOW, mode, test_function, beside=point.load)
         ordinate = solver.shape.ordinate(found.x)

@@ -30,7 +30,7 @@ from rodfem.stability.round_off import resolve
 from rodfem.tolerances import round_off, unit
 
 NODES, FEWER = 6, 4
-"""Number of nodes of an interpolant, and of one over a very short piece."""
+"""Number of nodes of an interpolant, and of one over a very short piece, unless it is even."""
 WINDOW = 0.02
 """Half length, in the metric, of the interval of a branch on which a special point is interpolated."""
 SHARP = 1e-11
@@ -219,7 +219,7 @@ def interpolate(
     slope_at = float(chebyshev.chebval(root, slope))
     left = zero_uncertainty(f, root)
     # the last coefficients bound what the series leaves out; a shift of the zero moves the load by its slope
-    tail = abs(load[-1]) + abs(slope_at) * left
+    tail = left_out(load) + abs(slope_at) * left
     floor = round_off(load_at, one)
     moved = abs(noise / float(chebyshev.chebval(root, chebyshev.chebder(f)))) if test_function == "mu" else 0.0
     arithmetic = floor + abs(slope_at) * moved
@@ -254,6 +254,19 @@ def zero_uncertainty(series: np.ndarray, root: float) -> float:
     return float(abs(series[-1] / slope)) if slope else float("inf")
 
 
+def left_out(series: np.ndarray) -> float:
+    """Size of what a Chebyshev series leaves out: that of its last coefficient, or what the one before it decays to.
+
+    Where a branch passes into its own mirror image the load is even about that point, and the last coefficient, an odd
+    one, is zero however much is left out.  The even ones before it decay geometrically.
+    """
+    odd = float(abs(series[-1]))
+    if len(series) < NODES:
+        return odd
+    before, even = abs(series[[-4, -2]])
+    return max(odd, float(even * min(even / before, 1.0)) if before else float(even))
+
+
 def _barycentric(nodes: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
     """Weights of the values at nodes in the interpolating polynomial at ``t`` and in its derivative."""
     degree = len(nodes) - 1
@@ -277,14 +290,14 @@ def refine(
     """Solve at Chebyshev nodes around ``center``, moved until the zero lies among them, shrunk until it is sharp.
 
     Where only the distance of its load from the one ``beside`` it is wanted, that to :data:`PART` of itself is sharp
-    enough, :data:`FEWER` nodes do, and nothing is counted.  ``curve(s)`` returns a predicted state and direction on the
-    mesh of ``solver``; ``half`` is the first half length of the piece.  ``test_function`` is ``mu`` or ``slope``,
-    ``mode`` is near the null vector, and ``persistent`` eigenvalues stay zero.  A zero between the ``ends`` is
-    preferred to others.  Raises :class:`ConvergenceError` where no zero is found near by.
+    enough, :data:`FEWER` nodes do for an eigenvalue, and nothing is counted.  ``curve(s)`` returns a predicted state
+    and direction on the mesh of ``solver``; ``half`` is the first half length of the piece.  ``test_function`` is
+    ``mu`` or ``slope``, ``mode`` is near the null vector, and ``persistent`` eigenvalues stay zero.  A zero between the
+    ``ends`` is preferred to others.  Raises :class:`ConvergenceError` where no zero is found near by.
     """
     best: Located | None = None
     one = solver.units.load
-    count = NODES if beside is None else FEWER
+    count = FEWER if beside is not None and test_function == "mu" else NODES
     for _ in range(10):
         if half < RESOLVED * unit(center, one=1.0):
             break

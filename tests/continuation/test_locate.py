@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
 from numpy.polynomial.polynomial import polyfromroots
 
 from rodfem.continuation.flutter import locate_flutter
-from rodfem.continuation.locate import real_root
+from rodfem.continuation.locate import NODES, left_out, real_root
 from rodfem.stability.cluster import Cluster, Measured
 
 pytestmark = pytest.mark.alone
@@ -38,3 +40,13 @@ def test_a_collision_is_not_extrapolated(start: float) -> None:
     found = locate_flutter(at, Cluster(np.zeros((1, 2)), 5.0), start, 1.0)
     assert abs(found.load - expected) <= found.uncertainty + 1e-15
     assert found.uncertainty < 1e-9
+
+
+@pytest.mark.parametrize("f", [np.cos, np.exp, lambda t: np.cos(t) ** 2, lambda t: np.exp(t) * np.cos(2 * t)])
+@pytest.mark.parametrize("half", [0.3, 0.1, 0.03])
+def test_what_a_series_leaves_out(f: Callable[[np.ndarray], np.ndarray], half: float) -> None:
+    """Of even functions, too, whose last coefficient is zero."""
+    t, fine = chebyshev.chebpts1(NODES), np.linspace(-1.0, 1.0, 201)
+    series = chebyshev.chebfit(t, f(half * t) - f(half * t[:1]), NODES - 1)
+    error = abs(chebyshev.chebval(fine, series) + f(half * t[:1]) - f(half * fine)).max()
+    assert error <= left_out(series) + 1e-15 <= 1e3 * error + 1e-14

@@ -30,12 +30,14 @@ class Measured:
     """Outcome of one case: ``error`` in the case's own measure, the bar that bounds it, and what was said.
 
     ``error`` is infinite where what was found is not what there is: a special point more or less, another index.
+    ``ratios`` are the errors of all loads over their error bars.
     """
 
     error: float
     bar: float
     said: tuple[str, ...] = ()
     wrong: str = ""
+    ratios: tuple[float, ...] = ()
 
     @property
     def right(self) -> bool:
@@ -91,7 +93,7 @@ def compare(found: Sequence[SpecialPoint], expected: Sequence[Change], said: tup
 
     Neighbours nearer to each other than the bars may be one point that has the change of all.
     """
-    left, error = list(expected), 0.0
+    left, ratios = list(expected), []
     for s in found:
         bar = max(s.error_estimate if isfinite(s.error_estimate) else s.located_to, 1e-15 * abs(s.point.load))
         group: list[Change] = []
@@ -99,7 +101,7 @@ def compare(found: Sequence[SpecialPoint], expected: Sequence[Change], said: tup
             group.append(left.pop(0))
         if not group or (group[0].before, group[-1].after) != (s.negative_before, s.negative_after):
             return Measured(inf, 1.0, said, f"{s!r} where {group} was expected")
-        error = max(error, *(abs(s.point.load - g.load) / bar for g in group))
+        ratios += [abs(s.point.load - g.load) / bar if s.point.load != g.load else 0.0 for g in group]
     if left:
         return Measured(inf, 1.0, said, f"{left} missed")
-    return Measured(error, 1.0, said)
+    return Measured(max(ratios, default=0.0), 1.0, said, ratios=tuple(ratios))

@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from hard import bifurcations, endurance, isolas, published, ranges, snapping, springy_rings, stiffness, writhing
+from hard import (
+    bifurcations,
+    classical,
+    endurance,
+    heavy,
+    isolas,
+    published,
+    ranges,
+    snapping,
+    springy_rings,
+    stiffness,
+    writhing,
+)
 from hard.case import Case
 
 EXACT = "all special points, each within its error bar, with the index on either side"
@@ -106,6 +118,11 @@ BIFURCATIONS = (
 )  # fmt: skip
 PUBLISHED = (
     Case(
+        "critical loads with closed forms", "three meshes, from a coarse one, and both formulations", EXACT,
+        "Euler, Haringx, Timoshenko, Greenhill, Michell, ...: tests/literature/test_classics.py", "problem",
+        classical.critical, ("heavy", "greenhill"), classical.PROBLEMS,
+    ),
+    Case(
         "helical springs between hinges", "two critical loads that meet where the spring is 2.6202694 diameters long",
         EXACT, "Haringx 1948, E/G = 2.6", "part by which the length exceeds that", published.spring, (1e-3, -1e-3),
         (1e-1, 1e-3, 1e-5, -1e-5),
@@ -163,7 +180,7 @@ PUBLISHED = (
     ),
     Case(
         "strips, clamps turned alike", "the arch ends in its mirror image; stable on either side, and no fold", EXACT,
-        "Cazzolli & Dal Corso 2019; shooting, conjugate points", "distance of the clamps", snapping.alike, (0.9,),
+        "Cazzolli & Dal Corso 2019; shooting, conjugate points", "distance of the clamps", snapping.alike, (0.9, 0.6),
         (0.95, 0.9, 0.8, 0.6),
     ),
     Case(
@@ -191,6 +208,18 @@ PUBLISHED = (
         "throughout", EXACT, "van der Heijden, Neukirch, Goss & Thompson 2003; shooting in space, conjugate points",
         "end shortening, C/B", lambda given: writhing.turned(*given), ((0.5, 1.0),),
         ((0.4, 1.0), (0.45, 1.0), (0.5, 1.0), (0.6, 1.0), (0.5, 0.75), (0.5, 2.0)),
+    ),
+    Case(
+        "a heavy, curved rod lost out of its plane", "a natural curvature of which nothing is seen in the plane; ends "
+        "up to 0.7 nearer", EXACT, "Lazarus, Miller, Metlitz & Reis 2013; shooting in space, conjugate points",
+        "natural curvature, weight", lambda given: heavy.shortened(*given), ((1.0, 20.0),),
+        ((1.0, 0.0), (1.0, 20.0), (1.0, 60.0), (3.0, 20.0), (3.0, 60.0), (5.0, 20.0)),
+    ),
+    Case(
+        "writhing of a heavy, curved rod", "the end turns by 4 pi, and back from one fold to the other; no symmetry at "
+        "all", EXACT, "Lazarus, Miller & Reis 2013; shooting in space, conjugate points",
+        "end shortening, natural curvature, weight", lambda given: heavy.turned(*given), ((0.4, 2.0, 50.0),),
+        ((0.5, 0.5, 10.0), (0.4, 2.0, 50.0), (0.4, 3.0, 50.0), (0.25, 5.0, 100.0), (0.25, 10.0, 20.0)),
     ),
 )  # fmt: skip
 ENDURANCE = (

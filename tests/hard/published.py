@@ -126,7 +126,8 @@ def localised(elements: int) -> Measured:
     found = [s for s in diagram.special("event") if abs(s.point.load / LOCALISED - 1) < 0.01]
     if not found:
         return Measured(inf, 1.0, said(diagram), "the slack is not met")
-    return Measured(abs(found[0].point.load - LOCALISED), found[0].error_estimate, said(diagram))
+    error, bar = abs(found[0].point.load - LOCALISED), found[0].error_estimate
+    return Measured(error, bar, said(diagram), ratios=(error / bar,))
 
 
 # --- others ---------------------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from hard.shooting_plane import STEP, linear
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-COARSE, FINE = 32, 64
+COARSE, FINE = 32, 96
 """Steps along a rod, by the coefficients of scipy's DOP853: to follow a branch, and for its special points."""
 BEGIN = 0.1
 """No rod is so unstable that a part of this length buckles between clamps."""
@@ -34,6 +34,8 @@ TURN, FIRST, LONGEST, SHORTEST = 0.93, 0.2, 0.6, 1e-4
 NEAR, ROUND_OFF, FAR = 1e-11, 1e-7, 0.3
 """Last step of Newton's method; singular values that count for nothing at a branch point, and the last step that they
 allow there; a step that it does not return from."""
+Misfit = Callable[[np.ndarray, int], np.ndarray]
+"""What must vanish, by all unknowns (m + 1, columns), the last of them the load, and the number of steps."""
 W, U, M, R = 0, slice(1, 4), slice(4, 7), slice(7, 10)
 """Rows of a state."""
 
@@ -84,12 +86,16 @@ class Rod:
             passed.append(y)
         return np.array(passed)
 
-    def index(self, m: Any, n: Any) -> int:
-        """Number of conjugate points for moment and force (3,) at the first clamp."""
+    def index(self, m: Any, n: Any, *, pieces: int = COARSE, to_the_end: bool = False) -> int:
+        """Number of conjugate points for moment and force (3,) at the first clamp, by so many ``pieces`` of the rod.
+
+        Those of the last piece count where it is looked at ``to_the_end``, at which all states of a rod that may turn
+        are singular.
+        """
         start = np.repeat(np.array([*m, *n], dtype=complex)[:, None], 6, axis=1) + 1j * STEP * np.eye(6)
-        passed = self.states(start[:3], start[3:])
+        passed = self.states(start[:3], start[3:], pieces)
         signs = []
-        for y in passed[int(BEGIN * COARSE) : -1]:
+        for y in passed[int(BEGIN * pieces) : None if to_the_end else -1]:
             back = np.array([y[W], *-y[U]]).real
             matrix = np.vstack([y[R].imag, times(y[:4].imag, back)[1:]]) / STEP
             signs.append(np.linalg.slogdet(matrix)[0])
@@ -100,7 +106,7 @@ class Rod:
 class Branch:
     """Equilibria (m + 1,) along a branch, the last entry of each the load, and the scaled derivatives (m, m + 1)."""
 
-    misfit: Callable[[np.ndarray, int], np.ndarray]
+    misfit: Misfit
     scale: np.ndarray
     points: list[np.ndarray]
     derivatives: list[np.ndarray]
@@ -108,7 +114,7 @@ class Branch:
     @classmethod
     def follow(
         cls,
-        misfit: Callable[[np.ndarray, int], np.ndarray],
+        misfit: Misfit,
         u: Any,
         scale: Sequence[float],
         span: tuple[float, float],
@@ -149,7 +155,7 @@ class Branch:
         raise AssertionError(f"the branch of the reference ends at {u}")
 
     def correct(self, u: np.ndarray, normal: np.ndarray, pieces: int = COARSE) -> tuple[np.ndarray, np.ndarray]:
-        """Point in the plane through ``u`` across the scaled ``normal``, and the scaled derivative there."""
+        """Point in the plane through ``u`` across the scaled ``normal``, and the scaled derivative a last step away."""
         for _ in range(10):
             left, derivative = linear(lambda u: self.misfit(u, pieces), u)
             derivative = derivative * self.scale
@@ -173,11 +179,13 @@ class Branch:
         """Load at which the determinant vanishes between a point and the next."""
         u, chord = self.points[i], self.points[i + 1] - self.points[i]
 
-        def at(part: float) -> tuple[np.ndarray, np.ndarray]:
-            return self.correct(u + part * chord, chord / self.scale, FINE)
+        def at(part: float) -> np.ndarray:
+            return self.correct(u + part * chord, chord / self.scale, FINE)[0]
 
-        part = brentq(lambda part: determinant(at(part)[1]), 0.0, 1.0, xtol=1e-12)
-        return float(at(part)[0][-1])
+        def singular(part: float) -> float:
+            return determinant(linear(lambda u: self.misfit(u, FINE), at(part))[1] * self.scale)
+
+        return float(at(brentq(singular, 0.0, 1.0, xtol=1e-12))[-1])
 
 
 def tangent(derivative: np.ndarray) -> np.ndarray:

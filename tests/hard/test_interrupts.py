@@ -11,18 +11,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import pytest
+from hard.folders import HOME, MPIRUN, alive, branches_in, children_of, surroundings
 
 from rodfem.app.interrupts import KEPT, held
 
-HOME = Path(__file__).parents[2]
-MPIRUN = ("/usr/bin/mpirun.openmpi", "--oversubscribe", "-n", "2")
 HEMITROPIC = ("demos/hemitropic.py", "--no-figures", "--output")
 MAP = ("demos/map.py", "--couplings", "200", "--output")
-OF_MPI = ("OMPI_", "PMI")
-GIVEN = ("OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "OMPI_MCA_btl", "OMPI_MCA_mpi_yield_when_idle")
-"""Variables that make a process part of these tests' own job, and those that people set."""
 LIMIT = 30
 SECOND_BRANCH, ROD = "branch 1 from", "rods"
 pytestmark = pytest.mark.alone
@@ -37,24 +32,15 @@ class Ended:
     left: list[int]
 
 
-def alive(process: int) -> bool:
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except OSError:
-        return False
-
-
 def struck(command: tuple[str, ...], ranks: int, line: str, whom: str, number: int) -> Ended:
     """Run a program, and send a signal to ``whom`` as soon as it has printed ``line``."""
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(OF_MPI) or name in GIVEN}
     whole = [*(MPIRUN if ranks > 1 else ()), sys.executable, *command]
     with subprocess.Popen(
-        whole, cwd=HOME, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        whole, cwd=HOME, env=surroundings(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as program:
         assert program.stdout is not None
         assert any(line in printed for printed in program.stdout), program.stderr and program.stderr.read()
-        children = Path(f"/proc/{program.pid}/task/{program.pid}/children").read_text().split()
-        processes = [int(child) for child in children] if ranks > 1 else [program.pid]
+        processes = children_of(program.pid) if ranks > 1 else [program.pid]
         target = {"first": processes[:1], "last": processes[-1:], "all": processes, "mpirun": [program.pid]}[whom]
         for process in target:
             os.kill(process, number)
@@ -66,18 +52,6 @@ def struck(command: tuple[str, ...], ranks: int, line: str, whom: str, number: i
             for process in {*left, program.pid} if left else ():
                 os.kill(process, signal.SIGKILL)
     return Ended(program.returncode, errors, left)
-
-
-def branches_in(folder: Path) -> list[str]:
-    """Branches that both files of a folder have, which holds nothing else but the steps of a run that goes on."""
-    rest = {file.name for file in folder.iterdir() if not file.match("resume-*.h5")}
-    assert rest - {".lock"} == {"diagram.json", "states.h5"}
-    data = json.loads((folder / "diagram.json").read_text())
-    with h5py.File(folder / "states.h5") as file:
-        assert file.attrs["run"] == data["run"]
-        for branch in data["branches"]:
-            assert file[f"branches/{branch['name']}/load"][:].tolist() == branch["columns"]["load"]
-    return [branch["name"] for branch in data["branches"]]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

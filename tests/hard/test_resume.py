@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import demo_cases
-import h5py
 import hemitropic_cases
 import numpy as np
 import pytest
+from hard.folders import HOME, alike, check_states, contents
 from mpi4py import MPI
 
 import rodfem
@@ -31,7 +31,6 @@ from rodfem.output.checkpoint import path_of
 from rodfem.problem.scene import Scene
 
 COMM = MPI.COMM_WORLD
-HOME = Path(__file__).parents[2]
 MESH = rodfem.Discretization("auto", 6, 6)
 CLOSE = 1e-8
 """Difference of two diagrams that were computed by different numbers of ranks."""
@@ -70,38 +69,6 @@ def interrupted_at(monkeypatch: pytest.MonkeyPatch, moment: int) -> None:
 
     for event in ("progress", "special"):
         monkeypatch.setattr(Terminal, event, strike)
-
-
-def contents(folder: Path) -> dict[str, Any]:
-    """Diagram of a run, but for times, origin and the name of the run."""
-    data: dict[str, Any] = json.loads((folder / "diagram.json").read_text())
-    return {name: value for name, value in data.items() if name not in ("timing", "origin", "run")}
-
-
-def check_states(folder: Path, other: Path, close: float = 0.0) -> None:
-    """Both files have the same rows, and those of the diagram beside them."""
-
-    def check(name: str, entry: Any) -> None:
-        if isinstance(entry, h5py.Dataset) and entry.dtype.kind == "f":
-            np.testing.assert_allclose(entry[()], theirs[name][()], rtol=close, atol=close)
-
-    with h5py.File(folder / "states.h5") as mine, h5py.File(other / "states.h5") as theirs:
-        names: list[set[str]] = [set(), set()]
-        mine.visit(names[0].add)
-        theirs.visit(names[1].add)
-        assert names[0] == names[1]
-        mine.visititems(check)
-
-
-def alike(a: Any, b: Any, close: float) -> bool:
-    """Whether two diagrams are the same but for numbers that are ``close``."""
-    if isinstance(a, dict) and isinstance(b, dict):
-        return a.keys() == b.keys() and all(alike(a[name], b[name], close) for name in a)
-    if isinstance(a, list) and isinstance(b, list):
-        return len(a) == len(b) and all(alike(p, q, close) for p, q in zip(a, b, strict=True))
-    if isinstance(a, float) and isinstance(b, float):
-        return abs(a - b) <= close * max(1.0, abs(a))
-    return bool(a == b)
 
 
 def run_of(scene: Scene, plan: rodfem.Plan, folder: Path, comm: MPI.Comm = COMM) -> rodfem.Diagram:

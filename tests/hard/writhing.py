@@ -28,6 +28,8 @@ SCALE = (10.0, 10.0, 50.0, 50.0, 50.0)
 """Sizes of moments and forces."""
 FIRST, LAST = 0.1, 0.9
 """Range of D of the planar elastica."""
+MOST = 4 * pi
+"""Largest angle phi."""
 
 
 def planar(D: float) -> np.ndarray:
@@ -55,8 +57,9 @@ def reference(C: float, load: str, D: float, span: tuple[float, float], back: fl
     return Branch.follow(misfit, [*planar(D), span[0]], (*SCALE, size), span, back).changes(index)
 
 
-def clamped_rod(C: float, load: str, D: float, span: tuple[float, float]) -> Scene:
-    """The rod as rodfem has it."""
+def clamped_rod(C: float, load: str, D: float, span: tuple[float, float], **more: Any) -> Scene:
+    """The rod as rodfem has it, with what else is given."""
+    constants = {"phi": 0.0, "D": D, "B2": 1.0, "C": C} | more.pop("constants", {})
 
     def turned(c: Any) -> tuple[Any, ...]:
         return (ufl.cos(c.phi / 2), 0.0, 0.0, ufl.sin(c.phi / 2))
@@ -67,16 +70,15 @@ def clamped_rod(C: float, load: str, D: float, span: tuple[float, float]) -> Sce
 
     return column(
         "writhing", (clamped(), clamped(lambda c: (0.0, 0.0, 1 - c.D), turned)), span, load=load, start=start,
-        constants={"phi": 0.0, "D": D, "B2": 1.0, "C": C},
-        ordinate=Ordinate("deflection", s=0.5, of=lambda r, q: np.hypot(r[0], r[1])),
+        constants=constants, ordinate=Ordinate("deflection", s=0.5, of=lambda r, q: np.hypot(r[0], r[1])), **more,
     )  # fmt: skip
 
 
 def turned(D: float, C: float) -> Measured:
     """The end is turned by 4 pi: both folds, or none where D is small, with the index on either side."""
-    span = (0.0, 4 * pi)
+    span = (0.0, MOST)
     half = reference(C, "phi", D, span, back=2 * pi)
-    expected = half + [Change(4 * pi - c.load, c.after, c.before) for c in reversed(half)]
+    expected = half + [Change(MOST - c.load, c.after, c.before) for c in reversed(half)]
     diagram = run(clamped_rod(C, "phi", D, span), Discretization("auto", 10, 6))
     return compare(singular(diagram[0]), expected, said(diagram))
 
