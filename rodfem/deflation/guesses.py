@@ -6,6 +6,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.system import System
+from rodfem.problem.end import TURNS
 
 
 def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[int]) -> PETSc.Vec:
@@ -27,6 +28,22 @@ def turned_state(system: System, base: PETSc.Vec, amplitude: float, seed: list[i
     state = system.at(base)
     turned = f.turning.turned(state.turned, waves @ weights * (amplitude / size))
     return system.vector(f.filled(state.named | {f.turning.name: turned}))
+
+
+def turned_over(system: System, base: PETSc.Vec) -> list[PETSc.Vec]:
+    """Known state turned as a whole by half a turn about d1, and about d2, where both ends turn freely; else none.
+
+    Waves along the rod never get there: a rod between two pins may hang below the one that it stands on.  Newton's
+    method moves the ends to where they are held.  ``base`` is the known state of the ``system``.
+    """
+    if system.scene.closed or any(end.turning != TURNS for end in system.scene.sides):
+        return []
+    f, state = system.fields, system.at(base)
+    out = []
+    for axis in np.eye(3)[:2]:
+        vector = np.broadcast_to(np.pi * axis, (*state.turned.shape[:-1], 3))
+        out.append(system.vector(f.filled(state.named | {f.turning.name: f.turning.turned(state.turned, vector)})))
+    return out
 
 
 def _waves(x: np.ndarray, left: bool, right: bool) -> np.ndarray:

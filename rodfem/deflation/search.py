@@ -25,7 +25,7 @@ from rodfem.continuation.prediction import hermite
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.deflation.deflated_newton import FLOW, MOST, DeflatedNewton
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
-from rodfem.deflation.guesses import turned_state
+from rodfem.deflation.guesses import turned_over, turned_state
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import combine
@@ -112,12 +112,16 @@ class Deflation(DeflatedNewton):
         """Make ``tries`` tries, the first from the scene's start if nothing is known; all that was found so far.
 
         Guesses start in turn from the known and the found states, and grow from ``LEAST`` to ``GREATEST``; half of them
-        flow twice as long.  The tries of a second call are others.
+        flow twice as long.  The tries of a second call are others.  The first ones of a rod whose ends turn freely are
+        the first state turned over.
         """
         before = len(self.tally.tries)
+        over = turned_over(self.system, self.bases[0]) if self.bases else []
         for number in range(before, before + tries):
             x = self.start.copy()
-            if number or self.known.states:
+            if number < len(over):
+                x = over[number]
+            elif number or self.known.states:
                 amplitude = LEAST * (GREATEST / LEAST) ** ((number - before) / max(tries - 1, 1))
                 base = self.bases[number % len(self.bases)] if self.bases else self.start
                 x = turned_state(self.system, base, amplitude, [self.seed, number])

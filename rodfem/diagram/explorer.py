@@ -14,7 +14,7 @@ from rodfem.adaptivity.gaps import Gap, arms
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.normal_form import normal_form_of, origin_of
 from rodfem.continuation.solvers import ON_BOUND
-from rodfem.continuation.special_points import COUPLED, coupling_of, directions, start_branch
+from rodfem.continuation.special_points import COUPLED, coupling_of, directions, lines, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
 from rodfem.diagram.equivalence import equally_stable, equivalent, near
@@ -193,11 +193,10 @@ class Explorer(Tracer):
         self.use(special.point.mesh)
         self.solver.damp(special.point.zero - self.solver.system.active_drifts(special.point.x) - special.multiplicity)
         ways = directions(self.solver, special)
-        before = len(self.branches)
-        for direction in ways:
+        before, firsts = len(self.branches), list[Point]()
+        for direction in self._lines(special, ways):
             self.use(special.point.mesh)
             self._law(special, direction)
-            first: Point | None = None
             for sign in (1.0, -1.0):
                 self.use(special.point.mesh)
                 name = self._name(parent)
@@ -213,15 +212,43 @@ class Explorer(Tracer):
                 if not self._bounds()[0] <= branch.points[1].load <= self._bounds()[1]:
                     self.observer.note(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
                     continue
-                if first is not None and self._mirrored(special, first, branch.points[1]):
-                    continue  # the mirror image of the branch just traced
                 first = branch.points[1]
+                if any(self._mirrored(special, known, first) for known in firsts):
+                    continue  # the mirror image of a branch just traced
+                firsts.append(first)
                 if special.connects_to is None and self._traced_already(branch, special):
                     continue
                 if self._came_from(parent, special, first):
                     continue
                 self.trace(branch)
         self._classify_from_the_side(special, self.branches[before:])
+
+    def _lines(self, special: SpecialPoint, ways: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
+        """Directions of the branches that leave, given those of the null vectors; what leaves subcritically is first.
+
+        Of several motions that become unstable at once the branches are to be found; each has its own normal form.
+        """
+        if len(ways) < 2 or special.test_function != "mu":
+            return list(ways)
+        with self.solver.system.clock.scope("location"):
+            found = lines(self.solver, special, ways)
+            forms = [normal_form_of(self.solver, origin_of(self.solver, special), way) for way in found]
+        kinds = []
+        for form in forms:
+            if form is not None:
+                form.classify(*self._indices(special))
+            kinds.append("" if form is None else form.kind)
+        order = sorted(range(len(found)), key=lambda i: not kinds[i].startswith("subcritical"))
+        several = dict.fromkeys(kinds[i] for i in order if kinds[i])
+        if len(several) > 1:
+            special.note = f"branches of several forms leave here: {', '.join(several)}"
+        return [found[i] for i in order]
+
+    @staticmethod
+    def _indices(special: SpecialPoint) -> tuple[int, int]:
+        """Index of the branch that is left at loads just below, and just above."""
+        indices = special.negative_before, special.negative_after
+        return indices if special.point.slope > 0 else (indices[1], indices[0])
 
     def _bounds(self) -> tuple[float, float]:
         """Least and greatest load, with room for round-off."""
@@ -240,8 +267,7 @@ class Explorer(Tracer):
             with self.solver.system.clock.scope("error bars"):
                 self.meshes.richer(special.point.mesh).law(special, way, special.law)
         if special.law is not None and not from_the_side:
-            indices = special.negative_before, special.negative_after
-            special.law.classify(*(indices if special.point.slope > 0 else reversed(indices)))
+            special.law.classify(*self._indices(special))
             self.observer.law(special)
 
     def _classify_from_the_side(self, special: SpecialPoint, trunk: Sequence[Branch]) -> None:

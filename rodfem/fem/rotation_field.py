@@ -14,6 +14,8 @@ from rodfem.problem.quaternions import of_vector, product
 Start = Callable[[np.ndarray], np.ndarray] | None
 TWICE = 4 * np.pi
 """Period of a quaternion as a function of the angle of rotation."""
+SAMPLES = 1001
+"""Arclengths at which a start is followed along the rod."""
 
 
 @dataclass(frozen=True)
@@ -52,15 +54,25 @@ class QuaternionField:
         return np.asarray(values / np.linalg.norm(values, axis=-1, keepdims=True))
 
     def start(self, start: Start, s: np.ndarray, interval: tuple[float, float]) -> np.ndarray:
-        """Values (m, size) at arclengths (m,) of a scene's start, a straight rod without one."""
-        return np.tile(IDENTITY, (s.size, 1)) if start is None else np.asarray(start(s), dtype=float)
+        """Values (m, size) at arclengths (m,) of a scene's start, a straight rod without one.
+
+        The signs that the start gives its quaternions are a matter of choice: they are made to be continuous along the
+        rod from its left end.
+        """
+        if start is None:
+            return np.tile(IDENTITY, (s.size, 1))
+        every, place = np.unique(np.append(np.linspace(*interval, SAMPLES), s), return_inverse=True)
+        values = np.asarray(start(every), dtype=float)
+        signs = np.cumprod(np.where((values[1:] * values[:-1]).sum(axis=1) < 0, -1.0, 1.0))
+        return np.asarray((values * np.append(1.0, signs)[:, None])[place.ravel()[SAMPLES:]])
 
     def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
-        """Value (size,) at an end at ``s`` that is clamped with the given unit quaternion.
+        """Value (size,) at an end at ``s`` that is clamped with a unit quaternion, or its negative: next to the start.
 
         ``rotation`` (4,) is that quaternion; ``start`` is the first guess, ``interval`` the arclengths of the ends.
         """
-        return np.array(rotation)
+        value = np.array(rotation)
+        return np.asarray(-value if value @ self.start(start, np.array([s]), interval)[0] < 0 else value)
 
 
 @dataclass(frozen=True)
@@ -109,9 +121,9 @@ class AngleField:
         """Values (m, size) at arclengths (m,) of a scene's start, continuous along the rod from its left end."""
         if start is None:
             return np.zeros((s.size, 1))
-        every, place = np.unique(np.append(np.linspace(*interval, 1001), s), return_inverse=True)
+        every, place = np.unique(np.append(np.linspace(*interval, SAMPLES), s), return_inverse=True)
         angles = np.unwrap(self._angle(np.asarray(start(every), dtype=float)), period=TWICE)
-        return np.asarray(angles[place.ravel()[1001:], None])
+        return np.asarray(angles[place.ravel()[SAMPLES:], None])
 
     def clamp(self, rotation: Sequence[float], start: Start, s: float, interval: tuple[float, float]) -> np.ndarray:
         """Value (size,) at an end at ``s`` that is clamped with a unit quaternion: the one next to the start.

@@ -85,9 +85,9 @@ def _least_zeros(branch: Mapping[str, Any]) -> int:
 
 
 def known_digits(special: Mapping[str, Any]) -> str:
-    """Load of a special point, with the digits that its error bar supports."""
+    """Load of a special point, with the digits that its error bar supports: rounded by less than that."""
     load, error = special["load"], special.get("error_estimate")
     digits = FEW
     if error and isfinite(error) and special.get("resolved") is not False:
-        digits = min(max(floor(log10(max(abs(load), error) / error)), 1), DIGITS)
+        digits = min(max(floor(log10(max(abs(load), error))) - floor(log10(error)) + 1, 1), DIGITS)
     return f"{load:.{digits}g}"

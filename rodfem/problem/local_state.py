@@ -100,11 +100,21 @@ def needs_centreline(scene: Scene) -> str:
         return "what is attached along the rod"
     if scene.inertia.rho_A(c) != 0:
         return "the mass of the rod"
+    if floats(scene) and not (scene.plain(0) and scene.plain(1)):
+        return "a rod that nothing holds, with more than dead forces at its ends,"
     functions = [("the potential along the rod", scene.potential)] if scene.potential else []
     functions += [] if scene.ordinate.places else [("the ordinate", scene.ordinate.of)]
     functions += [("what is attached along the rod", x.energy) for x in scene.attachments if x.energy and x.s in inner]
     functions += [("a constraint", x.of) for x in scene.constraints if x.s is None or x.s in inner]
     return next((what for what, function in functions if asks_where(function, c)), "")
+
+
+def floats(scene: Scene) -> bool:
+    """Whether nothing holds the rod where it is: no end, no spring, no constraint."""
+    c = scene.constants()
+    if scene.closed or any(len(end.fixed(c)) for end in scene.sides):
+        return False
+    return not any(asks_where(function, c) for _, function, _ in functions_of_places(scene))
 
 
 def asks_where(function: OfPlace, c: Constants) -> bool:

@@ -39,6 +39,7 @@ def check_results(scene: Scene) -> None:
                 values = function(there)
                 _check_numbers(what, role, values)
                 check_same(what, _numbers(role, values), _numbers(role, function(there)))
+            function(_symbols(scene))
         elif role.call == "f(x, c)":
             check_expression(what, function(some_places(scene, wrap=ufl.variable)[role.along], c))
             places = [some_places(scene, i)[role.along] for i in range(len(STATES))]
@@ -70,6 +71,21 @@ def _constants(scene: Scene, role: Role) -> Iterator[Constants]:
     yield scene.constants()
     yield from (scene.constants(load) for load in scene.span)
     yield from (scene.constants(s=s) for s in scene.samples() if role.along)
+
+
+class _Symbol(ufl.classes.Variable):  # type: ignore[misc]
+    """An expression that stands for no number, as the constants do in the equations: ``math.cos`` refuses it."""
+
+    __slots__ = ()
+
+    def evaluate(self, *_: Any, **__: Any) -> float:
+        """Raise :class:`TypeError`."""
+        raise TypeError("a constant is an expression of UFL")
+
+
+def _symbols(scene: Scene) -> Constants:
+    """Constants as a function of them meets them in the equations."""
+    return Constants(**{name: _Symbol(ufl.as_ufl(value)) for name, value in vars(scene.constants()).items()})
 
 
 def _check_numbers(what: str, role: Role, values: Any) -> None:

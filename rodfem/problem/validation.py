@@ -19,7 +19,7 @@ from rodfem.problem.attachment import Attachment
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End
 from rodfem.problem.kinds import check_scalar, real, reals
-from rodfem.problem.local_state import STATES, asked_for, asks_where, functions_of_places, some_places
+from rodfem.problem.local_state import STATES, asked_for, asks_where, floats, functions_of_places, some_places
 from rodfem.problem.results import check_expression, check_results, check_same
 from rodfem.problem.roles import functions_of, is_object
 from rodfem.tolerances import NEGLIGIBLE
@@ -318,9 +318,11 @@ def check_supports(scene: Scene) -> None:
 def check_drift(scene: Scene) -> None:
     """Raise :class:`SceneError` where the rod is held, but not in all directions in which it can be moved.
 
-    One that nothing holds may float: whether its loads balance, the equations tell.
+    One that nothing holds may float if the forces on its ends balance.  Whether loads along it do, the equations tell.
     """
     c = scene.constants()
+    if floats(scene):
+        check_balance(scene)
     if scene.closed or any(asks_where(f, c) for _, f, _ in functions_of_places(scene)):
         return
     held = np.vstack([np.zeros(3), *(end.fixed(c) for end in scene.sides)])
@@ -331,6 +333,22 @@ def check_drift(scene: Scene) -> None:
             raise SceneError(
                 f"The rod can drift away along e{i + 1}: hold that component of the position at one end at least, "
                 "or attach a spring."
+            )
+
+
+def check_balance(scene: Scene) -> None:
+    """Raise :class:`SceneError` where dead forces on the ends of a rod that nothing holds do not add up to zero."""
+    along = [x for x in scene.attachments if x.force]
+    if along or scene.distributed is not None or not scene.conservative:
+        return
+    for load in scene.span:
+        c = scene.constants(load)
+        forces = np.array([[float(x) for x in end.force(c)] for end in scene.sides if end.force] or np.zeros((1, 3)))
+        total = forces.sum(axis=0)
+        if abs(total).max() > NEGLIGIBLE * abs(forces).max():
+            raise SceneError(
+                f"At {scene.load} = {load:g} the forces on the ends add up to {(total + 0.0).tolist()}, and nothing "
+                "holds the rod against that: hold an end, attach a spring, or let the forces balance."
             )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.faults import as_failure
 from rodfem.stability.method import Method
 from rodfem.stability.methods import AUTO, METHODS, find
 from rodfem.stability.rank import rank_of
@@ -131,7 +132,8 @@ class Assessor(Workspace):
             raise InputError(f"{number} eigenvalues cannot be computed: ask for none or more.")
         started = perf_counter()
         if self.inertia is None:
-            found = self._method(name).nearest(x, max(number, 1))
+            with as_failure(self.system.comm):
+                found = self._method(name).nearest(x, max(number, 1))
             scale = ZERO * self.system.stiffness_scale / self.system.scene.length
             bad = int(((found.values.real < -scale) | (abs(found.values.imag) > scale)).sum())
             index, zero, nothing = bad, self.system.active_drifts(x), np.zeros(0)
@@ -141,7 +143,8 @@ class Assessor(Workspace):
             decision = self._index(x)
             index, zero = decision.index.negative, decision.index.zero
             inside, made = (decision.band, decision.inside, decision.uncertainty), 2 - self.factorisations()
-            found = self._method(name if number else "count").leftmost(x, number, interval)
+            with as_failure(self.system.comm):
+                found = self._method(name if number else "count").leftmost(x, number, interval)
             made += self.factorisations()
         return Verdict(
             *(index, zero, found.values, found.vectors, found.errors, *inside, found.certified),

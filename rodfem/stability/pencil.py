@@ -302,11 +302,12 @@ def with_factors(
     return solver
 
 
-def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> SLEPc.EPS:
+def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, room: int = 100) -> SLEPc.EPS:
     """Set up spectrum slicing for all eigenvalues of a symmetric pencil between two numbers that are none themselves.
 
     Options: ``-rodfem_slicing_eps_...``, ``-rodfem_slicing_st_...``.  Raises :class:`PETSc.Error` where an end is one.
-    The pencil is ``matrix - mu mass``, the two numbers are ``low`` and ``high``.
+    The pencil is ``matrix - mu mass``, the two numbers are ``low`` and ``high``; ``room`` is what MUMPS has beyond its
+    estimate, a percentage.
     """
     solver = eigensolver(matrix, mass, "rodfem_slicing_", symmetric=True)
     solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
@@ -318,6 +319,7 @@ def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> 
     ksp.setType("preonly")
     ksp.getPC().setType("cholesky")
     ksp.getPC().setFactorSolverType("mumps")
-    with preferred(ksp.getOptionsPrefix(), ordering(matrix) | {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1}):
+    controls = {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_14": room}
+    with preferred(ksp.getOptionsPrefix(), ordering(matrix) | controls):
         solver.setUp()
     return solver

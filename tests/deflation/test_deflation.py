@@ -168,6 +168,17 @@ def test_nothing_to_find() -> None:
         assert "no proof" in out.getvalue()
 
 
+@pytest.mark.parametrize("planar", [None, "e1"])
+def test_a_column_that_hangs(planar: str | None) -> None:
+    """Between pins, one of which slides: turned over, what pressed the column pulls it straight, at any load."""
+    solver = Solver(replace(classics.euler("pinned-pinned"), planar=planar))
+    standing = solver.equilibrium(5.0)
+    (hangs,) = (p for p in solver.search(5.0, [standing], tries=3) if p.stable)
+    r = solver.equilibria.shape.sample(hangs.x)["r"]
+    assert r[-1] == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
+    assert hangs.energy == pytest.approx(0.0, abs=1e-12)
+
+
 def test_known_state_at_another_load() -> None:
     with pytest.raises(InputError, match=r"not 6\.5"):
         Deflation(ruler().follower, 6.5, hemitropic_cases.user_points(ruler()["plane"], 6.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import hypot, pi
 
 import numpy as np
@@ -10,8 +11,9 @@ from numpy.polynomial import Legendre
 from scipy.optimize import brentq
 
 import rodfem
+from forms import loads
 from forms.energy import bending_and_twist
-from rodfem import Discretization, Inertia, Ordinate, Parameter, Plan, Scene, SceneError, Solver, free
+from rodfem import Discretization, End, Inertia, Ordinate, Parameter, Plan, Scene, SceneError, Solver, free
 
 ROOTS = [brentq(lambda x: np.cos(x) - 1 / np.cosh(x), (n + 0.4) * pi, (n + 0.6) * pi, xtol=1e-14) for n in (1, 2, 3)]
 FREQUENCIES = np.square(ROOTS)
@@ -97,5 +99,15 @@ def test_forces_that_nothing_balances() -> None:
     one_sided = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
     with pytest.raises(SceneError, match="nothing holds the rod against"):
         rodfem.trace(floating(one_sided, (0.0, 5.0)), MESH, Plan(depth=0))
+    with pytest.raises(SceneError, match="nothing holds the rod against"):
+        floating((free(), free(lambda c: (0.0, 0.0, -c.P))), (0.0, 5.0))
     with pytest.raises(SceneError, match="not the state that a small P leads on from"):
-        rodfem.trace(floating((free(), free(lambda c: (0.0, 0.0, -c.P))), (0.0, 5.0)), MESH, Plan(depth=0))
+        rodfem.trace(floating((free(), free()), (0.0, 5.0), distributed=lambda c: (0.0, 0.0, -c.P)), MESH)
+
+
+def test_a_spring_that_resists_turning_alone() -> None:
+    """A rod that turns against a spring at one end and is held nowhere: stable, and free to move along e1, e2, e3."""
+    spring = End(energy=lambda x, c: loads.rotational_spring(x.q, 2.0 + c.P))
+    massless = replace(floating((spring, free()), (0.0, 1.0)), inertia=Inertia())
+    point = Solver(massless).equilibrium(0.0)
+    assert (point.negative, point.zero) == (0, 3)

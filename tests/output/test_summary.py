@@ -13,6 +13,7 @@ import golden_cases
 import pytest
 
 from rodfem import Discretization, Plan, trace
+from rodfem.output.change_words import known_digits
 from rodfem.output.summary import in_sentences
 
 
@@ -39,6 +40,11 @@ def known(name: str) -> str:
 
 
 # --- what is known ----------------------------------------------------------------------------------------------------
+
+
+def test_loads_are_rounded_by_less_than_their_error() -> None:
+    for load, error, words in ((3.384, 0.17, "3.4"), (1.449, 0.0145, "1.45"), (9.8696044, 2e-11, "9.8696044")):
+        assert known_digits(special("branch point", 1, load, 0, 1, error_estimate=error)) == words
 
 
 @pytest.mark.parametrize(
@@ -150,7 +156,7 @@ def test_verbs(more: dict[str, Any], verb: str) -> None:
 def test_digits_are_those_of_the_error_bar() -> None:
     point = special("fold", 2, 2.123456789, 0, 1, error_estimate=1e-4)
     rod = branch("straight", [0.0, 1.0, 2.123456789, 3.0, 4.0], [0, 0, 0, 1, 1], special=[point])
-    assert "to 2.123, where" in said(rod)
+    assert "to 2.1235, where" in said(rod)
     point["error_estimate"] = None
     assert "to 2.12346, where" in said(rod)
 

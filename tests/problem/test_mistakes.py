@@ -133,6 +133,13 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ({"ends": right(force=lambda c: (0, 0, 1 / (c.P - 3)))}, "force on the right end fails with ZeroDivision"),
     ({"ends": right(force=lambda c: exit(3))}, "force on the right end fails with SystemExit"),
     ({"ends": right(force=lambda c: (0, 0, -c.P * random.random()))}, "returns other values each time"),
+    # what is a number here is an expression in the equations
+    ({"ends": right(force=lambda c: (0, 0, math.cos(c.P)))}, "force on the right end fails with TypeError.*with UFL"),
+    (
+        {"ends": (clamped(rotation=lambda c: (np.cos(c.P), 0, 0, np.sin(c.P))), TIP)},
+        "rotation of the left end fails.*with UFL",
+    ),
+    ({"ends": (free(), TIP)}, "add up to .0.0, 0.0, -3.0., and nothing holds the rod against that"),
     *(
         (
             {"ends": (clamped(), hinged(x, lambda c: (0, 0, None), force=lambda c: (0, 0, -c.P)))},

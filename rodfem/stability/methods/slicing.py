@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from petsc4py import PETSc
+from slepc4py import SLEPc
 
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.stability.method import Found, Interval, SymmetricMethod
@@ -14,6 +15,10 @@ WIDER = (0.0, 1e-9, 1e-7, 1e-5)
 """By how much of itself an interval is widened where what SLEPc finds in it does not match the counts at its ends."""
 PETSC_ERR_PLIB = 77
 """PETSc's error code for that."""
+PETSC_ERR_LIB = 76
+"""PETSc's error code for a fault of MUMPS."""
+ROOMS = (100, 400, 1600)
+"""Percentages of room beyond MUMPS's estimate: where rotations have no mass many pivots of the pencil are delayed."""
 STEP, CUT = 1.0371, 0.4931
 """Factors of the ends tried, no simple numbers: an end on an eigenvalue is unlikely."""
 HALVINGS = 20
@@ -38,13 +43,8 @@ class Slicing(SymmetricMethod):
         for wider in WIDER:  # an end on an eigenvalue is moved off it
             low, high = low - wider * (high - low), high + wider * (high - low)
             wanted = pencil.below(high) - pencil.below(low)
-            try:
-                solver = in_interval(matrix, mass, low / units.omega2, high / units.omega2)
-                solver.solve()
-            except PETSc.Error as trouble:
-                if trouble.ierr != PETSC_ERR_PLIB:
-                    raise
-            else:
+            solver = solved(matrix, mass, low / units.omega2, high / units.omega2)
+            if solver is not None:
                 break
         else:
             raise ConvergenceError(f"An end of the interval from {low:.6g} to {high:.6g} is an eigenvalue: move it.")
@@ -58,6 +58,26 @@ class Slicing(SymmetricMethod):
         solver.destroy()
         values = values[order]
         return Found(values, vectors, pencil.backward_errors(values, vectors), complete, FACTORISATIONS)
+
+
+def solved(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> SLEPc.EPS | None:
+    """Eigenvalues of a pencil between ``low`` and ``high``; None where they do not match the counts at these ends.
+
+    Raises :class:`PETSc.Error` where PETSc gives up, MUMPS with the largest of :data:`ROOMS`.  ``matrix - mu mass`` is
+    the pencil.
+    """
+    for room in ROOMS:
+        try:
+            solver = in_interval(matrix, mass, low, high, room)
+            solver.solve()
+        except PETSc.Error as trouble:
+            if trouble.ierr == PETSC_ERR_PLIB:
+                return None
+            if trouble.ierr != PETSC_ERR_LIB or room == ROOMS[-1]:
+                raise
+        else:
+            return solver
+    return None
 
 
 def enclose(pencil: SymmetricPencil, number: int) -> Interval:

@@ -1,0 +1,161 @@
+"""More rods against closed forms and equations of their linearised states: rings, strips, torques, tension, signs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import hypot, pi, sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from classics import BEAM, ON_AXIS, RIGID, circle, column, push
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import rodfem
+from forms.energy import bending_and_twist
+from rodfem import (
+    Discretization,
+    Ordinate,
+    Parameter,
+    Plan,
+    Ring,
+    Scene,
+    Solver,
+    clamped,
+    everywhere,
+    free,
+    pinned,
+    sliding,
+)
+from rodfem.stability.methods import METHODS
+
+FIRST = Plan(depth=0)
+B, C = 1.0, 0.7
+
+
+def ring(turns: int, load: str, span: tuple[float, float], **more: Any) -> Scene:
+    """A rod of natural curvature k0 closed to a circle of radius one that it covers several times."""
+    values = {"k0": 1.0, "C": C} | {load: span[0]}
+    given: dict[str, Any] = {
+        "energy": lambda v, k, c: bending_and_twist((k[0], k[1] - c.k0, k[2]), (B, B, c.C)),
+        "parameters": {name: Parameter(value) for name, value in values.items()},
+        "ordinate": Ordinate("width", s=pi, of=lambda r, q: hypot(*r)),
+    }
+    return Scene(
+        name="ring", interval=(0.0, 2 * pi * turns), rod=RIGID, ends=Ring(odd=turns % 2 == 1), start=circle, load=load,
+        span=span, **given | more,
+    )  # type: ignore[arg-type]  # fmt: skip
+
+
+def test_ring_covered_twice() -> None:
+    """Out of its plane a mode of wave number p has the energy ``B (a p - b)^2 + C (a - b p)^2 - M (a^2 ...)``.
+
+    With the moment ``M = B (1 - k0)`` it vanishes where ``M^2 - (B + C) M = B C (p^2 - 1)``.  Of p = 1/2, 1, 3/2, ...
+    the first is unstable in a naturally straight rod, whatever C is (Manning & Hoffman, J. Elasticity 62, 2001).
+    """
+    expected = []
+    for p in (0.5, 1.5):
+        M = ((B + C) - np.array([1, -1]) * sqrt((B + C) ** 2 - 4 * B * C * (1 - p * p))) / 2
+        expected += [1 - x / B for x in M if 0.05 < 1 - x / B < 1.6]
+    found = rodfem.trace(ring(2, "k0", (0.05, 1.6)), Discretization(elements=14, degree=6), FIRST).special()
+    assert [(s.negative_before, s.negative_after, s.multiplicity) for s in found] == [(2, 0, 2), (0, 2, 2)]
+    for special, k0 in zip(found, sorted(expected), strict=True):
+        assert abs(special.point.load - k0) < special.error_estimate < 1e-8
+
+
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "count"])
+def test_vibrating_ring(method: str) -> None:
+    """Love: ``n^2 (n^2 - 1)^2 / (n^2 + B/C)`` out of the plane, ``B2 n^2 (n^2 - 1)^2 / (n^2 + 1)`` in it.
+
+    Rotations have no mass, so that factors of the pencil delay many pivots.
+    """
+    energy = lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (B, 2.0, c.C))  # noqa: E731
+    solver = Solver(ring(1, "C", (C, 1.0), energy=energy, inertia=BEAM), Discretization(elements=8, degree=6))
+    verdict = solver.assess(solver.equilibrium(C), method=method, number=8)
+    size = {n: n * n * (n * n - 1) ** 2 for n in (2, 3)}
+    expected = [x for n in (2, 3) for x in (size[n] / (n * n + B / C), 2 * size[n] / (n * n + 1))]
+    assert (verdict.negative, verdict.zero, verdict.certified) == (0, 6, True)
+    assert verdict.values == pytest.approx(np.repeat(expected, 2), rel=1e-6)
+
+
+@pytest.mark.parametrize("above", [0.0, 0.2, -0.2])
+def test_load_above_a_strip(above: float) -> None:
+    """A strip that does not bend in its plane, loaded across at its tip, off its axis (Prandtl, Timoshenko & Gere 6.3).
+
+    ``C phi'' + P^2 (1 - s)^2 / B phi = 0``, with ``C phi' = P a phi`` at the tip under a load at the height a.
+    """
+
+    def tip(P: float) -> float:
+        y = solve_ivp(
+            lambda s, y: [y[1], -((P * (1 - s)) ** 2) / (B * C) * y[0]], (0, 1), [0.0, 1.0], "DOP853", rtol=1e-12,
+            atol=1e-13,
+        ).y[:, -1]  # fmt: skip
+        return float(C * y[1] - P * above * y[0])
+
+    strip = column(
+        "strip", (clamped(), free(energy=lambda x, c: -c.P * (x.r[0] - c.k * x.d1[0]))), (0.0, 5.0),
+        constants={"k": above, "B1": B, "C": C}, constraints=(everywhere(lambda x, c: x.k[1], strain=True),),
+    )  # fmt: skip
+    (found,) = rodfem.trace(strip, plan=FIRST).special()
+    assert (found.negative_before, found.negative_after) == (0, 1)
+    assert abs(found.point.load - brentq(tip, 1.5, 5.0, xtol=1e-13)) < found.error_estimate < 1e-9
+
+
+def torque(T: float) -> float:
+    """Least torque at which a round rod between clamps buckles under a tension T: ``y'''' - i M y''' - T y'' = 0``."""
+
+    def determinant(M: float) -> float:
+        a, b = 1j * (M / 2 + np.sqrt(M * M / 4 - T + 0j) * np.array([1, -1]))
+        rows = [[1, 0, 1, 1], [0, 1, a, b], [1, 1, np.exp(a), np.exp(b)], [0, 1, a * np.exp(a), b * np.exp(b)]]
+        value = np.linalg.det(np.array(rows)) * np.exp(-(a + b) / 2) / (a - b)
+        return float(value.real if abs(value.real) > abs(value.imag) else value.imag)
+
+    low = sqrt(max(4 * T, 0.0)) + 0.01  # before that roots are not imaginary
+    grid = np.linspace(low, 16.0, 800)
+    values = [determinant(M) for M in grid]
+    i = next(i for i in range(len(grid) - 1) if values[i] * values[i + 1] < 0)
+    return float(brentq(determinant, grid[i], grid[i + 1], xtol=1e-13))
+
+
+def test_torque_and_tension() -> None:
+    turned: Any = lambda c: (ufl.cos(c.phi / 2), 0.0, 0.0, ufl.sin(c.phi / 2))  # noqa: E731
+    rod = column(
+        "cable", (clamped(), sliding(ON_AXIS, turned, force=lambda c: (0.0, 0.0, c.T))), (0.0, 6.0), load="phi",
+        constants={"phi": 0.0, "T": 0.0, "B2": 1.0, "C": 2.0},
+    )  # fmt: skip
+    diagram = rodfem.trace(rod, plan=replace(FIRST, error_bars=False))
+    locus = diagram.locus(diagram.special("branch point")[0], "T", (-30.0, 20.0), load=(0.0, 8.0))
+    assert min(locus.values[:, 1]) == -30.0 and max(locus.values[:, 1]) == 20.0
+    for phi, T in locus.values[::7]:
+        assert 2.0 * phi == pytest.approx(torque(T), rel=1e-8)
+
+
+def test_buckling_in_tension() -> None:
+    """Haringx: ``P (1 + P/GA) = n^2 pi^2 B``, the negative root; for n = 0, ``P = -GA``, all sections turn alike."""
+    GA = 10.0
+    expected = [-GA, *(-(GA + sqrt(GA * GA + 4 * GA * pi**2 * x)) / 2 for x in (1.0, 2.0))]
+    rod = column(
+        "tension", (pinned(), pinned(ON_AXIS, push)), (0.0, -22.0), rod="inextensible",
+        energy=lambda v, k, c: GA / 2 * (v[0] ** 2 + v[1] ** 2) + bending_and_twist(k, (c.B1, c.B2, c.C)),
+    )  # fmt: skip
+    found = rodfem.trace(rod, plan=FIRST).special()
+    assert [(s.negative_before, s.negative_after) for s in found] == [(0, 2), (2, 3), (3, 4)]
+    for special, P in zip(found, expected, strict=True):
+        assert abs(special.point.load - P) < special.error_estimate < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("start", "rotation"),
+    [
+        (lambda s: np.stack([-1 + 0 * s, 0 * s, 0 * s, 0 * s], axis=1), (1.0, 0.0, 0.0, 0.0)),
+        (lambda s: np.stack([np.where(s < 0.33, -1.0, 1.0), 0 * s, 0 * s, 0 * s], axis=1), (1.0, 0.0, 0.0, 0.0)),
+        (None, (-1.0, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_signs_of_quaternions(start: Any, rotation: tuple[float, float, float, float]) -> None:
+    """A quaternion and its negative are one rotation: a column is Euler's, whichever of them a person gives."""
+    rod = column("signs", (clamped(rotation=rotation), free(push)), (0.0, 4.0), start=start)
+    (found,) = rodfem.trace(rod, plan=FIRST).special()
+    assert abs(found.point.load - pi**2 / 4) < found.error_estimate < 1e-9
