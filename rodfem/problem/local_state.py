@@ -100,7 +100,7 @@ def needs_centreline(scene: Scene) -> str:
         return "what is attached along the rod"
     if scene.inertia.rho_A(c) != 0:
         return "the mass of the rod"
-    if floats(scene) and not (scene.plain(0) and scene.plain(1)):
+    if floats(scene) and not all(scene.plain):
         return "a rod that nothing holds, with more than dead forces at its ends,"
     functions = [("the potential along the rod", scene.potential)] if scene.potential else []
     functions += [] if scene.ordinate.places else [("the ordinate", scene.ordinate.of)]
