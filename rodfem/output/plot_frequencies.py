@@ -22,7 +22,7 @@ from rodfem.output.intervals import intervals_of
 from rodfem.output.plot_pieces import STABLE
 from rodfem.output.sheet import DPI, HALO, PALETTE, SIZE, STYLE, at_most, axis_label, mesh_in_words, save
 
-COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5}
+COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5, "rigid motion": 6}
 """Places in the palette."""
 SPECIAL = {name: kind.marker for name, kind in KINDS.items() if kind.test == FREQUENCY}
 """Markers of the special points of a sweep."""

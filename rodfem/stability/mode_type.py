@@ -10,6 +10,8 @@ from rodfem.tolerances import TINY
 
 PURE = 0.99
 """Share of the mean square rotation above which a mode is named after one kind of motion."""
+RIGID = "rigid motion"
+"""Name of what a rod that nothing holds does at no frequency: translations have no rotation to be named after."""
 KINDS = ("bending about d1", "bending about d2", "torsion")
 
 

@@ -35,6 +35,7 @@ from rodfem.linalg.chain import Chain, Elimination
 from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, is_spread
 from rodfem.linalg.matrices import gathered, local_rows, petsc_matrix, shared
 from rodfem.linalg.selection import factors_of
+from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.pencil import (
@@ -65,6 +66,8 @@ MULTIPLE = 1e-8
 """Eigenvalues that differ by less than this, relative, are one that is multiple."""
 ALIKE = 1e-6
 """Eigenvalues that differ by less than this, relative, have one name: where another is near the shift, digits go."""
+STILL = 1e-10
+"""Share of the farthest eigenvalue below which that of a rod that nothing holds is zero."""
 NEAR_ZERO = 1e-2
 """Share of the farthest eigenvalue below which differences of others are relative to this share."""
 EPS = float(np.finfo(float).eps)
@@ -125,6 +128,7 @@ class NonsymmetricSolver(PencilMatrices):
         super().__init__(system)
         self.inverted: tuple[PETSc.Mat, Factors] | None = None
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
+        self.floats = floats(system.scene)
         self._rows: sp.csr_matrix | None = None
 
     @property
@@ -161,6 +165,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         """Be the state that the matrices were just filled for."""
         super().__init__(shared)
         self._turned, self._free, self._own = shared.turned, shared.free, slice(None)
+        self._floats = shared.floats
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
@@ -254,8 +259,9 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         np.add.at(sums, owners, squares)
         kinds = [""] * len(values)
         for group, square in zip(together, sums, strict=True):
+            rigid = self._floats and abs(values[group]).max() < STILL * abs(values).max()
             for j in group:
-                kinds[j] = mode_type.name(square / max(square.sum(), TINY))
+                kinds[j] = mode_type.RIGID if rigid else mode_type.name(square / max(square.sum(), TINY))
         return kinds
 
     def motion(self, basis: np.ndarray) -> str:
