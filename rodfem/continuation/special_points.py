@@ -275,7 +275,8 @@ def lines(solver: BranchSolver, special: SpecialPoint, ways: Sequence[PETSc.Vec]
     In the space of null vectors the reduced equations select a few lines, and a null vector of the eigensolver is on
     one by chance only.  Newton's method is started in directions all around, and once more in that in which what it
     finds is seen from the branch point.  Nearer to that any direction is an equilibrium to round-off.  ``solver`` has
-    the mesh; ``ways`` are those of :func:`directions`, which are returned where nothing is found.
+    the mesh; ``ways`` are those of :func:`directions`, which are returned where nothing is found.  Of motions that a
+    continuous symmetry turns, each in its own circle, only the relative phase that the ways have is tried.
     """
     system, n = solver.system, len(ways)
     if n == 2:
