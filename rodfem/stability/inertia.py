@@ -318,6 +318,8 @@ class Factored:
                 basis.add(v.copy(), DEPENDENT)
             new = self._inverse(basis.vectors[len(images) :])
             images += new
+        if len(images) < len(block):  # a mesh of a few unknowns has no more
+            return block
         projection = np.array([[dual.dot(w).real for w in images] for dual in basis.duals])
         nu, z = np.linalg.eigh((projection + projection.T) / 2)
         return [combine(basis.vectors, z[:, j]) for j in np.argsort(-abs(nu))[: len(block)]]

@@ -53,7 +53,7 @@ def test_two_states_of_a_twisted_ring_are_joined_at_any_step() -> None:
     )
     plan = Plan(depth=1, error_bars=False, steps=StepControl(largest=0.025))
     diagram = trace(ring, Discretization(elements=8, degree=6), plan)
-    first, last = diagram["straight"].special[0], diagram["branch 1"].special[-1]
+    first, last = diagram["ring"].special[0], diagram["branch 1"].special[-1]
     assert first.point.load == pytest.approx(2 / sqrt(3), abs=1e-8)
     assert last.point.load == pytest.approx(2 - 2 / sqrt(3), abs=1e-8)
     assert last.point.ordinate == pytest.approx(2.0, abs=1e-9)
