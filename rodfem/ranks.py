@@ -13,18 +13,25 @@ from mpi4py import MPI
 from rodfem.errors import INTERRUPTED, InputError
 from rodfem.launcher import end_with_launcher
 
-PATIENCE, PAUSE = 30.0, 0.01
-"""Seconds after which a rank that others do not join has failed alone, and between two looks for them."""
+PATIENCE, PAUSE, SHORTEST = 30.0, 0.01, 1e-4
+"""Seconds after which a rank that others do not join has failed alone; between two looks for them, and the first two."""
 
 
 def on_first(comm: MPI.Comm, check: Callable[[], object]) -> None:
-    """Do something on the first rank, and raise its :class:`InputError` on every rank."""
+    """Do something on the first rank, and raise its :class:`InputError` on every rank.
+
+    The others sleep meanwhile: waiting for a message they would keep a processor busy that the first one can use.
+    """
     trouble: InputError | None = None
     if comm.rank == 0:
         try:
             check()
         except InputError as error:
             trouble = error
+    done, pause = comm.Ibarrier(), SHORTEST
+    while not done.Test():
+        time.sleep(pause)
+        pause = min(2.0 * pause, PAUSE)
     trouble = comm.bcast(trouble)
     if trouble is not None:
         raise trouble

@@ -145,16 +145,28 @@ def _place_legend(
     ``axes``, ``pieces`` and ``points`` are those of :func:`place_words`, ``handles`` all of the legend.
     """
     around = np.array(list(product((-14.0, -7.0, 0.0, 7.0, 14.0), repeat=2)))
-    corners = ("upper left", "upper right", "lower left", "lower right") if inside else ()
+    font = min(LARGEST, HIGH / len(handles))
     beside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.015, 1.0), "borderaxespad": 0.0}
-    for style in (*({"loc": corner} for corner in corners), beside):
-        font = min(LARGEST, HIGH / len(handles))
+
+    def drawn(**style: Any) -> tuple[Bbox, Floats]:
         legend = axes.legend(handles=handles, fontsize=font, markerscale=font / LARGEST, **style)
         axes.figure.draw_without_rendering()
-        box = legend.get_window_extent().padded(8.0)
         lines = [dense(axes, piece.curve)[0] for piece in pieces]
         marks = [axes.transData.transform(at) + around for places in points.values() for at in places]
-        obstacles = np.concatenate([np.empty((0, 2)), *lines, *marks])
+        return legend.get_window_extent().padded(8.0), np.concatenate([np.empty((0, 2)), *lines, *marks])
+
+    if not inside:
+        return drawn(**beside)
+    first, obstacles = drawn(loc="upper left")
+    # inside the axes a legend moves nothing else: the other corners are known without drawing
+    right = axes.bbox.x0 + axes.bbox.x1 - first.x0 - first.x1
+    down = axes.bbox.y0 + axes.bbox.y1 - first.y0 - first.y1
+    for corner, x, y in (
+        ("upper left", 0.0, 0.0), ("upper right", right, 0.0), ("lower left", 0.0, down), ("lower right", right, down)
+    ):  # fmt: skip
+        box = first.translated(x, y)
         if not _inside(box, obstacles):
-            break
-    return box, obstacles
+            if corner != "upper left":
+                axes.legend(handles=handles, fontsize=font, markerscale=font / LARGEST, loc=corner)
+            return box, obstacles
+    return drawn(**beside)
