@@ -31,6 +31,8 @@ from rodfem.tolerances import round_off, unit
 
 NODES, FEWER = 6, 4
 """Number of nodes of an interpolant, and of one over a very short piece, unless it is even."""
+STEADILY = 4.0
+"""Safety factor on the decay of the coefficients of an even series: it is told by one ratio, and changes."""
 WINDOW = 0.02
 """Half length, in the metric, of the interval of a branch on which a special point is interpolated."""
 SHARP = 1e-11
@@ -264,7 +266,7 @@ def left_out(series: np.ndarray) -> float:
     if len(series) < NODES:
         return odd
     before, even = abs(series[[-4, -2]])
-    return max(odd, float(even * min(even / before, 1.0)) if before else float(even))
+    return max(odd, float(even * min(STEADILY * even / before, 1.0)) if before else float(even))
 
 
 def _barycentric(nodes: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
