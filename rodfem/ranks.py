@@ -14,7 +14,7 @@ from rodfem.errors import INTERRUPTED, InputError
 from rodfem.launcher import end_with_launcher
 
 PATIENCE, PAUSE, SHORTEST = 30.0, 0.01, 1e-4
-"""Seconds after which a rank that others do not join has failed alone; between two looks for them, at last and first."""
+"""Seconds after which a rank that others do not join failed alone; between two looks for them at last, and at first."""
 
 
 def on_first(comm: MPI.Comm, check: Callable[[], object]) -> None:
