@@ -23,8 +23,8 @@ finds and classifies the points where it is lost, follows what branches off, and
 
 * **Rod**: ``flexible``, ``unshearable``, ``inextensible`` or both; any stored energy ``W(v, k, c)`` that returns a UFL
   expression of the strains, the constants and the arclength ``c.s`` (:mod:`forms.energy` has a few).
-* **Stiffnesses**: :mod:`section <rodfem.problem.section>` has those of circles, tubes, rectangles, ellipses, from E, nu
-  and dimensions, in any units.
+* **Stiffnesses**: :mod:`section <rodfem.problem.section>` has those of circles, tubes, rectangles, strips, ellipses,
+  from E, nu and dimensions, in any units.
 * **Ends**: :func:`clamped`, :func:`pinned`, :func:`sliding`, :func:`hinged`, :func:`sliding_hinge`, :func:`free`,
   :func:`elastic`, or in full :class:`End`; a closed rod is a :class:`Ring`.  Positions and rotations may be functions
   of the constants.

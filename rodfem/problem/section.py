@@ -226,7 +226,7 @@ def tube(outer: float, inner: float, *, E: float, nu: float, density: float = 0.
 
 @checked(width=_positive, height=_positive, **MATERIAL)
 def rectangle(width: float, height: float, *, E: float, nu: float, density: float = 0.0) -> Section:
-    """A rectangle, of any proportion: a strip has one side much shorter than the other.
+    """A rectangle, of any proportion.
 
     Parameters
     ----------
@@ -244,6 +244,24 @@ def rectangle(width: float, height: float, *, E: float, nu: float, density: floa
     J = long * short**3 * (1 / 3 - 64 / pi**5 * short / long * series)
     shear = 10 * (1 + nu) / (12 + 11 * nu)
     return Section(width * height, width * height**3 / 12, height * width**3 / 12, J, (shear, shear), E, nu, density)
+
+
+@checked(width=_positive, thickness=_positive, **MATERIAL)
+def strip(width: float, thickness: float, *, E: float, nu: float, density: float = 0.0) -> Section:
+    """A strip: a flat :func:`rectangle`, which bends easily about its width ``d1``.
+
+    Parameters
+    ----------
+    width, thickness
+        Sides along ``d1`` and ``d2``, the second the shorter one.
+    E, nu, density
+        Young's modulus, Poisson's ratio, mass per volume.
+
+    Raises :class:`InputError` for numbers that no section has, and for a strip that is thicker than wide.
+    """
+    if thickness > width:
+        raise InputError(f"thickness is {thickness:g}: give no more than the width, {width:g}, or a section.rectangle.")
+    return rectangle(width, thickness, E=E, nu=nu, density=density)
 
 
 @checked(width=_positive, height=_positive, **MATERIAL)
