@@ -41,6 +41,8 @@ def _law(law: NormalForm, resolved: bool | None) -> str:
     if law.side == 0:
         return f"{law.kind}: a family of equilibria at one and the same load"
     sign, x = "-" if law.coefficient < 0 else "+", "x" if law.power == 1 else f"x^{law.power}"
+    if isfinite(law.uncertainty) and law.uncertainty >= abs(law.coefficient):
+        return f"{law.kind}, load = load_b + c {x} + ..., where c is not told from zero"
     return f"{law.kind}, load = load_b {sign} {number(abs(law.coefficient), law.uncertainty, resolved)} {x} + ..."
 
 

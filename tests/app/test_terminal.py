@@ -22,6 +22,8 @@ from mpi4py import MPI
 
 import rodfem
 from rodfem.app.run import run
+from rodfem.app.terminal import _law
+from rodfem.continuation.branch import NormalForm
 from rodfem.diagram.plan import Plan
 from rodfem.fem.fields import Discretization
 from rodfem.problem.ends import Attachment, clamped, free
@@ -198,6 +200,12 @@ def test_python_of_the_readme(folder: Path, monkeypatch: pytest.MonkeyPatch, cap
     assert (straight.index, buckled.index, buckled.zero, buckled.load) == (2, 0, 1, 0.52)
     np.testing.assert_allclose(names["modes"].value[0], solver.assess(straight, "dense").values[0], rtol=1e-8)
     assert capfd.readouterr().out.count("Locus of the branch point in lam and k0") == 1
+
+
+def test_a_coefficient_that_may_have_either_sign() -> None:
+    law = NormalForm("supercritical pitchfork", -13.0, 1, 200.0, -1)
+    assert _law(law, True) == "supercritical pitchfork, load = load_b + c x + ..., where c is not told from zero"
+    assert "load_b - 13.0 (2e-01) x" in _law(replace(law, uncertainty=0.2), True)
 
 
 def test_an_equilibrium_that_there_is_not() -> None:
