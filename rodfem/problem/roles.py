@@ -33,7 +33,7 @@ MEANINGS = {
 """What the arguments of the functions of a scene are."""
 
 
-class Unknown(SceneError):
+class NoSuchNameError(SceneError):
     """A function of a scene asks for a name that there is not; its words lack the subject, which :func:`guarded` has.
 
     A person reads ``The stored energy asks for a constant 'G': ...``.
@@ -104,7 +104,7 @@ def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[...
         try:
             value = function(*arguments)
             return value if role.returns is None else role.returns(value)
-        except Unknown as trouble:
+        except NoSuchNameError as trouble:
             raise SceneError(f"The {what} {trouble}") from None
         except SceneError:
             raise
