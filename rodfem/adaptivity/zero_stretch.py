@@ -68,11 +68,18 @@ def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
 
 
 def _bracketed_zero(stretch: Callable[[float], float], coarse: Point, span: float) -> float:
-    """Load at which ``stretch`` vanishes: bracketed by steps from the coarse load along the branch, then solved for."""
+    """Load at which ``stretch`` vanishes: bracketed by steps from the coarse load along the branch, then solved for.
+
+    Within round-off of zero a stretch has no sign, and another one when it is computed again.
+    """
     a, value = coarse.load, stretch(coarse.load)
+    if abs(value) <= ROUND_OFF:
+        return a
     step = np.copysign(FIRST * span, coarse.slope if value > 0 else -coarse.slope)
     for _ in range(14):
         b, other = a + step, stretch(a + step)
+        if abs(other) <= ROUND_OFF:
+            return b
         if value * other <= 0:
             return zero_between(stretch, a, b, ROUND_OFF * span)
         a, value, step = b, other, 1.7 * step
