@@ -49,6 +49,37 @@ class SoftRows:
         for point in branch.points:
             if id(point) not in special and id(point) not in first:
                 self._of(point).examine(point, fixed_load=False, compare=self.error_bars and doubtful)
+        self._count_at_special_points(branch)
+
+    def _count_at_special_points(self, branch: Branch) -> None:
+        """Count at special points, too, the soft modes that the rows on either side of them have as negative.
+
+        A factorisation has those within its tolerance as zero.  At the rows richer meshes decide; at a special point,
+        where a richer mesh has an eigenvalue of either sign next to zero, the rows beside it do, if they agree and the
+        mesh itself has as many negative values beyond round-off at the special point.
+        """
+        at = {id(s.point): s for s in branch.special if s.kind.counted}
+        groups = [(at_special, list(rows)) for at_special, rows in groupby(branch.points, lambda p: id(p) in at)]
+        if branch.parent and groups[0][0]:
+            return
+        for i, (at_special, rows) in enumerate(groups):
+            if not at_special:
+                continue
+            specials = [at[id(p)] for p in rows]
+            beside = [(groups[i - 1][1][-1], specials[0].negative_before)] if i else []
+            beside += [(group[0], specials[-1].negative_after) for _, group in groups[i + 1 : i + 2]]
+            more = {point.negative - index for point, index in beside}
+            number = more.pop() if len(more) == 1 else 0
+            settled = all(not p.undecided and sum(m.value < 0 for m in p.soft) >= number for p, _ in beside)
+            if number <= 0 or not settled:
+                continue
+            modes = [[m for m in self._of(s.point).persistent(s) if m.decided and m.value < 0] for s in specials]
+            if any(len(negative) < number for negative in modes):
+                continue
+            for s, negative in zip(specials, modes, strict=True):
+                s.negative_before, s.negative_after = s.negative_before + number, s.negative_after + number
+                s.point.negative, s.point.zero = s.point.negative + number, s.point.zero - number
+                s.point.soft = negative[:number]
 
     def undecided(self, branch: Branch) -> Iterator[str]:
         """Yield a sentence on each piece of a branch whose index is not decided."""

@@ -15,8 +15,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import STEADY, Enriched
-from rodfem.continuation.branch import Point
+from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.corrector import NEAR
+from rodfem.continuation.locate import across
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
@@ -69,6 +70,16 @@ class SoftStates:
         point.negative, point.zero, point.undecided = found.negative, found.zero, found.undecided
         point.soft = list(found.soft)
         return bool(found.soft)
+
+    def persistent(self, special: SpecialPoint) -> list[SoftMode]:
+        """Soft modes at a special point that are none of its null vectors, with their round-off on this mesh alone."""
+        inertia = self.solver.inertia
+        found = inertia.at(special.point.x)
+        vectors = across(self.solver.system, near_zero(found).vectors, special.null_vectors)
+        values = [v.dot(found.matrix * v).real + found.shift for v in vectors]
+        bars = [max(quotient_error(found.matrix, v), TOLERANCE * inertia.scale) for v in vectors]
+        names = self.names(special.point.x, vectors)
+        return [SoftMode(*mode) for mode in zip(names, values, bars, strict=True)]
 
     def _with_the_mesh(self, point: Point, near: NearZero, least: int) -> NearZero:
         """Eigenvalues with what the mesh makes of the motion along the rod in their uncertainty.

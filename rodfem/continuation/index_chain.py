@@ -78,7 +78,7 @@ def _beside(point: Point, at: dict[int, SpecialPoint], persistent: int, after: b
     if special is not None:
         index = special.negative_after if after else special.negative_before
         return index, index
-    return point.negative, point.negative + max(point.zero - persistent, 0)
+    return point.negative, point.negative + max(point.zero - persistent, point.undecided)
 
 
 def explain(branch: Branch) -> None:

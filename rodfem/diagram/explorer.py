@@ -24,6 +24,7 @@ from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.rank import require_independent_constraints
+from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import SAME_SPECIAL, SAME_STATE
 
 TAIL = 8
@@ -129,8 +130,9 @@ class Explorer(Tracer):
             Tw, Wr = (round(x, 4) + 0.0 for x in turns)  # no negative zero
             self.observer.note(f"  closed rod: linking number {number}, twist {Tw:.4f}, writhe {Wr:.4f}")
         if point.negative:
+            index = index_range(point.negative, point.zero - self.solver.system.active_drifts(point.x))
             self.observer.note(
-                f"  the first state is unstable already (index {point.negative}): stability was lost outside the range"
+                f"  the first state is unstable already (index {index}): stability was lost outside the range"
             )
         name = name_of_first(self.solver.shape, [point.x, ahead(point.x, point.tangent)])
         return Branch(name, None, 0, [point])

@@ -348,6 +348,7 @@ class Tracer:
     def _soft_modes(self, branch: Branch) -> None:
         with self.without(f"Soft modes of {branch.name} were not found"):
             self.soft.examine(branch)
+            explain(branch)  # once more: richer meshes may have decided more than a factorisation does
         for sentence in self.soft.undecided(branch):
             self.observer.warn(sentence)
 

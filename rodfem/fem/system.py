@@ -36,6 +36,7 @@ from rodfem.fem.symmetries import Symmetry, may_slide
 from rodfem.fem.values import NodalValues
 from rodfem.fem.verification import Verification
 from rodfem.linalg.chain import Chain
+from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.scene import Scene
@@ -126,7 +127,7 @@ class System:
         self.phase = no_phase(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
-        self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, {8: 0})
+        self.lu = factors_of("lu", comm, self.fields.along, self.fields.dense_rows, {8: 0}, sizes=self.natural_sizes)
         self.compiled = None
         if isinstance(self.lu, Chain) and CompiledNewton.serves(self.matrix, self.lu):
             self.compiled = CompiledNewton(self, self.matrix, self.lu)
@@ -291,6 +292,11 @@ class System:
     def sizes(self) -> PETSc.Vec:
         """Natural size of each unknown."""
         return self.vector(self.fields.sizes, [self.scene.units.moment] * len(self.drifts))
+
+    @property
+    def natural_sizes(self) -> Sizes | None:
+        """What returns :attr:`sizes` for factors of a matrix; None where all of them are one."""
+        return None if self.scene.units.ordinary else lambda: self.sizes
 
     def matrix_in_units(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Second variation at fixed load for unknowns in units of their natural sizes."""

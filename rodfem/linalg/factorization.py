@@ -7,7 +7,7 @@ by it as well (``-rodfem_lu_pc_factor_mat_solver_type mumps``, ``-rodfem_cholesk
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import inf, log
 from typing import Any, Protocol
@@ -18,6 +18,8 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 
+Sizes = Callable[[], PETSc.Vec]
+"""Natural sizes of the unknowns of a matrix, asked for when it is factored."""
 PETSC_ERR_LIB = 76
 """PETSc's error code for a failure in a library below."""
 LONG = 20_000
@@ -102,6 +104,10 @@ class Mumps:
     Unknowns are ordered by an approximate minimum degree that knows dense rows (QAMD): what MUMPS chooses by itself
     takes ten times as long to order the matrix of 3e4 elements with an integral constraint.  PETSc's options change
     that and all else, ``-rodfem_lu_mat_mumps_icntl_7 2`` or ``-rodfem_cholesky_...`` for example.
+
+    MUMPS's own scaling is off.  A rod in units far from its natural ones has entries of very different sizes, and the
+    count of negative pivots is wrong next to an eigenvalue: given the natural ``sizes`` d of the unknowns it is ``D A
+    D`` that is factored, which has the same inertia.
     """
 
     def __init__(
@@ -110,12 +116,16 @@ class Mumps:
         controls: dict[int, int],
         thresholds: dict[int, float] | None = None,
         prefix: str = "",
+        sizes: Sizes | None = None,
     ) -> None:
         """Keep MUMPS's integer ``controls`` (ICNTL) and real ``thresholds`` (CNTL) for when there is a matrix.
 
-        ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``prefix`` that of PETSc's options.
+        ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``prefix`` that of PETSc's options, and ``sizes`` returns the
+        natural sizes of the unknowns when a matrix is factored; None where they are one.
         """
         self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
+        self.sizes, self._shift = sizes, 0.0
+        self._scaled: PETSc.Mat | None = None
         self.prefix = prefix or f"rodfem_{kind}_"
         self.room = 50
         self.ksp = PETSc.KSP()
@@ -129,6 +139,7 @@ class Mumps:
         Delayed pivots may need more room than was estimated.  PETSc does not raise by itself, and what a failed
         factorisation counts or solves is arbitrary: the factors are then made again with more room.
         """
+        matrix = self._in_units(matrix)
         while True:
             if self.factor is None or matrix.handle != self._matrix:
                 self._prepare(matrix)
@@ -148,11 +159,21 @@ class Mumps:
 
     def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
         """Solve with the last factors."""
-        self.ksp.solve(right, out)
+        if self.sizes is None:
+            self.ksp.solve(right, out)
+        else:
+            sizes = self.sizes()
+            self.ksp.solve(right * sizes, out)
+            out.pointwiseMult(out, sizes)
 
     def solve_all(self, right: PETSc.Mat, out: PETSc.Mat) -> None:
         """Solve for all columns of a dense matrix at once: the cost is that of the call, hardly of a column."""
+        if self.sizes is not None:
+            right = right.copy()
+            right.diagonalScale(L=self.sizes())
         self.ksp.getPC().getFactorMatrix().matSolve(right, out)
+        if self.sizes is not None:
+            out.diagonalScale(L=self.sizes())
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
@@ -163,7 +184,21 @@ class Mumps:
         """Logarithm of the size of the determinant of the symmetric matrix last factored; -inf where it is zero."""
         factor = self.ksp.getPC().getFactorMatrix()
         mantissa = abs(factor.getMumpsRinfog(12))
-        return log(mantissa) + factor.getMumpsInfog(34) * log(2.0) if mantissa else -inf
+        return log(mantissa) + factor.getMumpsInfog(34) * log(2.0) - self._shift if mantissa else -inf
+
+    def _in_units(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Matrix for unknowns in units of their natural sizes: itself where those are one."""
+        if self.sizes is None:
+            return matrix
+        sizes = self.sizes()
+        if self._scaled is None or self._scaled.sizes != matrix.sizes:
+            self._scaled = matrix.copy()
+        else:
+            matrix.copy(self._scaled, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        self._scaled.diagonalScale(sizes, sizes)
+        own = 2 * float(np.log(abs(sizes.array_r)).sum())
+        self._shift = matrix.comm.tompi4py().allreduce(own)
+        return self._scaled
 
     def _prepare(self, matrix: PETSc.Mat) -> None:
         self.ksp.destroy()

@@ -8,7 +8,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import InputError
 from rodfem.linalg.chain import Chain
-from rodfem.linalg.factorization import Factors, Mumps
+from rodfem.linalg.factorization import Factors, Mumps, Sizes
 from rodfem.linalg.pieces import Pieces
 
 CHAIN, MUMPS = "chain", "mumps"
@@ -35,15 +35,17 @@ def factors_of(
     controls: dict[int, int],
     thresholds: dict[int, float] | None = None,
     prefix: str = "",
+    sizes: Sizes | None = None,
 ) -> Factors:
     """Factors for matrices of ``unknowns`` rows along a rod on a communicator, the last ``scalars`` of which are dense.
 
     Those of another matrix, of 0 unknowns, are MUMPS's, which is the last resort of the others.  ``controls`` are its
     ICNTL, ``thresholds`` its CNTL; PETSc's options begin with ``rodfem_lu_`` or ``rodfem_cholesky_``, or with another
-    ``prefix``.  ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the matrices.
+    ``prefix``.  ``kind`` is ``lu`` or ``cholesky`` (LDL^t), ``comm`` that of the matrices.  ``sizes`` are those of the
+    unknowns for MUMPS, where they are not one; elimination along the rod finds its own scale.
     """
     prefix = prefix or f"rodfem_{kind}_"
-    mumps = Mumps(kind, controls, thresholds, prefix)
+    mumps = Mumps(kind, controls, thresholds, prefix, sizes)
     if not unknowns or package(prefix) == MUMPS:
         return mumps
     return (Chain if comm.size == 1 else Pieces)(kind, scalars, mumps)

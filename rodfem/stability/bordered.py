@@ -41,11 +41,19 @@ class Bordered:
         self.matrix.setPreallocationCSR((self.start, self.columns, self.values))
         along = self.n + borders if system.fields.along else 0
         sizes = along, system.fields.dense_rows + borders
+        natural = None if system.natural_sizes is None else self._sizes
         if constraints is None:
-            self.factors = factors_of("lu", self.comm, *sizes, {8: 0})
+            self.factors = factors_of("lu", self.comm, *sizes, {8: 0}, sizes=natural)
         else:
-            self.factors = inertia_factors(self.comm, *sizes)
+            self.factors = inertia_factors(self.comm, *sizes, natural)
         self.right, self.out, self.residual = (self.matrix.createVecRight() for _ in range(3))
+
+    def _sizes(self) -> PETSc.Vec:
+        """Natural sizes of the unknowns; the multipliers of the borders have none of their own."""
+        out, own = self.matrix.createVecRight(), self.system.sizes.array_r
+        out.set(1.0)
+        out.array[: len(own)] = own
+        return out
 
     def factor(self, matrix: PETSc.Mat, columns: list[PETSc.Vec], rows: list[PETSc.Vec] | None = None) -> int:
         """Factor with a matrix of the same pattern; its negative eigenvalues off the borders, -1 without a count.

@@ -21,7 +21,7 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
-from rodfem.linalg.factorization import Factors
+from rodfem.linalg.factorization import Factors, Sizes
 from rodfem.linalg.matrices import local_rows
 from rodfem.linalg.orthogonal import Basis, combine, generic, orthonormalize
 from rodfem.linalg.selection import factors_of
@@ -56,16 +56,18 @@ class Index:
     determinant: float = field(default=float("nan"), compare=False)
 
 
-def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int) -> Factors:
+def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int, sizes: Sizes | None = None) -> Factors:
     """LDL^t factors that report the inertia, of matrices of ``unknowns`` rows, the last ``scalars`` perhaps dense.
 
+    The matrices are those of a communicator ``comm``; ``sizes`` are the natural sizes of the unknowns, None where they
+    are one.
     ICNTL(24) = 1 is what makes MUMPS report it; CNTL(3) is so small that no pivot is taken for zero: the matrices are
     shifted off their eigenvalues.  ICNTL(8) = 0: with MUMPS's own scaling of saddle matrices solutions were seen to
     lose ten digits, and factorisations take up to ten times as long.  CNTL(1) is ten times below MUMPS's own threshold:
     the stiffness is 1/h and the constraints are h, and at 1e5 elements pivots were delayed by the hundred thousand, to
     the few rows of the scalars, which cost several times the factorisation itself.
     """
-    return factors_of("cholesky", comm, unknowns, scalars, {24: 1, 8: 0}, {3: -TINY, 1: PIVOT})
+    return factors_of("cholesky", comm, unknowns, scalars, {24: 1, 8: 0}, {3: -TINY, 1: PIVOT}, sizes=sizes)
 
 
 class Inertia:
@@ -90,7 +92,7 @@ class Inertia:
             self.metric.setValue(system.load_index, system.load_index, 0.0)
         self.metric.assemble()
         self._weights = local_rows(self.metric) if system.comm.size == 1 else None
-        self.factors = inertia_factors(system.comm, system.fields.along, system.fields.dense_rows)
+        self.factors = inertia_factors(system.comm, system.fields.along, system.fields.dense_rows, system.natural_sizes)
         self.constraints = system.fields.constraints()
         self.scale = system.stiffness_scale
         self.tolerance = ZERO_BAND * self.scale

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import demo_cases
 import golden_cases
+import hemitropic_cases
 import numpy as np
 import pytest
 from rescaled import DNA as METRES_AND_NEWTONS
-from rescaled import differences
+from rescaled import differences, rescaled
 
 import rodfem
 from forms.energy import bending_and_twist
@@ -104,6 +108,19 @@ def test_methods(method: str) -> None:
         assert verdict.negative == 2
         values.append(np.array(verdict.values) * length**2 / stiffness)
     np.testing.assert_allclose(values[1], values[0], rtol=1e-8)
+
+
+@pytest.mark.parametrize(("name", "units"), [("cord", (7.0, 1e6)), ("hemitropic", (1e-3, 1e6))])
+def test_mumps_counts_in_any_units(name: str, units: tuple[float, float]) -> None:
+    """Off natural units its pivots do not tell a singular state from others: branch points are missed."""
+    scene, buckling = {
+        "cord": (demo_cases.scene("cord"), [49.34802200545, 8.063525384098]),
+        "hemitropic": (replace(hemitropic_cases.scene(), span=(0.0, 0.3)), [0.11430421452]),
+    }[name]
+    plan = Plan(depth=0, error_bars=False)
+    diagram = rodfem.trace(rescaled(scene, *units), Discretization("pointwise", 7, 5, factors="petsc"), plan)
+    assert [s.point.load for s in diagram.special("branch point")] == pytest.approx(buckling, rel=1e-7)
+    assert not diagram.warnings
 
 
 def test_numbers_in_words() -> None:
