@@ -126,6 +126,7 @@ class Mumps:
         self.kind, self.controls, self.thresholds = kind, controls, thresholds or {}
         self.sizes, self._shift = sizes, 0.0
         self._scaled: PETSc.Mat | None = None
+        self._scaled_from = 0
         self.prefix = prefix or f"rodfem_{kind}_"
         self.room = 50
         self.ksp = PETSc.KSP()
@@ -191,10 +192,10 @@ class Mumps:
         if self.sizes is None:
             return matrix
         sizes = self.sizes()
-        if self._scaled is None or self._scaled.sizes != matrix.sizes:
-            self._scaled = matrix.copy()
-        else:
-            matrix.copy(self._scaled, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        if self._scaled is None or matrix.handle != self._scaled_from:
+            self._scaled, self._scaled_from = matrix.copy(), matrix.handle
+        else:  # a new pattern would make PETSc forget all controls
+            matrix.copy(self._scaled, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         self._scaled.diagonalScale(sizes, sizes)
         own = 2 * float(np.log(abs(sizes.array_r)).sum())
         self._shift = matrix.comm.tompi4py().allreduce(own)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Any
@@ -63,9 +64,15 @@ class Case:
     all: tuple[Any, ...]
 
 
+ASKED: ContextVar[float | None] = ContextVar("asked", default=None)
+"""An accuracy that is asked for in place of a mesh, and that errors are then compared with in place of their bars."""
+
+
 def run(scene: Scene, mesh: Discretization | None = None, **plan: Any) -> Diagram:
     """Diagram of a scene; what is an error with branches is their diagram, with the error among its warnings."""
     given = {"depth": 0} | plan
+    if (accuracy := ASKED.get()) is not None:
+        mesh, given = None, given | {"accuracy": accuracy}
     try:
         return trace(scene, mesh, Plan(**given))
     except (ConvergenceError, InputError) as trouble:
@@ -96,6 +103,8 @@ def compare(found: Sequence[SpecialPoint], expected: Sequence[Change], said: tup
     left, ratios = list(expected), []
     for s in found:
         bar = max(s.error_estimate if isfinite(s.error_estimate) else s.located_to, 1e-15 * abs(s.point.load))
+        if (accuracy := ASKED.get()) is not None:
+            bar = accuracy * max(1.0, abs(s.point.load))
         group: list[Change] = []
         while left and (not group or (group[-1].after != s.negative_after and abs(left[0].load - s.point.load) <= bar)):
             group.append(left.pop(0))

@@ -101,6 +101,24 @@ def test_many_right_hand_sides(package: str) -> None:
         np.testing.assert_allclose(out.getDenseArray()[:, i], one.array_r, rtol=1e-8, atol=1e-12)
 
 
+def test_natural_sizes() -> None:
+    """What MUMPS factors in units of the unknowns has the inertia, the determinant and the solutions of the matrix."""
+    system, x = at("hemitropic", "buckled", "pointwise", 0.2)
+    inertia, sizes = Inertia(system), system.new_vector()
+    sizes.array[:] = 10.0 ** np.random.default_rng(system.comm.rank).uniform(-3, 3, sizes.local_size)
+    factors = Mumps("cholesky", {24: 1, 8: 0}, {3: -1e-300, 1: 1e-3}, sizes=lambda: sizes)
+    for sigma in (-3.0, 0.1):
+        matrix = inertia.at(x).matrix
+        matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        dense, right, out = gathered(matrix).toarray(), inertia.seed(1), system.new_vector()
+        factors(matrix)
+        assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
+        assert factors.determinant() == pytest.approx(np.linalg.slogdet(dense)[1], rel=1e-9)
+        factors.solve(right, out)
+        expected = np.linalg.solve(dense, whole(right))
+        np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
+
+
 @PACKAGES
 @FORMULATIONS
 @pytest.mark.parametrize(("name", "load"), [("follower", 10.0), ("hemitropic", 0.3)])

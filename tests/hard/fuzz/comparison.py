@@ -198,7 +198,7 @@ def frequencies_of(oracle: Oracle, point: Point) -> str | None:
 
 def check_chain(branch: Branch, out: Compared) -> None:
     """Whether from row to row the index changes by what the special points in between say."""
-    special = sorted((s for s in branch.special if s.kind.singular), key=lambda s: s.point.arclength)
+    special = sorted((s for s in branch.special if s.kind.counted), key=lambda s: s.point.arclength)
     at_special = {id(s.point) for s in special}
     least = min(p.zero for p in branch.points)  # a row with an eigenvalue near zero may have either index
     rows = [p for p in branch.points if id(p) not in at_special and p.zero == least and not p.undecided]
