@@ -15,7 +15,8 @@ whose eigenvalue is within the tolerance, 1e-7 of the usual, grows by 1e7.  If t
 state is computed by LU factors of ``J``, and counted by two shifts.
 
 Tangent and index of a row are from factors at the row's own state, those of Newton's method from factors at the
-prediction: an eigenvalue may cross zero, and the branch may bend, on the way from one to the other.
+prediction: an eigenvalue may cross zero, and the branch may bend, on the way from one to the other.  Where there is no
+way, as the prediction is the state but for round-off (a straight rod's), the factors of the one correction serve.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ from rodfem.tolerances import TINY
 
 BLOCK = 2
 """Number of vectors that are iterated along a branch."""
+SAME = 1e-12
+"""Correction, relative, below which a prediction is the state itself: a hundredth of Newton's tolerance."""
 NEAR = 1e-3
 """Distance of an eigenvalue from zero, over the lowest bending eigenvalue, below which the two shifts count."""
 
@@ -93,6 +96,15 @@ class Corrector:
         if self.compiled is not None:
             self.compiled.restart()
 
+    def corrected(self, x: PETSc.Vec, outcome: NewtonResult) -> Regular | None:
+        """Factors of ``S`` at a state that :meth:`correct` has just converged to; None where they do not serve.
+
+        Those of the correction itself, where it was the only one and moved the state by less than :data:`SAME`.
+        """
+        if self.compiled is None or outcome.iterations > 1 or outcome.error > SAME or self.system.damping:
+            return self.factor(x)
+        return self._counted(self.compiled, x, self.inertia.held)
+
     def factor(self, x: PETSc.Vec, right: PETSc.Vec | None = None) -> Regular | None:
         """Factor ``S`` at ``x``; solve for the tangent, the block, and ``right`` (into ``_step``).
 
@@ -126,8 +138,10 @@ class Corrector:
             found = compiled.factor(x)
         if not system.verify(inertia.matrix, system.at(x)):
             found = compiled.factor(x)
-        if found is None:
-            return None
+        return None if found is None else self._counted(compiled, x, found)
+
+    def _counted(self, compiled: CompiledCorrector, x: PETSc.Vec, found: Factored) -> Regular | None:
+        system = self.system
         try:
             below = found.counted()
         except ConvergenceError:

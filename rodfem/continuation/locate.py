@@ -35,6 +35,8 @@ STEADILY = 4.0
 """Safety factor on the decay of the coefficients of an even series: it is told by one ratio, and changes."""
 WINDOW = 0.02
 """Half length, in the metric, of the interval of a branch on which a special point is interpolated."""
+NARROW = 0.25
+"""Part of it that will do for an eigenvalue, whose zero is known to a tenth of it: a wider one is always narrowed."""
 SHARP = 1e-11
 """Uncertainty of a load on the given mesh below which the interpolation is not refined further."""
 PART = 0.02
@@ -376,7 +378,7 @@ def bracket(
     h = high - low
 
     def passed(s: float) -> bool:
-        return solver.inertia.at(solve_beside(solver, curve, s, OFF * h)[0]).count().negative > order
+        return solver.inertia.at(solve_beside(solver, curve, s, OFF * h)[0]).below(-solver.inertia.tolerance) > order
 
     first = passed(low)
     if first == passed(high):  # the zero is nearer to an end than a state can be solved
@@ -400,15 +402,16 @@ def locate(
     def curve(s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
         return hermite(a, b, s)
 
-    h = b.arclength - a.arclength
+    h, window = b.arclength - a.arclength, WINDOW
     if test_function == "slope":
         x, guess = solve_beside(solver, curve, a.arclength + h * a.slope / (a.slope - b.slope), OFF * h)
         (mode,) = solver.inertia.modes_near_zero(x, 1, ROUGH)
     else:
         piece = a.arclength + OFF * h, b.arclength - OFF * h
         guess, mode = crossing_mode(solver, curve, piece, order, still)
+        window *= NARROW
     ends = a.arclength, b.arclength
-    return refine(solver, curve, guess, min(WINDOW, 0.45 * h), mode, test_function, len(still), ends=ends)
+    return refine(solver, curve, guess, min(window, 0.45 * h), mode, test_function, len(still), ends=ends)
 
 
 def locate_mode(solver: BranchSolver, a: Point, b: Point, guess: float, mode: PETSc.Vec, persistent: int) -> Located:

@@ -297,11 +297,12 @@ class BranchSolver(StaticSolver):
         metric.
         """
         outcome = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)
+        regular = outcome is not None
         if outcome is None:
             outcome = correct(self.system, x, row, most=8, reach=reach)
         if not outcome.converged:
             return outcome, None, None
-        at = self.corrector.factor(x)
+        at = self.corrector.corrected(x, outcome) if regular else self.corrector.factor(x)
         return outcome, at.along(row) if at else self._tangent(row, x), at.index if at else None
 
     def damp(self, freedoms: int) -> None:

@@ -14,6 +14,7 @@ without any symmetry of its own and one direction decide that to round-off, at t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -129,25 +130,28 @@ def generic_state(system: System, like: PETSc.Vec, amplitude: float, seed: int) 
     return system.vector(f.filled(named))
 
 
-def mirrors(system: System, x: PETSc.Vec) -> list[Mirror]:
-    """Discrete symmetries of the equations at the load of ``x``, the identity left out.
+def candidates(system: System) -> list[Mirror]:
+    """Maps that may be symmetries, the identity left out.
 
     None of a scene with constraints all along the rod: what a mirror does to their multipliers is not known.
     """
     if any(block.along for block in system.fields.blocks):
         return []
+    signs = [s for s in product((1, -1), repeat=3) if s != (1, 1, 1)]
+    return [Mirror((s1, s2, s3), reversal=s3 < 0) for s1, s2, s3 in signs]
+
+
+def mirrors(system: System, x: PETSc.Vec, among: Sequence[Mirror] | None = None) -> list[Mirror]:
+    """Discrete symmetries of the equations at the load of ``x``, among all :func:`candidates` unless given."""
+    among = candidates(system) if among is None else among
+    if not among:
+        return []
     system.set_phase(None)
     base = generic_state(system, x, 0.2, 1)
     beside = generic_state(system, base, 0.2, 2)
     reference, scale = _work(system, base, beside)
-    found = []
-    for s1, s2, s3 in product((1, -1), repeat=3):
-        mirror = Mirror((s1, s2, s3), reversal=s3 < 0)
-        if (s1, s2, s3) != (1, 1, 1):
-            work, _ = _work(system, mirror(system, base), mirror(system, beside))
-            if abs(work - reference) < ACCURACY * scale:
-                found.append(mirror)
-    return found
+    works = ((mirror, _work(system, mirror(system, base), mirror(system, beside))[0]) for mirror in among)
+    return [mirror for mirror, work in works if abs(work - reference) < ACCURACY * scale]
 
 
 def _work(system: System, x: PETSc.Vec, y: PETSc.Vec) -> tuple[float, float]:

@@ -147,7 +147,7 @@ class Explorer(Tracer):
                 "load, give the scene a start nearer to one, or see whether constraints repeat each other or what an "
                 "end holds."
             )
-        if solver.convexity is not None and solver.convexity.lowest(x) <= 0:
+        if solver.convexity is not None and not solver.convexity.holds(x):
             raise SceneError(
                 f"The stored energy is not convex somewhere along the first state, at {self.scene.load} = {start:g}: "
                 "choose constants that make it so."

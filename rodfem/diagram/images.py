@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.solvers import StaticSolver
-from rodfem.deflation.discrete_symmetries import Mirror, mirrors
+from rodfem.deflation.discrete_symmetries import candidates, mirrors
 from rodfem.tolerances import NEGLIGIBLE
 
 ZERO = 1e-9
@@ -28,14 +28,15 @@ def image_of(branch: Branch, solver: StaticSolver) -> str:
     size = max([solver.units.ordinate, *(abs(point.ordinate) for point in points)])
     if any(abs(point.ordinate) <= ZERO * size for point in chosen) or not chosen:
         return ""
-    system, phase, known = solver.system, solver.system.phase, list[set[Mirror]]()
-    for point in chosen:
-        taken = {
+    system, phase = solver.system, solver.system.phase
+    found = candidates(system)
+    for point in chosen:  # the ordinate, which few of them take to its opposite, costs less than the equations
+        opposite = [
             mirror
-            for mirror in mirrors(system, point.x)
+            for mirror in found
             if abs(solver.shape.ordinate(mirror(system, point.x)) + point.ordinate) <= NEGLIGIBLE * size
-        }
-        known.append(taken)
+        ]
+        found = mirrors(system, point.x, opposite) if opposite else []
     system.phase = phase
-    found = sorted(set.intersection(*known), key=lambda mirror: (mirror.reversal, -sum(mirror.signs), mirror.signs))
+    found.sort(key=lambda mirror: (mirror.reversal, -sum(mirror.signs), mirror.signs))
     return found[0].in_words() if found else ""

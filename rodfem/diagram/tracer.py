@@ -197,7 +197,7 @@ class Tracer:
             if item.stretch <= 0:
                 self._end_at_zero_stretch(branch, previous, item)
                 return
-            if self.solver.convexity is not None and self.solver.convexity.lowest(item.x) <= 0:
+            if self.solver.convexity is not None and not self.solver.convexity.holds(item.x):
                 why = f"the stored energy is not convex any more at {self.scene.load} = {item.load:.6g}"
                 branch.ended = self._rest(branch) or why
                 return

@@ -31,7 +31,9 @@ class Arclength:
         fields, size = self._fields, len(self._fields.number)
         mean = sp.csr_matrix((size, size))
         for block in fields.blocks:
-            slopes, dofs = _slopes(fields, block), fields.dofs[block.name].ravel()
+            (columns, values), dofs = _slopes(fields, block), fields.dofs[block.name].ravel()
+            rows = np.arange(len(dofs) + 1) * columns.shape[1]
+            slopes = sp.csr_matrix((values.ravel(), columns.ravel(), rows), shape=(len(dofs), size))
             sums = sp.csr_matrix((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(size, len(dofs)))
             shared = np.maximum(np.asarray(sums.sum(axis=1)).ravel(), 1.0)
             mean += sp.diags(1.0 / shared) @ sums @ slopes
@@ -46,27 +48,33 @@ class Arclength:
     def jumps(self) -> sp.csr_matrix:
         """Matrix (shared nodes, local size) of its jumps between cells, of rotation and centreline."""
         fields = self._fields
-        jumps = [sp.csr_matrix((0, len(fields.number)))]
+        columns, values = [], []
         for block in (b for b in fields.blocks if b.name in (fields.turning.name, "r")):
             slopes, dofs = _slopes(fields, block), fields.dofs[block.name].ravel()
             order = np.argsort(dofs, kind="stable")
             twins = np.flatnonzero(np.diff(dofs[order]) == 0)
-            jumps.append(slopes[order[twins + 1]] - slopes[order[twins]])
-        return sp.vstack(jumps).tocsr()
+            sides = order[twins + 1], order[twins]
+            columns.append(np.hstack([slopes[0][side] for side in sides]))
+            values.append(np.hstack([sign * slopes[1][side] for sign, side in zip((1, -1), sides, strict=True)]))
+        rows = sum(len(c) for c in columns)
+        starts = np.cumsum([0, *(c.shape[1] for c in columns for _ in range(len(c)))])
+        entries = (np.concatenate([x.ravel() for x in parts]) for parts in (values, columns))
+        return sp.csr_matrix((*entries, starts), shape=(rows, len(fields.number)))
 
 
-def _slopes(fields: Fields, block: Block) -> sp.csr_matrix:
-    """Derivative of a field at the nodes of each cell, in the order of the flattened ``fields.dofs``."""
+def _slopes(fields: Fields, block: Block) -> tuple[np.ndarray, np.ndarray]:
+    """Derivative of a field at the nodes of each cell, in the order of the flattened ``fields.dofs``.
+
+    Columns and values of as many rows, (dofs, nodes) each.
+    """
     dofs, ends = fields.dofs[block.name], fields.vertices
     cells, nodes, components = dofs.shape
     sizes = (ends[:, 1] - ends[:, 0]) / fields.scene.units.length
     weights = differentiation(block.degree) / sizes[:, None, None]
     shape = (cells, nodes, components, nodes)
-    rows = np.broadcast_to(np.arange(dofs.size).reshape(cells, nodes, components, 1), shape)
     columns = np.broadcast_to(dofs.transpose(0, 2, 1)[:, None], shape)
     values = np.broadcast_to(weights[:, :, None, :], shape)
-    where = (rows.ravel(), columns.ravel())
-    return sp.csr_matrix((values.ravel(), where), shape=(dofs.size, len(fields.number)))
+    return columns.reshape(-1, nodes), values.reshape(-1, nodes)
 
 
 @cache

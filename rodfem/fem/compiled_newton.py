@@ -151,6 +151,14 @@ class CompiledNewton:
         rod.assemble, rod.factors = equations.residual.function, elimination.pointer
         rod.factor, rod.solve, rod.negative, rod.zero = elimination.functions
 
+    def assemble(self, x: PETSc.Vec) -> None:
+        """Fill the matrix with ``S`` at ``x`` and a one for the load, and :attr:`border`; phase conditions stay."""
+        self._take()
+        state = x.array_r
+        failed = self.lib.assemble_at(self.rod, self.ffi.cast("double *", state.ctypes.data))
+        assert not failed, "A term at a point inside the rod must be evaluated in one of the two cells there."
+        self.matrix.stateIncrease()
+
     def correct(self, x: PETSc.Vec, row: PETSc.Vec, limits: Limits) -> Ended:
         """Solve the equations on the plane through ``x`` across ``row``, in place.
 

@@ -51,11 +51,32 @@ class Convexity:
         vector = with_constants(ufl.as_vector(entries), f.mesh)
         self.evaluate = form_compiler.expression(vector, points.reshape(-1, 1), f.mesh, f.owned_cells)
 
+    def holds(self, x: PETSc.Vec) -> bool:
+        """Whether the second derivative is positive definite along the whole rod at the state ``x``.
+
+        It is where Cholesky's factors exist; where not, the least eigenvalue decides.
+        """
+        if self.evaluate is None:
+            return True
+        mine = True
+        try:
+            np.linalg.cholesky(self._matrices(x))
+        except np.linalg.LinAlgError:
+            mine = False
+        comm = self.system.comm
+        sure = mine if comm.size == 1 else comm.allreduce(mine, op=MPI.LAND)
+        return sure or not self.lowest(x) <= 0
+
     def lowest(self, x: PETSc.Vec) -> float:
         """Least eigenvalue over the whole rod at the state ``x``, relative to the largest one; 1 if it is constant."""
         if self.evaluate is None:
             return 1.0
-        matrices = self.system.at(x).evaluate(self.evaluate).reshape(-1, self.size, self.size)
-        values = np.linalg.eigvalsh((matrices + matrices.transpose(0, 2, 1)) / 2)
+        values = np.linalg.eigvalsh(self._matrices(x))
         mine = (values[:, 0] / abs(values).max(axis=1)).min() if len(values) else 1.0
         return float(self.system.comm.allreduce(float(mine), op=MPI.MIN))
+
+    def _matrices(self, x: PETSc.Vec) -> np.ndarray:
+        """Second derivatives at all places of this rank, symmetric, (places, size, size)."""
+        assert self.evaluate is not None
+        matrices = self.system.at(x).evaluate(self.evaluate).reshape(-1, self.size, self.size)
+        return np.asarray((matrices + matrices.transpose(0, 2, 1)) / 2)

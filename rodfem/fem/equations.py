@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import dolfinx.mesh
 import numpy as np
+import scipy.sparse as sp
 import ufl
 from dolfinx import fem
 from ufl.algorithms.analysis import extract_type
@@ -17,7 +18,7 @@ from forms import inertia, lagrangian
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
 from rodfem.fem import form_compiler
-from rodfem.fem.assembly import Assembler, Cells, vector_places
+from rodfem.fem.assembly import Assembler, Cells, Places, matrix_places, vector_places
 from rodfem.fem.fields import Fields
 from rodfem.fem.literals import with_constants
 from rodfem.fem.parameters import Line, load_line
@@ -70,6 +71,17 @@ class Equations:
         self.jacobian, self.residual, self.energy, self.metric, self.kinetic, *more = self._assemblers
         self.ordinate = more[0] if more else None
         self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
+
+    @cached_property
+    def local_entries(self) -> tuple[sp.csr_matrix, Places]:
+        """Pattern of a matrix between all local degrees of freedom, and the places of a bilinear form in it."""
+        dofs, every = self.cells.dofs, np.arange(len(self.fields.number))
+        rows, columns = (
+            np.broadcast_to(x, (*dofs.shape, dofs.shape[1])).ravel() for x in (dofs[:, :, None], dofs[:, None])
+        )
+        pattern = sp.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(every),) * 2)
+        pattern.sort_indices()
+        return pattern, matrix_places(dofs, every, every, pattern)
 
     def _derive(self, fields: Fields) -> list[Any]:
         """Forms in UFL: second and first derivative of the Lagrangian, energy, metric, mass, ordinate along the rod."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,19 +17,24 @@ from rodfem.linalg.matrices import times
 if TYPE_CHECKING:
     from rodfem.fem.parameters import Line
     from rodfem.fem.state import State
+    from rodfem.fem.symmetries import Symmetry
     from rodfem.fem.system import System
 
 
 class Generators:
-    """Changes of states of one :class:`~rodfem.fem.system.System` by its symmetries, in the order of those."""
+    """Changes of states of one :class:`~rodfem.fem.system.System` by its symmetries, in the order of those.
 
-    def __init__(self, system: System) -> None:
+    Of any other motions where they are given.
+    """
+
+    def __init__(self, system: System, motions: Sequence[Symmetry] | None = None) -> None:
         """Make the matrices."""
         fields = system.fields
-        self.system, self.count = system, len(system.symmetries)
+        self.motions = system.symmetries if motions is None else list(motions)
+        self.system, self.count = system, len(self.motions)
         scalars = fields.copies[0] if system.has_scalars else np.zeros(0, int)
         self._rows, self._columns = np.concatenate([fields.free_owned, scalars]), np.flatnonzero(fields.number >= 0)
-        every = [symmetry.linear(fields) for symmetry in system.symmetries]
+        every = [symmetry.linear(fields) for symmetry in self.motions]
         none = sp.csr_matrix((0, len(self._columns)))
         self._forth = sp.vstack([none, *(A[self._rows][:, self._columns] for A in every)]).tocsr()
         self._back = sp.vstack([none, *(A.T.tocsr()[self._rows][:, self._columns] for A in every)]).tocsr()
@@ -48,7 +54,7 @@ class Generators:
     def _constant_at(self, line: Line, load: float) -> np.ndarray:
         fields = self.system.fields
         at_load = NodalValues(fields, fields.filled({LOAD: load}), line)
-        return np.array([symmetry.change(at_load)[self._rows] for symmetry in self.system.symmetries])
+        return np.array([symmetry.change(at_load)[self._rows] for symmetry in self.motions])
 
     def at(self, state: State) -> np.ndarray:
         """All generators at a state, (count, own rows): see :meth:`vector`."""

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -82,6 +83,11 @@ class Phase:
         return out
 
 
+@cache
+def _identity(count: int) -> np.ndarray:
+    return np.eye(count)
+
+
 def no_phase(system: System, reference: PETSc.Vec | None = None) -> Phase:
     """No active condition for any drift scalar of the ``system``."""
     count, reference = len(system.drifts), None if reference is None else reference.copy()
@@ -100,11 +106,13 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
     if system.comm.size > 1:
         gram = system.comm.allreduce(gram, op=MPI.SUM)
     exact = [i for i, s in enumerate(symmetries) if not s.along and i not in dropped]
-    among = gram[exact][:, exact]
-    squares, turn = np.linalg.eigh(among) if len(exact) > 1 else (among.ravel(), np.ones(among.shape))
-    combinations = np.zeros((len(exact), count))
-    combinations[:, exact] = turn.T
-    sizes, least = np.sqrt(np.maximum(squares, 0.0)), np.full(len(exact), SYMMETRIC_STATE)
+    if len(exact) > 1:
+        squares, turn = np.linalg.eigh(gram if len(exact) == count else gram[exact][:, exact])
+        combinations = np.zeros((len(exact), count))
+        combinations[:, exact] = turn.T
+    else:
+        squares, combinations = gram.diagonal()[exact], _identity(count)[exact]
+    sizes, least = [sqrt(max(x, 0.0)) for x in squares.tolist()], [SYMMETRIC_STATE] * len(exact)
     if symmetries[-1].along and count - 1 not in dropped:
         # of the motion along itself only what the exact symmetries do not do as well
         rest = np.eye(count)[-1]
@@ -113,23 +121,23 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
                 rest = rest - weights / size**2 * (weights @ gram[:, -1])
         rest = rest / np.linalg.norm(rest)
         # by the difference of the vectors: in the Gram matrix half of the digits cancel
-        size = system.norm(system.generators.vector(rest @ generators))
-        combinations, sizes = np.vstack([combinations, rest]), np.append(sizes, size)
-        least = np.append(least, max(MESH * mismatch(state), 10 * SYMMETRIC_STATE))
-    broken = sizes >= least
-    active = np.flatnonzero(broken)
-    weights = combinations[active] / sizes[active, None]
+        sizes.append(system.norm(system.generators.vector(rest @ generators)))
+        combinations = np.vstack([combinations, rest])
+        least.append(max(MESH * mismatch(state), 10 * SYMMETRIC_STATE))
+    numbers = [i for i, (size, bound) in enumerate(zip(sizes, least, strict=True)) if size >= bound]
+    if not numbers:  # a straight rod has all of them itself
+        return Phase({}, np.zeros(count), {}, combinations, reference.copy(), system.generators.vector)
+    weights = combinations[numbers] / np.array([sizes[i] for i in numbers])[:, None]
     rows, offsets = weights @ images, np.zeros(count)
     own = system.fields.free_owned
-    offsets[active] = rows[:, : len(own)] @ state.local[own]
+    offsets[numbers] = rows[:, : len(own)] @ state.local[own]
     if system.comm.size > 1:
         offsets = system.comm.allreduce(offsets, op=MPI.SUM)
-    numbers = active.tolist()
     return Phase(
         dict(zip(numbers, rows, strict=True)),
         offsets,
         dict(zip(numbers, weights, strict=True)),
-        combinations[~broken],
+        combinations[[i for i in range(len(sizes)) if i not in numbers]],
         reference.copy(),
         system.generators.vector,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,7 @@ class Shape:
         self._v_dense = compat.lagrange_basis(k - 1, np.linspace(0, 1, 4 * k + 1))
         self._v_to_powers = np.linalg.inv(np.vander(2 * compat.nodes(k - 1) - 1, k, increasing=True))
         self._held_strains = np.array([0.0 if i in system.scene.free_strains else x for i, x in enumerate(UNDEFORMED)])
+        self._strains = np.eye(len(UNDEFORMED))[list(system.scene.free_strains)]
         self._probe_weights = [self._position_weights(s) for s in system.scene.ordinate.places]
         self.cells = cells
         self.s = self.start[:, None] + self.size[:, None] * self.nodes
@@ -214,12 +216,10 @@ class Shape:
     def slopes(self, state: NodalValues) -> np.ndarray:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""
         R = directors(state.fields.turning.quaternion(self._q_at_gauss @ state.turned[self.cells]))
-        free = list(self.system.scene.free_strains)
-        slopes = R @ self._held_strains
-        if free:
-            v = self._v_at_gauss @ state.values("v")[self.cells]
-            slopes += (R[..., free] @ v[..., None])[..., 0]
-        return np.asarray(slopes)
+        if not self.system.scene.free_strains:
+            return np.asarray(R @ self._held_strains)
+        strains = self._v_at_gauss @ state.values("v")[self.cells] @ self._strains + self._held_strains
+        return np.asarray(np.add.reduce(R * strains[..., None, :], axis=-1))
 
     def _position_weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
         """Weights of slopes at Gauss points in their integrals to ``s`` and over the rod, of nodal values at ``s``."""
@@ -236,15 +236,17 @@ class Shape:
         """Centreline (3,) and unit quaternion (4,) at the ordinate's arclength."""
         system, f = self.system, self.system.fields
         ((integral, value),) = self._probe_weights
-        parts = np.zeros((3, 4))
         size = f.turning.size
-        parts[0, :size] = value @ state.turned[self.cells].reshape(-1, size)
-        parts[1:, :3] = f.formulation.sums(self, state, integral, value)
+        turned, sums = (
+            value @ state.turned[self.cells].reshape(-1, size),
+            f.formulation.sums(self, state, integral, value),
+        )
         if system.comm.size > 1:
-            parts = system.comm.allreduce(parts)
-        r = parts[1, :3] + f.formulation.offset(f, state, np.array(s), parts[2, :3])
-        q = f.turning.quaternion(parts[0, :size])
-        return r, q / np.linalg.norm(q)
+            turned, sums = (system.comm.allreduce(part) for part in (turned, sums))
+        place, chord = sums if sums.ndim > 1 else (sums, sums)
+        r = place + f.formulation.offset(f, state, np.array(s), chord)
+        q = f.turning.quaternion(turned)
+        return r, q / sqrt(q @ q)
 
 
 def unique(values: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ from rodfem.linalg.matrices import shared
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations
     from rodfem.fem.parameters import Line
+    from rodfem.fem.phase import Phase
     from rodfem.fem.system import System
 
 
@@ -57,8 +58,13 @@ class Evaluation(NodalValues):
 
     def tangent(self) -> sp.csr_matrix:
         """Their derivative in all local degrees of freedom, clamped ones included."""
-        self._register()
-        return compat.local_table(self.equations.jacobian.form)
+        if not self.fields.compiled or self.fields.comm.size > 1:
+            self._register()
+            return compat.local_table(self.equations.jacobian.form)
+        pattern, places = self.equations.local_entries
+        values = np.zeros(pattern.nnz)
+        self._add(self.equations.jacobian, places, values)
+        return sp.csr_matrix((values, pattern.indices, pattern.indptr), shape=pattern.shape)
 
     def integral(self, form: Assembler) -> float:
         """Integral over the rod; collective."""
@@ -83,6 +89,8 @@ class State(Evaluation):
     ----------
     drifts
         Drift scalars, the same on all ranks.
+    phases
+        Its phase conditions, by the symmetries that are left out, as :meth:`System.set_phase` has found them.
     """
 
     def __init__(self, system: System, local: np.ndarray, drifts: np.ndarray, line: Line) -> None:
@@ -93,6 +101,7 @@ class State(Evaluation):
         """
         super().__init__(system.equations, local, line)
         self.system, self.drifts = system, drifts
+        self.phases: dict[frozenset[int], Phase] = {}
 
     def residual(self, out: PETSc.Vec) -> None:
         """Equations and phase conditions into ``out``; the row of the load is left zero."""

@@ -46,6 +46,8 @@ FEW = 4000
 """Number of unknowns up to which symmetries are sought on the mesh itself."""
 FINE = 128
 """Number of elements of a mesh on which a rod may move along itself as well as in truth."""
+RECENT = 4
+"""Number of states of up to FEW unknowns that are kept, of more one: a row is left for its neighbours and met again."""
 
 
 class System:
@@ -100,8 +102,9 @@ class System:
         self.drifts = [self.scalars[f"drift{i}"] for i in range(len(self.symmetries))]
         self.has_scalars = comm.rank == comm.size - 1
         without_load = np.where(number == self.load_index, -1, number).astype(PETSc.IntType)
-        self._last: State | None = None
-        self._last_values = b""
+        self._recent: list[tuple[bytes, State]] = []
+        self._kept = RECENT if self.fields.unknowns <= FEW else 1
+        self._ordinary = scene.units.ordinary
         self._columns = {True: number.astype(PETSc.IntType), False: without_load}
         self._all = PETSc.LGMap().create(self._columns[True], comm=comm)
         self._no_load = PETSc.LGMap().create(without_load, comm=comm)
@@ -183,7 +186,10 @@ class System:
     def weighed(self, own: np.ndarray) -> np.ndarray:
         """Metric times vectors of which this rank has these rows each, (count, own rows)."""
         if self._weights is not None:
-            return np.array([times(self._weights, row) for row in own]).reshape(own.shape)
+            out = np.empty_like(own)
+            for i, row in enumerate(own):
+                out[i] = times(self._weights, row)
+            return out
         images = [self.metric * self.generators.vector(row) for row in own]
         return np.array([image.array_r[: own.shape[1]].real for image in images]).reshape(own.shape)
 
@@ -195,18 +201,19 @@ class System:
     def at(self, x: PETSc.Vec, line: Line | None = None) -> State:
         """State of the values ``x`` has now, with the parameters of a ``line``, :attr:`line` unless given.
 
-        On one rank the same object as last time where values and line are the same.
+        On one rank the same object as lately where values and line are the same.
         """
-        gathered, line, last = self.gathered(x), line or self.line, self._last
+        line = line or self.line
         # each row is asked for the same state ten times over: what it has derived of itself is kept with it
-        values = gathered.tobytes() if self.comm.size == 1 else b""
-        if last is not None and values == self._last_values and line is last.line:
-            return last
-        local = self.fields.clamps.copy()
+        values = x.array_r.tobytes() if self.comm.size == 1 else b""
+        for known, state in self._recent:
+            if values == known and line is state.line:
+                return state
+        gathered, local = self.gathered(x), self.fields.clamps.copy()
         local[self._numbered] = gathered[: len(self._numbered)]
         state = State(self, local, gathered[len(self._numbered) :], line)
         if values:
-            self._last, self._last_values = state, values
+            self._recent = [(values, state), *self._recent[: self._kept - 1]]
         return state
 
     def change(self, d: PETSc.Vec) -> NodalValues:
@@ -300,7 +307,7 @@ class System:
 
     def matrix_in_units(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Second variation at fixed load for unknowns in units of their natural sizes."""
-        if self.scene.units.ordinary:
+        if self._ordinary:
             return matrix
         scaled, sizes = matrix.copy(), self.sizes.copy()
         self.set_load(sizes, 0.0)  # its row is that of a unit matrix, without units
@@ -309,7 +316,7 @@ class System:
 
     def in_units(self, vector: PETSc.Vec, power: int) -> PETSc.Vec:
         """Vector times a power of the natural sizes: 1 for equations, -1 for a change of state."""
-        if self.scene.units.ordinary:
+        if self._ordinary:
             return vector
         out = vector.copy()
         (out.pointwiseMult if power > 0 else out.pointwiseDivide)(vector, self.sizes)
@@ -337,7 +344,10 @@ class System:
         if reference is None:
             self.phase = no_phase(self)
         elif not self.phase.belongs_to(reference):
-            self.phase = phase_at(self, reference, self.verification.dropped)
+            phases, dropped = self.at(reference).phases, frozenset(self.verification.dropped)
+            if dropped not in phases:
+                phases[dropped] = phase_at(self, reference, self.verification.dropped)
+            self.phase = phases[dropped]
 
     def verify(self, matrix: PETSc.Mat, state: State, equations: PETSc.Vec | None = None) -> bool:
         """Verify the symmetries at a state, where ``S`` is ``matrix`` and the equations are given (None: zero).
@@ -354,7 +364,7 @@ class System:
 
     def drift(self, x: PETSc.Vec) -> float:
         """Greatest drift scalar of a state: zero, but for round-off, at an equilibrium."""
-        return float(abs(self.at(x).drifts).max(initial=0.0))
+        return float(abs(self.at(x).drifts).max()) if self.drifts else 0.0
 
     def equivalent_directions(self, x: PETSc.Vec, direction: PETSc.Vec) -> list[PETSc.Vec]:
         """Directions into which the symmetries that the state ``x`` has itself carry a direction, to first order."""

@@ -61,7 +61,7 @@ class Verification:
         self.notices: list[str] = []
         self.norm = 0.0
         self._closing: list[PETSc.Vec] | None = None
-        self._left, self._none = system.new_vector(), np.zeros(len(system.drifts))
+        self._left, self._generator, self._none = system.new_vector(), system.new_vector(), np.zeros(len(system.drifts))
 
     def __call__(self, matrix: PETSc.Mat, state: State, equations: PETSc.Vec | None = None) -> bool:
         """Try the symmetries at a state, whose ``S`` is given; False where one of them was dropped.
@@ -118,7 +118,8 @@ class Verification:
         """
         system, left = self.system, self._left
         weights = _generic(len(chosen))
-        g = system.generators.vector(weights @ generators[chosen])
+        g, own = self._generator, generators.shape[1]
+        g.array[:own] = weights @ generators[chosen]
         matrix.mult(g, left)
         if system.has_scalars:
             left.setValues(system.drifts, self._none)  # phase conditions, no part of S
@@ -131,7 +132,7 @@ class Verification:
         small = RESIDUAL * self.norm * (length + TINY)
         if equations is not None:
             pulled = system.generators.pulled_back(self._unloaded(state, equations))
-            left.axpy(1.0, system.generators.vector(weights @ pulled[chosen]))
+            left.array[:own] += weights @ pulled[chosen]
             quotient = float(np.real(left.dot(g)))
         left = system.in_units(left, 1)
         if left.norm() > small:

@@ -19,8 +19,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
+from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.state import State
 from rodfem.fem.system import System
+from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Factors, Sizes
 from rodfem.linalg.matrices import local_rows
 from rodfem.linalg.orthogonal import Basis, combine, generic, orthonormalize
@@ -99,6 +101,9 @@ class Inertia:
         self.resolution = 0.0
         self.vectors: list[PETSc.Vec] = []
         self.shift, self.filled, self.factored = 0.0, 0, 0
+        self.compiled: CompiledNewton | None = None
+        if isinstance(self.factors, Chain) and CompiledNewton.serves(self.matrix, self.factors):
+            self.compiled = CompiledNewton(system, self.matrix, self.factors)
 
     def at(self, x: PETSc.Vec, equations: PETSc.Vec | None = None) -> Factored:
         """Assemble ``S`` at ``x``, with the phase conditions of that state.
@@ -109,12 +114,12 @@ class Inertia:
         if equations is None:
             self.system.set_phase(x)
         state = self.system.at(x)
-        self._assemble(state)
+        self._assemble(x, state)
         # a generator that is no null vector of S is no symmetry: verify drops its phase condition, S is assembled anew
         with self.system.clock("stability"):
             sound = self.system.verify(self.matrix, state, equations)
         if not sound:
-            self._assemble(state)
+            self._assemble(x, state)
         self.filled += 1
         return Factored(self)
 
@@ -131,21 +136,29 @@ class Inertia:
         """The state that the matrix holds now."""
         return Factored(self)
 
-    def _assemble(self, state: State) -> None:
+    def _assemble(self, x: PETSc.Vec, state: State) -> None:
         system = self.system
         with system.clock("assembly"):
-            self.matrix.zeroEntries()
-            state.assemble_into(self.matrix, system.equations.jacobian, load=True)
-            system.add_drifts(self.matrix)
-            self.matrix.assemble()
-            # at fixed load: the column of the load becomes the border F_lam, a unit diagonal stands for its unknown
-            self.matrix.mult(self._axis, self.border)
-            self.matrix.diagonalScale(R=self._without_load)
-            if system.has_scalars:
-                self.matrix.setValue(system.load_index, system.load_index, 1.0)
-            self.matrix.assemble()
+            if self.compiled is not None:
+                self.compiled.assemble(x)
+                self.border.array[:] = self.compiled.border
+            else:
+                self._assemble_by_petsc(state)
         self.shift = 0.0
         self._settle_band()
+
+    def _assemble_by_petsc(self, state: State) -> None:
+        system = self.system
+        self.matrix.zeroEntries()
+        state.assemble_into(self.matrix, system.equations.jacobian, load=True)
+        system.add_drifts(self.matrix)
+        self.matrix.assemble()
+        # at fixed load: the column of the load becomes the border F_lam, a unit diagonal stands for its unknown
+        self.matrix.mult(self._axis, self.border)
+        self.matrix.diagonalScale(R=self._without_load)
+        if system.has_scalars:
+            self.matrix.setValue(system.load_index, system.load_index, 1.0)
+        self.matrix.assemble()
 
     def _settle_band(self) -> None:
         system = self.system

@@ -9,15 +9,18 @@ named after the directors about which the rod turns in it.  Symmetries of the st
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from forms.symmetry import AXES, cross, left
+from rodfem.fem.generators import Generators
 from rodfem.fem.state import State
 from rodfem.fem.symmetries import Elementary, Symmetry, elementary_generators
 from rodfem.fem.system import System
 from rodfem.stability import mode_type
-from rodfem.stability.pencil import symmetry_modes
 
 SHARE = 0.9
 """Share of a vector in the span of a group above which it is named after it."""
@@ -43,6 +46,8 @@ class MotionNames:
             self._rigid[turn] = _sum(parts, [p.matrix in (left(axis), cross(axis)) or p.name == turn for p in parts])
             self._rigid[move] = _sum(parts, [p.name == move for p in parts])
         self._along = Symmetry(np.zeros(len(parts)), parts, along=1.0)
+        sliding = "slipping along itself" if system.scene.closed else "sliding along the rod"
+        self._groups = [list(self._turning), list(self._rigid), [sliding]]
 
     def __call__(self, x: PETSc.Vec, vectors: list[PETSc.Vec]) -> list[str]:
         """Name each of some ``vectors`` of metric norm 1 at the state ``x``."""
@@ -57,9 +62,39 @@ class MotionNames:
 
         They are of metric norm 1 and across the symmetries of the state; those that vanish are left out.
         """
-        turning, rigid = (self._generators(x, state, motions) for motions in (self._turning, self._rigid))
-        sliding = "slipping along itself" if self.system.scene.closed else "sliding along the rod"
-        return turning, rigid, self._generators(x, state, {sliding: self._along})
+        vector = self.system.generators.vector
+        turning, rigid, along = (
+            [(name, vector(row)) for name, row in zip(group, rows, strict=True)] for group, rows in self.rows(x, state)
+        )
+        return turning, rigid, along
+
+    def rows(self, x: PETSc.Vec, state: State) -> list[tuple[list[str], np.ndarray]]:
+        """The same as names and own rows (number, own rows) of each of the three groups."""
+        system, motions = self.system, self._motions.at(state)
+        before = self.sum(np.einsum("ij,ij->i", motions, system.weighed(motions)))
+        system.set_phase(x)
+        for weights in system.phase.broken.values():
+            g = weights @ state.generators
+            image = system.weighed(g[None])[0]
+            motions = motions - np.outer(self.sum(motions @ image) / self.sum(g @ image), g)
+        after = self.sum(np.einsum("ij,ij->i", motions, system.weighed(motions)))
+        kept = after > DEPENDENT * np.maximum(before, DEPENDENT)
+        out, first = [], 0
+        for names in self._groups:
+            chosen = [first + i for i in range(len(names)) if kept[first + i]]
+            rows = motions[chosen] / np.sqrt(after[chosen])[:, None]
+            out.append(([names[i - first] for i in chosen], rows))
+            first += len(names)
+        return out
+
+    def sum(self, own: np.ndarray) -> np.ndarray:
+        """Sum over the ranks."""
+        return own if self.system.comm.size == 1 else np.asarray(self.system.comm.allreduce(own, op=MPI.SUM))
+
+    @cached_property
+    def _motions(self) -> Generators:
+        """Changes of state by all the motions, made when one is first asked for."""
+        return Generators(self.system, [*self._turning.values(), *self._rigid.values(), self._along])
 
     def _name(self, state: State, v: PETSc.Vec, turning: Group, rigid: Group, along: Group) -> str:
         share, weights = self.share(v, rigid)
@@ -73,23 +108,6 @@ class MotionNames:
             return along[0][0]
         return mode_type.name(mode_type.shares(self.system, state.turned, [v.array_r.real]))
 
-    def _generators(self, x: PETSc.Vec, state: State, motions: dict[str, Symmetry]) -> Group:
-        """Generators at a state ``x``, of metric norm 1 and across its symmetries, but for those that vanish."""
-        symmetries, found = list(symmetry_modes(self.system, x).values()), []
-        for name, motion in motions.items():
-            g = self.system.vector(motion.change(state), np.zeros(len(self.system.drifts)))
-            before = self._square(g)
-            for s in symmetries:
-                g.axpy(-s.dot(self.metric * g) / self._square(s), s)
-            after = self._square(g)
-            if after > DEPENDENT * max(before, DEPENDENT):
-                g.scale(after**-0.5)
-                found.append((name, g))
-        return found
-
-    def _square(self, g: PETSc.Vec) -> float:
-        return float(g.dot(self.metric * g).real)
-
     def share(self, v: PETSc.Vec, group: Group) -> tuple[float, np.ndarray]:
         """Share of ``v`` (metric norm 1) in the span of a group, and the weights of the members in its projection."""
         if not group:
@@ -97,8 +115,16 @@ class MotionNames:
         images = [self.metric * g for _, g in group]
         gram = np.array([[g.dot(image).real for image in images] for _, g in group])
         b = np.array([v.dot(image).real for image in images])
-        weights = np.linalg.pinv(gram, rcond=DEPENDENT, hermitian=True) @ b
-        return float(weights @ b), weights
+        return share(gram, b)
+
+
+def share(gram: np.ndarray, b: np.ndarray) -> tuple[float, np.ndarray]:
+    """Share of a vector (metric norm 1) in the span of others, and their weights in its projection.
+
+    ``gram`` (number, number) and ``b`` (number,) are the products of those in the metric, with each other and with it.
+    """
+    weights = np.linalg.pinv(gram, rcond=DEPENDENT, hermitian=True) @ b
+    return float(weights @ b), weights
 
 
 def _sum(parts: tuple[Elementary, ...], chosen: list[bool]) -> Symmetry:

@@ -19,13 +19,12 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.fem.symmetries import derivative, mismatch
-from rodfem.linalg.orthogonal import combine
+from rodfem.linalg.matrices import times
 from rodfem.stability.inertia import Factored, Inertia
-from rodfem.stability.motion_names import DEPENDENT, SHARE, MotionNames
+from rodfem.stability.motion_names import DEPENDENT, SHARE, MotionNames, share
 from rodfem.tolerances import same_place
 
 AMPLE = 2.0
@@ -72,31 +71,38 @@ class Sliding:
 class _Along:
     """Motion along the rod at one state, beside the motions of all of it."""
 
+    across: np.ndarray | None
+
     def __init__(self, names: MotionNames, x: PETSc.Vec) -> None:
         """Find the generators; those of the symmetries of the state have no part in them."""
         self.names, self.system, self.state = names, names.system, names.system.at(x)
-        turning, rigid, along = names.generators(x, self.state)
-        self.group = [*along, *turning, *rigid]
-        self.across: PETSc.Vec | None = None
-        if along:
-            share, weights = names.share(along[0][1], self.group[1:])
-            if share < 1 - DEPENDENT:  # else it is a motion of the whole rod
-                self.across = along[0][1] - combine([g for _, g in self.group], np.append(0.0, weights))
+        turning, rigid, along = (rows for _, rows in names.rows(x, self.state))
+        self.group = np.concatenate([along, turning, rigid])
+        self.across = None
+        self.images = self.system.weighed(self.group)
+        self.gram = names.sum(self.group @ self.images.T)
+        if len(along):
+            along_them, weights = share(self.gram[1:, 1:], self.gram[0, 1:])
+            if along_them < 1 - DEPENDENT:  # else it is a motion of the whole rod
+                self.across = self.group[0] - weights @ self.group[1:]
 
     def part(self, v: PETSc.Vec) -> float:
         """``c w . S s`` of a vector of metric norm 1, zero for one that is no motion along the rod."""
-        if self.across is None or self.names.share(v, self.group)[0] <= SHARE:
+        own = v.array_r[: self.group.shape[1]].real
+        if self.across is None or share(self.gram, self.names.sum(self.images @ own))[0] <= SHARE:
             return 0.0
-        c, product = self._factors([v])
+        c, product = self._factors(own[None])
         return float(c[0] * product[0])
 
-    def _factors(self, vectors: list[PETSc.Vec]) -> tuple[np.ndarray, np.ndarray]:
-        """``c`` and ``w . S s`` of vectors, each (number,)."""
+    def _factors(self, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``c`` and ``w . S s`` of vectors of which this rank has the rows ``own`` (number, own rows)."""
         assert self.across is not None
-        image, comm = self.names.metric * self.across, self.system.comm
-        c = np.array([v.dot(image).real for v in vectors]) / self._derivative.dot(image).real
-        own = np.array([self.system.change(v).local @ self._covector for v in vectors])
-        return c, own if comm.size == 1 else comm.allreduce(own, op=MPI.SUM)
+        system, sums = self.system, self.names.sum
+        image = system.weighed(self.across[None])[0]
+        c = sums(own @ image) / sums(self._derivative @ image)
+        whole = np.zeros((len(own), system.workspace.local_size))
+        whole[:, : own.shape[1]] = own
+        return c, sums(system.changes(whole.T) @ self._covector)
 
     def suspects(self, found: Factored, nearest: float) -> int:
         """Number of motions along the rod that cost less than its bending, but for the mesh's part.
@@ -105,29 +111,28 @@ class _Along:
         """
         if self.across is None:
             return 0
-        inertia, vectors = found.inertia, [g for _, g in self.group]
-        gram, quadratic = (
-            np.array([[g.dot(w).real for w in images] for g in vectors])
-            for images in ([matrix * g for g in vectors] for matrix in (inertia.metric, found.matrix))
-        )
-        squares, turn = np.linalg.eigh(gram)
+        inertia, number = found.inertia, self.group.shape[1]
+        products = [(found.matrix * self.system.generators.vector(g)).array_r[:number].real for g in self.group]
+        quadratic = self.names.sum(self.group @ np.array(products).T)
+        squares, turn = np.linalg.eigh(self.gram)
         basis = turn[:, squares > DEPENDENT] / np.sqrt(squares[squares > DEPENDENT])
         theta, z = np.linalg.eigh(basis.T @ quadratic @ basis)
-        c, product = ((basis @ z).T @ x for x in self._factors(vectors))
+        c, product = ((basis @ z).T @ x for x in self._factors(self.group))
         parts = abs(c * product)
         cheap = abs(abs(theta) - parts) < np.maximum(inertia.scale, MOSTLY * parts)
         return int((cheap & (AMPLE * parts > nearest)).sum())
 
     @cached_property
-    def _derivative(self) -> PETSc.Vec:
-        """``s``, without what is clamped."""
-        return self.system.vector(derivative(self.state), np.zeros(len(self.system.drifts)))
+    def _derivative(self) -> np.ndarray:
+        """``s``, without what is clamped, (own rows,)."""
+        x = self.system.vector(derivative(self.state), np.zeros(len(self.system.drifts)))
+        return np.asarray(x.array_r[: self.group.shape[1]].real)
 
     @cached_property
     def _covector(self) -> np.ndarray:
         """``S s`` by this rank's cells, zero at the ends and for scalars, (local size,)."""
         fields, state = self.system.fields, self.state
-        out = np.array(state.tangent() @ fields.scattered(fields.arclength.everywhere @ state.local))
+        out = times(state.tangent(), fields.scattered(times(fields.arclength.everywhere, state.local)))
         out[self._ends] = 0.0
         return out
 

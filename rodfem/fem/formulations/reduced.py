@@ -125,12 +125,17 @@ def end_positions(
     ``c`` are the constants, ``scalars`` the values of the scalar unknowns by name.  Across the plane of a planar rod an
     end that nothing holds is where the plane is: at zero.
     """
+    return [end_position(side, scene, c, scalars, given) for side in range(2)]
+
+
+def end_position(
+    side: int, scene: Scene, c: Constants, scalars: Mapping[str, Any], given: Callable[[Any], Any] = lambda x: x
+) -> list[Any]:
+    """Position of the end on one ``side``: see :func:`end_positions` for ``scene``, ``c``, ``scalars``, ``given``."""
+    letter = LETTERS[side]
     return [
-        [
-            given(x) if x is not None else scalars.get(f"{letter}{i + 1}", 0.0 if i == scene.normal else None)
-            for i, x in enumerate(end.held(c))
-        ]
-        for letter, end in zip(LETTERS, scene.sides, strict=True)
+        given(x) if x is not None else scalars.get(f"{letter}{i + 1}", 0.0 if i == scene.normal else None)
+        for i, x in enumerate(scene.sides[side].held(c))
     ]
 
 
@@ -141,5 +146,8 @@ def left_end(
 
     ``scene``, ``c``, ``scalars`` and ``given`` are as for :func:`end_positions`.
     """
-    left, right = end_positions(scene, c, scalars, given)
+    left = end_position(0, scene, c, scalars, given)
+    if None not in left:
+        return np.array(left)
+    right = end_position(1, scene, c, scalars, given)
     return np.array([a if a is not None else (b or 0.0) - d for a, b, d in zip(left, right, chord, strict=True)])
