@@ -58,7 +58,7 @@ def hemitropic_rod(
         energy=lambda v, k, c: hemitropic(v, k, stretching=10.0, coupling=c.A, twisting=c.B, bending=c.C),
         parameters={
             "lam": Parameter(0.0, r"\lambda", admissible=(-inf, 1.0), words="end shortening"),
-            "A": Parameter(coupling),
+            "A": Parameter(coupling, words="coupling"),
             "B": Parameter(twisting),
             "C": Parameter(bending),
             "l": Parameter(half_length),
