@@ -22,6 +22,8 @@ MARKERS: dict[str, dict[str, Any]] = {
     "branch point": {"marker": "o", "mfc": "white"},
     "fold": {"marker": "D", "mfc": "black"},
 }
+CLEAR = 16.0
+"""Pixels between two numbers."""
 FREQUENCIES = 3
 """Left-most frequencies that are drawn."""
 ROOM, LEAST = 0.15, 1e-9
@@ -58,8 +60,9 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
         return
     axes.margins(y=ROOM)
     axes.autoscale_view()  # the directions of curves on paper depend on the limits
+    written: list[np.ndarray] = []
     for text, colour, places in labels:
-        _write(axes, text, colour, places, 6 * width)
+        _write(axes, text, colour, places, 6 * width, written)
     axes.set_xlabel(axis_label(found))
 
 
@@ -70,7 +73,9 @@ def legend_of(found: Mapping[str, Any]) -> list[Artist]:
         return draw_into(Figure().subplots(), waves, FREQUENCIES)
     styles = {STABLE: "-", PLANAR: "--", UNSTABLE: ":"}
     kinds = {UNSTABLE if index else PLANAR if in_space else STABLE for _, index, in_space in parts}
-    out: list[Artist] = [Line2D([], [], color="0.3", ls=style, lw=2.0, label=kind) for kind, style in styles.items() if kind in kinds]
+    out: list[Artist] = [
+        Line2D([], [], color="0.3", ls=style, lw=2.0, label=kind) for kind, style in styles.items() if kind in kinds
+    ]
     out.append(Line2D([], [], ls="none", marker="$n$", ms=6, color="0.3", label="negative eigenvalues"))
     special = {special["kind"] for branch in found["branches"] for special in branch["special"]}
     for kind, style in MARKERS.items():
@@ -80,13 +85,19 @@ def legend_of(found: Mapping[str, Any]) -> list[Artist]:
     return out + [Line2D([], [], ls="none", label=f"{ENDS}{reason}", **END_MARKER) for reason in reasons]
 
 
-def _write(axes: Axes, text: str, colour: str, places: np.ndarray, distance: float) -> None:
-    """Write a ``text`` above the middle of a curve of ``places`` (n, 2), at a ``distance`` from it in points."""
+def _write(axes: Axes, text: str, colour: str, places: np.ndarray, distance: float, written: list[np.ndarray]) -> None:
+    """Write a ``text`` above the middle of a curve of ``places`` (n, 2), at a ``distance`` from it in points.
+
+    Unless it is nearer than :data:`CLEAR` to one that was ``written``, by the places on paper.
+    """
     middle, on_paper = len(places) // 2, axes.transData.transform(places)
     x, y = on_paper[min(middle + 1, len(places) - 1)] - on_paper[max(middle - 1, 0)]
     normal = np.array([-y, x]) / max(np.hypot(x, y), LEAST) * (-1.0 if x < 0 else 1.0)
-    offset = {"xytext": tuple(distance * normal), "textcoords": "offset points", "ha": "center", "va": "center"}
-    axes.annotate(text, tuple(places[middle]), color=colour, path_effects=HALO, **offset)
+    place = on_paper[middle] + distance * normal * axes.figure.dpi / 72
+    if all(np.hypot(*(place - other)) > CLEAR for other in written):
+        written.append(place)
+        offset = {"xytext": tuple(distance * normal), "textcoords": "offset points", "ha": "center", "va": "center"}
+        axes.annotate(text, tuple(places[middle]), color=colour, path_effects=HALO, **offset)
 
 
 def pieces(branch: Mapping[str, Any]) -> list[tuple[slice, int, int]]:

@@ -12,21 +12,22 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from panels import draw, legend_of
 
-from rodfem import Branch, Diagram, Discretization, Plan, Scene, StepControl, trace
+from rodfem import Branch, Diagram, Discretization, Plan, Ring, Scene, trace
 from rodfem.output.sheet import STYLE, symbol_of, tex
-from rodfem.output.view import view_of
+from rodfem.output.view import sign_of, view_of
 
 DOCS = Path(__file__).parent
 COLUMNS, DPI, MOST_ENTRIES = 2, 110, 4
 WIDTHS = [2.6, 1.0]
 """Of a diagram, and of the shape beside it."""
-STEP = 0.02
-"""Largest step in radian: curves leave branch points as parabolas, of which chords are seen."""
+FIRST_STEP = (0.25, 0.5, 0.75)
+"""Places of more rows on the first step of a branch, in parts of its ordinate; it is a parabola, nearly."""
 STILL = 1e-3
 """Ordinate below which a state has not moved."""
 MOST_BRANCHES = 6
@@ -71,8 +72,7 @@ def sheet(scenes: Mapping[str, Scene], path: Path) -> None:
         grid = figure.add_gridspec(rows, 2 * COLUMNS, width_ratios=COLUMNS * WIDTHS)
         for number, (name, scene) in enumerate(scenes.items()):
             row, column = divmod(number, COLUMNS)
-            steps = StepControl(largest=STEP)
-            diagram = trace(scene, Discretization("auto", 8, 6), Plan(error_bars=False, steps=steps))
+            diagram = traced(scene)
             found = first_switches(diagram.data)
             state = shown(diagram)
             last = 2 * column + (1 if state else 2)
@@ -93,24 +93,41 @@ def sheet(scenes: Mapping[str, Scene], path: Path) -> None:
         figure.savefig(path)
 
 
+def traced(scene: Scene) -> Diagram:
+    """Diagram of a scene, with rows of their own on the first step of each branch, which would be drawn as a chord."""
+    found = trace(scene, Discretization("auto", 8, 6), Plan(error_bars=False))
+    starts = [b.points[:2] for b in found if b.parent and len(b.points) > 1]
+    loads = {p.load + (q.load - p.load) * t**2 for p, q in starts for t in FIRST_STEP}
+    return found.again(at=tuple(sorted(loads))) if loads else found
+
+
 def shown(diagram: Diagram) -> tuple[Branch, int] | None:
-    """Branch and row of the state that is drawn: the last stable one, of a branch that moves if there is one."""
+    """Branch and row of the state that is drawn: the last stable one of a branch, of one that moves if there is one.
+
+    Where no state that moves is stable it is the one that has moved most, of the first side branch.
+    """
     if not diagram.scene.conservative:
         return None
-    stable = [(b, i) for b in diagram for i, p in enumerate(b.points) if p.negative == 0]
-    moving = [(b, i) for b, i in stable if abs(b.points[i].ordinate) > STILL]
-    side = [(b, i) for b, i in moving if b is not diagram[0]]
-    chosen = side or moving or [(b, i) for b in diagram.branches[1:2] for i in range(len(b.points))]
-    if not chosen:
-        return None
-    return max((x for x in chosen if x[0] is chosen[0][0]), key=lambda x: abs(x[0].points[x[1]].ordinate))
+    stable = [(b, i) for b in diagram for i, p in enumerate(b.points) if p.negative == 0 and abs(p.ordinate) > STILL]
+    side = [(b, i) for b, i in stable if b is not diagram[0]]
+    if chosen := side or stable:
+        return [(b, i) for b, i in chosen if b is chosen[0][0]][-1]
+    branch = next(iter(diagram.branches[1:]), None)
+    return branch and (branch, max(range(len(branch.points)), key=lambda i: abs(branch.points[i].ordinate)))
 
 
 def shape(axes: Axes, diagram: Diagram, branch: Branch, row: int) -> None:
-    """Draw the centreline of a state, and of the first one in grey, as :mod:`rodfem.output.view` looks at it."""
+    """Draw the centreline of a state, and of the first one in grey, as :mod:`rodfem.output.view` looks at it.
+
+    Gravity is along -e3.
+    """
     first, point = diagram[0].points[0], branch.points[row]
     lines = [diagram.solvers[p.mesh].shape.sample(p.x)["r"] for p in (first, point)]
-    right, up, _ = view_of(lines[0], lines[1] - lines[0])
+    if isinstance(diagram.scene.ends, Ring):  # it may be anywhere
+        lines = [r - r.mean(axis=0) for r in lines]
+    moved, down = lines[1] - lines[0], None if diagram.scene.distributed is None else np.array([0.0, 0.0, -1.0])
+    right, up, _ = view_of(lines[0], moved, down=down)
+    up = up * sign_of(moved[np.argmax(abs(moved @ up))] @ up) if down is None else up  # of two images the upper one
     for r, style in zip(lines, ({"color": "0.75", "lw": 2.0}, {"color": "#7ea6cf", "lw": 3.0}), strict=True):
         axes.plot(r @ right, r @ up, solid_capstyle="round", **style)
         axes.plot(r[0] @ right, r[0] @ up, "s", color="0.45", ms=4)

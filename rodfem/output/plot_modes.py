@@ -26,7 +26,7 @@ from rodfem.output.glyphs import glyphs_of
 from rodfem.output.program import status_of, terse
 from rodfem.output.sheet import DPI, STYLE
 from rodfem.output.solids import Solid, curve_of, profile_of
-from rodfem.output.view import POINT, view_of
+from rodfem.output.view import POINT, on_feet, view_of
 from rodfem.problem.setting import Setting
 from rodfem.tolerances import TINY
 from rodfem.whole_files import draft_of
@@ -172,6 +172,7 @@ class _Panel:
         most = off[np.argmax(np.linalg.norm(off, axis=1))]
         across = most if held.force is None and np.linalg.norm(most) > BENT * span else held.force
         chosen = {"axis": held.axis, "down": held.down, "load": across, "side": held.widest(self.frames[0])}
+        chosen |= {"feet": on_feet(held)}
         self.view = view_of(self.r, moved, **chosen)
         raised = moved @ self.view[1]
         if raised[np.argmax(abs(raised))] < 0.0:

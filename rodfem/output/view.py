@@ -47,6 +47,7 @@ def view_of(
     down: Floats | None = None,
     load: Floats | None = None,
     side: Floats | None = None,
+    feet: bool = False,
 ) -> Floats:
     """Axes of a picture as rows (3, 3): to the right, upwards, and to the viewer.
 
@@ -62,6 +63,8 @@ def view_of(
         Direction of a force across the rod, or of its deflection, which is not along the line of sight.
     side
         Direction that is upwards where a straight rod has not moved.
+    feet
+        Whether the rod is held in two places or more (:func:`on_feet`), and may be an arch.
 
     Returns
     -------
@@ -87,14 +90,14 @@ def view_of(
     else:
         right = _snapped(chord / np.linalg.norm(chord))
         up = upwards(_principal(shape, right, STRAIGHT * size, side))
-        up = up if load is None else up * _standing(up, reference, load)
+        up = up * (_standing(up, reference, load) if feet and load is not None else 1.0)
         if load is not None:
             aside = load - (load @ right) * right
             if abs(up @ aside) < BESIDE * np.linalg.norm(aside):
                 up, tilt = _snapped(aside / np.linalg.norm(aside)), ABOVE
                 up = up - (up @ right) * right
                 up = upwards(up / np.linalg.norm(up))
-                up = up * _standing(up, reference, load)
+                up = up * (_standing(up, reference, load) if feet else 1.0)
                 right = np.cos(ASIDE) * right + np.sin(ASIDE) * np.cross(right, up)  # the rod goes away, so upwards
             elif (up @ aside) * (np.cross(right, up) @ aside) > POINT * (aside @ aside):  # towards the load
                 tilt = -tilt
@@ -125,6 +128,11 @@ def _standing(up: Floats, reference: Floats, load: Floats) -> float:
     bow, size = (reference - feet).mean(axis=0), np.linalg.norm(np.ptp(reference, axis=0))
     arch = np.linalg.norm(bow) > ARCHED * size and abs(up @ bow) > LEVEL * np.linalg.norm(bow)
     return sign_of(up @ bow) if arch and load @ bow < 0 else 1.0
+
+
+def on_feet(setting: Setting) -> bool:
+    """Whether a rod is held in two places or more."""
+    return sum(bool(x.held.any()) for x in setting.supports) > 1
 
 
 def _principal(moments: Floats, axis: Floats, least: float, other: Floats | None) -> Floats:
