@@ -38,8 +38,10 @@ SHAPES = {
     9: ("ruler", (("plane", 3.0), ("branch 1", 6.0), ("branch 1", 12.0))),
 }
 """Figure: demo, and the states whose shapes it has, by branch and load."""
-DPI, PANEL = 150, (900, 760)
-"""Dots per inch, and pixels of the picture of one of three states."""
+DPI, WIDTH, TITLE = 150, 12.0, 0.3
+"""Dots per inch; width of three states, and height of their titles, in inches."""
+PANEL, PANELS = (900, 760), {"ruler": (760, 860)}
+"""Pixels of the picture of one state, and for the rods for which they are others."""
 RADII = {"ruler": 0.017}
 """Mean radii of rods that are drawn thicker than by default."""
 MARGIN, WHITE = 24, 250
@@ -86,16 +88,23 @@ def shapes(name: str, states: Sequence[tuple[str, float]], path: Path) -> None:
     with h5py.File(file) as known:
         rows = [int(np.argmin(abs(known[f"branches/{branch}/load"][:] - load))) for branch, load in states]
     view = view_in(file, states[-1][0], rows[-1])
-    with matplotlib.rc_context(STYLE), tempfile.TemporaryDirectory() as folder:
-        figure = Figure(figsize=(12.0, 3.2), dpi=DPI, layout="constrained")
-        for axes, (branch, load), row in zip(figure.subplots(1, len(states)), states, rows, strict=True):
-            columns = next(b["columns"] for b in found["branches"] if b["name"] == branch)
-            picture = Path(folder, "shape.png")
-            draw_shape(file, branch, row, picture, caption="", size=PANEL, view=view, radius=RADII.get(name))
-            axes.imshow(cropped(matplotlib.image.imread(picture)))
+    pictures = []
+    with tempfile.TemporaryDirectory() as folder:
+        for (branch, _), row in zip(states, rows, strict=True):
+            kept = {"caption": "", "size": PANELS.get(name, PANEL), "view": view, "radius": RADII.get(name)}
+            picture = draw_shape(file, branch, row, Path(folder, "shape.png"), **kept)
+            pictures.append(cropped(matplotlib.image.imread(picture)))
+    tallest = max(len(picture) / len(picture[0]) for picture in pictures)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, WIDTH / len(states) * tallest + TITLE), dpi=DPI, layout="constrained")
+        for axes, picture, (branch, load), row in zip(
+            figure.subplots(1, len(states)), pictures, states, rows, strict=True
+        ):
+            index = next(b["columns"]["negative"][row] for b in found["branches"] if b["name"] == branch)
+            axes.imshow(picture)
             axes.set_axis_off()
             axes.set_anchor("N")
-            axes.set_title(f"{branch}, {axis_label(found)} = {load:g}, index {columns['negative'][row]}", fontsize=12)
+            axes.set_title(f"{branch}, {axis_label(found)} = {load:g}, index {index}", fontsize=12)
         figure.savefig(path)
 
 

@@ -90,7 +90,12 @@ def _write(axes: Axes, text: str, colour: str, places: np.ndarray, distance: flo
 
     Unless it is nearer than :data:`CLEAR` to one that was ``written``, by the places on paper.
     """
-    middle, on_paper = len(places) // 2, axes.transData.transform(places)
+    on_paper = axes.transData.transform(places)
+    along = np.cumsum(np.hypot(*np.diff(on_paper, axis=0, prepend=on_paper[:1]).T))
+    middle = int(np.argmin(abs(along - along[-1] / 2)))
+    if middle in (0, len(places) - 1):  # of two rows, or nearly: there is a place between them
+        places = places[[0, -1]].mean(axis=0) + np.outer([-LEAST, 0, LEAST], places[-1] - places[0])
+        middle, on_paper = 1, axes.transData.transform(places)
     x, y = on_paper[min(middle + 1, len(places) - 1)] - on_paper[max(middle - 1, 0)]
     normal = np.array([-y, x]) / max(np.hypot(x, y), LEAST) * (-1.0 if x < 0 else 1.0)
     place = on_paper[middle] + distance * normal * axes.figure.dpi / 72
