@@ -22,7 +22,9 @@ MARKERS: dict[str, dict[str, Any]] = {
     "branch point": {"marker": "o", "mfc": "white"},
     "fold": {"marker": "D", "mfc": "black"},
 }
-CLEAR = 16.0
+PARTS = (0.5, 0.7, 0.3, 0.85, 0.15)
+"""Places of the number of a piece, in parts of its length on paper: the first that is clear of other numbers."""
+CLEAR = 18.0
 """Pixels between two numbers."""
 FREQUENCIES = 3
 """Left-most frequencies that are drawn."""
@@ -88,21 +90,22 @@ def legend_of(found: Mapping[str, Any]) -> list[Artist]:
 def _write(axes: Axes, text: str, colour: str, places: np.ndarray, distance: float, written: list[np.ndarray]) -> None:
     """Write a ``text`` above the middle of a curve of ``places`` (n, 2), at a ``distance`` from it in points.
 
-    Unless it is nearer than :data:`CLEAR` to one that was ``written``, by the places on paper.
+    Elsewhere, or not at all, where it is nearer than :data:`CLEAR` to others that were ``written``, by their places.
     """
     on_paper = axes.transData.transform(places)
     along = np.cumsum(np.hypot(*np.diff(on_paper, axis=0, prepend=on_paper[:1]).T))
-    middle = int(np.argmin(abs(along - along[-1] / 2)))
-    if middle in (0, len(places) - 1):  # of two rows, or nearly: there is a place between them
-        places = places[[0, -1]].mean(axis=0) + np.outer([-LEAST, 0, LEAST], places[-1] - places[0])
-        middle, on_paper = 1, axes.transData.transform(places)
-    x, y = on_paper[min(middle + 1, len(places) - 1)] - on_paper[max(middle - 1, 0)]
-    normal = np.array([-y, x]) / max(np.hypot(x, y), LEAST) * (-1.0 if x < 0 else 1.0)
-    place = on_paper[middle] + distance * normal * axes.figure.dpi / 72
-    if all(np.hypot(*(place - other)) > CLEAR for other in written):
-        written.append(place)
-        offset = {"xytext": tuple(distance * normal), "textcoords": "offset points", "ha": "center", "va": "center"}
-        axes.annotate(text, tuple(places[middle]), color=colour, path_effects=HALO, **offset)
+    for part in PARTS:
+        middle = np.array([np.interp(part * along[-1], along, column) for column in on_paper.T])
+        row = min(max(int(np.searchsorted(along, part * along[-1])), 1), len(along) - 1)
+        x, y = on_paper[row] - on_paper[row - 1]
+        normal = np.array([-y, x]) / max(np.hypot(x, y), LEAST) * (-1.0 if x < 0 else 1.0)
+        place = middle + distance * normal * axes.figure.dpi / 72
+        if all(np.hypot(*(place - other)) > CLEAR for other in written):
+            written.append(place)
+            offset = {"xytext": tuple(distance * normal), "textcoords": "offset points", "ha": "center", "va": "center"}
+            at = axes.transData.inverted().transform(middle)
+            axes.annotate(text, tuple(at), color=colour, path_effects=HALO, **offset)
+            return
 
 
 def pieces(branch: Mapping[str, Any]) -> list[tuple[slice, int, int]]:

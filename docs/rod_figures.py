@@ -102,16 +102,18 @@ def traced(scene: Scene) -> Diagram:
 
 
 def shown(diagram: Diagram) -> tuple[Branch, int] | None:
-    """Branch and row of the state that is drawn: the last stable one of a branch, of one that moves if there is one.
+    """Branch and row of the state that is drawn: a stable one, of a side branch if there is one.
 
-    Where no state that moves is stable it is the one that has moved most, of the first side branch.
+    It is some way along a side branch, at the end of the first one.  Where no state that moves is stable it is the
+    one that has moved most, of the first side branch.
     """
     if not diagram.scene.conservative:
         return None
     stable = [(b, i) for b in diagram for i, p in enumerate(b.points) if p.negative == 0 and abs(p.ordinate) > STILL]
     side = [(b, i) for b, i in stable if b is not diagram[0]]
     if chosen := side or stable:
-        return [(b, i) for b, i in chosen if b is chosen[0][0]][-1]
+        rows = [(b, i) for b, i in chosen if b is chosen[0][0]]
+        return rows[2 * len(rows) // 3 if side else -1]
     branch = next(iter(diagram.branches[1:]), None)
     return branch and (branch, max(range(len(branch.points)), key=lambda i: abs(branch.points[i].ordinate)))
 

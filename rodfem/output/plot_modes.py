@@ -171,9 +171,8 @@ class _Panel:
         off = off - np.outer(off @ axis, axis) / max(axis @ axis, TINY)
         most = off[np.argmax(np.linalg.norm(off, axis=1))]
         across = most if held.force is None and np.linalg.norm(most) > BENT * span else held.force
-        chosen = {"axis": held.axis, "down": held.down, "load": across, "side": held.widest(self.frames[0])}
-        chosen |= {"feet": on_feet(held)}
-        self.view = view_of(self.r, moved, **chosen)
+        side, feet = held.widest(self.frames[0]), on_feet(held)
+        self.view = view_of(self.r, moved, axis=held.axis, down=held.down, load=across, side=side, feet=feet)
         raised = moved @ self.view[1]
         if raised[np.argmax(abs(raised))] < 0.0:
             self.u, self.w = -self.u, -self.w

@@ -159,10 +159,8 @@ class State:
     def view(self) -> Floats:
         """Axes of the picture, (3, 3)."""
         held, moved = self.setting, self.centres - self.reference
-        side = held.widest(self.directors[0])
-        axis = axis_of(held, self.reference)
-        chosen = {"down": held.down, "load": held.force, "side": side, "feet": on_feet(held)}
-        return view_of(self.reference, moved, axis=axis, **chosen)
+        axis, side, feet = axis_of(held, self.reference), held.widest(self.directors[0]), on_feet(held)
+        return view_of(self.reference, moved, axis=axis, down=held.down, load=held.force, side=side, feet=feet)
 
     def solids(self, radius: float, view: Floats) -> list[Solid]:
         """The rod, its stripe, what holds it and what loads it."""

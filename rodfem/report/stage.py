@@ -57,9 +57,9 @@ def stage_of(data: Mapping[str, Any], shapes: Mapping[str, Shapes], groups: Any)
     (r, frames), setting = shapes[branch][row], read_setting(groups[branch], row)
     side = setting.widest(frames[0])
     axis = axis_of(setting, reference)
-    chosen = {"down": setting.down, "load": setting.force, "side": side, "feet": on_feet(setting)}
-    axes = view_of(reference, r - reference, axis=axis, **chosen)
-    load = setting.force if setting.down is None else setting.down
+    down, load, feet = setting.down, setting.force, on_feet(setting)
+    axes = view_of(reference, r - reference, axis=axis, down=down, load=load, side=side, feet=feet)
+    load = load if down is None else down
     length = float(shapes[branch].s[-1] - shapes[branch].s[0])
     radius = min(length / SLENDER, float(np.linalg.norm(np.ptp(r, axis=0))) / COILED)
     return Stage(branch, row, axes, None if load is None else load / np.linalg.norm(load), radius, setting)

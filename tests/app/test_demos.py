@@ -26,7 +26,9 @@ def path_of(name: str) -> Path:
     return HOME / "demos" / f"{name}.py"
 
 
-@pytest.mark.parametrize("name", LESSONS)
+@pytest.mark.parametrize(
+    "name", ["ruler", *(pytest.param(n, marks=pytest.mark.alone) for n in LESSONS if n != "ruler")]
+)
 def test_a_demo_ends_with_its_number(
     name: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
