@@ -34,7 +34,7 @@ setup: ## install what is missing: Debian packages (as root or by sudo) and .ven
 	@tools/setup.sh viz,test
 
 demo: setup ## follow a hemitropic rod past its bifurcations and draw it
-	timeout --foreground -k 10 $(LIMIT) $(MPIRUN) -n 2 $(PYTHON) demos/hemitropic.py
+	timeout --foreground -k 10 $(LIMIT) $(MPIRUN) -n 2 $(PYTHON) -m rodfem run demos/hemitropic.py
 	@echo "The pictures:"; ls results/hemitropic/diagram.png results/hemitropic/shape.png
 
 test: setup ## run the tests: serially, on two ranks, and the short ones on three

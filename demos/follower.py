@@ -1,27 +1,36 @@
-r"""A rod under a follower load.
+# %% [markdown]
+# # A rod under a follower load
+#
+# ## Idea
+#
+# A rod is clamped at one end, and pushed at the other by a force $P$ that stays tangent to it, as a rocket does. The
+# straight rod is an equilibrium at every $P$, and the only one near it: nothing ever buckles. Still it does not stay
+# straight. The load has no potential, so that stability is a matter of motion, and the mass of the rod counts.
+#
+# ## Form
+#
+# The rod is unshearable and inextensible, $m = (k_1, 10\,k_2, k_3)$. The tangent matrix $S$ of a load without a
+# potential is not symmetric. Two frequencies of
+#
+# $$S x = \mu M x, \qquad \mu = \omega^2,$$
+#
+# approach each other as $P$ grows, meet, and become a complex pair: oscillations that grow. This is *flutter*.
+#
+# Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section 5.4 and figure 11.
 
-A rod is clamped at one end, and pushed at the other by a force P that stays tangent to it, like a rocket.  It is
-unshearable and inextensible, with m = (k1, 10 k2, k3).  The straight rod is an equilibrium at every P, and the
-only one near it at any: nothing ever buckles.  Still it does not stay straight.  The load has no potential, its
-tangent matrix is not symmetric, and two frequencies
+# %% [markdown]
+# ## Program
+#
+# `follower` gives the components of a force along the directors. The scene has an `Inertia` besides. The arguments of
+# the function are options: `rodfem run demos/follower.py --rotary-inertia 0.001 0.001 0.001`.
 
-    omega^2 = mu,    S x = mu M x,
-
-approach each other as P grows, meet, and become a complex pair: oscillations that grow.  This is flutter, at P =
-20.0509 without rotary inertia (Beck 1952).  Stability is a matter of motion here, so the mass of the rod counts,
-and with it the centreline.
-
-Kumar & Healey, Comput. Methods Appl. Mech. Engrg. 199 (2010) 1805-1815, section 5.4 and figure 11.
-"""
-
+# %%
 from math import hypot, inf
 
 import rodfem
-import rodfem.app.main as program
+import rodfem.app.script as script
 from forms.energy import bending_and_twist
-from rodfem.errors import InputError
-from rodfem.problem.ends import clamped, free
-from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
+from rodfem import Discretization, Inertia, InputError, Ordinate, Parameter, Scene, clamped, free
 
 
 def pushed_rod(
@@ -29,7 +38,7 @@ def pushed_rod(
     mass: float = 1.0,
     rotary_inertia: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Scene:
-    """State the problem: the rod's energy, its ends, its inertia, and the number to look at.
+    """A rod clamped at one end, and pushed at the other along its own tip.
 
     Parameters
     ----------
@@ -44,16 +53,12 @@ def pushed_rod(
     j1, j2, j3 = rotary_inertia
     if min(j1, j2, j3) < 0:
         raise InputError(f"A rotary inertia of {min(j1, j2, j3):g} is negative: give zero or more.")
-
-    def energy(v, k, c):
-        return bending_and_twist(k, (c.B1, c.B2, c.B3))
-
     return Scene(
         name="follower",
         title="Rod under a follower load",
         interval=(0.0, 1.0),
         rod="unshearable and inextensible",
-        energy=energy,
+        energy=lambda v, k, c: bending_and_twist(k, (c.B1, c.B2, c.B3)),
         parameters={
             "P": Parameter(0.0, "P", words="follower force"),
             "B1": Parameter(b1),
@@ -72,10 +77,35 @@ def pushed_rod(
     )
 
 
-def mesh(**_: object) -> rodfem.Discretization:
+def mesh(**_: object) -> Discretization:
     """Four elements are enough for a straight rod."""
-    return rodfem.Discretization(elements=4)
+    return Discretization(elements=4)
 
 
-if __name__ == "__main__":
-    program.main(pushed_rod, mesh)
+# %% [markdown]
+# ## Number
+#
+# Without rotary inertia flutter begins at $P = 20.0509536190$ (Beck 1952; lesson 9 of the course solves the frequency
+# equation), more than eight times the load $\pi^2/4$ under which the rod buckles if the force keeps its direction.
+
+# %%
+if script.lesson(__name__):
+    diagram = rodfem.trace(pushed_rod(), mesh())
+    print(diagram.in_words())
+    diagram.save("results/follower")  # rodfem view results/follower
+    diagram.plot("results/follower/diagram.png")
+    flutter = diagram.special("flutter")[0]
+    print(f"P = {flutter.point.load:.10f} +- {flutter.error_estimate:.0e}, where omega^2 = {flutter.omega2:.6f}")
+    assert abs(flutter.point.load - 20.05095361897) < 1e-8
+
+# %% [markdown]
+# ## Exercises
+#
+# * `rodfem run demos/follower.py --mass 4`: which of the two numbers changes, the load or the frequency?
+# * `rodfem run demos/follower.py --rotary-inertia 0.001 0.001 0.001`: by how much does rotary inertia lower the load?
+# * `rodfem run demos/follower.py --stiffness 1 1 1`: a round rod flutters in any plane. What do its
+#   frequencies look like?
+#
+# ## Where it breaks
+#
+# A little damping may lower the load by a finite amount (Ziegler 1952), and damping is not part of the model.

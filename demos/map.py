@@ -1,26 +1,33 @@
-r"""A stability map: how a compressed hemitropic rod behaves for every coupling of stretch and twist.
+# %% [markdown]
+# # A stability map
+#
+# ## Idea
+#
+# How does a compressed hemitropic rod behave for *every* coupling of stretch and twist? One diagram is the answer for
+# one coupling $A$ (`demos/hemitropic.py`). A map has a diagram for each of many, read at a grid of compressions
+# $\lambda$: the colour is the displacement of the middle of the stable state, and lines are where the straight rod's
+# index changes.
+#
+# Rods are independent, so that ranks share them: `mpirun -n 2 .venv/bin/python demos/map.py`. What is finished is kept:
+# started again, it goes on.
 
-For each of a grid of couplings A the whole diagram of demos/hemitropic.py is traced, and read at a grid of compressions
-lam: the displacement of the middle of the stable state; lines are where the straight rod's index changes.  Rods are
-independent, so that ranks share them: mpirun -n 2 .venv/bin/python demos/map.py.  What is finished is kept: started
-again, it goes on.
-"""
+# %% [markdown]
+# ## Program
+#
+# `scene` states one rod, and `read` traces it and takes from the diagram what the map shows.
 
+# %%
 from math import hypot, inf
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 
+import rodfem
 import rodfem.app.cli as cli
 from forms.energy import hemitropic
-from rodfem.app.many import many
+from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, clamped
 from rodfem.app.terminal import Report
-from rodfem.diagram.plan import Plan
-from rodfem.diagram.trace import trace
-from rodfem.fem.fields import Discretization
-from rodfem.problem.ends import clamped
-from rodfem.problem.scene import Ordinate, Parameter, Scene
 from rodfem.whole_files import draft_of
 
 
@@ -42,7 +49,7 @@ def scene(A: float, highest: float) -> Scene:
 def read(rod: Scene, loads: np.ndarray) -> dict:
     """Where the straight rod's index changes, and least displacement of a stable state (None: no such) at each load."""
     plan = Plan(rod.span, at=tuple(loads), depth=1, error_bars=False)
-    diagram = trace(rod, Discretization("reduced", 8, 6), plan, comm=MPI.COMM_SELF)
+    diagram = rodfem.trace(rod, Discretization("reduced", 8, 6), plan, comm=MPI.COMM_SELF)
     stable = np.full(len(loads), np.nan)
     for point in (s.point for s in diagram.special("user") if s.point.stable):
         i = int(np.argmin(abs(loads - point.load)))
@@ -54,6 +61,11 @@ def read(rod: Scene, loads: np.ndarray) -> dict:
     }
 
 
+# %% [markdown]
+# ## Picture
+
+
+# %%
 def draw(couplings: np.ndarray, loads: np.ndarray, results: list[dict], path: Path) -> None:
     """Draw the map: colour for the displacement of the stable state, lines where the straight rod's index changes."""
     from matplotlib.figure import Figure
@@ -79,12 +91,19 @@ def draw(couplings: np.ndarray, loads: np.ndarray, results: list[dict], path: Pa
         figure.savefig(draft)
 
 
+# %% [markdown]
+# ## Many rods
+#
+# `rodfem.many` does the work for each rod once, in files, whichever rank has it.
+
+
+# %%
 def main(parser: cli.Parser, couplings: np.ndarray, loads: np.ndarray, output: Path) -> None:
     """Compute what is missing in the folder ``output``, and draw it; ``parser`` words what is refused."""
     report = Report()
     with cli.sentences(parser):
         rods = [scene(float(A), 0.6) for A in couplings]
-        results = many(
+        results = rodfem.many(
             rods,
             lambda rod: read(rod, loads),
             output,
@@ -102,7 +121,7 @@ MOST = 10_000
 """Couplings, or loads, of a map."""
 
 if __name__ == "__main__":
-    parser = cli.Parser(prog="map.py", description=__doc__)
+    parser = cli.Parser(prog="map.py", description="Draw how a compressed hemitropic rod behaves for every coupling.")
     parser.add_argument("--couplings", type=int, default=40, metavar="N", help="number of couplings A (default 40)")
     parser.add_argument("--loads", type=int, default=40, metavar="N", help="number of compressions (default 40)")
     words = "(default results/map)"

@@ -1,28 +1,39 @@
-r"""Michell's ring.
+# %% [markdown]
+# # Michell's ring
+#
+# ## Idea
+#
+# A thin rod whose natural state is twisted is bent to a circle, and its ends are joined. The link of the ring is fixed
+# from then on, so that the circle has no twist, and is under a torque. At a critical one it leaves its plane, like a
+# kinked cable.
+#
+# ## Form
+#
+# The rod has round cross-sections and the natural twist $t_0$:
+#
+# $$W = \tfrac12\,[k_1^2 + k_2^2 + C\,(k_3 - t_0)^2] .$$
+#
+# A ring may go anywhere: rotations, the turning of its cross-sections and the motion along itself are zero eigenvalues
+# at every state. They are found from the equations, and counted apart.
+#
+# The diagram shows the twist, $\int k_3\,ds/2\pi$, which tells all states apart: 0 on the first circle, 2 on the last
+# one, and in between the link less the writhe, as long as the rod does not pass through itself.
 
-A thin rod is bent to a circle, and its ends are joined.  It has round cross-sections, W = 1/2 [k1^2 + k2^2 + C (k3 -
-t0)^2], and its natural twist is t0.  Its link was fixed when it was closed, so that the circle has
-no twist, and is under a torque C t0.  With radius 1 it buckles out of its plane where
+# %% [markdown]
+# ## Program
+#
+# `Ring()` takes the place of two ends, and `start` is the circle. The argument of the function is an option:
+# `rodfem run demos/ring.py --twisting 0.7`.
 
-    C t0 = sqrt(n^2 - 1),    n = 2, 3, ...
-
-(Michell 1889; Zajac, J. Appl. Mech. 29 (1962) 136): at C t0 = sqrt(3) first, like a kinked cable.  What leaves there
-leads, past a figure of eight, to a circle with another link, in which the rod has passed through itself.  The twist,
-int k3 ds / 2 pi, tells all of these apart: 0 on the first circle, 2 on the last one, and in between the link less the
-writhe, as long as the rod does not pass through itself.
-
-A ring may go anywhere: rotations, the turning of its cross-sections and the motion along itself are zero eigenvalues at
-every state.  They are found from the equations, and counted apart.
-"""
-
-from math import inf, pi
+# %%
+from math import inf, pi, sqrt
 
 import numpy as np
 
-import rodfem.app.main as program
+import rodfem
+import rodfem.app.script as script
 from forms.energy import bending_and_twist
-from rodfem.problem.ends import Ring
-from rodfem.problem.scene import Ordinate, Parameter, Scene
+from rodfem import Ordinate, Parameter, Ring, Scene
 
 TWIST = r"twist $\int k_3\,ds/2\pi$"
 
@@ -33,7 +44,7 @@ def circle(s):
 
 
 def ring(twisting: float = 1.5) -> Scene:
-    """State the problem: the rod's energy, that it is closed, and the number to look at.
+    """A closed rod whose natural state is twisted.
 
     Parameters
     ----------
@@ -59,5 +70,30 @@ def ring(twisting: float = 1.5) -> Scene:
     )
 
 
-if __name__ == "__main__":
-    program.main(ring)
+# %% [markdown]
+# ## Number
+#
+# A ring of radius 1 leaves its plane where $C t_0 = \sqrt{n^2 - 1}$, $n = 2, 3, \dots$, at $\sqrt 3$ first
+# (Michell 1889; Zajac, J. Appl. Mech. 29 (1962) 136). What leaves there leads, past a figure of eight, to a circle with
+# another link, in which the rod has passed through itself.
+
+# %%
+if script.lesson(__name__):
+    diagram = rodfem.trace(ring())
+    print(diagram.in_words())
+    diagram.save("results/ring")  # rodfem view results/ring
+    diagram.plot("results/ring/diagram.png")
+    kink = diagram.special("branch point", "circle")[0]
+    print(f"C t0 = {1.5 * kink.point.load:.10f}, exact sqrt(3) = {sqrt(3):.10f}; {kink.point.zero} zero eigenvalues")
+    assert abs(1.5 * kink.point.load - sqrt(3)) < 1e-8
+
+# %% [markdown]
+# ## Exercises
+#
+# * `rodfem run demos/ring.py --twisting 0.7 --range 0 3`: at which $t_0$ does a ring that is soft in twist leave its
+#   plane?
+# * `rodfem run demos/ring.py --range 0 2.5`: where does the circle become unstable in a third way? (Take $n = 3$.)
+#
+# ## Where it breaks
+#
+# The rod passes through itself in the figure of eight: a real ring is stopped there by contact.

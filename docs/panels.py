@@ -7,19 +7,27 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from rodfem.output.endings import endings
 from rodfem.output.plot_diagram import END_MARKER, ENDS
+from rodfem.output.plot_frequencies import draw_into
 from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE
 from rodfem.output.sheet import HALO, PALETTE, axis_label
 
 MARKERS: dict[str, dict[str, Any]] = {
     "branch point": {"marker": "o", "mfc": "white"},
     "fold": {"marker": "D", "mfc": "black"},
-    "flutter": {"marker": "*", "mfc": "#F0E442"},
 }
+PARTS = (0.5, 0.7, 0.3, 0.85, 0.15)
+"""Places of the number of a piece, in parts of its length on paper: the first that is clear of other numbers."""
+CLEAR = 18.0
+"""Pixels between two numbers."""
+FREQUENCIES = 3
+"""Left-most frequencies that are drawn."""
 ROOM, LEAST = 0.15, 1e-9
 """Share of the height that is kept free above and below, and pixels below which a curve has no direction."""
 
@@ -32,7 +40,6 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
     labels: list[tuple[str, str, np.ndarray]] = []
     for branch, colour in zip(found["branches"], 3 * PALETTE, strict=False):
         if branch["columns"].get("omega2"):
-            frequencies(axes, branch, colour)
             continue
         load, ordinate = (np.array(branch["columns"][x]) for x in ("load", "ordinate"))
         for rows, index, in_space in pieces(branch):
@@ -49,21 +56,28 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
             for sign in signs if special["kind"] in MARKERS else ():
                 style = {"mec": "black", "mew": 0.6 * width, "ms": 3 * width} | MARKERS[special["kind"]]
                 axes.plot(special["load"], sign * special["ordinate"], ls="none", zorder=5, **style)
+    if waves := swept(found):
+        draw_into(axes, waves, FREQUENCIES)
+        axes.set_xlabel(axis_label(found))
+        return
     axes.margins(y=ROOM)
     axes.autoscale_view()  # the directions of curves on paper depend on the limits
+    written: list[np.ndarray] = []
     for text, colour, places in labels:
-        _write(axes, text, colour, places, 6 * width)
+        _write(axes, text, colour, places, 6 * width, written)
     axes.set_xlabel(axis_label(found))
 
 
-def legend_of(found: Mapping[str, Any]) -> list[Line2D]:
+def legend_of(found: Mapping[str, Any]) -> list[Artist]:
     """Entries of a legend for what :func:`draw` draws of a diagram."""
     parts = [part for branch in found["branches"] for part in pieces(branch)]
-    if any(branch["columns"].get("omega2") for branch in found["branches"]):
-        return [Line2D([], [], ls="none", mec="black", ms=10, label="flutter", **MARKERS["flutter"])]
+    if waves := swept(found):
+        return draw_into(Figure().subplots(), waves, FREQUENCIES)
     styles = {STABLE: "-", PLANAR: "--", UNSTABLE: ":"}
     kinds = {UNSTABLE if index else PLANAR if in_space else STABLE for _, index, in_space in parts}
-    out = [Line2D([], [], color="0.3", ls=style, lw=2.0, label=kind) for kind, style in styles.items() if kind in kinds]
+    out: list[Artist] = [
+        Line2D([], [], color="0.3", ls=style, lw=2.0, label=kind) for kind, style in styles.items() if kind in kinds
+    ]
     out.append(Line2D([], [], ls="none", marker="$n$", ms=6, color="0.3", label="negative eigenvalues"))
     special = {special["kind"] for branch in found["branches"] for special in branch["special"]}
     for kind, style in MARKERS.items():
@@ -73,13 +87,25 @@ def legend_of(found: Mapping[str, Any]) -> list[Line2D]:
     return out + [Line2D([], [], ls="none", label=f"{ENDS}{reason}", **END_MARKER) for reason in reasons]
 
 
-def _write(axes: Axes, text: str, colour: str, places: np.ndarray, distance: float) -> None:
-    """Write a ``text`` above the middle of a curve of ``places`` (n, 2), at a ``distance`` from it in points."""
-    middle, on_paper = len(places) // 2, axes.transData.transform(places)
-    x, y = on_paper[min(middle + 1, len(places) - 1)] - on_paper[max(middle - 1, 0)]
-    normal = np.array([-y, x]) / max(np.hypot(x, y), LEAST) * (-1.0 if x < 0 else 1.0)
-    offset = {"xytext": tuple(distance * normal), "textcoords": "offset points", "ha": "center", "va": "center"}
-    axes.annotate(text, tuple(places[middle]), color=colour, path_effects=HALO, **offset)
+def _write(axes: Axes, text: str, colour: str, places: np.ndarray, distance: float, written: list[np.ndarray]) -> None:
+    """Write a ``text`` above the middle of a curve of ``places`` (n, 2), at a ``distance`` from it in points.
+
+    Elsewhere, or not at all, where it is nearer than :data:`CLEAR` to others that were ``written``, by their places.
+    """
+    on_paper = axes.transData.transform(places)
+    along = np.cumsum(np.hypot(*np.diff(on_paper, axis=0, prepend=on_paper[:1]).T))
+    for part in PARTS:
+        middle = np.array([np.interp(part * along[-1], along, column) for column in on_paper.T])
+        row = min(max(int(np.searchsorted(along, part * along[-1])), 1), len(along) - 1)
+        x, y = on_paper[row] - on_paper[row - 1]
+        normal = np.array([-y, x]) / max(np.hypot(x, y), LEAST) * (-1.0 if x < 0 else 1.0)
+        place = middle + distance * normal * axes.figure.dpi / 72
+        if all(np.hypot(*(place - other)) > CLEAR for other in written):
+            written.append(place)
+            offset = {"xytext": tuple(distance * normal), "textcoords": "offset points", "ha": "center", "va": "center"}
+            at = axes.transData.inverted().transform(middle)
+            axes.annotate(text, tuple(at), color=colour, path_effects=HALO, **offset)
+            return
 
 
 def pieces(branch: Mapping[str, Any]) -> list[tuple[slice, int, int]]:
@@ -96,11 +122,6 @@ def pieces(branch: Mapping[str, Any]) -> list[tuple[slice, int, int]]:
     return [(slice(a, b + 1), *both[(a + b) // 2 if b > a + 1 else b]) for a, b in pairwise(cuts)]
 
 
-def frequencies(axes: Axes, branch: Mapping[str, Any], colour: str, most: int = 3) -> None:
-    """Draw the real parts of the ``most`` left-most frequencies of a ``branch`` in a ``colour``; flutter is a star."""
-    omega2 = np.array(branch["columns"]["omega2"], dtype=float)
-    omega = np.sqrt(omega2[:, : 2 * most, 0] + 1j * omega2[:, : 2 * most, 1])
-    axes.plot(branch["columns"]["load"], omega.real, ".", color=colour, markersize=2)
-    for special in (s for s in branch["special"] if s["kind"] == "flutter"):
-        axes.plot(special["load"], special["omega2"] ** 0.5, ls="none", mec="black", ms=12, **MARKERS["flutter"])
-    axes.set_ylim(0, 1.1 * float(omega.real[:, :most].max()))
+def swept(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Branches of a diagram that have frequencies."""
+    return [branch for branch in found["branches"] if branch["columns"].get("omega2")]

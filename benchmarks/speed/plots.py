@@ -35,7 +35,7 @@ COLOURS = {1: "#d55e00", 2: "#e69f00", 3: "#a6a000", 4: "#009e73", 5: "#3aa6a0",
 """Colour for each degree."""
 FLOOR, LOWEST = 1e-15, 3e-16
 """An error of zero is drawn here; the least error on the axes."""
-COLUMNS, WIDE, HIGH, DPI = 3, 3.9, 3.3, 110
+COLUMNS, WIDE, HIGH, DPI = 3, 3.9, 3.4, 110
 """Panels side by side, the size of one in inches, dots per inch."""
 LINE = 0.24
 """Height of a line of a legend in inches."""
@@ -90,8 +90,8 @@ def discretisation(words: str) -> tuple[int, int, str]:
 def series(axes: Axes, points: Iterable[tuple[str, float, float]]) -> None:
     """Errors against times by discretisation, those of one degree joined in the order of their elements.
 
-    The reduced formulation has filled marks; hollow ones are the pointwise formulation, and joined only where there is
-    no other.  The paper's discretisation is a star.
+    Those of the reduced formulation, with filled marks; of the pointwise one, with hollow marks, where there is no
+    other.  The paper's discretisation is a star, in either formulation.
     """
     groups: dict[tuple[str, int], list[tuple[int, float, float]]] = {}
     for words, time, error in points:
@@ -100,12 +100,11 @@ def series(axes: Axes, points: Iterable[tuple[str, float, float]]) -> None:
     joined = REDUCED if any(formulation == REDUCED for formulation, _ in groups) else "pointwise"
     for (formulation, degree), group in sorted(groups.items(), reverse=True):
         places = [(time, error) for _, time, error in sorted(group)]
-        colour, line = COLOURS[degree], "-" if formulation == joined else "none"
-        face = colour if formulation == REDUCED else "white"
-        size = 5.0 if formulation == joined else 3.6
-        style = {"color": colour, "markerfacecolor": face, "zorder": 3 + (formulation == joined)}
-        label = DEGREE.format(degree) if formulation == REDUCED else "_"
-        axes.loglog(*zip(*places, strict=True), marker="o", linestyle=line, lw=1.5, ms=size, label=label, **style)
+        colour = COLOURS[degree]
+        style: dict[str, Any] = {"color": colour, "markerfacecolor": colour if formulation == REDUCED else "white"}
+        if formulation == joined:
+            label = DEGREE.format(degree) if formulation == REDUCED else "_"
+            axes.loglog(*zip(*places, strict=True), "o-", lw=1.8, ms=5.0, label=label, zorder=4, **style)
         for elements, time, error in group:
             if (elements, degree) == PAPER:
                 style |= {"mec": "black", "mew": 0.7, "ms": 13, "label": "_", "zorder": 6}
@@ -180,14 +179,13 @@ def sheet(
             ticks(axes)
             if number % columns == 0:
                 axes.set_ylabel("largest relative error")
-            if number + columns >= len(panels):
-                axes.set_xlabel(time)
+            axes.set_xlabel(time)
             for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
                 entries.setdefault(label, handle)
         for axes in grid.ravel()[len(panels) :]:
             axes.set_axis_off()
         for label, style in (
-            ("hollow: pointwise formulation", {"marker": "o", "ms": 4.5}),
+            ("hollow: pointwise formulation", {"marker": "o", "ms": 5.0}),
             ("the paper's: 150 linear elements", {"marker": "*", "ms": 13}),
         ):
             entries[label] = matplotlib.lines.Line2D([], [], ls="none", mfc="white", mec="0.2", **style)
@@ -221,11 +219,11 @@ def work_precision(page: Page, path: Path, special: bool) -> None:
 
         return draw_panel
 
-    panels = [(f"{scene}, {branch}", panel(scene, branch)) for scene, branch in targets(special)]
+    panels = [(f"{scene}: {branch}", panel(scene, branch)) for scene, branch in targets(special)]
     if special:
-        sheet(panels, path, "A whole branch, its special points located", "ms for the branch")
+        sheet(panels, path, "A whole branch, its special points located", "milliseconds for the branch")
     else:
-        sheet(panels, path, "Following a branch, with the index of every point", "ms for a point")
+        sheet(panels, path, "Following a branch, with the index of every point", "milliseconds for a point")
 
 
 def eigenvalues(page: Page, path: Path) -> None:
@@ -236,7 +234,7 @@ def eigenvalues(page: Page, path: Path) -> None:
         return lambda axes: series(axes, [(r[1], float(r[4]), float(r[3])) for r in found if r[0] == name])
 
     panels = [(name, panel(name)) for name in dict.fromkeys(r[0] for r in found)]
-    sheet(panels, path, "Left-most eigenvalues of a straight rod", "ms for one judgement", columns=2)
+    sheet(panels, path, "Left-most eigenvalues of a straight rod", "milliseconds for one judgement", columns=2)
 
 
 def growth(page: Page, path: Path) -> None:
@@ -246,7 +244,7 @@ def growth(page: Page, path: Path) -> None:
         figure = Figure(figsize=(WIDE * COLUMNS, HIGH + 1.0), dpi=DPI, layout="constrained")
         panels = figure.subplots(1, 3)
         for axes, column, words in zip(
-            panels, (4, 6, 7), ("s for an equilibrium", "s for an index", "MB of memory"), strict=True
+            panels, (4, 6, 7), ("seconds for an equilibrium", "seconds for an index", "memory in MB"), strict=True
         ):
             for formulation, colour in ((REDUCED, "#0072b2"), ("pointwise", "#d55e00")):
                 for state, mark in (("straight", "o-"), ("buckled", "s--")):

@@ -15,7 +15,8 @@
 # ## Picture
 #
 # The energy of the elastica of lesson 1 over two directions, $\theta = a_1\sin(\pi s/2) + a_2\sin(3\pi s/2)$, at three
-# loads. The straight rod, in the middle, is a minimum, then a saddle, then a maximum: index 0, 1, 2.
+# loads; red is more than that of the straight rod, in the middle, and blue is less. It is a minimum, then a saddle,
+# then a maximum: index 0, 1, 2.
 
 # %%
 import numpy as np
@@ -28,7 +29,7 @@ s = (x + 1) / 2
 a1, a2 = np.meshgrid(np.linspace(-1, 1, 81), np.linspace(-1, 1, 81))
 shape = a1[..., None] * np.sin(np.pi * s / 2) + a2[..., None] * np.sin(3 * np.pi * s / 2)
 slope = a1[..., None] * np.pi / 2 * np.cos(np.pi * s / 2) + a2[..., None] * 3 * np.pi / 2 * np.cos(3 * np.pi * s / 2)
-drawn = panels(3, "$a_1$", "$a_2$", equal=True)
+drawn = panels(3, "amplitude $a_1$", "amplitude $a_2$", equal=True)
 for ax, load, index in zip(drawn, (0.5, 5.0, 14.0), range(3), strict=True):
     energy = (slope**2 / 2 + load * EULER * (np.cos(shape) - 1)) @ w / 2
     ax.contourf(a1, a2, energy, levels=np.linspace(-abs(energy).max(), abs(energy).max(), 16), cmap="RdBu_r")
@@ -92,14 +93,14 @@ print(f"the index changes at P = {low:.9f}")
 # %%
 import rodfem
 from forms.energy import bending_and_twist
-from rodfem import Ordinate, Plan, Scene, clamped, free
+from rodfem import Ordinate, Parameter, Plan, Scene, clamped, free
 
 column = Scene(
     name="column",
     interval=(0.0, 1.0),
     rod="unshearable and inextensible",
     energy=lambda v, k, c: bending_and_twist(k, (2.0, 1.0, 1.0)),
-    parameters={"P": 0.0},
+    parameters={"P": Parameter(0.0, words="thrust")},
     load="P",
     ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
     ordinate=Ordinate("tip displacement", s=1.0, of=lambda r, q: abs(r[0])),

@@ -15,8 +15,8 @@
 # ## Picture
 #
 # A rod between clamps, $\theta = a_1\sin\pi s + a_3\sin 3\pi s$, held on the axis at both ends: $\int\theta\,ds = 0$ is
-# the line $3a_1 + a_3 = 0$. The quadratic energy is a saddle at both loads (grey: where it is zero). On the line it has
-# a minimum, then a maximum.
+# the line $3a_1 + a_3 = 0$. The quadratic energy is a saddle at both loads (red is positive, blue negative). On the
+# line it has a minimum, then a maximum.
 
 # %%
 import numpy as np
@@ -24,7 +24,7 @@ import numpy as np
 from rodfem.course.pictures import panels, show
 
 a1, a3 = np.meshgrid(np.linspace(-1, 1, 81), np.linspace(-1, 1, 81))
-drawn = panels(2, "$a_1$", "$a_3$", equal=True)
+drawn = panels(2, "amplitude $a_1$", "amplitude $a_3$", equal=True)
 for ax, load in zip(drawn, (30.0, 85.0), strict=True):
     energy = ((np.pi**2 - load) * a1**2 + (9 * np.pi**2 - load) * a3**2) / 4
     shade = np.sign(energy) * np.sqrt(abs(energy))  # to see small values, too
@@ -95,14 +95,14 @@ print(f"critical: {critical():.6f} without, {euler:.6f} with, {held:.6f} with th
 # %%
 import rodfem
 from forms.energy import bending_and_twist
-from rodfem import Ordinate, Plan, Scene, at, clamped, sliding
+from rodfem import Ordinate, Parameter, Plan, Scene, at, clamped, sliding
 
 column = Scene(
     name="held in the middle",
     interval=(0.0, 1.0),
     rod="unshearable and inextensible",
     energy=lambda v, k, c: bending_and_twist(k, (4.0, 1.0, 1.0)),
-    parameters={"P": 20.0},
+    parameters={"P": Parameter(20.0, words="thrust")},
     load="P",
     ends=(clamped(), sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, -c.P))),
     constraints=(at(0.5, lambda x, c: x.r[0]),),

@@ -18,7 +18,7 @@ import numpy as np
 
 from rodfem.course.pictures import axes, show
 
-ax = axes("$x$", "energy, each load shifted")
+ax = axes("place $x$ of the apex", "energy, each load shifted")
 for shift, p in enumerate((0.0, 0.2, 2 / np.sqrt(27), 0.6)):
     energy = np.poly1d([0.25, 0, -0.5, -p, 0.25 - 0.7 * shift])
     ax.plot(x := np.linspace(-1.55, 1.65, 200), energy(x), lw=2, label=f"$p = {p:.3f}$")

@@ -86,14 +86,14 @@ from dataclasses import replace
 
 import rodfem
 from forms.energy import bending_and_twist
-from rodfem import Ordinate, Plan, Scene, clamped, free
+from rodfem import Ordinate, Parameter, Plan, Scene, clamped, free
 
 column = Scene(
     name="column",
     interval=(0.0, 1.0),
     rod="unshearable and inextensible",
     energy=lambda v, k, c: bending_and_twist(k, (2.0, 1.0, 1.0)),
-    parameters={"P": 1.0, "eps": 0.0},
+    parameters={"P": Parameter(1.0, words="thrust"), "eps": 0.0},
     load="P",
     ends=(clamped(), free(force=lambda c: (c.eps, 0.0, -c.P))),
     ordinate=Ordinate("tip displacement", s=1.0, of=lambda r, q: r[0]),

@@ -40,7 +40,7 @@ ring = Scene(
     interval=(0.0, 2 * np.pi),
     rod="unshearable and inextensible",
     energy=lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t0), (1.0, 1.0, c.C)),
-    parameters={"t0": Parameter(0.0, "t_0"), "C": Parameter(1.5)},
+    parameters={"t0": Parameter(0.0, "t_0", words="natural twist"), "C": Parameter(1.5)},
     load="t0",
     ends=Ring(),
     start=circle,

@@ -46,7 +46,7 @@ cord = Scene(
 slack = rodfem.trace(cord, Discretization(elements=18), Plan(depth=1))
 (perversion,) = [point for point in slack.at(40.0) if point.stable]
 r = slack.solvers[perversion.mesh].shape.sample(perversion.x)["r"]
-ax = axes("$r_3$", "$r_1$ and $r_2$", equal=True)
+ax = axes("along the axis, $r_3$", "across it, $r_1$ and $r_2$", equal=True)
 ax.plot(r[:, 2], r[:, :2], lw=2, label=["$r_1$", "$r_2$"])
 ax.legend(frameon=False)
 show(ax.figure, "08_cord")

@@ -89,7 +89,7 @@ column = Scene(
     interval=(0.0, 1.0),
     rod="unshearable and inextensible",
     energy=lambda v, k, c: bending_and_twist(k, (1.0, 10.0, 1.0)),
-    parameters={"P": Parameter(0.0)},
+    parameters={"P": Parameter(0.0, words="follower force")},
     load="P",
     ends=(clamped(), free_end(follower=lambda c: (0.0, 0.0, -c.P))),
     inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0)),

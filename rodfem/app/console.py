@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -26,6 +27,8 @@ rodfem COMMAND --help lists the arguments of a command.
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command that ``arguments``, by default those of the shell, name; bad input ends with one sentence."""
+    if arguments is None:  # a reader, as head, may leave
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     name, *words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     if name in ("-h", "--help", "help"):
         print(HELP.format(commands="\n".join(f"  {each:<10}{_words(_module(each))}" for each in COMMANDS)), end="")

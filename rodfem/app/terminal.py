@@ -206,14 +206,15 @@ class Report(Observer):
         known = any(isfinite(s.error_estimate) for b in branches for s in b.special)
         bars = "in parentheses a bound of the error" if known else "no estimate of the errors"
         self.say(f"\nSpecial points ({bars}; ordinate: {ordinate})")
-        self.say(f"  {'branch':<12} {'kind':<13} {load:<24} {'ordinate':<24} {self.count}")
+        wide = max([len("branch point"), *(len(s.kind.words) for b in branches for s in b.special)])
+        self.say(f"  {'branch':<12} {'kind':<{wide}} {load:<24} {'ordinate':<24} {self.count}")
         scale = max([self.units.ordinate, *(abs(p.ordinate) for b in branches for p in b.points)])
         for branch in branches:
             for s in branch.special:
                 load, ordinate, index = in_words(s, scale)
                 load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in (load, ordinate))
                 zero = f", {s.point.zero} zero" if s.point.zero else ""
-                self.say(f"  {branch.name:<12} {s.kind:<13} {load:<24} {ordinate:<24} {index}{zero}")
+                self.say(f"  {branch.name:<12} {s.kind.words:<{wide}} {load:<24} {ordinate:<24} {index}{zero}")
                 for mode in s.point.soft:
                     self.say(f"    {mode}")
                 if s.kind == FLUTTER:
@@ -250,9 +251,10 @@ class Report(Observer):
         if rows:
             inertia = "the scene's inertia" if scene.has_inertia else "unit rotary inertia"
             self.say(f"\nLeft-most eigenvalues mu = omega^2 for {inertia} (symmetry modes left out; no error bars)")
+        wide = max((len(s.kind.words) for _, s in rows), default=0)
         for branch, s in rows:
             self.say(
-                f"  {branch.name:<12} {s.kind:<13} {s.point.load:<13.8g} "
+                f"  {branch.name:<12} {s.kind.words:<{wide}} {s.point.load:<13.8g} "
                 + "  ".join(f"{mu:.6g}" for mu in s.point.spectrum)
             )
 

@@ -210,7 +210,7 @@ class SpecialPoint:
     def __repr__(self) -> str:
         """Kind, load and change of the index."""
         change = f"{self.negative_before}->{self.negative_after}"
-        return f"<Special point: {self.kind} at load {self.point.load:.10g}, index {change}>"
+        return f"<Special point: {self.kind.words} at load {self.point.load:.10g}, index {change}>"
 
     @property
     def multiplicity(self) -> int:

@@ -53,6 +53,11 @@ class Kind(str):
         return kind
 
     @property
+    def words(self) -> str:
+        """Name for a reader: that of its mark, where it has another one."""
+        return str(self.marker.get("label", self))
+
+    @property
     def singular(self) -> bool:
         """Whether the second variation is singular there, so that there are null vectors."""
         return self.test == EIGENVALUE

@@ -308,7 +308,7 @@ class Diagram:
         from rodfem.output.digits import in_words
 
         scale = max([self.scene.units.ordinate, *(abs(p.ordinate) for b in self.branches for p in b.points)])
-        cells = [(branch.name, s.kind, *in_words(s, scale)) for branch in self.branches for s in branch.special]
+        cells = [(branch.name, s.kind.words, *in_words(s, scale)) for branch in self.branches for s in branch.special]
         rows = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in cells]
         head = ("branch", "kind", self.scene.load, self.scene.ordinate.name, "index")
         title = "".join(f"<th>{escape(name)}</th>" for name in head)

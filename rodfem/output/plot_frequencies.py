@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -87,35 +87,38 @@ def figure_of(diagram: Mapping[str, Any], most: int = 3) -> Figure:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
         axes = figure.subplots()
-        motions: dict[str, str] = {}
-        shown: set[str] = set()
-        ranges: dict[str, Patch] = {}
-        for branch in branches:
-            ranges |= _shade(axes, branch)
-            for curve in curves(branch["columns"]):
-                motions.setdefault(curve.motion, PALETTE[COLORS.get(curve.motion, 7) % len(PALETTE)])
-                shown |= _draw_curve(axes, curve, motions[curve.motion])
-            for special in branch["special"]:
-                if special["kind"] in SPECIAL:
-                    _mark(axes, special)
-                    shown.add(special["kind"])
-        axes.set_ylim(0, 1.15 * max(_top(b["columns"], most) for b in branches))
+        handles = draw_into(axes, branches, most)
         axes.set_xlabel(axis_label(diagram))
-        axes.set_ylabel(r"frequency $\omega$")
         axes.set_title(str(diagram["title"]))
-        handles: list[Artist] = [
-            Line2D([], [], color=color, lw=WIDTH, label=motion) for motion, color in motions.items()
-        ]
-        handles += [
-            Line2D([], [], color="0.3", marker=marker, ls=style, lw=0.8, label=what)
-            for what, (marker, style) in PARTS.items()
-            if what in shown
-        ]
-        handles += [Line2D([], [], ls="none", label=kind, **SPECIAL[kind]) for kind in SPECIAL if kind in shown]
-        handles += ranges.values()
         axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9)
         figure.supxlabel(_footer(diagram, branches), fontsize=8.5, color="0.4", x=0.01, ha="left")
     return figure
+
+
+def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> list[Artist]:
+    """Draw the frequencies of branches, up to the ``most`` left-most, in given axes; returns entries of a legend."""
+    motions: dict[str, str] = {}
+    shown: set[str] = set()
+    ranges: dict[str, Patch] = {}
+    for branch in branches:
+        ranges |= _shade(axes, branch)
+        for curve in curves(branch["columns"]):
+            motions.setdefault(curve.motion, PALETTE[COLORS.get(curve.motion, 7) % len(PALETTE)])
+            shown |= _draw_curve(axes, curve, motions[curve.motion])
+        for special in branch["special"]:
+            if special["kind"] in SPECIAL:
+                _mark(axes, special)
+                shown.add(special["kind"])
+    axes.set_ylim(0, 1.15 * max(_top(b["columns"], most) for b in branches))
+    axes.set_ylabel(r"frequency $\omega$")
+    handles: list[Artist] = [Line2D([], [], color=color, lw=WIDTH, label=motion) for motion, color in motions.items()]
+    handles += [
+        Line2D([], [], color="0.3", marker=marker, ls=style, lw=0.8, label=what)
+        for what, (marker, style) in PARTS.items()
+        if what in shown
+    ]
+    handles += [Line2D([], [], ls="none", label=kind, **SPECIAL[kind]) for kind in SPECIAL if kind in shown]
+    return handles + list(ranges.values())
 
 
 PARTS = {

@@ -26,7 +26,7 @@ from rodfem.output.glyphs import glyphs_of
 from rodfem.output.program import status_of, terse
 from rodfem.output.sheet import DPI, STYLE
 from rodfem.output.solids import Solid, curve_of, profile_of
-from rodfem.output.view import POINT, view_of
+from rodfem.output.view import POINT, on_feet, view_of
 from rodfem.problem.setting import Setting
 from rodfem.tolerances import TINY
 from rodfem.whole_files import draft_of
@@ -171,8 +171,8 @@ class _Panel:
         off = off - np.outer(off @ axis, axis) / max(axis @ axis, TINY)
         most = off[np.argmax(np.linalg.norm(off, axis=1))]
         across = most if held.force is None and np.linalg.norm(most) > BENT * span else held.force
-        chosen = {"axis": held.axis, "down": held.down, "load": across, "side": held.widest(self.frames[0])}
-        self.view = view_of(self.r, moved, **chosen)
+        side, feet = held.widest(self.frames[0]), on_feet(held)
+        self.view = view_of(self.r, moved, axis=held.axis, down=held.down, load=across, side=side, feet=feet)
         raised = moved @ self.view[1]
         if raised[np.argmax(abs(raised))] < 0.0:
             self.u, self.w = -self.u, -self.w

@@ -19,7 +19,7 @@ from rodfem.file_format import STATES, UNREADABLE
 from rodfem.output.glyphs import DARK, LOAD, glyphs_of
 from rodfem.output.program import status_of, terse
 from rodfem.output.solids import Solid, curve_of, profile_of, rod, straight_arrow
-from rodfem.output.view import POINT, axis_of, view_of
+from rodfem.output.view import POINT, axis_of, on_feet, view_of
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
 from rodfem.whole_files import draft_of
@@ -44,6 +44,7 @@ LIBRARIES = "try to install the Debian packages libegl1 libgl1-mesa-dri libxrend
 def draw_shape(
     states: Path, branch: str, row: int, path: Path,
     *, caption: str | None = None, radius: float | None = None, size: tuple[int, int] = SIZE,
+    view: Floats | None = None,
 ) -> Path:  # fmt: skip
     """Draw one equilibrium: the rod with a stripe along d1, arrows along d1 and d2, what holds it and what loads it.
 
@@ -65,6 +66,8 @@ def draw_shape(
         Mean radius of the rod, nondimensional; about 1/90 of its length when None.
     size
         Width and height of the picture in pixels; words keep theirs, so that a smaller picture has larger ones.
+    view
+        Axes of the picture as rows (3, 3), as :func:`view_in` gives them; those of this state when None.
 
     Returns
     -------
@@ -90,7 +93,7 @@ def draw_shape(
     length = np.linalg.norm(np.diff(state.centres, axis=0), axis=1).sum()
     thickness = float(radius or min(length / 90.0, np.linalg.norm(np.ptp(state.centres, axis=0)) / 40.0))
     text = state.caption if caption is None else caption
-    view = state.view()
+    view = state.view() if view is None else view
     solids = state.solids(thickness, view)
     pyvista = _import_pyvista()
     font = str(Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf"))
@@ -125,6 +128,11 @@ def draw_shape(
     return path
 
 
+def view_in(states: Path, branch: str, row: int) -> Floats:
+    """Axes (3, 3) of the picture of one state of a file, for those of others; raises as :func:`draw_shape` does."""
+    return _read(Path(states), branch, row).view()
+
+
 @dataclass(frozen=True)
 class State:
     """A state as a picture needs it, at n places along the rod.
@@ -151,9 +159,8 @@ class State:
     def view(self) -> Floats:
         """Axes of the picture, (3, 3)."""
         held, moved = self.setting, self.centres - self.reference
-        side = held.widest(self.directors[0])
-        axis = axis_of(held, self.reference)
-        return view_of(self.reference, moved, axis=axis, down=held.down, load=held.force, side=side)
+        axis, side, feet = axis_of(held, self.reference), held.widest(self.directors[0]), on_feet(held)
+        return view_of(self.reference, moved, axis=axis, down=held.down, load=held.force, side=side, feet=feet)
 
     def solids(self, radius: float, view: Floats) -> list[Solid]:
         """The rod, its stripe, what holds it and what loads it."""

@@ -2,7 +2,7 @@
 
 What is upwards is decided here, for pictures, animations and the report alike.  Gravity is downwards.  Without it an
 axis of space points upwards, e1 before e2 before e3, never the opposite way, so that a weight that hangs along -e1
-pulls downwards.
+pulls downwards.  The exception is an arch, a rod that is bent before a load presses on its crown: it stands.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ SIDEWAYS = 0.3
 """Cosine of a rod's chord and the axis of its only support below which it leaves that sideways."""
 LEVEL = 0.1
 """Cosine below which an axis of space is across a direction, for its sense."""
+ARCHED = 0.05
+"""Mean distance of a rod from the line of its ends, relative to its size, from which on it is an arch."""
 STRAIGHT = 1e-3
 """Displacement relative to the rod's size below which the rod has not moved."""
 CLOSED = 1e-6
@@ -45,6 +47,7 @@ def view_of(
     down: Floats | None = None,
     load: Floats | None = None,
     side: Floats | None = None,
+    feet: bool = False,
 ) -> Floats:
     """Axes of a picture as rows (3, 3): to the right, upwards, and to the viewer.
 
@@ -60,6 +63,8 @@ def view_of(
         Direction of a force across the rod, or of its deflection, which is not along the line of sight.
     side
         Direction that is upwards where a straight rod has not moved.
+    feet
+        Whether the rod is held in two places or more (:func:`on_feet`), and may be an arch.
 
     Returns
     -------
@@ -67,7 +72,8 @@ def view_of(
         Without gravity the rod's axis goes to the right, so that nothing that holds it looks tilted, and vertical is
         the principal direction of the displacement across it.  A load that is not nearly along that direction is
         vertical instead, and the rod is seen from aside.  Upwards is then where e1 points, or e2 or e3 where that is
-        horizontal (:func:`upwards`), whichever way the rod moves and the load pulls.  With gravity that is downwards.
+        horizontal (:func:`upwards`), whichever way the rod moves and the load pulls, but for an arch on whose crown
+        the load presses: its crown is above its feet.  With gravity that is downwards.
         A closed rod is shown in the plane nearest to it.
     """
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
@@ -84,12 +90,14 @@ def view_of(
     else:
         right = _snapped(chord / np.linalg.norm(chord))
         up = upwards(_principal(shape, right, STRAIGHT * size, side))
+        up = up * (_standing(up, reference, load) if feet and load is not None else 1.0)
         if load is not None:
             aside = load - (load @ right) * right
             if abs(up @ aside) < BESIDE * np.linalg.norm(aside):
                 up, tilt = _snapped(aside / np.linalg.norm(aside)), ABOVE
                 up = up - (up @ right) * right
                 up = upwards(up / np.linalg.norm(up))
+                up = up * (_standing(up, reference, load) if feet else 1.0)
                 right = np.cos(ASIDE) * right + np.sin(ASIDE) * np.cross(right, up)  # the rod goes away, so upwards
             elif (up @ aside) * (np.cross(right, up) @ aside) > POINT * (aside @ aside):  # towards the load
                 tilt = -tilt
@@ -109,6 +117,22 @@ def axis_of(setting: Setting, reference: Floats) -> Floats:
         if stem @ chord > SIDEWAYS * np.linalg.norm(chord):
             return np.asarray(stem)
     return np.asarray(chord)
+
+
+def _standing(up: Floats, reference: Floats, load: Floats) -> float:
+    """-1 where an arch, the rod ``reference`` (n, 3), would hang from ``up`` though the ``load`` presses on its crown.
+
+    Otherwise 1.
+    """
+    feet = np.linspace(reference[0], reference[-1], len(reference))
+    bow, size = (reference - feet).mean(axis=0), np.linalg.norm(np.ptp(reference, axis=0))
+    arch = np.linalg.norm(bow) > ARCHED * size and abs(up @ bow) > LEVEL * np.linalg.norm(bow)
+    return sign_of(up @ bow) if arch and load @ bow < 0 else 1.0
+
+
+def on_feet(setting: Setting) -> bool:
+    """Whether a rod is held in two places or more."""
+    return sum(bool(x.held.any()) for x in setting.supports) > 1
 
 
 def _principal(moments: Floats, axis: Floats, least: float, other: Floats | None) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodfem.output.typical import typical_state
-from rodfem.output.view import axis_of, view_of
+from rodfem.output.view import axis_of, on_feet, view_of
 from rodfem.problem.setting import Setting
 from rodfem.problem.setting import read as read_setting
 from rodfem.report.shapes import Shapes
@@ -57,8 +57,9 @@ def stage_of(data: Mapping[str, Any], shapes: Mapping[str, Shapes], groups: Any)
     (r, frames), setting = shapes[branch][row], read_setting(groups[branch], row)
     side = setting.widest(frames[0])
     axis = axis_of(setting, reference)
-    axes = view_of(reference, r - reference, axis=axis, down=setting.down, load=setting.force, side=side)
-    load = setting.force if setting.down is None else setting.down
+    down, load, feet = setting.down, setting.force, on_feet(setting)
+    axes = view_of(reference, r - reference, axis=axis, down=down, load=load, side=side, feet=feet)
+    load = load if down is None else down
     length = float(shapes[branch].s[-1] - shapes[branch].s[0])
     radius = min(length / SLENDER, float(np.linalg.norm(np.ptp(r, axis=0))) / COILED)
     return Stage(branch, row, axes, None if load is None else load / np.linalg.norm(load), radius, setting)

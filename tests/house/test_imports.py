@@ -33,7 +33,7 @@ MATRICES = {
 }
 """Linear algebra, which knows nothing of rods."""
 COMMAND_LINE = ("rodfem.app.cli", "rodfem.app.options", "rodfem.app.constants", "rodfem.app.main")
-COMMAND_LINE += ("rodfem.app.console", "rodfem.app.commands.")
+COMMAND_LINE += ("rodfem.app.console", "rodfem.app.commands.", "rodfem.app.script")
 """Beginnings of the names of modules that know options."""
 BELOW_MATRICES = {"rodfem.errors", "rodfem.compat", "rodfem.tolerances", "rodfem.beside", "rodfem.code_cache"}
 """Other modules that they may import."""

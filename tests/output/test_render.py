@@ -312,6 +312,19 @@ def test_a_hanging_weight_pulls_downwards() -> None:
         assert (view[:2] @ abs(a + b) > 0.5).all()  # a ring
 
 
+def test_an_arch_stands_where_a_load_presses_on_its_crown() -> None:
+    arc = np.sin(pi * S)[:, None]
+    for crown in (E1, -E1, -E2, np.array([-0.6, 0.8, 0.0])):
+        arch = STRAIGHT["r"] + 0.5 * arc * crown
+        view = view_of(arch, -0.1 * arc * crown, load=-crown, feet=True)
+        assert view[1] @ crown > 0.5 and view[0] @ E3 > 0.5 and np.linalg.det(view) == pytest.approx(1.0)
+        sway = np.sin(2 * pi * S)[:, None] * np.cross(crown, E3)
+        assert view_of(arch, 0.1 * sway, load=-crown, feet=True)[1] @ crown > 0.5  # it moves aside
+        for load, feet in ((crown, True), (None, True), (-crown, False)):  # nothing presses, or holds: e1, or e2
+            seen = view_of(arch, -0.1 * arc * crown, load=load, feet=feet)
+            assert seen[1] @ crown * crown[np.argmax(abs(crown) > 0)] > 0
+
+
 @pytest.mark.parametrize("way", [E1, E2, -E2, np.array([0.6, 0.8, 0.0])])
 def test_names_of_the_axes_do_not_overlap(way: np.ndarray) -> None:
     view = view_of(STRAIGHT["r"], np.sin(pi * S)[:, None] * way)

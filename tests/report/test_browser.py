@@ -46,6 +46,7 @@ OPTIONS = (
     "--disable-dev-shm-usage",  # a container may have little of it
 )
 SIZES = [(1280, 720), (1920, 1080)]
+PROJECTOR = (1024, 768)
 PATIENCE = 90.0
 """Seconds that a page may take on a busy machine."""
 POINTS, FRAMES = 5000, 40
@@ -165,7 +166,8 @@ def test_the_page_is_drawn_without_a_frame(opened: Callable[..., Any], browser: 
 
 
 @pytest.mark.parametrize(
-    ("name", "size"), [("pinned", SIZES[0]), ("pinned", SIZES[1]), ("locus", SIZES[0]), ("follower", SIZES[1])]
+    ("name", "size"),
+    [("pinned", PROJECTOR), ("pinned", SIZES[0]), ("pinned", SIZES[1]), ("locus", SIZES[0]), ("follower", SIZES[1])],
 )
 def test_all_parts_fit_into_the_window(opened: Callable[..., Any], name: str, size: tuple[int, int]) -> None:
     page = opened(name, size)
@@ -175,6 +177,8 @@ def test_all_parts_fit_into_the_window(opened: Callable[..., Any], name: str, si
         box = card.rect
         assert box["x"] >= 0 and box["x"] + box["width"] <= size[0] and box["y"] + box["height"] <= size[1]
         assert box["width"] > 300 and box["height"] > 150
+    wide = "return [...document.querySelectorAll('.bar')].filter((bar) => bar.scrollWidth > bar.clientWidth).length"
+    assert page.execute_script(wide) == 0
     assert page.find_element(By.ID, "badge").text.startswith(("STABLE", "UNSTABLE"))
 
 

@@ -9,7 +9,7 @@ import { PLANAR, STABLE, UNDECIDED } from "report/styles";
 
 const slider = document.getElementById("load"), value = document.getElementById("load-value"), list = document.getElementById("states");
 const loads = data.branches.flatMap((b) => b.load), low = Math.min(...loads), high = Math.max(...loads);
-const WIDTH = 122; // of a state, in pixels
+const GAP = 6; // between states, in pixels
 const STEPS = 1000, MOST = 24, WAIT = 150; // milliseconds of rest before states are drawn
 let stage = null, rod = null, stripe = null, waiting = 0;
 
@@ -80,7 +80,8 @@ function paintOne({ canvas, found }, width, height) {
 
 function redraw() {
   const found = statesAt(state.load).slice(0, MOST), cards = found.map(card);
-  list.classList.toggle("many", cards.length * WIDTH > list.clientWidth);
+  const least = parseFloat(getComputedStyle(list).getPropertyValue("--least")) + GAP;
+  list.classList.toggle("many", cards.length * least > list.clientWidth);
   list.replaceChildren(...cards.map((each) => each.button));
   if (!cards.length) list.textContent = "No branch has a state at this load.";
   paint(cards);

@@ -44,8 +44,7 @@ function counts(b) {
       line: { color: count ? VERMILION : BLUE, width: 5 },
     };
   });
-  const note = { xref: "paper", yref: "paper", x: 1, y: 1, xanchor: "right", yanchor: "top", showarrow: false, text: "their values: run with --spectrum 4", font: { color: "#66707c" }, bgcolor: "rgba(255,255,255,0.8)" };
-  const how = layout(data.label, "index", { margin: { l: 60, r: 8, t: 4, b: 34 }, uirevision: b.name, annotations: [note] });
+  const how = layout(data.label, "index", { margin: { l: 60, r: 8, t: 4, b: 34 }, uirevision: b.name });
   const most = Math.max(1, ...b.pieces.map((piece) => parseInt(piece.index)));
   Object.assign(how.yaxis, { range: [-0.2 * most, 1.4 * most], dtick: Math.ceil(most / 4) });
   finish(traces, how);

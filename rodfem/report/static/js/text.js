@@ -32,7 +32,10 @@ function values(b) {
     span.textContent = `${y ? "×" : x < 0 ? "▼" : "●"} ${rough(x, 4)}${y ? ` ${y > 0 ? "+" : "−"} ${digits(Math.abs(y), 4)} i` : ""}`;
     return span;
   });
-  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω²:" : "μ:", ...each] : []));
+  const none = document.createElement("span");
+  none.className = "quiet";
+  none.textContent = b.spectrum || b.omega2 || known.length ? "" : "Values of eigenvalues: run with --spectrum 4";
+  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω²:" : "μ:", ...each] : [none]));
 }
 
 function line(list, name, text, code = false) {

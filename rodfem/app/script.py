@@ -1,0 +1,42 @@
+"""A file that states a rod, run as a program: without options it is a lesson, with options ``rodfem run FILE OPTIONS``.
+
+A demo states its rod, and ends with a cell that traces it::
+
+    if script.lesson(__name__):
+        diagram = rodfem.trace(cord(), mesh())
+
+``rodfem run`` imports the file: it takes the rod and the mesh, and leaves out the cell.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from rodfem.app import console
+
+
+def lesson(name: str) -> bool:
+    """Whether the file's own cell is to run: it is the program, or a notebook, and has no options.
+
+    With options the file is ``rodfem run FILE OPTIONS``, with the errors and the status of that, and the cell does not
+    run.  What a lesson prints is printed by the first rank alone.
+
+    Parameters
+    ----------
+    name
+        ``__name__`` of the file.
+    """
+    if name != "__main__":
+        return False
+    file, options = getattr(sys.modules[name], "__file__", None), sys.argv[1:]
+    if file is None or "ipykernel" in sys.modules:
+        return True
+    if options:
+        console.main(["run", file, *options])
+        return False
+    from mpi4py import MPI
+
+    if MPI.COMM_WORLD.rank:
+        sys.stdout = open(os.devnull, "w")
+    return True
