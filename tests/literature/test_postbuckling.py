@@ -14,6 +14,7 @@ import rodfem
 from forms.energy import bending_and_twist
 from rodfem import Diagram, Discretization, Ordinate, Parameter, Plan, Ring, Scene, clamped, pinned, sliding
 
+pytestmark = pytest.mark.alone
 ACROSS = Ordinate("middle", s=0.5, of=lambda r, q: float(r[0]))
 PINNED = (pinned(), pinned(ON_AXIS, push))
 ONCE = Plan(depth=1)
@@ -130,11 +131,11 @@ def test_sides_that_differ_across_the_plane() -> None:
 
 
 @pytest.mark.parametrize("planar", [None, "e2"])
-def test_states_beside_a_pitchfork(planar: str | None, tmp_path: Path) -> None:
+def test_states_beside_a_pitchfork(planar: str | None, folder: Path) -> None:
     """At loads just above the critical one the straight state and the bent one, ``x = sqrt(8 (P - pi^2)) / pi^2``."""
     energy = lambda v, k, c: bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
     diagram = traced((9.0, 10.5), energy, {}, planar=planar)
-    for known in (diagram, rodfem.load(diagram.save(tmp_path), diagram.scene)):
+    for known in (diagram, rodfem.load(diagram.save(folder), diagram.scene)):
         for above in (1e-7, 1e-5, 1e-3):
             straight, bent = known.at(pi**2 * (1 + above))
             assert (straight.negative, bent.negative) == (1, 0)
