@@ -18,16 +18,16 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.prediction import hermite
-from rodfem.continuation.solvers import BranchSolver
+from rodfem.continuation.solvers import BranchSolver, distance
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
-from rodfem.fem.newton import correct
+from rodfem.fem.newton import NewtonResult, correct
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, project_out
 from rodfem.problem.events import Event
 from rodfem.roots import zero_between
 from rodfem.stability.inertia import ROUGH, Factored
 from rodfem.stability.round_off import resolve
-from rodfem.tolerances import round_off, unit
+from rodfem.tolerances import INSIDE, round_off, unit
 
 NODES, FEWER = 6, 4
 """Number of nodes of an interpolant, and of one over a very short piece, unless it is even."""
@@ -56,6 +56,15 @@ ALONG = 1e-13
 """Arclength to which an event is located, in the metric."""
 NARROWER = 6
 """Largest number of times a bracket is narrowed until the crossing eigenvalue is among those nearest zero."""
+
+EXACT = 1e-15
+"""Arclength, in the metric, to which a load is located before it is set."""
+CORRECTIONS = 3
+"""Newton steps on the interpolated load that improve the arclength at which a state is expected."""
+ON_THE_WAY = 0.5
+"""Distance of a state from where it is expected, over that from the nearer neighbour, below which it is on the way."""
+INTERPOLATED = 1e-7
+"""Distance of a state from where it is expected, in the metric, that is the error of the interpolation."""
 
 Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
 
@@ -89,6 +98,52 @@ def solve_at(solver: BranchSolver, curve: Curve, s: float) -> PETSc.Vec:
     raise ConvergenceError(
         f"No equilibrium near load {system.scalar(start):.8g} while locating a special point", SMALLER_STEPS
     )
+
+
+def solve_at_load(
+    solver: BranchSolver, curve: Curve, p: Point, q: Point, load: float
+) -> tuple[PETSc.Vec, float, NewtonResult]:
+    """State at exactly ``load`` between two neighbours ``p``, ``q`` of a branch, its arclength, and the last iteration.
+
+    Close to a branch point Newton's method at a fixed load fails, or ends on the other branch: far from where the
+    ``curve`` that interpolates the branch is.  On planes across the branch it does not, and the load is a function of
+    arclength there, whose zero is found.  ``solver`` has the mesh.  Raises :class:`ConvergenceError` where there is no
+    such state.
+    """
+    system, s = solver.system, _expected(solver, curve, p, q, load)
+    guess = curve(s)[0]
+    x, outcome = solver.at_load(guess, load, reach=1.0)
+    if outcome.converged:
+        near = min(distance(system, p.x, x), distance(system, q.x, x))
+        if load in (p.load, q.load) or distance(system, guess, x) < max(ON_THE_WAY * near, INTERPOLATED):
+            return x, s, outcome
+    if (p.load - load) * (q.load - load) >= 0:
+        raise ConvergenceError(
+            f"No equilibrium at {system.scene.load} = {load:g} between two points of the branch: use another load."
+        )
+
+    known = {p.arclength: p.load, q.arclength: q.load}  # there the equations may be singular
+
+    def beyond(s: float) -> float:
+        return (known[s] if s in known else system.scalar(solve_at(solver, curve, s))) - load
+
+    margin = INSIDE * (q.arclength - p.arclength)
+    s = zero_between(beyond, p.arclength, q.arclength, EXACT)
+    s = min(max(s, p.arclength + margin), q.arclength - margin)
+    x = solve_at(solver, curve, s)
+    system.set_load(x, load)
+    return x, s, outcome
+
+
+def _expected(solver: BranchSolver, curve: Curve, p: Point, q: Point, load: float) -> float:
+    """Arclength between ``p`` and ``q`` at which the interpolated branch has a ``load``."""
+    s = p.arclength + (load - p.load) / (q.load - p.load) * (q.arclength - p.arclength)
+    for _ in range(CORRECTIONS):
+        x, direction = curve(s)
+        slope = solver.system.scalar(direction)
+        if slope:
+            s = min(max(s + (load - solver.system.scalar(x)) / slope, p.arclength), q.arclength)
+    return s
 
 
 def solve_beside(solver: BranchSolver, curve: Curve, s: float, aside: float) -> tuple[PETSc.Vec, float]:

@@ -4,6 +4,10 @@ With ``x`` the change of the scene's ordinate, a pitchfork obeys ``load = load_b
 quadratic in the amplitude (a shortening, say), ``load = load_b + c x^2 + ...`` where it is linear (a
 displacement).  A pitchfork is supercritical where the branch exists on the side on which the index of the branch
 that it leaves is higher, else subcritical.
+
+The power series of a load in the amplitude converges up to the nearest other point at which the branch turns, or meets
+another one, and that may be near: of two branch points about to merge, or a fold beside a transcritical point.
+Amplitudes are made smaller until the series is resolved.
 """
 
 from __future__ import annotations
@@ -21,6 +25,17 @@ from rodfem.tolerances import round_off
 
 AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 """Amplitudes, in the metric, at which the branch is solved: the positive half of eight Chebyshev nodes."""
+VERTICAL_BRANCH = "vertical branch"
+SCALES = tuple(4.0**-i for i in range(4))
+"""Factors of the amplitudes, of which the first is taken at which the series is resolved, else that of least error."""
+RESOLVED = 1e-3
+"""Uncertainty of a coefficient, relative to it, and part by which a load is no even function, of a resolved series."""
+ODD = 0.1
+"""Part of the change of the load that is odd in the amplitude, from which on a branch is transcritical."""
+OPPOSITE = 1 - 1e-9
+"""That part where the load rises on one side and falls on the other."""
+SEEN = 100
+"""Ratio of a change of the load to the uncertainty of the load that it is measured from, for which it counts."""
 BESIDE = 1e-3
 """Distance along a branch, in the metric, over which the slope of the ordinate is taken."""
 CONSTANT = 1e-12
@@ -59,35 +74,70 @@ def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -
     At a pitchfork the load is an even function of the amplitude, and the ordinate an even or an odd one;
     polynomials through four amplitudes give their leading coefficients.  Uncertain is what those through three miss,
     what the load is odd by, and what the location of the branch point leaves open: of loads and ordinates that are
-    measured from it, divided by the square of an amplitude.
+    measured from it, divided by the square of an amplitude.  Where the load has a slope in the amplitude, uncertain is
+    what that at larger amplitudes differs by.
     """
-    row = solver.row(direction)
-    near = [_near(solver, origin, direction, row, float(a)) for a in (*AMPLITUDES, -AMPLITUDES[-1])]
-    if None in near:
+    row, best, seen = solver.row(direction), None, SEEN * origin.load_left
+    for scale in SCALES:
+        found = _at_scale(solver, origin, direction, row, scale)
+        if found is None:
+            continue
+        form, odd, change = found
+        if best is not None and odd * change <= seen and form.kind != best.kind:
+            break  # what is odd, or even, is round-off
+        if best is None or form.kind != best.kind or form.uncertainty < best.uncertainty:
+            best = form
+        settled = odd > OPPOSITE or odd < RESOLVED or form.kind == VERTICAL_BRANCH
+        if change <= seen or (settled and form.uncertainty <= RESOLVED * abs(form.coefficient)):
+            break
+    return best
+
+
+def _at_scale(
+    solver: BranchSolver, origin: Origin, direction: PETSc.Vec, row: PETSc.Vec, scale: float
+) -> tuple[NormalForm, float, float] | None:
+    """Normal form by amplitudes of a scale, the part of the load that is odd, and its change at the least amplitude.
+
+    None where an equilibrium was not found at one of them, or the ordinate does not change.
+    """
+    amplitudes = AMPLITUDES * scale
+
+    def near(a: float) -> tuple[float, float] | None:
+        return _near(solver, origin, direction, row, float(a))
+
+    points = [near(a) for a in (*amplitudes, -amplitudes[-1])]
+    if None in points:
         return None
-    loads, ordinates = np.array(near, dtype=float).T
+    loads, ordinates = np.array(points, dtype=float).T
     plus, minus = loads[-2], loads[-1]
     span = solver.system.scene.span
-    if max(map(abs, loads)) < VERTICAL * abs(span[1] - span[0]):
-        return NormalForm("vertical branch", 0.0, 1, max(map(abs, loads)) / max(map(abs, ordinates)), 0)
-    uneven = abs(plus - minus) / (abs(plus) + abs(minus))
-    if uneven > 0.1:
+    if max(map(abs, loads)) < VERTICAL * abs(span[1] - span[0]) * scale**2:
+        left = max(map(abs, loads)) / max(map(abs, ordinates))
+        return NormalForm(VERTICAL_BRANCH, 0.0, 1, left, 0), 0.0, 0.0
+    change = abs(plus) + abs(minus)
+    uneven = abs(plus - minus) / change
+    if uneven > ODD:
+        farther = near(-amplitudes[-2])
+        if farther is None:
+            return None
+        pairs = np.stack([loads, ordinates], axis=1)
+        loads, ordinates = np.array([pairs[-3], farther, pairs[-2], pairs[-1]]).T
         best = _slope(loads, ordinates)
-        left = abs(best - _slope(loads[[2, 4]], ordinates[[2, 4]])) + _left(_slope, loads, ordinates, origin)
-        return NormalForm("transcritical", best, 1, left, int(np.sign(plus)))
+        left = abs(best - _slope(loads[:2], ordinates[:2])) + _left(_slope, loads, ordinates, origin)
+        return NormalForm("transcritical", best, 1, left, int(np.sign(plus - minus))), uneven, change
     growth = abs(ordinates[0] / ordinates[3]) if ordinates[3] else np.inf
     odd = growth < (AMPLITUDES[0] / AMPLITUDES[3]) ** 1.5
 
     one = solver.units.ordinate
 
     def leading(loads: np.ndarray, ordinates: np.ndarray, count: int = 4) -> float:
-        return _leading(loads[:4], ordinates[:4] / one, odd, count) / one ** (2 if odd else 1)
+        return _leading(amplitudes, loads[:4], ordinates[:4] / one, odd, count) / one ** (2 if odd else 1)
 
     best = leading(loads, ordinates)
     if not np.isfinite(best):
         return None
     left = abs(best - leading(loads, ordinates, 3)) + uneven * abs(best) + _left(leading, loads, ordinates, origin)
-    return NormalForm("pitchfork", best, 2 if odd else 1, left, int(np.sign(plus)))
+    return NormalForm("pitchfork", best, 2 if odd else 1, left, int(np.sign(plus))), uneven, change
 
 
 def _near(
@@ -117,9 +167,9 @@ def _slope(loads: np.ndarray, ordinates: np.ndarray) -> float:
     return float((loads[-2] - loads[-1]) / (ordinates[-2] - ordinates[-1]))
 
 
-def _leading(loads: np.ndarray, ordinates: np.ndarray, odd: bool, count: int) -> float:
+def _leading(amplitudes: np.ndarray, loads: np.ndarray, ordinates: np.ndarray, odd: bool, count: int) -> float:
     """Ratio of the leading coefficients of the load and of the ordinate (squared if odd) in the amplitude."""
-    a = AMPLITUDES[-count:]
+    a = amplitudes[-count:]
     powers = np.vander(a**2, count, increasing=True)
     load = np.linalg.solve(powers, loads[-count:] / a**2)[0]
     x = np.linalg.solve(powers, ordinates[-count:] / (a if odd else a**2))[0]

@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.locate import Located, across, locate, locate_mode, solve_at
+from rodfem.continuation.locate import Located, across, locate, locate_mode, solve_at, solve_at_load
 from rodfem.continuation.prediction import hermite
 from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
@@ -328,6 +328,24 @@ def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, fir
     return None
 
 
+def between(solver: BranchSolver, special: SpecialPoint, outer: Point, load: float) -> Point | None:
+    """State at ``load`` of a branch between ``special``, which it leaves, and its point ``outer``; None without one.
+
+    ``solver`` has the mesh.  The state is on the side of ``outer``: what leaves in the opposite way is another one.
+    """
+    chord = outer.x - special.point.x
+    ends = replace(special.point, arclength=0.0), replace(outer, arclength=1.0)
+
+    def along(part: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+        return special.point.x + chord * part, chord
+
+    try:
+        x, part, outcome = solve_at_load(solver, along, *ends, load)
+    except ConvergenceError:  # the load is none of those between
+        return None
+    return solver.point(x, part * outer.arclength, solver.load_tangent(x, True), outcome)
+
+
 def start_branch(
     special: SpecialPoint,
     direction: PETSc.Vec,
@@ -379,9 +397,10 @@ def _side(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec) -> 
     """Sign of the load's change along a branch right after it leaves; zero where that is not asked for."""
     if special.test_function != "mu":
         return 0.0
-    if special.law is not None:
+    if special.law is not None and special.law.kind != "transcritical":
         return special.law.side if "pitchfork" in special.law.kind else 0.0
-    near = leave(solver, special, direction, FIRST / 4)
+    # of a transcritical branch one side may turn back at once, in a fold: the slope is that right at the point
+    near = leave(solver, special, direction, FIRST / 4 if special.law is None else NEAREST)
     return 0.0 if near is None else float(np.sign(near.load - special.point.load))
 
 

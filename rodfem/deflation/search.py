@@ -13,13 +13,15 @@ A search can show that there are more equilibria, and never that there are no mo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, Point
+from rodfem.continuation.locate import solve_at_load
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.prediction import hermite
 from rodfem.continuation.solvers import BranchSolver
@@ -211,6 +213,11 @@ def find_equilibria(
     return found
 
 
+def _chord(a: Point, b: Point, t: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """State at a part ``t`` of the way from ``a`` to ``b``, and the direction from one to the other."""
+    return combine([a.x, b.x], np.array([1 - t, t])), b.x - a.x
+
+
 def equilibria_at(
     solver: BranchSolver, branches: Sequence[Branch], load: float, here: Callable[[Point], Point] = lambda p: p
 ) -> list[Point]:
@@ -225,12 +232,10 @@ def equilibria_at(
         for a, b in pairwise(points):
             if (a.load - load) * (b.load - load) > 0 or a.load == b.load or (b.load == load and b is not points[-1]):
                 continue
-            t = (load - a.load) / (b.load - a.load)
-            s = a.arclength + t * (b.arclength - a.arclength)
             smooth = a.tangent is not None and b.tangent is not None and b.arclength > a.arclength
-            guess = hermite(a, b, s)[0] if smooth else combine([a.x, b.x], np.array([1 - t, t]))
-            x, outcome = solver.at_load(guess, load, reach=1.0)
-            if not outcome.converged:
-                raise ConvergenceError(f"No equilibrium at load {load:g} between two points of {branch.name}.")
+            curve = partial(hermite, a, b) if smooth else partial(_chord, a, b)
+            p, q = (a, b) if smooth else (replace(a, arclength=0.0), replace(b, arclength=1.0))
+            x, s, outcome = solve_at_load(solver, curve, p, q, load)
+            s = s if smooth else a.arclength + s * (b.arclength - a.arclength)
             found.append(solver.point(x, s, solver.load_tangent(x, True), outcome))
     return found

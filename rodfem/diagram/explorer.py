@@ -14,10 +14,10 @@ from rodfem.adaptivity.gaps import Gap, arms
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.normal_form import normal_form_of, origin_of
 from rodfem.continuation.solvers import ON_BOUND
-from rodfem.continuation.special_points import COUPLED, coupling_of, directions, lines, start_branch
+from rodfem.continuation.special_points import COUPLED, between, coupling_of, directions, lines, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
-from rodfem.diagram.equivalence import equally_stable, equivalent, near
+from rodfem.diagram.equivalence import SAME_DETERMINANT, equally_stable, equivalent, near
 from rodfem.diagram.first_name import ahead, name_of_first
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
@@ -288,16 +288,20 @@ class Explorer(Tracer):
 
         The metric need not share the symmetry: points at one distance in it need not be mirror images themselves.
         """
-        units = self.solver.units
-        if equivalent(a, b, units):
-            return equally_stable(a, b)
-        inner, outer = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
-        piece = Branch("", None, 0, [replace(special.point, arclength=0.0), outer])
-        try:
-            there = equilibria_at(self.solver, [piece], inner.load, self.here)
-        except ConvergenceError:  # nothing of the one branch is at the other's load
-            return False
-        return any(self.alike(self.here(inner), p, SAME_STATE) for p in there)
+        if not equivalent(a, b, self.solver.units):
+            a, b = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
+            there = between(self.solver, special, b, a.load)
+            if there is None or not self.alike(a, there, SAME_STATE):
+                return False
+            b = there
+        return equally_stable(a, b) and self._equally_stable_in_space(a, b)
+
+    def _equally_stable_in_space(self, a: Point, b: Point) -> bool:
+        """Whether the states of a planar rod have the same index and determinant in space."""
+        if (space := self.solver.space) is None:
+            return True
+        first, second = (space.count(p.x) for p in (a, b))
+        return first == second and abs(first.determinant - second.determinant) <= SAME_DETERMINANT
 
     def _came_from(self, parent: Branch, special: SpecialPoint, point: Point) -> bool:
         """Whether what leaves the end of a side branch is that branch again, or its mirror image."""

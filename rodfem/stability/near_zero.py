@@ -87,7 +87,9 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
     quotients = np.array([v.dot(found.matrix * v).real for v in members]) + found.shift
     floor = TOLERANCE * inertia.scale
     uncertainty = np.array([max(quotient_error(found.matrix, v), floor) for v in members])
-    firm = index.negative - int((quotients < -inertia.tolerance).sum())  # the count has the others as zero
+    # the count has the nearest ones as zero: beside its tolerance a quotient and the count need not agree
+    counted = np.argsort(abs(quotients))[inside:]
+    firm = index.negative - int((quotients[counted] < 0).sum())
     order = np.argsort(quotients)
     return NearZero(quotients[order], [members[i] for i in order], uncertainty[order], firm, found.drifts)
 

@@ -45,6 +45,14 @@ def test_an_end_nearly_free_to_turn(k: float, stable: bool, index: int) -> None:
     assert [m.name for m in verdict.soft] == [m.name for m in point.soft]
 
 
+@pytest.mark.parametrize("part", [1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-7])
+def test_an_eigenvalue_at_the_tolerance_of_the_count(part: float) -> None:
+    """``mu = pi^2 - P``: at -1e-7 of the lowest bending eigenvalue the count and the quotient need not agree."""
+    rod = column("euler", (pinned(), pinned(lambda c: (0.0, 0.0, None), push)), (8.0, 12.0), planar="e2")
+    point = Solver(replace(rod, parameters={**rod.parameters, "B2": 1.0})).equilibrium(pi**2 * (1 + 1e-7 * part))
+    assert (point.stable, point.negative, point.zero, point.undecided) == (False, 1, 0, 0)
+
+
 def test_an_end_too_free_to_tell() -> None:
     """A spring of 1e-10 is below what a state is solved to: rotations about e1 and e2; about e3 it is a symmetry."""
     solver = Solver(nearly_free(1e-10), Discretization("reduced", 4, 4))

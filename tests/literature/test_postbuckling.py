@@ -1,0 +1,143 @@
+"""Initial postbuckling (Koiter): coefficients in closed form, what turns back at once, and sides that differ."""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from classics import ON_AXIS, RIGID, circle, column, push
+
+import rodfem
+from forms.energy import bending_and_twist
+from rodfem import Diagram, Discretization, Ordinate, Parameter, Plan, Ring, Scene, clamped, pinned, sliding
+
+pytestmark = pytest.mark.alone
+ACROSS = Ordinate("middle", s=0.5, of=lambda r, q: float(r[0]))
+PINNED = (pinned(), pinned(ON_AXIS, push))
+ONCE = Plan(depth=1)
+Energy = Any
+
+
+def traced(span: tuple[float, float], energy: Energy, constants: dict[str, float], **more: Any) -> Diagram:
+    """A pinned column in the plane across e2, bent about d2 with the stiffness one; ``ends`` may be given."""
+    ends = more.pop("ends", PINNED)
+    given = {"planar": "e2", "ordinate": ACROSS, "energy": energy, "constants": constants} | more
+    return rodfem.trace(column("postbuckling", ends, span, **given), plan=ONCE)
+
+
+def quartic(v: Any, k: Any, c: Any) -> Any:
+    """Not linear: ``k^2/2 + beta k^4``."""
+    return bending_and_twist(k, (9.0, 1.0, 1.0)) + c.beta * k[1] ** 4
+
+
+@pytest.mark.parametrize("beside", [0.9, 1.001])
+def test_material_that_is_not_linear(beside: float) -> None:
+    """For ``k^2/2 + beta k^4`` ``P = pi^2 + pi^4/8 (1 + 24 beta pi^2) x^2``: subcritical below -1/(24 pi^2)."""
+    beta = -beside / (24 * pi**2)
+    (found,) = traced((9.0, 10.5), quartic, {"beta": beta}).special("branch point", "straight")
+    assert found.law is not None
+    assert found.law.kind == ("supercritical pitchfork" if beside < 1 else "subcritical pitchfork")
+    assert abs(found.law.coefficient - pi**4 / 8 * (1 - beside)) <= found.law.uncertainty < 1e-5
+
+
+@pytest.mark.parametrize("excess", [0.3, 1e-3, 1e-4])
+def test_column_that_stretches(excess: float) -> None:
+    """``P (1 - P/EA) = pi^2`` has two roots if EA exceeds 4 pi^2: it buckles, and is straight again when it is shorter.
+
+    Near that the branches that leave the two points turn at once.  ``P (1 - P/EA) = pi^2 + 3 A^2 (P/24 - P^2/(6 EA))``
+    for the slope ``A cos(pi s)``, and the middle moves by ``(1 - P/EA) A/pi``: subcritical for EA below 16 pi^2/3.
+    """
+    EA = 4 * pi**2 * (1 + excess)
+    energy = lambda v, k, c: c.EA / 2 * (v[2] - 1) ** 2 + bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
+    loads = [EA / 2 * (1 + side * sqrt(1 - 4 * pi**2 / EA)) for side in (-1, 1)]
+    margin = loads[1] - loads[0]
+    diagram = traced((loads[0] - margin, loads[1] + margin), energy, {"EA": EA}, rod="unshearable")
+    found = diagram.special("branch point", "straight")
+    assert [(s.negative_before, s.negative_after) for s in found] == [(0, 1), (1, 0)]
+    for special, P in zip(found, loads, strict=True):
+        assert abs(special.point.load - P) <= special.error_estimate
+        expected = 3 * pi**2 * (P / 24 - P * P / (6 * EA)) / ((1 - 2 * P / EA) * (1 - P / EA) ** 2)
+        supercritical = expected > 0 and P < EA / 2
+        assert special.law is not None
+        assert special.law.kind == f"{'super' if supercritical else 'sub'}critical pitchfork"
+        assert abs(special.law.coefficient - expected) <= special.law.uncertainty < 1e-3 * abs(expected)
+
+
+def test_buckling_in_tension() -> None:
+    """Under a tension T a column that shears buckles supercritically: the law with ``T (T/GA - 1)``, ``T^2/(6 GA)``."""
+    GA = 10.0
+    T = (GA + sqrt(GA * GA + 4 * GA * pi**2)) / 2
+    energy = lambda v, k, c: c.GA / 2 * (v[0] ** 2 + v[1] ** 2) + bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
+    diagram = traced((-15.0, -17.0), energy, {"GA": GA, "P": -15.0}, rod="inextensible")
+    (found,) = diagram.special("branch point", diagram.branches[0].name)
+    expected = -3 * pi**2 * (T * T / (6 * GA) - T / 24) / ((2 * T / GA - 1) * (T / GA - 1) ** 2)
+    assert found.law is not None
+    assert found.law.kind == "supercritical pitchfork"
+    assert abs(found.law.coefficient - expected) <= found.law.uncertainty < 1e-4
+
+
+@pytest.mark.parametrize("C", [1.3, 1.4])
+def test_ring_of_intrinsic_twist(C: float) -> None:
+    """Michell's ring buckles supercritically for C/B above 11/8 (Le Bret 1984): ``t = sqrt(3)/C + (C - 11/8)/C x``.
+
+    ``x`` is the twist in turns that it loses.  The coefficient is that of the expansion about the circle.
+    """
+    ring = Scene(
+        "michell", (0.0, 2 * pi), RIGID, lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t), (1.0, 1.0, c.C)),
+        {"t": Parameter(1.0), "C": Parameter(C)}, "t", Ring(),
+        Ordinate("twist", s=None, of=lambda x, c: x.k[2] / (2 * pi)), (1.0, 1.6), start=circle,
+    )  # fmt: skip
+    plan = Plan(depth=1, most_branches=2, error_bars=False)
+    (found, *_) = rodfem.trace(ring, Discretization(elements=14, degree=6), plan).special("branch point", "ring")
+    assert abs(found.point.load - sqrt(3) / C) < 1e-9
+    assert found.law is not None
+    assert found.law.kind == f"{'super' if C > 11 / 8 else 'sub'}critical pitchfork"
+    assert found.law.coefficient == pytest.approx((C - 11 / 8) / C, abs=1e-7)
+
+
+@pytest.mark.parametrize("beta", [1.0, 0.3, 0.01])
+def test_foundation_that_is_softer_on_one_side(beta: float) -> None:
+    """With ``beta x^3`` per length ``P = pi^2 + 8 beta/pi^3 x + pi^4/8 x^2 + ...``: two branches, a fold on one.
+
+    The fold is ``(8 beta/pi^3)^2 / (pi^4/2)`` below the branch point, to first order in beta.
+    """
+    slope = 8 * beta / pi**3
+    energy = lambda v, k, c: bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
+    diagram = traced((9.5, 10.5), energy, {"k": beta}, potential=lambda x, c: c.k * x.r[0] ** 3)
+    (point,) = diagram.special("branch point", "straight")
+    assert point.law is not None and point.law.kind == "transcritical"
+    assert abs(point.law.coefficient - slope) <= point.law.uncertainty < 1e-3 * slope
+    assert [b.name for b in diagram] == ["straight", "branch 1", "branch 2"]
+    assert np.sign([b.points[-1].ordinate for b in diagram.branches[1:]]).tolist() == [1.0, -1.0]
+    assert all(b.points[-1].stable for b in diagram.branches[1:])
+    if beta < 0.1:  # the fold is nearer than the first point of a branch
+        return
+    (fold,) = diagram.special("fold")
+    assert (fold.negative_before, fold.negative_after) == (1, 0)
+    assert point.point.load - fold.point.load == pytest.approx(slope**2 / (pi**4 / 2), rel=2e-3)
+
+
+def test_sides_that_differ_across_the_plane() -> None:
+    """``g x y^2`` does nothing in the plane across y: of the two sides of the pitchfork one is unstable in space."""
+    ends = (clamped(), sliding(ON_AXIS, force=push))
+    energy = lambda v, k, c: bending_and_twist(k, (1.05, 1.0, 1.0))  # noqa: E731
+    diagram = traced((38.0, 44.0), energy, {"k": 200.0}, ends=ends, potential=lambda x, c: c.k * x.r[0] * x.r[1] ** 2)
+    ends_at = {np.sign(b.points[-1].ordinate): b.points[-1] for b in diagram.branches[1:]}
+    assert {side: (p.negative, p.negative_in_space) for side, p in ends_at.items()} == {1.0: (0, 0), -1.0: (0, 1)}
+    assert ends_at[1.0].ordinate == pytest.approx(-ends_at[-1.0].ordinate, rel=1e-6)
+
+
+@pytest.mark.parametrize("planar", [None, "e2"])
+def test_states_beside_a_pitchfork(planar: str | None, folder: Path) -> None:
+    """At loads just above the critical one the straight state and the bent one, ``x = sqrt(8 (P - pi^2)) / pi^2``."""
+    energy = lambda v, k, c: bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
+    diagram = traced((9.0, 10.5), energy, {}, planar=planar)
+    for known in (diagram, rodfem.load(diagram.save(folder), diagram.scene)):
+        for above in (1e-7, 1e-5, 1e-3):
+            straight, bent = known.at(pi**2 * (1 + above))
+            assert (straight.negative, bent.negative) == (1, 0)
+            assert abs(straight.ordinate) < 1e-9
+            assert abs(bent.ordinate) == pytest.approx(sqrt(8 * above) / pi, rel=1e-5 + 2 * above)
