@@ -266,7 +266,7 @@ class BranchSolver(StaticSolver):
             drift=system.drift(x),
             error=outcome.error if outcome else 0.0,
             spectrum=self._leftmost(x, index),
-            negative_in_space=None if self.space is None else self.space.count(x).negative,
+            negative_in_space=None if self.space is None else self.space.negative(x),
             mesh=self.mesh,
             determinant=index.determinant,
             near_zero=near_zero,

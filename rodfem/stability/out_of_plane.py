@@ -11,11 +11,14 @@ from rodfem.fem.newton import correct
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.problem.ring import CLOSING_MOMENT
-from rodfem.stability.inertia import Index, Inertia
+from rodfem.stability.inertia import NULL, Factored, Index, Inertia
+from rodfem.stability.round_off import SPARE, quotient_error
 from rodfem.tolerances import same_place
 
 PUSHED = 1e-8
 """Force or moment out of the plane, over bending stiffness by length, below which it is round-off."""
+MOSTLY = 0.5
+"""Part of an eigenvector's squared norm out of the plane above which it is a motion out of the plane."""
 NEAR = 1e-2
 """Distance, in the metric, within which the state in space that belongs to a planar one is sought."""
 
@@ -43,6 +46,35 @@ class InSpace:
 
     def count(self, x: PETSc.Vec) -> Index:
         """Index in space of the planar equilibrium ``x``; raises :class:`SceneError` where it is none in space."""
+        return self._at(x).count()
+
+    def negative(self, x: PETSc.Vec) -> int:
+        """Number of negative eigenvalues in space of the planar equilibrium ``x``; raises as :meth:`count` does.
+
+        Those out of the plane that the count has as zero are decided by their Rayleigh quotients: symmetries in space
+        are left out, and a rod that is nearly symmetric may fall out of its plane slowly.
+        """
+        found = self._at(x)
+        index = found.count()
+        near = index.zero - found.drifts
+        if near <= 0:
+            return index.negative
+        _, vectors = found.nearest(near + SPARE, NULL)
+        values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
+        falling = [
+            value < -quotient_error(found.matrix, v) and self._share(v) > MOSTLY
+            for value, v in zip(values, vectors, strict=True)
+            if abs(value) <= self.inertia.tolerance
+        ]
+        return index.negative + sum(falling)
+
+    def _share(self, v: PETSc.Vec) -> float:
+        """Part of the squared norm of a vector of norm 1 that is out of the plane."""
+        own = float((v.array_r * (self.inertia.metric * v).array_r).real[self._out].sum())
+        return float(self.system.comm.allreduce(own, op=MPI.SUM))
+
+    def _at(self, x: PETSc.Vec) -> Factored:
+        """Second variation in space at the planar equilibrium ``x``."""
         state = self.lift(x)
         self.system.set_phase(state)
         residual = self.system.new_vector()
@@ -56,7 +88,7 @@ class InSpace:
         settled = state.copy()
         if correct(self.system, settled, self.system.load_axis(), most=6, reach=NEAR).converged:
             state = settled  # else the state is so near a singular one that its own error decides as well
-        return self.inertia.at(state).count()
+        return self.inertia.at(state)
 
     def _scalars(self, state: State) -> dict[str, float]:
         """Scalar unknowns in space from those in the plane, vectors by their components along new directions."""
