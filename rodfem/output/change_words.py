@@ -63,7 +63,7 @@ def _form(special: Mapping[str, Any]) -> str:
         return "passes a branch point" + (" of undetermined form" if special["followed"] else " that was not followed")
     words = FORMS[law["kind"]]
     uncertain = law["uncertainty"] is None or abs(law["coefficient"]) <= law["uncertainty"]
-    return words + (", or nearly so," if uncertain and law["side"] else "")
+    return words + (" (or nearly so)" if uncertain and law["side"] else "")
 
 
 def _directions(special: Mapping[str, Any], branch: Mapping[str, Any], branches: Branches) -> str:

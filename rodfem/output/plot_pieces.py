@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rodfem.continuation.kinds import FREQUENCY, KINDS
+from rodfem.continuation.kinds import BRANCH_POINT, FREQUENCY, KINDS
 from rodfem.stability.soft_mode import index_range
 
 Floats = NDArray[np.float64]
@@ -24,6 +24,8 @@ STYLES: dict[str, dict[str, Any]] = {
 }
 COUNTED = {name for name, kind in KINDS.items() if kind.counted or kind.test == FREQUENCY}
 """Kinds whose index before and after is that of the segments beside."""
+COINCIDE = 1e-6
+"""Arclength within which a row of a branch is at the branch point that it leaves."""
 SAME = 2.0
 """Distance in pixels up to which two lines lie on each other."""
 APART = 30.0
@@ -67,6 +69,7 @@ def pieces_of(branch: Mapping[str, Any], colour: str) -> Iterator[Piece]:
     if not len(columns["load"]) == len(columns["ordinate"]) == len(columns["negative"]):
         raise ValueError(f"columns of branch {name!r} differ in length: try to compute the diagram anew")
     curve = np.column_stack([np.asarray(columns[key], dtype=float) for key in ("load", "ordinate")])
+    special = [*special, *_coinciding(curve[:, 0], special), *_at_the_origin(branch)]
     indices, undecided = segment_ranges(columns["negative"], columns.get("undecided"), special)
     space = _in_space(columns.get("negative_in_space"), indices, special)
     changes = np.flatnonzero(np.diff(indices) | np.diff(space) | np.diff(undecided)) + 1
@@ -74,6 +77,35 @@ def pieces_of(branch: Mapping[str, Any], colour: str) -> Iterator[Piece]:
         if b > a:
             in_space = int(space[a]) if space[a] >= 0 else None
             yield Piece(name, colour, curve[a : b + 1], int(indices[a]), in_space, int(undecided[a]))
+
+
+def _coinciding(loads: Floats, special: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
+    """Rows next to special points at the same load to its error bar, as special points at which nothing changes.
+
+    A load asked for may be that of a special point: there the index of the row itself is not decided.
+    """
+    for point in special:
+        if point["kind"] not in COUNTED or point.get("negative_after") is None:
+            continue
+        bar, row = max(point.get("error_estimate") or 0.0, point.get("located_to") or 0.0), int(point["row"])
+        for step, key in ((-1, "negative_before"), (1, "negative_after")):
+            other = row + step
+            while 0 <= other < len(loads) and abs(loads[other] - loads[row]) <= bar:
+                yield {"kind": point["kind"], "row": other, "negative_before": point[key], "negative_after": point[key]}
+                other += step
+
+
+def _at_the_origin(branch: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """The same for undecided rows of a branch at the branch point that it leaves, whose index is that of the next."""
+    columns = branch["columns"]
+    undecided = columns.get("undecided")
+    if not (branch.get("parent") and undecided and "arclength" in columns):
+        return
+    places = columns["arclength"]
+    near = [row for row in range(1, len(places) - 1) if places[row] - places[0] < COINCIDE and undecided[row]]
+    for row in near:
+        index = columns["negative"][near[-1] + 1]
+        yield {"kind": BRANCH_POINT, "row": row, "negative_before": index, "negative_after": index}
 
 
 def segment_indices(negative: ArrayLike, special: Sequence[Mapping[str, Any]]) -> NDArray[np.int64]:

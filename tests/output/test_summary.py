@@ -119,6 +119,14 @@ def test_how_a_branch_ends() -> None:
     assert words.endswith("; it ends there: stretch reaches zero.")
 
 
+def test_a_load_asked_for_that_is_critical() -> None:
+    """Its own state is undecided, which says nothing of the states beside it."""
+    scene = classics.column("column", classics.SUPPORTS["clamped-free"], (1.0, 4.0))
+    words = trace(scene, Discretization("reduced", 4, 6), Plan(at=(pi**2 / 4,), depth=1)).in_words()
+    assert "buckles supercritically; then unstable (index 1) to 4" in words
+    assert "Branch 1, which leaves straight at 2.4674011, is stable on its whole range" in words
+
+
 def test_a_diagram_says_it_itself() -> None:
     diagram = trace(demo_cases.scene("cord", span=(60.0, 55.0)), Discretization("reduced", 6, 3), Plan(depth=0))
     assert diagram.in_words() == "The first branch, straight, is stable on its whole range, from lam = 60 to 55."
@@ -135,8 +143,14 @@ LAW = {"kind": "transcritical", "coefficient": 1.0, "power": 1, "uncertainty": 0
     [
         ({"law": LAW}, "meets another branch transcritically;"),
         ({"law": LAW | {"kind": "subcritical pitchfork"}}, "buckles subcritically;"),
-        ({"law": LAW | {"kind": "supercritical pitchfork", "uncertainty": 2.0}}, "buckles supercritically, or nearly"),
-        ({"law": LAW | {"kind": "supercritical pitchfork", "uncertainty": None}}, "buckles supercritically, or nearly"),
+        (
+            {"law": LAW | {"kind": "supercritical pitchfork", "uncertainty": 2.0}},
+            "buckles supercritically (or nearly so);",
+        ),
+        (
+            {"law": LAW | {"kind": "supercritical pitchfork", "uncertainty": None}},
+            "buckles supercritically (or nearly so);",
+        ),
         ({"law": LAW | {"kind": "vertical branch", "side": 0}}, "meets a family of states at one and the same load;"),
         ({"law": LAW | {"kind": "pitchfork"}}, "passes a branch point of undetermined form;"),
         ({}, "passes a branch point of undetermined form;"),
