@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 from collections.abc import Iterator
+from functools import partial
 from math import inf, isfinite
 from pathlib import Path
 from time import strftime
@@ -22,6 +24,7 @@ from benchmarks.store import Store
 sys.path.append(str(ROOT / "tests"))
 
 from hard import kills
+from hard.accuracy import PROBLEMS, at
 from hard.case import Case, Measured
 from hard.cases import CASES
 from hard.fuzz import worker
@@ -30,6 +33,7 @@ from rodfem.errors import InputError
 
 LIMIT = 900.0
 """Seconds after which a process that measures a case is stopped."""
+ACCURACIES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-11)
 SEED = 1
 """Of the random scenes, and of the moments of kills."""
 TITLES = {
@@ -105,6 +109,43 @@ def bars_of(store: Store) -> str:
     return table(["loads of special points", "number", "above their bar", "within", "largest error over bar"], rows)
 
 
+def accuracies_of(store: Store) -> str:
+    """How well accuracies that are asked for are kept, in a table."""
+    rows = []
+    for accuracy in ACCURACIES:
+        found = store.measure(f"accuracy/{accuracy:g}", partial(asked, accuracy))
+        verdicts = [row.get("verdict", "stopped") for row in found]
+        left = "; ".join(row["name"] for row in found if row.get("verdict") == "said")
+        worst = max((row["ratio"] for row in found if row.get("verdict") == "right"), default=None)
+        counts = [str(verdicts.count(kind)) for kind in ("right", "said", "wrong", "stopped")]
+        rows.append([f"{accuracy:g}", *counts, digits(worst, 3), left])
+    return table(["accuracy", "right", "said", "wrong", "stopped", "largest error over it", "said of"], rows)
+
+
+def asked(accuracy: float) -> list[dict[str, Any]]:
+    """Verdicts on all problems at an accuracy, in a process of its own."""
+    return list(measured("benchmarks.robustness", "--accuracy", accuracy, limit=4 * LIMIT))
+
+
+def at_accuracy(accuracy: float) -> Iterator[dict[str, Any]]:
+    """Verdict on each problem with a known solution, with the error over the accuracy, and what was said."""
+    for name in PROBLEMS:
+        found = at(accuracy, name)
+        ratio = found.error if isfinite(found.error) else None
+        yield {"name": name, "verdict": found.verdict, "ratio": ratio, "said": found.said, "why": found.wrong}
+
+
+def accuracy_section(store: Store) -> str:
+    """Section of the page on accuracies that are asked for."""
+    return f"""## Accuracies asked for
+
+`Plan(accuracy=...)` chooses meshes such that every load and ordinate is in error by less than that (relative to values
+greater than one). Of {len(PROBLEMS)} problems with a known solution, all of whose special points count, the largest
+error over the accuracy; **said**: that it is not reached. Measured on {strftime("%Y-%m-%d")}.
+
+{accuracies_of(store)}"""
+
+
 def kills_of(store: Store) -> str:
     """What runs left that were killed, in a table."""
     return table(kills.HEAD, list(kills.in_rows(store.rows("kills"))))
@@ -145,6 +186,7 @@ load of a special point that has a reference is counted. Of random scenes (`pyth
 seed {SEED}) special points on two meshes are compared with each other: their difference over the sum of their bars.
 
 {bars_of(store)}
+{accuracy_section(store)}
 ## Runs that are killed
 
 A run of the compressed hemitropic rod is killed by SIGKILL (`python -m tests.hard.kills`): at a random time, or before
@@ -159,6 +201,8 @@ def main() -> None:
     """Write the page, or measure one value in this process."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--measure", nargs=2, metavar=("GROUP", "NUMBER"))
+    parser.add_argument("--accuracy", type=float, help="measure all problems at this accuracy in this process")
+    parser.add_argument("--accuracies", action="store_true", help="bring the page's section on these up to date")
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "robustness.md")
     parser.add_argument("--resume", action="store_true", help="keep what an interrupted run has measured")
     parser.add_argument("--tries", type=int, default=200, help="runs that are killed")
@@ -167,6 +211,13 @@ def main() -> None:
     if given.measure:
         for row in measure(given.measure[0], int(given.measure[1])):
             print(json.dumps(row), flush=True)
+    elif given.accuracy:
+        for row in at_accuracy(given.accuracy):
+            print(json.dumps(row), flush=True)
+    elif given.accuracies:
+        store = Store(ROOT / "results" / "robustness" / "accuracies.json", given.resume)
+        before, rest = re.split(r"(?m)^## (?:Accuracies asked for[\s\S]*?^## )?(?=Runs that)", given.output.read_text())
+        given.output.write_text(f"{before}{accuracy_section(store)}\n## {rest}")
     else:
         store = Store(ROOT / "results" / "robustness" / "measured.json", given.resume)
         if not given.resume:

@@ -1,0 +1,15 @@
+"""An accuracy asked for is kept, or it is said that it is not, of scenes whose special points are known."""
+
+from __future__ import annotations
+
+import pytest
+from hard.accuracy import at
+
+pytestmark = pytest.mark.alone
+
+
+@pytest.mark.parametrize("accuracy", [1e-4, 1e-9])
+@pytest.mark.parametrize("name", ["greenhill", "cord of 2 turns", "deep arch", "hysteresis 8"])
+def test_an_accuracy_is_kept(name: str, accuracy: float) -> None:
+    found = at(accuracy, name)
+    assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
