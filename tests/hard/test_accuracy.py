@@ -9,7 +9,7 @@ pytestmark = pytest.mark.alone
 
 
 @pytest.mark.parametrize("accuracy", [1e-4, 1e-9])
-@pytest.mark.parametrize("name", ["greenhill", "cord of 2 turns", "deep arch", "hysteresis 8"])
+@pytest.mark.parametrize("name", ["greenhill", "cord of 2 turns", "deep arch"])
 def test_an_accuracy_is_kept(name: str, accuracy: float) -> None:
     found = at(accuracy, name)
     assert found.right, f"{found.error:.3g} {found.wrong} {found.said}"
