@@ -66,7 +66,7 @@ class InSpace:
             for value, v in zip(values, vectors, strict=True)
             if abs(value) <= self.inertia.tolerance
         ]
-        return index.negative + sum(falling)
+        return index.negative + int(sum(falling))
 
     def _share(self, v: PETSc.Vec) -> float:
         """Part of the squared norm of a vector of norm 1 that is out of the plane."""

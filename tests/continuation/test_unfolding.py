@@ -136,9 +136,11 @@ def test_what_steps_do_not_resolve_is_called_imperfect() -> None:
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("beside", [1e-12, 1e-9, 1e-6])
+@pytest.mark.parametrize("beside", [1e-11, 1e-9, 1e-6])
 def test_a_load_beside_a_branch_point(beside: float) -> None:
     """The branch that leaves there has its row at that load, and goes on: sqrt(P) = K(k), tip 2 k / sqrt(P).
+
+    The branch point itself is located to 6e-12.
 
     The tip grows with the root of what P exceeds the critical load by, which round-off changes by 4e-15.
     """
