@@ -138,9 +138,27 @@ FAULTS = {
     ),
     "index-in-space-of-the-plane": Fault(
         f"{STABILITY}out_of_plane.py",
-        "return self.inertia.at(state).count()",
-        "return Inertia(self.planar).at(x).count()",
+        "return self.inertia.at(state)",
+        "return Inertia(self.planar).at(x)",
         "tests/literature/test_rods.py tests/literature/test_ruler.py tests/literature/test_classics.py",
+    ),
+    "soft-modes-not-counted-at-special-points": Fault(
+        "rodfem/adaptivity/soft_rows.py",
+        "self._count_at_special_points(branch)",
+        "pass",
+        "tests/fem/test_dead_pressure.py",
+    ),
+    "mumps-in-any-units": Fault(
+        "rodfem/linalg/selection.py",
+        "Mumps(kind, controls, thresholds, prefix, sizes)",
+        "Mumps(kind, controls, thresholds, prefix)",
+        "tests/problem/test_units.py",
+    ),
+    "falls-out-of-the-plane-slowly": Fault(
+        f"{STABILITY}out_of_plane.py",
+        "int(sum(falling))",
+        "0 * sum(falling)",
+        "tests/literature/test_postbuckling.py",
     ),
     "flutter-beside-the-collision": Fault(
         f"{CONTINUATION}flutter.py",
