@@ -59,9 +59,8 @@ class SoftRows:
         mesh itself has as many negative values beyond round-off at the special point.
         """
         at = {id(s.point): s for s in branch.special if s.kind.counted}
-        groups = [(at_special, list(rows)) for at_special, rows in groupby(branch.points, lambda p: id(p) in at)]
-        if branch.parent and groups[0][0]:
-            return
+        points = branch.points[1:] if branch.parent else branch.points  # its first is a special point of another
+        groups = [(at_special, list(rows)) for at_special, rows in groupby(points, lambda p: id(p) in at)]
         for i, (at_special, rows) in enumerate(groups):
             if not at_special:
                 continue

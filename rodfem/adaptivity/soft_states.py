@@ -73,13 +73,14 @@ class SoftStates:
 
     def persistent(self, special: SpecialPoint) -> list[SoftMode]:
         """Soft modes at a special point that are none of its null vectors, with their round-off on this mesh alone."""
-        inertia = self.solver.inertia
-        found = inertia.at(special.point.x)
-        vectors = across(self.solver.system, near_zero(found).vectors, special.null_vectors)
-        values = [v.dot(found.matrix * v).real + found.shift for v in vectors]
-        bars = [max(quotient_error(found.matrix, v), TOLERANCE * inertia.scale) for v in vectors]
-        names = self.names(special.point.x, vectors)
-        return [SoftMode(*mode) for mode in zip(names, values, bars, strict=True)]
+        x, system = special.point.x, self.solver.system
+        near = near_zero(self.solver.inertia.at(x))
+        kept = [i for i, v in enumerate(near.vectors) if across(system, [v], special.null_vectors)]
+        names = self.names(x, [near.vectors[i] for i in kept])
+        return [
+            SoftMode(name, float(near.values[i]), float(near.uncertainty[i]))
+            for name, i in zip(names, kept, strict=True)
+        ]
 
     def _with_the_mesh(self, point: Point, near: NearZero, least: int) -> NearZero:
         """Eigenvalues with what the mesh makes of the motion along the rod in their uncertainty.

@@ -63,6 +63,7 @@ def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int, sizes: Sizes | 
 
     The matrices are those of a communicator ``comm``; ``sizes`` are the natural sizes of the unknowns, None where they
     are one.
+
     ICNTL(24) = 1 is what makes MUMPS report it; CNTL(3) is so small that no pivot is taken for zero: the matrices are
     shifted off their eigenvalues.  ICNTL(8) = 0: with MUMPS's own scaling of saddle matrices solutions were seen to
     lose ten digits, and factorisations take up to ten times as long.  CNTL(1) is ten times below MUMPS's own threshold:

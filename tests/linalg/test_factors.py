@@ -47,23 +47,28 @@ def whole(vector: PETSc.Vec) -> np.ndarray:
     return np.concatenate(vector.comm.tompi4py().allgather(vector.array_r))
 
 
+def check(factors: Pieces | Mumps, matrix: PETSc.Mat, right: PETSc.Vec) -> None:
+    """Compare inertia, determinant and a solution with dense linear algebra."""
+    dense, out = gathered(matrix).toarray(), right.duplicate()
+    factors(matrix)
+    assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
+    assert factors.determinant() == pytest.approx(np.linalg.slogdet(dense)[1], rel=1e-9)
+    factors.solve(right, out)
+    expected = np.linalg.solve(dense, whole(right))
+    np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
+
+
 @PACKAGES
 @FORMULATIONS
 @STATES
 def test_inertia_and_solutions(name: str, state: str, formulation: str, load: float, package: str) -> None:
     system, x = at(name, state, formulation, load)
     inertia, factors = Inertia(system), symmetric(system, package)
-    right, out = inertia.seed(1), system.new_vector()
+    right = inertia.seed(1)
     for sigma in SIGMAS:
         matrix = inertia.at(x).matrix
         matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        dense = gathered(matrix).toarray()
-        factors(matrix)
-        assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
-        assert factors.determinant() == pytest.approx(np.linalg.slogdet(dense)[1], rel=1e-9)
-        factors.solve(right, out)
-        expected = np.linalg.solve(dense, whole(right))
-        np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
+        check(factors, matrix, right)
 
 
 @PACKAGES
@@ -110,13 +115,7 @@ def test_natural_sizes() -> None:
     for sigma in (-3.0, 0.1):
         matrix = inertia.at(x).matrix
         matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        dense, right, out = gathered(matrix).toarray(), inertia.seed(1), system.new_vector()
-        factors(matrix)
-        assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
-        assert factors.determinant() == pytest.approx(np.linalg.slogdet(dense)[1], rel=1e-9)
-        factors.solve(right, out)
-        expected = np.linalg.solve(dense, whole(right))
-        np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
+        check(factors, matrix, inertia.seed(1))
 
 
 @PACKAGES
