@@ -10,12 +10,11 @@ from mpi4py import MPI
 from numpy.polynomial import legendre
 from petsc4py import PETSc
 
-from forms.kinematics import UNDEFORMED
 from rodfem import compat
+from rodfem.fem.compiled_shape import CompiledShape
 from rodfem.fem.fields import LOAD
 from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
-from rodfem.problem.quaternions import directors
 
 INWARDS = 1e-9
 """Part of the way to the middle of its cell by which a node is moved: the end of a cell belongs to that cell."""
@@ -87,10 +86,8 @@ class Shape:
         self.order = np.argsort(compat.nodes(k))
         self._q_at_gauss = compat.lagrange_basis(k, self.gauss.points)
         self._v_at_gauss = compat.lagrange_basis(k - 1, self.gauss.points)
-        self._v_dense = compat.lagrange_basis(k - 1, np.linspace(0, 1, 4 * k + 1))
+        self._compiled = CompiledShape(f, self.gauss.points)
         self._v_to_powers = np.linalg.inv(np.vander(2 * compat.nodes(k - 1) - 1, k, increasing=True))
-        self._held_strains = np.array([0.0 if i in system.scene.free_strains else x for i, x in enumerate(UNDEFORMED)])
-        self._strains = np.eye(len(UNDEFORMED))[list(system.scene.free_strains)]
         self._probe_weights = [self._position_weights(s) for s in system.scene.ordinate.places]
         self.cells = cells
         self.s = self.start[:, None] + self.size[:, None] * self.nodes
@@ -111,12 +108,10 @@ class Shape:
         """
         if 2 not in self.system.scene.free_strains:
             return 1.0
-        nodal = self.system.at(x).values("v")[self.cells, :, -1]
-        dense = nodal @ self._v_dense.T
-        cell, place = divmod(int(dense.argmin()), dense.shape[1])
-        spacing = 2.0 / (dense.shape[1] - 1)
-        turn = minimum((self._v_to_powers @ nodal[cell]).tolist(), -1.0 + spacing * place, spacing)
-        mine, comm = min(float(dense[cell, place]), turn), self.system.comm
+        local, comm, spacing = self.system.at(x).local, self.system.comm, self._compiled.spacing
+        least, cell, place = self._compiled.least_stretch(local)
+        powers = self._v_to_powers @ local[self.system.fields.dofs["v"][cell, :, -1]]
+        mine = min(least, minimum(powers.tolist(), -1.0 + spacing * place, spacing))
         return mine if comm.size == 1 else float(comm.allreduce(mine, op=MPI.MIN))
 
     def sample(self, x: PETSc.Vec) -> dict[str, Any]:
@@ -215,11 +210,7 @@ class Shape:
 
     def slopes(self, state: NodalValues) -> np.ndarray:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""
-        R = directors(state.fields.turning.quaternion(self._q_at_gauss @ state.turned[self.cells]))
-        if not self.system.scene.free_strains:
-            return np.asarray(R @ self._held_strains)
-        strains = self._v_at_gauss @ state.values("v")[self.cells] @ self._strains + self._held_strains
-        return np.asarray(np.add.reduce(R * strains[..., None, :], axis=-1))
+        return self._compiled.slopes(state.local)
 
     def _position_weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
         """Weights of slopes at Gauss points in their integrals to ``s`` and over the rod, of nodal values at ``s``."""
