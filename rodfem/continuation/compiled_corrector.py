@@ -59,20 +59,19 @@ class CompiledCorrector(CompiledNewton):
         """Factor ``S`` at ``x``, with the phase conditions as they are; None where it is too near singular."""
         self._take()
         state = x.array_r
-        failed = self.lib.assemble_at(self.rod, self.ffi.cast("double *", state.ctypes.data))
-        failed = failed or self.lib.solve_at(self.rod, self.block, self.ffi.NULL)
+        failed = self.lib.factor_at(self.rod, self.block, self.ffi.cast("double *", state.ctypes.data))
         self.factors.adopt(regular=not failed)
-        found = self._held()
+        found = self.hold()
         return None if failed else found
 
     def correct(self, x: PETSc.Vec, row: PETSc.Vec, limits: Limits) -> Ended:
         """As the base class; ``x`` is as it was also where ``S`` is too near singular."""
         outcome = super().correct(x, row, limits)
         if self.newton.factorisations:  # else the matrix holds what it held before
-            self._held()
+            self.hold()
         return outcome
 
-    def _held(self) -> Factored:
+    def hold(self) -> Factored:
         """The state that the matrix holds now, and its factors."""
         self.inertia.border.array[:] = self.border
         return self.inertia.hold()

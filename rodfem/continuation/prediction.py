@@ -6,12 +6,17 @@ where the last row is.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
+
+ROWS = 4
+"""Rows of a branch that a prediction extrapolates, at most."""
 
 
 def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
@@ -29,22 +34,24 @@ def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
     return value, slope
 
 
-def predict(points: list[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """Extrapolate a branch to arclength ``s``: state and direction, from up to four points or one and its tangent.
+def weights(points: Sequence[Point], s: float) -> tuple[list[PETSc.Vec], np.ndarray, np.ndarray]:
+    """Vectors whose combinations extrapolate a branch to arclength ``s``: weights of the state, and of its direction.
 
-    Raises :class:`ValueError` for one point without a tangent.
+    From up to four points, or one and its tangent.  Raises :class:`ValueError` for one point without a tangent.
     """
     last = points[-1]
     if len(points) < 3:
         if last.tangent is None:
             raise ValueError("A branch of one point needs a tangent to be continued.")
-        x = last.x.copy()
-        x.axpy(s - last.arclength, last.tangent)
-        return x, last.tangent.copy()
-    recent = points[-4:]
-    value, slope = lagrange(np.array([p.arclength for p in recent]), s)
-    states = [p.x for p in recent]
-    return combine(states, value), combine(states, slope)
+        return [last.x, last.tangent], np.array([1.0, s - last.arclength]), np.array([0.0, 1.0])
+    recent = points[-ROWS:]
+    return [p.x for p in recent], *lagrange(np.array([p.arclength for p in recent]), s)
+
+
+def predict(points: Sequence[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """Extrapolate a branch to arclength ``s``: state and direction, as :func:`weights`."""
+    vectors, value, slope = weights(points, s)
+    return combine(vectors, value), combine(vectors, slope)
 
 
 def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:

@@ -8,8 +8,8 @@ where it does not.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 
@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.continuation.branch import Point, SpecialPoint
-from rodfem.continuation.corrector import Corrector
+from rodfem.continuation.corrector import STEPS, Corrector
 from rodfem.continuation.kinds import Kind
 from rodfem.continuation.prediction import across_orbit, predict
 from rodfem.continuation.step_control import StepControl
@@ -52,6 +52,34 @@ PILE = 64
 """Points of a branch after which the vectors that are not used any more are destroyed."""
 ON_BOUND = 1e-8
 """Distance from a bound, in spans, below which a load counts as on it: branches of constant load may lie there."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step along a branch: the state ``x``, a prediction where it was not corrected, and its ``load``.
+
+    Attributes
+    ----------
+    outcome
+        The Newton iteration; None where none was made.
+    tangent, index
+        Of an equilibrium its unit tangent, and its index where one factorisation determines it.
+    aligned
+        Cosine between the direction of the prediction and the tangent.
+    length
+        Distance from the last row, in the metric.
+    energy
+        Stored energy, where it is known.
+    """
+
+    x: PETSc.Vec
+    load: float
+    outcome: NewtonResult | None = None
+    tangent: PETSc.Vec | None = None
+    index: Index | None = None
+    aligned: float = -1.0
+    length: float = 0.0
+    energy: float | None = None
 
 
 class StaticSolver:
@@ -243,8 +271,9 @@ class BranchSolver(StaticSolver):
         tangent: PETSc.Vec | None,
         outcome: NewtonResult | None = None,
         index: Index | None = None,
+        energy: float | None = None,
     ) -> Point:
-        """Evaluate all records of the equilibrium ``x``; its index is counted unless given.
+        """Evaluate all records of the equilibrium ``x``; its index is counted, its energy summed, unless given.
 
         ``arclength`` and ``tangent`` are its place on the branch, ``outcome`` is the Newton iteration that led to it,
         ``index`` that of the factors, if they are those of ``x``.
@@ -258,7 +287,7 @@ class BranchSolver(StaticSolver):
             arclength=arclength,
             load=system.scalar(x),
             ordinate=self.shape.ordinate(x),
-            energy=self.energy(x),
+            energy=self.energy(x) if energy is None else energy,
             stretch=self.shape.stretch(x),
             negative=index.negative,
             zero=index.zero,
@@ -287,6 +316,30 @@ class BranchSolver(StaticSolver):
             )
         return [float(value) for value in modes.values]
 
+    def step(self, known: Sequence[Point], s: float, bounds: tuple[float, float], reach: float) -> Step:
+        """Predict from the ``known`` rows the equilibrium at arclength ``s``, and correct the prediction.
+
+        In one call of compiled code where that serves.  A prediction whose load is not within the ``bounds`` is not
+        corrected, nor one that turns back; ``reach`` bounds a correction, in the metric.
+        """
+        made = self.corrector.step(known, s, bounds, reach)
+        if made is not None:
+            whole, index = made
+            load, numbers = self.system.scalar(whole.x), (whole.aligned, whole.length, whole.energy)
+            return Step(whole.x, load, whole.outcome, whole.tangent, index, *numbers)
+        last, system = known[-1], self.system
+        x, direction = predict(known, s)
+        if system.symmetries:
+            across_orbit(system, last.x, x, direction)
+        load, row = system.scalar(x), self.row(direction)
+        back = last.tangent is not None and row.dot(last.tangent) <= 0
+        if back or not bounds[0] <= load <= bounds[1]:
+            return Step(x, load)
+        outcome, tangent, index = self.correct(x, row, reach)
+        if tangent is None:
+            return Step(x, load, outcome)
+        return Step(x, system.scalar(x), outcome, tangent, index, row.dot(tangent), distance(system, last.x, x))
+
     def correct(
         self, x: PETSc.Vec, row: PETSc.Vec, reach: float
     ) -> tuple[NewtonResult, PETSc.Vec | None, Index | None]:
@@ -296,10 +349,10 @@ class BranchSolver(StaticSolver):
         the normal of the plane on which the equilibrium lies, and ``reach`` bounds how far ``x`` may move, in the
         metric.
         """
-        outcome = self.corrector.correct(x, row, most=8, reach=reach, tolerance=TOLERANCE)
+        outcome = self.corrector.correct(x, row, most=STEPS, reach=reach, tolerance=TOLERANCE)
         regular = outcome is not None
         if outcome is None:
-            outcome = correct(self.system, x, row, most=8, reach=reach)
+            outcome = correct(self.system, x, row, most=STEPS, reach=reach)
         if not outcome.converged:
             return outcome, None, None
         at = self.corrector.corrected(x, outcome) if regular else self.corrector.factor(x)
@@ -383,29 +436,21 @@ def follow(
         known = points
         if system.damping and last.tangent is not None:  # across a family, along which the path is not determined
             known = [replace(last, tangent=solver.tangent(solver.row(last.tangent), at=last.x))]
-        x, direction = predict(known, last.arclength + step)
-        if system.symmetries:
-            across_orbit(system, last.x, x, direction)
-        load, outcome, tangent, index = system.scalar(x), None, None, None
-        if low <= load <= high:
-            row = solver.row(direction)
-            if last.tangent is None or row.dot(last.tangent) > 0:  # else an extrapolation that turns back
-                outcome, tangent, index = solver.correct(x, row, 0.5 * step)
-                if outcome.converged:
-                    load = system.scalar(x)
-        if not low <= load <= high or _on_bound(load, last, bounds, span):
-            bound = min(bounds, key=lambda bound: abs(bound - load))
-            point = _to_load(solver, points, load, bound, step, steps.smallest)
+        made = solver.step(known, last.arclength + step, (low, high), 0.5 * step)
+        if not low <= made.load <= high or _on_bound(made.load, last, bounds, span):
+            bound = min(bounds, key=lambda bound: abs(bound - made.load))
+            point = _to_load(solver, points, made.load, bound, step, steps.smallest)
             if point is not None:
                 yield point
                 yield "end of range"
                 return
-        elif outcome is not None and tangent is not None and row.dot(tangent) > ALIGNED:
-            point = solver.point(x, last.arclength + distance(system, last.x, x), tangent, outcome, index)
+        elif made.outcome is not None and made.tangent is not None and made.aligned > ALIGNED:
+            place = last.arclength + made.length
+            point = solver.point(made.x, place, made.tangent, made.outcome, made.index, made.energy)
             if steps.accepts(last, point):
                 yield point
                 order = 2 if system.damping else min(len(points) - 1, 3) + 1
-                step = steps.after(step, outcome.moved, order)
+                step = steps.after(step, made.outcome.moved, order)
                 continue
         step /= 2
         if step < min(steps.smallest, 0.01 * most):

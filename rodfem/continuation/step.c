@@ -230,10 +230,11 @@ int advance(Step *step, int known, const double **states, const double *value, c
     for (int i = 0; i < n; i++) step->row[i] /= size;
     if (before && !(dot(n, step->row, before) > 0)) return TURNED;
     set_phase(step, step->x);
+    int broken = step->broken;
     if (((correct_state *)step->correct)(step->rod, step->block, step->newton, step->x, step->row)) return NOT_CORRECTED;
-    int moved = *step->iterations > 1 || !(*step->error <= same);
     set_phase(step, step->x);
-    if (moved && ((factor_at *)step->factor)(step->rod, step->block, NULL)) return SINGULAR;
+    int moved = *step->iterations > 1 || !(*step->error <= same) || step->broken != broken;
+    if (moved && ((factor_at *)step->factor)(step->rod, step->block, step->x)) return SINGULAR;
     step->verified = verified(step);
     memcpy(step->tangent, step->null, n * sizeof(double));
     step->along = dot(n, step->row, step->tangent);

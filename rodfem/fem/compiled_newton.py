@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 FUNCTIONS = """
 int assemble_at(const Rod *rod, const double *x);
-int solve_at(const Rod *rod, Block *b, const double *r);
+int residual_at(const Rod *rod, const double *x, double *out);
+int factor_at(const Rod *rod, Block *b, const double *x);
 int correct(const Rod *rod, Block *b, Newton *newton, double *x, const double *row);
 """
 CONVERGED, FAILED, SINGULAR, BROKEN = range(4)
@@ -73,6 +74,8 @@ class CompiledNewton:
         The iterate that was factored last, and the equations there, (n,).
     border
         Derivative of the equations in the load at that state, (n,), where the factors are symmetric.
+    active, conditions, offsets
+        Of each drift scalar: whether it has a phase condition, that condition (drifts, n), and its offset.
     """
 
     @staticmethod
@@ -92,8 +95,8 @@ class CompiledNewton:
         assert metric is not None
         self._pattern = own.pattern
         drifts = np.array(system.drifts, dtype=np.int32)
-        self._conditions, self._offsets = np.zeros((len(drifts), n)), np.zeros(len(drifts))
-        self._active, self.border = np.zeros(len(drifts), dtype=np.int32), np.zeros(n)
+        self.conditions, self.offsets = np.zeros((len(drifts), n)), np.zeros(len(drifts))
+        self.active, self.border = np.zeros(len(drifts), dtype=np.int32), np.zeros(n)
         starts, load, every = own.pattern.indptr, system.load_index, np.arange(n)
         # scalars are the last columns of each row, and their own rows are dense
         column = {i: starts[1:] - (n - i) for i in (load, *system.drifts)}
@@ -103,8 +106,8 @@ class CompiledNewton:
         rod.values, rod.load, rod.load_diagonal = self._doubles(own.values), load, int(column[load][load])
         rod.load_column = self._ints(np.where(every == load, -1, column[load]))
         rod.load_row = self._ints(starts[load] + every)
-        rod.drifts, rod.drift, rod.active = len(drifts), self._ints(drifts), self._ints(self._active)
-        rod.conditions, rod.offsets = self._doubles(self._conditions), self._doubles(self._offsets)
+        rod.drifts, rod.drift, rod.active = len(drifts), self._ints(drifts), self._ints(self.active)
+        rod.conditions, rod.offsets = self._doubles(self.conditions), self._doubles(self.offsets)
         rod.drift_row = self._ints(np.array([starts[d] + every for d in drifts]))
         rod.drift_column = self._ints(np.array([column[d] for d in drifts]))
         rod.starts, rod.indices = self._ints(metric.pattern.indptr), self._ints(metric.pattern.indices)
@@ -135,9 +138,20 @@ class CompiledNewton:
         if any(mine is not new for mine, new in zip(self._given, given, strict=True)):
             self._point(rod, given[0])
             self._given = given
-        self._active[:], self._offsets[:] = 0, system.phase.offsets
+        self.active[:], self.offsets[:] = 0, system.phase.offsets
         for i, row in system.phase.rows.items():
-            self._active[i], self._conditions[i, : len(row)] = 1, row
+            self.active[i], self.conditions[i, : len(row)] = 1, row
+
+    def prepare(self, limits: Limits) -> None:
+        """Use what the system has now, and these ``limits`` of Newton's method."""
+        self._take()
+        for name, value in vars(limits).items():
+            setattr(self.newton, name, value)
+
+    def adopt(self, *, regular: bool) -> None:
+        """The matrix holds another state, whose factors are ``regular``, as compiled code has left them."""
+        self.factors.adopt(regular=regular)
+        self.matrix.stateIncrease()
 
     def _point(self, rod: Any, elimination: Elimination) -> None:
         """Let the ``rod`` point to the forms with their constants, and to the factors."""
@@ -164,10 +178,8 @@ class CompiledNewton:
 
         ``x`` is as it was where there were no factors.
         """
-        self._take()
+        self.prepare(limits)
         newton, along = self.newton, row.array_r
-        for name, value in vars(limits).items():
-            setattr(newton, name, value)
         with x as state:
             begin, arrays = state.copy(), (state, along)
             pointers = [self.ffi.cast("double *", array.ctypes.data) for array in arrays]
@@ -175,6 +187,5 @@ class CompiledNewton:
             if status >= SINGULAR:
                 state[:] = begin
         if newton.factorisations:
-            self.factors.adopt(regular=status < SINGULAR and not newton.singular)
-            self.matrix.stateIncrease()
+            self.adopt(regular=status < SINGULAR and not newton.singular)
         return Ended(status, newton.iterations, newton.error, newton.moved)

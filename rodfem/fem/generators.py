@@ -42,14 +42,25 @@ class Generators:
 
     def _constant(self, state: State) -> np.ndarray:
         """``c`` of all generators: with ends that are held, and forces that are known, they vary with the load."""
-        system, line = self.system, state.line
+        fixed = self.fixed(state.line)
+        return self._constant_at(state.line, state.load) if fixed is None else fixed
+
+    def fixed(self, line: Line) -> np.ndarray | None:
+        """``c`` of all generators along a ``line``, (count, own rows), unless it varies with the load."""
         if line is not self._line:
-            low, high = system.scene.span
+            low, high = self.system.scene.span
             found = [self._constant_at(line, load) for load in (low, 0.62 * low + 0.38 * high, high)]
             varies = any(np.any(c != found[0]) for c in found)
-            self._varies = bool(system.comm.allreduce(varies, op=MPI.LOR))
+            self._varies = bool(self.system.comm.allreduce(varies, op=MPI.LOR))
             self._line, self._fixed = line, found[0]
-        return self._constant_at(line, state.load) if self._varies else self._fixed
+        return None if self._varies else self._fixed
+
+    def in_unknowns(self) -> sp.csr_matrix:
+        """``A`` of all generators, one below the other, for vectors of the system on one rank."""
+        fields, n = self.system.fields, self.system.fields.unknowns
+        columns = fields.number[self._columns]
+        place = sp.csr_matrix((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=(len(columns), n))
+        return (self._forth @ place).tocsr()
 
     def _constant_at(self, line: Line, load: float) -> np.ndarray:
         fields = self.system.fields

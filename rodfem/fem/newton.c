@@ -91,7 +91,7 @@ static void gather(const Rod *rod, const double *x)
 }
 
 /* Equations and phase conditions at x; the row of the load is zero.  */
-static int residual_at(const Rod *rod, const double *x, double *out)
+int residual_at(const Rod *rod, const double *x, double *out)
 {
     memset(out, 0, rod->n * sizeof(double));
     gather(rod, x);
@@ -151,7 +151,7 @@ int assemble_at(const Rod *rod, const double *x)
 
 /* Factors of the matrix, solutions for r (NULL: none) and F_lam, and a step of inverse iteration of the block, three from
    generic vectors.  0; 2 where S is too near singular; 3 where the factors failed.  */
-int solve_at(const Rod *rod, Block *b, const double *r)
+static int solve_at(const Rod *rod, Block *b, const double *r)
 {
     int n = rod->n, columns = b->block + 2;
     if (((factor_matrix *)rod->factor)(rod->factors, rod->values) > 1) return 3;
@@ -197,6 +197,12 @@ int solve_at(const Rod *rod, Block *b, const double *r)
     memcpy(b->vectors, b->fresh, (size_t)n * b->block * sizeof(double));
     memcpy(b->images, b->fresh_images, (size_t)n * b->block * sizeof(double));
     return 2;
+}
+
+/* The same at x. */
+int factor_at(const Rod *rod, Block *b, const double *x)
+{
+    return assemble_at(rod, x) ? 3 : solve_at(rod, b, NULL);
 }
 
 /* Solve the equations on the plane through x across row, in place; see rodfem.fem.newton.iterate.  With a block the

@@ -117,7 +117,7 @@ class Verification:
         :meth:`__call__`.
         """
         system, left = self.system, self._left
-        weights = _generic(len(chosen))
+        weights = generic_weights(len(chosen))
         g, own = self._generator, generators.shape[1]
         g.array[:own] = weights @ generators[chosen]
         matrix.mult(g, left)
@@ -180,6 +180,6 @@ class Verification:
 
 
 @cache
-def _generic(count: int) -> np.ndarray:
-    """Weights of a generic combination."""
+def generic_weights(count: int) -> np.ndarray:
+    """Weights (count,) of a generic combination of as many generators."""
     return np.random.default_rng(0).uniform(0.5, 1.0, count) * (-1.0) ** np.arange(count) if count > 1 else np.ones(1)
