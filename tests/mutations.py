@@ -43,12 +43,22 @@ KILLS = "tests/hard/test_files_after_a_kill.py"
 INERTIA = "tests/stability/test_inertia.py tests/stability/test_assessment.py"
 HARD = "tests/hard/test_hard_cases.py"
 DIAGRAM = "tests/diagram/test_diagram.py"
+STEP = "tests/continuation/test_compiled_step.py"
 
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
     "jumps-to-another-branch": Fault(
         f"{CONTINUATION}jumping.py", "if moved <= FAR and off <= SHARE * moved", "if True", HARD
+    ),
+    "step-checks-nothing": Fault(
+        f"{CONTINUATION}step.c", "double left = fabs(step->right[i])", "double left = 0 * step->right[i]", STEP
+    ),
+    "step-keeps-the-phase-of-its-prediction": Fault(
+        f"{CONTINUATION}step.c",
+        "    set_phase(step, step->x);\n    int moved",
+        "    int moved",
+        STEP,
     ),
     # location
     "location-is-blunt": Fault(f"{CONTINUATION}locate.py", "SHARP = 1e-11", "SHARP = 1e-4", f"{HEMITROPIC} {GOLDEN}"),

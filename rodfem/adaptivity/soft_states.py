@@ -30,6 +30,8 @@ from rodfem.stability.soft_mode import Judgement, SoftMode
 
 REFINEMENTS = 2
 """Meshes that are tried beyond that of a state until the signs of its soft modes are decided."""
+SURE = 0.1
+"""Part of the estimated distance of the nearest eigenvalue from zero within which there is none."""
 FLAT = 1e-6
 """Slope of the load along a branch, in spans, below which the branch is a family of equilibria at one load."""
 
@@ -54,10 +56,11 @@ class SoftStates:
         ``compare`` the index there is asked for; eigenvalues that have another sign are soft, too.  Raises
         :class:`ConvergenceError` where constraints that depend on each other leave less than no negative eigenvalue.
         """
-        inertia, clear = self.solver.inertia, self._is_clear(point)
+        inertia, nearest = self.solver.inertia, self._nearest(point)
         differing = self._differing(point, fixed_load) if compare and self._richer else 0
-        sliding = self.sliding.suspects(inertia, point.x, NEAR * inertia.scale if clear else soft_limit(inertia))
-        if clear and not differing and not sliding:
+        least = max(NEAR * inertia.scale, SURE * nearest) if nearest else soft_limit(inertia)
+        sliding = self.sliding.suspects(inertia, point.x, least)
+        if nearest and not differing and not sliding:
             return False
         least = max(differing, sliding + 1 if sliding else 0)  # another eigenvalue may be nearer to zero
         near = self._with_the_mesh(point, near_zero(inertia.at(point.x), least=least), differing)
@@ -93,10 +96,12 @@ class SoftStates:
         chosen = (away < limit) | (away <= uncertainty) | (np.argsort(np.argsort(away)) < least)
         return near.chosen(chosen, uncertainty, self.solver.inertia.tolerance)
 
-    def _is_clear(self, point: Point) -> bool:
-        """Whether no eigenvalue is near zero, by one factorisation."""
-        regular = self.solver.corrector.factor(point.x) if point.near_zero else None
-        return not point.near_zero or (regular is not None and regular.index is not None)
+    def _nearest(self, point: Point) -> float:
+        """Estimated distance of the nearest eigenvalue from zero; 0 where one factorisation does not tell the index."""
+        if point.nearest:
+            return point.nearest
+        regular = self.solver.corrector.factor(point.x)
+        return 0.0 if regular is None or regular.index is None else regular.index.nearest
 
     def _differing(self, point: Point, fixed_load: bool) -> int:
         """Number of eigenvalues that have another sign on the richer mesh, or are zero there and not on this one."""

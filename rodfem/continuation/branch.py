@@ -63,8 +63,9 @@ class Point:
         Logarithm of the size of the saddle matrix's determinant, at the state whose factors gave the index.
     soft
         Eigenvalues near zero, by name: :class:`~rodfem.stability.soft_mode.SoftMode`.
-    near_zero
-        Whether one factorisation does not tell the index: an eigenvalue may be soft.
+    nearest
+        Estimated distance of the nearest eigenvalue from zero, symmetry modes left out; 0 where one factorisation does
+        not tell the index: an eigenvalue may be soft.
     """
 
     x: PETSc.Vec
@@ -89,7 +90,7 @@ class Point:
     determinant: float = float("nan")
     undecided: int = 0
     soft: list[SoftMode] = field(default_factory=list)
-    near_zero: bool = False
+    nearest: float = 0.0
 
     @property
     def index(self) -> int:

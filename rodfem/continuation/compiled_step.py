@@ -1,4 +1,4 @@
-"""A whole step of continuation in one call of compiled code (``step.c``): prediction, correction, tangent, index, checks.
+"""A step of continuation in one call of compiled code (``step.c``): prediction, correction, tangent, index, checks.
 
 Between the calls of a step Python and PETSc's vectors take longer than the arithmetic.  Where the compiled step gives
 up, as near a singular state, or where a condition below is not met, :func:`~rodfem.continuation.solvers.follow` makes
@@ -29,7 +29,6 @@ from rodfem.linalg.matrices import shared
 if TYPE_CHECKING:
     from rodfem.fem.compiled_newton import Limits
     from rodfem.fem.parameters import Line
-    from rodfem.fem.system import System
     from rodfem.stability.inertia import Factored
 
 FUNCTIONS = """
@@ -49,7 +48,7 @@ def declarations() -> str:
 
 
 @dataclass(frozen=True)
-class Step:
+class Made:
     """A step that was made.
 
     Attributes
@@ -159,12 +158,13 @@ class CompiledStep:
 
     def _sparse(self, sparse: Any, pattern: sp.csr_matrix, values: np.ndarray) -> None:
         sparse.rows, sparse.columns = pattern.shape
-        sparse.starts, sparse.indices = (self._array(x.astype(np.int32), "int") for x in (pattern.indptr, pattern.indices))
+        sparse.starts = self._array(pattern.indptr.astype(np.int32), "int")
+        sparse.indices = self._array(pattern.indices.astype(np.int32), "int")
         sparse.values = self._array(values)
 
     def __call__(
         self, known: Sequence[Point], s: float, bounds: tuple[float, float], limits: Limits, same: float
-    ) -> Step | None:
+    ) -> Made | None:
         """Step to the arclength ``s``; None where it is to be made step by step.
 
         Parameters
@@ -212,7 +212,7 @@ class CompiledStep:
                 self._step.constants = self._array(fixed)
         return self._fixed and system.verification.norm > 0
 
-    def _made(self) -> Step | None:
+    def _made(self) -> Made | None:
         """The step that the code has just made; None where a symmetry is to be verified again, or the count fails."""
         system, corrector, step = self.system, self.corrector, self._step
         x, tangent = system.new_vector(), system.new_vector()
@@ -228,7 +228,7 @@ class CompiledStep:
             return None
         outcome = NewtonResult(True, newton.iterations, newton.error, newton.moved)
         self.checked = Checked(x, step.unbalanced, step.stretched)
-        return Step(x, tangent, found, corrector.nearest, below, outcome, step.along, step.length, step.energy_value)
+        return Made(x, tangent, found, corrector.nearest, below, outcome, step.along, step.length, step.energy_value)
 
     def _phase(self, x: PETSc.Vec) -> Phase:
         """Phase conditions at ``x``, which the code has just found."""

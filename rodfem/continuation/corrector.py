@@ -21,19 +21,16 @@ way, as the prediction is the state but for round-off (a straight rod's), the fa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import Point
 from rodfem.continuation.compiled_corrector import CompiledCorrector
-from rodfem.continuation.compiled_step import Checked, CompiledStep, Step
 from rodfem.errors import ConvergenceError
 from rodfem.fem.compiled_newton import SINGULAR
-from rodfem.fem.newton import TOLERANCE, NewtonResult, iterate, limits, result
+from rodfem.fem.newton import NewtonResult, iterate, limits, result
 from rodfem.fem.state import State
 from rodfem.fem.system import dense_columns
 from rodfem.stability.inertia import FRESH, Factored, Index, Inertia
@@ -91,8 +88,6 @@ class Corrector:
         near_zero = NEAR * inertia.scale
         serves = CompiledCorrector.serves(inertia.matrix, inertia.factors)
         self.compiled = CompiledCorrector(inertia, BLOCK, near_zero) if serves else None
-        conservative = self.compiled is not None and system.scene.conservative
-        self._whole = CompiledStep(self.compiled) if conservative else None
         self._fresh = np.stack([inertia.seed(i).array_r for i in range(BLOCK)], axis=1)
         self._fresh_images = inertia.weighed(self._fresh)
         self.restart()
@@ -102,24 +97,6 @@ class Corrector:
         self._block, self._images, self._started = self._fresh, self._fresh_images, False
         if self.compiled is not None:
             self.compiled.restart()
-
-    def step(
-        self, known: Sequence[Point], s: float, bounds: tuple[float, float], reach: float
-    ) -> tuple[Step, Index | None] | None:
-        """A whole step from the ``known`` rows to arclength ``s``, and its index where one count determines it.
-
-        ``bounds`` are those of the load of its prediction, ``reach`` bounds the correction.  None where it is to be
-        made step by step.
-        """
-        if self._whole is None:
-            return None
-        made = self._whole(known, s, bounds, limits(self.system, STEPS, reach, TOLERANCE), SAME)
-        return made and (made, self._index(made.found, made.below, made.nearest))
-
-    def checked(self, x: PETSc.Vec) -> Checked | None:
-        """What was checked at the state ``x`` when a whole step found it."""
-        found = self._whole and self._whole.checked
-        return found if found and found.x is x else None
 
     def corrected(self, x: PETSc.Vec, outcome: NewtonResult) -> Regular | None:
         """Factors of ``S`` at a state that :meth:`correct` has just converged to; None where they do not serve.
@@ -176,13 +153,13 @@ class Corrector:
         return self._regular(x, found, below, compiled.nearest, tangent)
 
     def _regular(self, x: PETSc.Vec, found: Factored, below: int, nearest: float, tangent: PETSc.Vec) -> Regular:
-        return Regular(x.copy(), found, self._index(found, below, nearest), nearest, tangent)
+        return Regular(x.copy(), found, self.index(found, below, nearest), nearest, tangent)
 
-    def _index(self, found: Factored, below: int, nearest: float) -> Index | None:
+    def index(self, found: Factored, below: int, nearest: float) -> Index | None:
         """Index by one count of factors, unless an eigenvalue is too near zero."""
         inertia = self.inertia
         certain = nearest >= NEAR * inertia.scale + 10 * inertia.tolerance
-        return Index(below, found.drifts, found.factors.determinant()) if certain else None
+        return Index(below, found.drifts, found.factors.determinant(), nearest) if certain else None
 
     def _solve(self, found: Factored, right: PETSc.Vec | None) -> tuple[PETSc.Vec, float]:
         """Solve for all right-hand sides at once: the cost is that of the call, hardly of a column.

@@ -36,7 +36,7 @@ class Invariants:
 
     def __call__(self, point: Point) -> None:
         """Check a point; raises :class:`ConvergenceError` that names the equation, or the norm, that is violated."""
-        found = self.solver.corrector.checked(point.x)
+        found = self.solver.checked(point.x)
         if found is not None and found.residual <= UNBALANCED and found.norm <= UNIT:
             return
         self._unit_quaternions(point)

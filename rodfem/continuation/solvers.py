@@ -18,14 +18,15 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.continuation.branch import Point, SpecialPoint
-from rodfem.continuation.corrector import STEPS, Corrector
+from rodfem.continuation.compiled_step import Checked, CompiledStep
+from rodfem.continuation.corrector import SAME, STEPS, Corrector
 from rodfem.continuation.kinds import Kind
 from rodfem.continuation.prediction import across_orbit, predict
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.fields import LOAD
-from rodfem.fem.newton import TOLERANCE, NewtonResult, correct, relax
+from rodfem.fem.newton import TOLERANCE, NewtonResult, correct, limits, relax
 from rodfem.fem.resultants import Resultants
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
@@ -224,6 +225,8 @@ class BranchSolver(StaticSolver):
         super().__init__(system)
         self.inertia = Inertia(system)
         self.corrector = Corrector(self.inertia)
+        compiled = self.corrector.compiled if system.scene.conservative else None
+        self._whole = None if compiled is None else CompiledStep(compiled)
         self.modes = spectrum
         self.spectrum = SymmetricSolver(self.inertia) if spectrum else None
 
@@ -278,7 +281,7 @@ class BranchSolver(StaticSolver):
         ``arclength`` and ``tangent`` are its place on the branch, ``outcome`` is the Newton iteration that led to it,
         ``index`` that of the factors, if they are those of ``x``.
         """
-        system, near_zero = self.system, index is None
+        system = self.system
         if index is None:
             index = decide(self.inertia.at(x)).index
         return Point(
@@ -298,7 +301,7 @@ class BranchSolver(StaticSolver):
             negative_in_space=None if self.space is None else self.space.negative(x),
             mesh=self.mesh,
             determinant=index.determinant,
-            near_zero=near_zero,
+            nearest=index.nearest,
         )
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:
@@ -322,12 +325,13 @@ class BranchSolver(StaticSolver):
         In one call of compiled code where that serves.  A prediction whose load is not within the ``bounds`` is not
         corrected, nor one that turns back; ``reach`` bounds a correction, in the metric.
         """
-        made = self.corrector.step(known, s, bounds, reach)
-        if made is not None:
-            whole, index = made
-            load, numbers = self.system.scalar(whole.x), (whole.aligned, whole.length, whole.energy)
-            return Step(whole.x, load, whole.outcome, whole.tangent, index, *numbers)
         last, system = known[-1], self.system
+        if self._whole is not None:
+            made = self._whole(known, s, bounds, limits(system, STEPS, reach, TOLERANCE), SAME)
+            if made is not None:
+                index = self.corrector.index(made.found, made.below, made.nearest)
+                numbers = made.aligned, made.length, made.energy
+                return Step(made.x, system.scalar(made.x), made.outcome, made.tangent, index, *numbers)
         x, direction = predict(known, s)
         if system.symmetries:
             across_orbit(system, last.x, x, direction)
@@ -357,6 +361,11 @@ class BranchSolver(StaticSolver):
             return outcome, None, None
         at = self.corrector.corrected(x, outcome) if regular else self.corrector.factor(x)
         return outcome, at.along(row) if at else self._tangent(row, x), at.index if at else None
+
+    def checked(self, x: PETSc.Vec) -> Checked | None:
+        """What was checked at the state ``x`` by the step that led to it; None where that was no compiled one."""
+        found = self._whole and self._whole.checked
+        return found if found and found.x is x else None
 
     def damp(self, freedoms: int) -> None:
         """Keep Newton's method from moving along families of equilibria at one load, where there are any."""

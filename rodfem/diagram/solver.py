@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.adaptivity.soft_states import SoftStates
+from rodfem.continuation import compiled_step
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.solvers import BranchSolver, StaticSolver
@@ -19,7 +20,7 @@ from rodfem.deflation.search import find_equilibria
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
-from rodfem.fem import assembly, compiled_newton, form_compiler
+from rodfem.fem import assembly, compiled_newton, compiled_shape, form_compiler
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.linalg import chain
@@ -112,6 +113,8 @@ class Solver:
             compile_ahead("chain", chain.DECLARATIONS)
             compile_ahead("assembly", assembly.DECLARATIONS, Path(assembly.__file__).parent)
             compile_ahead("newton", compiled_newton.declarations(), Path(compiled_newton.__file__).parent)
+            compile_ahead("shape", compiled_shape.DECLARATIONS, Path(compiled_shape.__file__).parent)
+            compile_ahead("step", compiled_step.declarations(), Path(compiled_step.__file__).parent)
         system = System(scene, discretization or Discretization(), comm, clock)
         self.equilibria = BranchSolver(system, spectrum) if scene.conservative else StaticSolver(system)
 

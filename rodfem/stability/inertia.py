@@ -48,14 +48,16 @@ PIVOT = 1e-3
 
 @dataclass(frozen=True)
 class Index:
-    """Number of negative and of zero eigenvalues (symmetry modes included) of the constrained second variation.
+    """Numbers ``negative`` and ``zero`` of eigenvalues of the constrained second variation, symmetry modes among these.
 
-    ``determinant`` is the logarithm of the size of that of the matrix that was counted.
+    ``determinant`` is the logarithm of the size of that of the matrix that was counted, ``nearest`` an estimate of the
+    distance of the nearest eigenvalue from zero, symmetry modes left out; 0 where there is none.
     """
 
     negative: int
     zero: int
     determinant: float = field(default=float("nan"), compare=False)
+    nearest: float = field(default=0.0, compare=False)
 
 
 def inertia_factors(comm: MPI.Comm, unknowns: int, scalars: int, sizes: Sizes | None = None) -> Factors:
