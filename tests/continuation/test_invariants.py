@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -15,7 +16,7 @@ from forms.symmetry import AXES, cross, left
 from rodfem import Discretization, Plan, Solver, clamped, free, trace
 from rodfem.continuation.branch import Point
 from rodfem.continuation.invariants import Invariants
-from rodfem.continuation.solvers import BranchSolver
+from rodfem.continuation.solvers import BranchSolver, Step
 from rodfem.errors import ConvergenceError
 from rodfem.fem.symmetries import add_change
 from rodfem.fem.system import System
@@ -96,19 +97,20 @@ def test_reactions_balance_the_load() -> None:
 @pytest.mark.alone
 @pytest.mark.parametrize("where", [0.0, 5.0])
 def test_a_violation_ends_the_branch_with_a_reason(where: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    correct: Callable[..., Any] = BranchSolver.correct
+    step: Callable[..., Step] = BranchSolver.step
 
-    def spoiling(self: BranchSolver, x: PETSc.Vec, *given: Any) -> Any:
-        outcome = correct(self, x, *given)
-        if self.system.scalar(x) > where:
-            self.system.set_load(x, self.system.scalar(x) + SMALL)
-            f = self.system.fields
-            begin = f.number[f.dofs["q"]].max() // 2
-            x.setValue(int(begin), x.getValue(int(begin)) + SMALL)
-            x.assemble()
-        return outcome
+    def spoiling(self: BranchSolver, *given: Any) -> Step:
+        made = step(self, *given)
+        if made.load <= where:
+            return made
+        x, f = made.x.copy(), self.system.fields
+        self.system.set_load(x, made.load + SMALL)
+        begin = f.number[f.dofs["q"]].max() // 2
+        x.setValue(int(begin), x.getValue(int(begin)) + SMALL)
+        x.assemble()
+        return replace(made, x=x)
 
-    monkeypatch.setattr(BranchSolver, "correct", spoiling)
+    monkeypatch.setattr(BranchSolver, "step", spoiling)
     diagram = trace(euler("clamped-pinned"), Discretization("reduced", 4, 4), Plan(depth=0, error_bars=False))
     (branch,) = diagram
     assert branch.ended.startswith("no convergence: At P = ")
