@@ -13,7 +13,8 @@ let cursor = null;
 
 const heights = (branch) => branch.ordinates[ordinate.key];
 
-function hover(branch, row) {
+// What is said of a row of a branch.
+export function hover(branch, row) {
   const words = branch.told[branch.words[row]];
   const special = branch.special.find((x) => x.row === row);
   const lines = [
