@@ -11,6 +11,7 @@ import numpy as np
 from rodfem.continuation.kinds import KINDS
 from rodfem.output.endings import endings
 from rodfem.output.plot_pieces import pieces_of
+from rodfem.report.frequencies import frequencies_of
 from rodfem.report.packing import plain
 from rodfem.report.readings import readings_of
 from rodfem.report.shapes import Shapes
@@ -49,7 +50,7 @@ def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str, natural:
         "told": [asdict(each) for each in told],
         "spectrum": columns.get("spectrum"),
         "omega2": columns.get("omega2"),
-        "motion": columns.get("motion"),
+        "frequencies": frequencies_of(branch),
         "unexplained": [change["row"] for change in branch.get("unexplained") or ()],
     }
 

@@ -336,6 +336,24 @@ def test_the_plane_of_loci_shows_states(opened: Callable[..., Any]) -> None:
     assert page.find_element(By.ID, "badge").text.startswith("STABLE")
 
 
+def test_frequencies_come_first_for_a_follower_load(opened: Callable[..., Any]) -> None:
+    """Leipholz's column (1962): two frequencies meet at q = 40.05, and the range above is shaded."""
+    page = opened("follower")
+    script = """const plot = document.getElementById("diagram"), star = plot.data.at(-1), { shapes } = plot.layout;
+        return [star.x[0], star.customdata[0][1], shapes.map((shape) => [shape.x0, shape.x1])]"""
+    load, row, ((low, high),) = page.execute_script(script)
+    assert load == pytest.approx(40.05, abs=5e-3) and low == pytest.approx(load) and high > low
+    assert "range of flutter" in page.find_element(By.ID, "legend").text
+    first = page.execute_script(
+        "return document.getElementById('diagram').data.filter((t) => t.mode == 'lines').map((t) => t.y[0])"
+    )
+    assert min(y for y in first if y is not None) == pytest.approx(3.51602, abs=1e-3)  # of the cantilever, at P = 0
+    click_at(page, 0, row)
+    until(page, lambda: shown(page)[1] == row)
+    page.find_elements(By.CSS_SELECTOR, "#ordinate option")[1].click()
+    until(page, lambda: "range of flutter" not in page.find_element(By.ID, "legend").text)
+
+
 def long(payload: dict[str, Any]) -> dict[str, Any]:
     """The same with a first branch of very many states."""
     branch = dict(payload["branches"][0])
@@ -356,7 +374,7 @@ def long(payload: dict[str, Any]) -> dict[str, Any]:
         "jumps": {symbol: [POINT] * POINTS for symbol in "vknm"},
         "bodies": [numbers] * POINTS,
         "maps": packed(maps),
-        **dict.fromkeys(("spectrum", "omega2", "motion")),
+        **dict.fromkeys(("spectrum", "omega2", "frequencies")),
         **{"special": [], "unexplained": [], "modes": {}, "readings": [], "endings": [], "image": ""},
     }
     return payload | {"branches": [branch], "start": [0, 0], "loci": []}

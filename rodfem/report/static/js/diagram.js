@@ -1,14 +1,18 @@
-// The bifurcation diagram: a trace for each piece of one index, special points, and the state that is shown.
+// The bifurcation diagram: a trace for each piece of one index, special points, and the state that is shown; of loads
+// without a potential the frequencies come first.
 
 import { data, escaped, reading } from "report/data";
 import { select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
+import * as frequencies from "report/frequencies";
 import { draw, layout } from "report/plotting";
 import { DASHES, ENDS, SYMBOLS, UNEXPLAINED, WIDTHS } from "report/styles";
 
 const plot = document.getElementById("diagram");
 const choice = document.getElementById("ordinate");
-let ordinate = data.ordinates[0];
+const FREQUENCIES = { key: "frequencies", name: "frequencies" };
+const ordinates = [...(frequencies.ANY ? [FREQUENCIES] : []), ...data.ordinates];
+let ordinate = ordinates[0];
 let cursor = null;
 
 const heights = (branch) => branch.ordinates[ordinate.key];
@@ -98,18 +102,20 @@ function traces() {
 }
 
 function redraw() {
+  document.body.dataset.ordinate = ordinate.key;
+  if (ordinate === FREQUENCIES) return draw(plot, frequencies.traces(), frequencies.frame());
   return draw(plot, traces(), layout(data.label, ordinate.label, { annotations: labels(), uirevision: ordinate.key }));
 }
 
 function moveCursor() {
   const b = data.branches[state.branch];
-  cursor(b.load[state.row], heights(b)[state.row] ?? undefined);
+  cursor(b.load[state.row], ordinate === FREQUENCIES ? null : (heights(b)[state.row] ?? undefined));
 }
 
 export async function start() {
-  for (const [i, each] of data.ordinates.entries()) choice.add(new Option(each.name, i));
+  for (const [i, each] of ordinates.entries()) choice.add(new Option(each.name, i));
   choice.addEventListener("change", async () => {
-    ordinate = data.ordinates[choice.value];
+    ordinate = ordinates[choice.value];
     await redraw();
     moveCursor();
   });
