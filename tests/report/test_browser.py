@@ -375,7 +375,7 @@ def long(payload: dict[str, Any]) -> dict[str, Any]:
         "bodies": [numbers] * POINTS,
         "maps": packed(maps),
         **dict.fromkeys(("spectrum", "omega2", "frequencies")),
-        **{"special": [], "unexplained": [], "modes": {}, "readings": [], "endings": [], "image": ""},
+        **{"special": [], "unexplained": [], "modes": {}, "readings": [], "endings": [], "image": "", "between": {}},
     }
     return payload | {"branches": [branch], "start": [0, 0], "loci": []}
 

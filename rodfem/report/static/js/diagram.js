@@ -32,13 +32,18 @@ export function hover(branch, row) {
   return lines.filter(Boolean).join("<br>");
 }
 
+// Points between a row and the next, each with the row that it is nearest to.
+const more = (found, row) => (found?.[0] ?? []).map((load, i, all) => [load, found[1][i], 2 * i < all.length ? row : row + 1]);
+
 function line(branch, number, piece) {
-  const [a, b] = piece.rows, rows = Array.from({ length: b - a + 1 }, (_, i) => a + i);
+  const [a, b] = piece.rows, between = branch.between[ordinate.key] ?? {};
+  const rows = Array.from({ length: b - a + 1 }, (_, i) => a + i);
+  const points = rows.flatMap((row) => [[branch.load[row], heights(branch)[row], row], ...(row < b ? more(between[row], row) : [])]);
   return {
-    x: rows.map((row) => branch.load[row]),
-    y: rows.map((row) => heights(branch)[row]),
-    customdata: rows.map((row) => [number, row]),
-    text: rows.map((row) => hover(branch, row)),
+    x: points.map(([load]) => load),
+    y: points.map(([, value]) => value),
+    customdata: points.map(([, , near]) => [number, near]),
+    text: points.map(([, , near]) => hover(branch, near)),
     hovertemplate: "%{text}<extra></extra>",
     mode: "lines",
     line: { color: branch.colour, width: WIDTHS[piece.kind], dash: DASHES[piece.kind], simplify: false },
