@@ -28,8 +28,9 @@ LEAST = 1e-3
 
 @dataclass(frozen=True)
 class FrequencyCurve:
-    """A curve of frequencies: loads, rows of the branch and roots with non-negative real part, all (n,), by ``motion``.
+    """A curve of frequencies, named by its ``motion``.
 
+    ``loads``, ``rows`` of the branch and ``roots`` with non-negative real part have the shape (n,).
     A conjugate pair is two curves, of which one has its roots left out of ``real`` and ``parts``.
     """
 
@@ -61,7 +62,7 @@ class FrequencyCurve:
 
 
 class Range(NamedTuple):
-    """An unstable range of the load, in words and in its shade."""
+    """An unstable range of the load, from ``low`` to ``high``, in ``words`` and in its ``shade``."""
 
     low: float
     high: float
