@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -13,12 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
-from rodfem.continuation.branch import Point
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.diagram.diagram import Diagram
 from rodfem.output.plot_pieces import STABLE, STYLES
 from rodfem.output.sheet import DPI, HALO, PALETTE, STYLE, save
 from rodfem.output.smooth import drawn_pieces
+
+if TYPE_CHECKING:
+    from rodfem.continuation.branch import Point
+    from rodfem.diagram.diagram import Diagram
 
 FOLDER = Path("results") / "course"
 """Where a script's pictures are."""
