@@ -64,3 +64,7 @@ def test_words_on_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(listed) == len(ENTRIES) and "fold, LP" in listed
     with pytest.raises(InputError, match="no entry 'foldd': try fold"):
         explanation("foldd")
+    with pytest.raises(InputError, match="no entry 'circle': try circle of states, or rodfem explain"):
+        explanation("circle")
+    with pytest.raises(InputError, match="no entry 'gravity': try rodfem explain, which lists all"):
+        explanation("gravity")
