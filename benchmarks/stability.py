@@ -324,9 +324,20 @@ def write(path: Path, store: Store) -> None:
     """Measure everything and write the page."""
     reduced, pointwise = times("reduced", store), times("pointwise", store)
     few, (scipys, ratios) = rich(store), beside_scipy(store)
-    band, rank = bands(), ranks()
+    counts = resolution(bands(), ranks())
+    path.write_text(
+        introduction(store, goals([reduced, pointwise], ratios))
+        + linear_elements(reduced, pointwise)
+        + comparison(scipys, reduced, pointwise, few)
+        + counts
+    )
+    print(f"{path}, measured in {store.took() / 60:.1f} minutes")
+
+
+def introduction(store: Store, reached: str) -> str:
+    """What was measured on which machine, and the goals that it ``reached``."""
     low, high = store.loads()
-    path.write_text(f"""# Every way to answer "is it stable?", and what it costs
+    return f"""# Every way to answer "is it stable?", and what it costs
 
 Written by `make bench` (`python -m benchmarks.stability`) in {store.took() / 60:.0f} minutes on
 {machine()}; {versions("petsc4py", "slepc4py", "numpy", "scipy")}; one thread;
@@ -345,8 +356,13 @@ that no eigenvalue is missing. No number: not tried, or stopped after {LIMIT:g} 
 
 ## Goals
 
-{goals([reduced, pointwise], ratios)}
-## Milliseconds, linear elements
+{reached}
+"""
+
+
+def linear_elements(reduced: Times, pointwise: Times) -> str:
+    """Times on linear elements, for both formulations."""
+    return f"""## Milliseconds, linear elements
 
 Reduced formulation (an integral constraint):
 
@@ -360,7 +376,12 @@ Left-most eigenvalue for n = {ELEMENTS[2]}: {pointwise.first}.
 
 The exponent is that of time over n from n = 1000 on.
 
-## Beside scipy
+"""
+
+
+def comparison(scipys: str, reduced: Times, pointwise: Times, few: str) -> str:
+    """Times beside those of scipy, memory, and times for few elements of high degree."""
+    return f"""## Beside scipy
 
 Milliseconds for {NUMBER} left-most eigenvalues at n = {ELEMENTS[2]}, of the straight cord at lam = {LOAD:g} and of
 the one buckled into its first branch at lam = {BUCKLED:g}. Some of rodfem's time is the proof that none is missing, one
@@ -378,7 +399,12 @@ Pointwise:
 ## Milliseconds, few elements of high degree (reduced)
 
 {few}
-## What the count resolves
+"""
+
+
+def resolution(band: str, rank: str) -> str:
+    """What the count resolves, and the rank of the constraints."""
+    return f"""## What the count resolves
 
 The band is the half width of the interval about zero in which inertia alone decides nothing, relative to the system's
 metric: 10 eps |S| over the smallest mass. Inside it the Rayleigh quotient of the pair nearest zero decides, which
@@ -392,8 +418,7 @@ elements of high degree reach more digits with a narrower band.
 The smallest singular value of the gradients C of the pointwise constraints, and over the size h of an element, for
 linear elements: it vanishes like h, as in Table 5 of Kumar & Healey (2010).
 
-{rank}""")
-    print(f"{path}, measured in {store.took() / 60:.1f} minutes")
+{rank}"""
 
 
 def main() -> None:

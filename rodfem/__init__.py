@@ -60,6 +60,7 @@ Type checkers read ``__init__.pyi``.
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import Any
 
@@ -104,7 +105,6 @@ _HOMES = {
     "load_json": "output.files",
 }
 
-# Not __all__: with it help(rodfem) prints every class in full, 1400 lines.
 _NAMES = sorted(_HOMES)
 
 __doc__ = f"{__doc__ or ''}\nPublic names, by module (``help(rodfem.Scene)`` describes one of them):\n\n" + "\n".join(
@@ -113,7 +113,13 @@ __doc__ = f"{__doc__ or ''}\nPublic names, by module (``help(rodfem.Scene)`` des
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name from its module, or a module of the package, at first use."""
+    """Load a public name from its module, or a module of the package, at first use.
+
+    ``from rodfem import *`` asks for ``__all__``, and so does ``help(rodfem)``, which would print every class in full,
+    1400 lines: it gets none.
+    """
+    if name == "__all__" and sys._getframe(1).f_globals.get("__name__") != "pydoc":
+        return _NAMES
     if name in _HOMES:
         return getattr(import_module(f"rodfem.{_HOMES[name]}"), name)
     module = submodule("rodfem", name)

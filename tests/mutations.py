@@ -59,6 +59,14 @@ FAULTS = {
         "    set_phase(step, step->x);\n    int moved",
         "    int moved",
         STEP,
+    "a-mass-brings-a-unit-rotary-inertia": Fault(
+        "rodfem/problem/scene.py", '"rho_I", _no_rotary)', '"rho_I", _unit_rotary)', "tests/problem/test_inertia.py"
+    ),
+    "pictures-draw-chords": Fault(
+        "rodfem/output/smooth.py",
+        "SEEN, LARGEST = 1e-3, 0.5",
+        "SEEN, LARGEST = 1e3, 0.5",
+        "tests/output/test_smooth.py",
     ),
     # location
     "location-is-blunt": Fault(f"{CONTINUATION}locate.py", "SHARP = 1e-11", "SHARP = 1e-4", f"{HEMITROPIC} {GOLDEN}"),

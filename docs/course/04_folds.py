@@ -16,7 +16,7 @@
 # %%
 import numpy as np
 
-from rodfem.course.pictures import axes, show
+from rodfem.course.pictures import axes, equilibria, shapes, show
 
 ax = axes("place $x$ of the apex", "energy, each load shifted")
 for shift, p in enumerate((0.0, 0.2, 2 / np.sqrt(27), 0.6)):
@@ -24,8 +24,7 @@ for shift, p in enumerate((0.0, 0.2, 2 / np.sqrt(27), 0.6)):
     ax.plot(x := np.linspace(-1.55, 1.65, 200), energy(x), lw=2, label=f"$p = {p:.3f}$")
     for root in energy.deriv().roots:
         if abs(root.imag) < 1e-6:
-            stable = energy.deriv(2)(root.real) > 1e-6
-            ax.plot(root.real, energy(root.real), "ko", mfc="k" if stable else "w", ms=7)
+            ax.plot(root.real, energy(root.real), "ko", mfc="k" if energy.deriv(2)(root.real) > 1e-6 else "w", ms=7)
 ax.legend(frameon=False)
 ax.set_yticks([])
 show(ax.figure, "04_truss")
@@ -117,11 +116,14 @@ machine = Scene(name="machine", parameters={"w": 0.0}, load="w", span=(0.0, 1.5)
 
 mesh = Discretization(elements=8, degree=8)
 diagram = rodfem.trace(dead, mesh, Plan(depth=0))
-show(diagram.plot(), "04_arch")
 solver, held = Solver(machine, mesh), None
 for w in np.linspace(0.0, 1.18, 13):
     held = solver.equilibrium(w, guess=held)
 pushed = next(p for p in diagram["arch"].points if p.ordinate > 1.18)
+ax = equilibria({"": diagram}, "dead load $P$", "displacement of the crown")
+first = diagram.special("fold")[0]
+shapes(ax, diagram, {"as made": diagram[0].points[0], "at the fold": first.point, "beyond it": pushed})
+show(ax.figure, "04_arch")
 print(f"the crown at 1.18: index {pushed.index} under the dead load, {held.index} in the machine")
 
 # %% [markdown]
@@ -130,10 +132,8 @@ print(f"the crown at 1.18: index {pushed.index} under the dead load, {held.index
 # DaDeppo and Schmidt (J. Appl. Mech. 42, 1975) found $P = 8.97$; to more digits it is 8.973089969728.
 
 # %%
-first = diagram.special("fold")[0]
 answer = first.point.load
-assert abs(answer - 8.973089969728) < 1e-8 and abs(fold - answer) < 2e-4
-assert (pushed.index, held.index) == (1, 0)
+assert abs(answer - 8.973089969728) < 1e-8 and abs(fold - answer) < 2e-4 and (pushed.index, held.index) == (1, 0)
 print(f"P = {answer:.9f} +- {first.error_estimate:.0e}, index {first.negative_before} -> {first.negative_after}")
 
 # %% [markdown]

@@ -19,7 +19,7 @@
 # %%
 import numpy as np
 
-from rodfem.course.pictures import axes, show
+from rodfem.course.pictures import axes, equilibria, show
 
 EULER = np.pi**2 / 4
 near = lambda a, eps: EULER * (1 + a**2 / 8) - 4 * eps / (np.pi * a)  # noqa: E731, load of the amplitude a
@@ -107,13 +107,15 @@ def bent(s):  # quaternions of a rotation by -1.7 sin(pi s/2)
     return np.stack([np.cos(half), 0 * s, np.sin(half), 0 * s], axis=1)
 
 
-perfect = rodfem.trace(column, plan=Plan(depth=1)).special("branch point")[0]
+straight = rodfem.trace(column, plan=Plan(depth=1))
+perfect = straight.special("branch point")[0]
 print(perfect, perfect.law, sep="\n")
 imperfect = column.varying("P", (1.0, 4.0), eps=0.02)
 followed = rodfem.trace(imperfect)
 other = rodfem.trace(replace(imperfect, start=bent, span=(4.0, 1.0), states="the other one"))
-show(other.plot(), "05_snap")
 (snap,) = other.special("fold")
+curves = {"perfect": straight, "followed": followed, "the other": other}
+show(equilibria(curves, "thrust $P$", "tip displacement").figure, "05_snap")
 print(f"followed: {followed.special()}; the other: {snap}")
 
 # %% [markdown]
@@ -126,10 +128,9 @@ print(f"followed: {followed.special()}; the other: {snap}")
 
 # %%
 answer = perfect.law.coefficient * (2 / np.pi) ** 2 / EULER
-koiter = near(-at_fold(0.02), 0.02)
 assert abs(answer - 1 / 8) < 1e-6 and abs(curvature - 1 / 8) < 1e-6
 assert followed.special() == [] and abs(snap.point.load - 2.5764720698) < 1e-8
-print(f"curvature {answer:.9f} (exact 1/8); the fold is at {snap.point.load:.10f}, Koiter's law says {koiter:.4f}")
+print(f"curvature {answer:.9f} (1/8); fold at {snap.point.load:.10f}, by Koiter {near(-at_fold(0.02), 0.02):.4f}")
 
 # %% [markdown]
 # ## Exercises

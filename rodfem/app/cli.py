@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import os
 import re
-import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from typing import Any, NoReturn
 
 from rodfem.app import petsc_options
 from rodfem.app.interrupts import listen
+from rodfem.app.pipes import end_quietly
 from rodfem.errors import ConvergenceError, InputError, SetupError
 
 NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
@@ -112,7 +112,7 @@ def start_petsc(options: Sequence[str]) -> None:
         petsc_options.check(options)
         petsc4py = import_module("petsc4py")
         petsc4py.init(["rodfem", *options])
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # of PETSc is a page of errors where a reader, as head, has left
+        end_quietly()
     except InputError as trouble:
         complain(str(trouble))
     except Exception as trouble:  # petsc4py has no class of its own for errors until PETSc is loaded

@@ -14,13 +14,14 @@ import os
 import sys
 
 from rodfem.app import console
+from rodfem.app.pipes import end_quietly
 
 
 def lesson(name: str) -> bool:
     """Whether the file's own cell is to run: it is the program, or a notebook, and has no options.
 
     With options the file is ``rodfem run FILE OPTIONS``, with the errors and the status of that, and the cell does not
-    run.  What a lesson prints is printed by the first rank alone.
+    run.  What a lesson prints is printed by the first rank alone, until nobody reads it.
 
     Parameters
     ----------
@@ -37,6 +38,7 @@ def lesson(name: str) -> bool:
         return False
     from mpi4py import MPI
 
+    end_quietly()
     if MPI.COMM_WORLD.rank:
         sys.stdout = open(os.devnull, "w")
     return True

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
@@ -209,6 +209,15 @@ class Locus:
         return "\n".join([*lines, f"  {n} points; ends: {self.ended[0]}; {self.ended[1]}"])
 
 
+class Curve(NamedTuple):
+    """``nodes`` of a curve, its rows with ``marks``, the row of its ``start``, and why it ``ended`` on either side."""
+
+    nodes: list[LocusPoint]
+    marks: dict[int, str]
+    start: int
+    ended: tuple[str, str]
+
+
 def locus(
     solver: StaticSolver,
     special: SpecialPoint,
@@ -255,23 +264,30 @@ def locus(
         criterion = _criterion(solver, plane, special.kind, guess)
         first = criterion.correct(p, special.point.x, (np.array([0.0, 1.0]) * plane.width, None), guess, 0.1)
         tracer = Tracer(criterion, plane, steps)
-        nodes, marks, start, ended = _both_sides(tracer, first)
-        level = float(p[1])
-        crossings = [(float(first.p[0]), first.ordinate)]
-        for a, b in (pair for side in (nodes[:start][::-1], nodes[start + 1 :]) for pair in pairwise(side)):
-            if (a.p[1] - level) * (b.p[1] - level) < 0:
-                crossings += [(float(n.p[0]), n.ordinate) for n in tracer.crossed(a, b, 1, level)]
-        error = np.full((len(nodes), 2), np.nan)
-        if error_bars:
-            rows = np.linspace(0, len(nodes) - 1, error_bars).round().astype(int).tolist()
-            _estimate(solver, special.kind, plane, nodes, sorted({*rows, *marks}), error)
+        found = _both_sides(tracer, first)
+        crossings = _crossings(tracer, found, first, float(p[1]))
+        error = _errors(solver, special.kind, plane, found, error_bars)
+    return _locus(solver, special, (plane.names, bounds), found, crossings, error)
+
+
+def _locus(
+    solver: StaticSolver,
+    special: SpecialPoint,
+    plane: tuple[tuple[str, str], tuple[Interval, Interval]],
+    found: Curve,
+    crossings: list[tuple[float, float]],
+    error: np.ndarray,
+) -> Locus:
+    """The curve that was found in a ``plane``, its names and bounds, with what a file of it says about the scene."""
+    scene, nodes, (names, bounds) = solver.system.scene, found.nodes, plane
     rest, k = np.array([n.rest for n in nodes]), special.multiplicity
+    load, other = (scene.parameters[name] for name in names)
     return Locus(
         scene=scene.name,
         title=scene.title or scene.name,
         kind=special.kind,
-        names=plane.names,
-        labels=(scene.parameters[scene.load].label or scene.load, scene.parameters[parameter].label or parameter),
+        names=names,
+        labels=(load.label or names[0], other.label or names[1]),
         ordinate_name=scene.ordinate.name,
         bounds=bounds,
         values=np.array([n.p for n in nodes]),
@@ -281,20 +297,39 @@ def locus(
         omega2=np.array([n.omega2 for n in nodes]),
         located_to=np.array([n.located_to for n in nodes]),
         error=error,
-        marks=[Mark(kind, row) for row, kind in sorted(marks.items())],
-        start=start,
-        ended=ended,
-        constants={name: v.value for name, v in scene.parameters.items() if name not in plane.names},
-        discretization=mesh_of(system),
+        marks=[Mark(kind, row) for row, kind in sorted(found.marks.items())],
+        start=found.start,
+        ended=found.ended,
+        constants={name: v.value for name, v in scene.parameters.items() if name not in names},
+        discretization=mesh_of(solver.system),
         states=[n.x for n in nodes],
         crossings=crossings,
-        words=(scene.parameters[scene.load].words, scene.parameters[parameter].words),
-        units=(scene.parameters[scene.load].unit, scene.parameters[parameter].unit),
+        words=(load.words, other.words),
+        units=(load.unit, other.unit),
     )
 
 
-def _both_sides(tracer: Tracer, first: LocusPoint) -> tuple[list[LocusPoint], dict[int, str], int, tuple[str, str]]:
-    """Points of the curve through the ``first`` one, marked rows, the row of the first, and why either side ends."""
+def _crossings(tracer: Tracer, found: Curve, first: LocusPoint, level: float) -> list[tuple[float, float]]:
+    """Load and ordinate at the start, and wherever else the curve passes the second parameter's value there."""
+    crossings = [(float(first.p[0]), first.ordinate)]
+    for side in (found.nodes[: found.start][::-1], found.nodes[found.start + 1 :]):
+        for a, b in pairwise(side):
+            if (a.p[1] - level) * (b.p[1] - level) < 0:
+                crossings += [(float(n.p[0]), n.ordinate) for n in tracer.crossed(a, b, 1, level)]
+    return crossings
+
+
+def _errors(solver: StaticSolver, kind: str, plane: Plane, found: Curve, error_bars: int) -> np.ndarray:
+    """Estimated errors (n, 2) at so many rows and at the marked ones, nan elsewhere."""
+    error = np.full((len(found.nodes), 2), np.nan)
+    if error_bars:
+        rows = np.linspace(0, len(found.nodes) - 1, error_bars).round().astype(int).tolist()
+        _estimate(solver, kind, plane, found.nodes, sorted({*rows, *found.marks}), error)
+    return error
+
+
+def _both_sides(tracer: Tracer, first: LocusPoint) -> Curve:
+    """The curve through the ``first`` point, to both sides."""
     onwards = tracer.run(first)
     backwards = Half([first], ended="closed curve")
     if onwards.ended != "closed curve":
@@ -302,7 +337,7 @@ def _both_sides(tracer: Tracer, first: LocusPoint) -> tuple[list[LocusPoint], di
     start = len(backwards.nodes) - 1
     marks = {start - i: kind for i, kind in backwards.marks.items()}
     marks |= {start + i: kind for i, kind in onwards.marks.items()}
-    return backwards.nodes[:0:-1] + onwards.nodes, marks, start, (backwards.ended, onwards.ended)
+    return Curve(backwards.nodes[:0:-1] + onwards.nodes, marks, start, (backwards.ended, onwards.ended))
 
 
 def _guess(solver: StaticSolver, special: SpecialPoint, p: np.ndarray) -> LocusPoint:

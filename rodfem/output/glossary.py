@@ -225,6 +225,8 @@ def explanation(word: str) -> list[tuple[str, str]]:
     if not found:
         found = [name for name in NAMES if name.lower() == " ".join(word.lower().split())]
     if not found:
-        near = get_close_matches(word.lower(), NAMES, n=NEAR) or ["index"]
-        raise InputError(f"There is no entry {word!r}: try {' or '.join(near)}, or rodfem explain, which lists all.")
+        inside = [name for name in NAMES if word.lower() in name.lower().replace(",", "").split()]
+        near = inside[:NEAR] or get_close_matches(word.lower(), NAMES, n=NEAR)
+        best = f"{' or '.join(near)}, or rodfem explain" if near else "rodfem explain"
+        raise InputError(f"There is no entry {word!r}: try {best}, which lists all.")
     return [(title(NAMES[name]), ENTRIES[NAMES[name]]) for name in dict.fromkeys(found)]

@@ -23,7 +23,7 @@ from rodfem.output.contents import read_diagram
 from rodfem.output.endings import endings
 from rodfem.output.placement import dense, place_words
 from rodfem.output.plot_images import draw_images
-from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, Piece, hidden, pieces_of
+from rodfem.output.plot_pieces import COUNTED, STABLE, STYLES, Piece, hidden
 from rodfem.output.program import status_of, terse
 from rodfem.output.sheet import (
     DPI,
@@ -39,6 +39,7 @@ from rodfem.output.sheet import (
     save,
     tex,
 )
+from rodfem.output.smooth import drawn_pieces
 from rodfem.output.view import POINT
 
 __all__ = ["draw_diagram", "main"]
@@ -150,7 +151,7 @@ def _draw_branches(
     pieces: list[Piece] = []
     found: dict[str, list[tuple[float, float]]] = {}
     for number, (branch, colour) in enumerate(zip(branches, cycle(PALETTE), strict=False)):
-        new = list(pieces_of(branch, colour))
+        new = list(drawn_pieces(branch, colour))
         pieces += new
         shape = SHAPES[number // HUES % len(SHAPES)]
         handles.append(Line2D([], [], ls="", marker=shape or "s", ms=8, color=colour, label=branch["name"]))

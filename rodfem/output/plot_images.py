@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from rodfem.output.plot_pieces import STYLES, pieces_of
+from rodfem.output.plot_pieces import STYLES
+from rodfem.output.smooth import drawn_pieces
 
 Floats = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ def draw_images(axes: Axes, branches: Sequence[Mapping[str, Any]], colours: Sequ
     for branch, colour in zip(branches, colours, strict=True):
         if not branch.get("image") or is_traced(branch, branches):
             continue
-        for piece in pieces_of(branch, colour):
+        for piece in drawn_pieces(branch, colour):
             style = STYLES[piece.kind] | {"linewidth": THIN, "alpha": PALE}
             axes.plot(*(piece.curve * [1.0, -1.0]).T, color=colour, **style)
         words = f"{IMAGE}{branch['image']}"

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from rodfem.continuation.kinds import BRANCH_POINT, KINDS, USER
 from rodfem.file_format import LOCUS
 from rodfem.output.sheet import DPI, FONT, HALO, PALETTE, SIZE, STYLE, at_most, mesh_in_words, named, save, tex
+from rodfem.output.stable_region import WORDS, stable_region
 from rodfem.output.view import POINT
 
 LINES = {name: (PALETTE[kind.line[0]], kind.line[1]) for name, kind in KINDS.items() if kind.line is not None}
@@ -65,35 +66,15 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     ValueError
         Without any locus, or if they are not of the same parameters.
     """
-    if not loci:
-        raise ValueError("There is no locus to draw: give the contents of at least one file.")
-    for one in loci:
-        LOCUS.check(one, "The locus", ("parameters", "columns", "marks", "start", "labels", "discretization"))
-    names = loci[0]["parameters"]
-    if any(one["parameters"] != names for one in loci):
-        raise ValueError("The loci are of different parameters: draw them one by one.")
+    _check(loci)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
         axes = figure.subplots()
         axes.set_axisbelow(True)
         axes.margins(y=ROOM)
-        for one in loci:
-            kind, columns = one["kind"], one["columns"]
-            x, y = (np.asarray(columns[name], dtype=float) for name in reversed(names))
-            colour, dashes = LINES[kind]
-            axes.plot(x, y, color=colour, linestyle=dashes, linewidth=2.2, label=kind)
-            for row, what in [(one["start"], "start"), *((m["row"], m["kind"]) for m in one["marks"])]:
-                style = POINTS.get("ends" if BRANCH_POINT in what else what.split()[0])
-                if style:
-                    axes.plot(x[row], y[row], linestyle="none", zorder=5, path_effects=HALO, **style)
-        for one in loci:
-            _fill_stable_region(axes, one, loci)
-        words, units = (loci[0].get(name, ("", "")) for name in ("words", "units"))
-        load, other = (named(*axis) for axis in zip(words, loci[0]["labels"], units, strict=True))
-        axes.set_xlabel(other, fontsize=FONT + 1)
-        axes.set_ylabel(load, fontsize=FONT + 1)
-        axes.set_title(tex(loci[0]["title"]))
-        figure.supxlabel(_footer(loci), fontsize=FONT - 3, color="0.4", x=0.012, ha="left")
+        _draw_curves(axes, loci)
+        _fill_stable_regions(axes, loci)
+        _name(figure, axes, loci)
         figure.draw_without_rendering()
         for one in loci:
             _shade_stable_side(axes, one)
@@ -104,6 +85,46 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
         for one in loci:
             _write_indices(axes, one)
     return save(figure, path)
+
+
+def _check(loci: Sequence[Mapping[str, Any]]) -> None:
+    """Raise what :func:`draw_locus` raises for loci that are no picture."""
+    if not loci:
+        raise ValueError("There is no locus to draw: give the contents of at least one file.")
+    for one in loci:
+        LOCUS.check(one, "The locus", ("parameters", "columns", "marks", "start", "labels", "discretization"))
+    if any(one["parameters"] != loci[0]["parameters"] for one in loci):
+        raise ValueError("The loci are of different parameters: draw them one by one.")
+
+
+def _draw_curves(axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:
+    """Draw the curves with the marks of their rows."""
+    for one in loci:
+        kind, columns = one["kind"], one["columns"]
+        x, y = (np.asarray(columns[name], dtype=float) for name in reversed(one["parameters"]))
+        colour, dashes = LINES[kind]
+        axes.plot(x, y, color=colour, linestyle=dashes, linewidth=2.2, label=kind)
+        for row, what in [(one["start"], "start"), *((m["row"], m["kind"]) for m in one["marks"])]:
+            style = POINTS.get("ends" if BRANCH_POINT in what else what.split()[0])
+            if style:
+                axes.plot(x[row], y[row], linestyle="none", zorder=5, path_effects=HALO, **style)
+
+
+def _fill_stable_regions(axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:
+    """Fill the regions that :func:`~rodfem.output.stable_region.stable_region` finds."""
+    for one in loci:
+        if region := stable_region(one, loci):
+            axes.fill_between(*region, color=STABLE_REGION, lw=0, zorder=-1, label=WORDS)
+
+
+def _name(figure: Figure, axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:
+    """Name the axes and the picture, and say how it was computed."""
+    words, units = (loci[0].get(name, ("", "")) for name in ("words", "units"))
+    load, other = (named(*axis) for axis in zip(words, loci[0]["labels"], units, strict=True))
+    axes.set_xlabel(other, fontsize=FONT + 1)
+    axes.set_ylabel(load, fontsize=FONT + 1)
+    axes.set_title(tex(loci[0]["title"]))
+    figure.supxlabel(_footer(loci), fontsize=FONT - 3, color="0.4", x=0.012, ha="left")
 
 
 def _write_indices(axes: Axes, one: Mapping[str, Any]) -> None:
@@ -120,42 +141,6 @@ def _write_indices(axes: Axes, one: Mapping[str, Any]) -> None:
     colour = LINES[one["kind"]][0]
     text = axes.text(*at, f"{low}|{high}", color=colour, weight="bold", ha="center", va="center", zorder=6)
     text.set(path_effects=HALO)
-
-
-def _fill_stable_region(axes: Axes, one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> None:
-    """Fill what lies between the stable side of a locus of branch points and the next locus, or the load's bound.
-
-    Only of a curve with one load for each value of the other parameter.
-    """
-    columns, (load, other) = one["columns"], one["parameters"]
-    x, y = (np.asarray(columns[name], dtype=float) for name in (other, load))
-    side, low = one.get("lower"), [pair[0] for pair in columns["index"]]
-    steps = np.diff(x)
-    if not side or any(low) or len(x) < 2 or not ((steps > 0).all() or (steps < 0).all()):
-        return
-    order = np.argsort(x)
-    grid = np.linspace(x.min(), x.max(), 400)
-    edge = np.interp(grid, x[order], y[order])
-    end = np.full(len(grid), float(one["bounds"][0][int(side > 0)]))
-    for another in loci:
-        if another is not one:
-            for level in _levels(another, grid):
-                between = side * (level - edge) > 0
-                end = np.where(between & (side * (level - end) < 0), level, end)
-    axes.fill_between(
-        grid, edge, end, color=STABLE_REGION, lw=0, zorder=-1, label="stable, as far as these curves tell"
-    )
-
-
-def _levels(one: Mapping[str, Any], grid: np.ndarray) -> list[np.ndarray]:
-    """Loads (len(grid),) at which each segment of a locus has these values of the second parameter; nan where none."""
-    load, other = one["parameters"]
-    x, y = (np.asarray(one["columns"][name], dtype=float) for name in (other, load))
-    found = []
-    for i in np.flatnonzero(np.diff(x) != 0):
-        share = (grid - x[i]) / (x[i + 1] - x[i])
-        found.append(np.where((share >= 0) & (share <= 1), y[i] + share * (y[i + 1] - y[i]), np.nan))
-    return found
 
 
 def _shade_stable_side(axes: Axes, one: Mapping[str, Any]) -> None:

@@ -90,15 +90,12 @@ def draw_shape(
     if radius is not None and not 0.0 < radius < float("inf"):
         raise ValueError(f"radius={radius} is not positive: expected a length, try 0.01 or leave it out")
     state = _read(Path(states), branch, row)
-    length = np.linalg.norm(np.diff(state.centres, axis=0), axis=1).sum()
-    thickness = float(radius or min(length / 90.0, np.linalg.norm(np.ptp(state.centres, axis=0)) / 40.0))
-    text = state.caption if caption is None else caption
+    thickness = radius or state.thickness()
     view = state.view() if view is None else view
-    solids = state.solids(thickness, view)
     pyvista = _import_pyvista()
-    font = str(Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf"))
     plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
     plotter.set_background("white")
+    solids = state.solids(thickness, view)
     for solid in solids:
         _add(pyvista, plotter, solid)
     _add_directors(pyvista, plotter, state.centres, state.directors, thickness)
@@ -107,17 +104,43 @@ def draw_shape(
     arrows, names = triad(view, corner, 2.0 * ARROW / size[1] * scale)
     for solid in arrows:
         _add(pyvista, plotter, solid)
-    top = 1.0 - 70.0 / size[1]
-    labels = [(text, 0.5, 0.03, "black"), ("d₁", 1.0 - 104.0 / size[0], top, FIRST)]
-    labels += [("d₂", 1.0 - 48.0 / size[0], top, SECOND)]
-    labels += [("load", 1.0 - 184.0 / size[0], top, LOAD)] if any(solid.color == LOAD for solid in solids) else []
     share, down = ARROW / np.array(size), np.array([0.0, 15.0 / size[1]])
-    labels += [(name, *(place - down + share * at), DARK) for name, at in names]
-    labels += [("not drawn: " + ", ".join(notes), 0.5, 0.095, DARK)] if (notes := state.setting.notes) else []
+    axes = [(name, *(place - down + share * at), DARK) for name, at in names]
+    loaded = any(solid.color == LOAD for solid in solids)
+    text = state.caption if caption is None else caption
+    _write(plotter, [*_labels(text, loaded, size), *axes, *_notes(state)], size)
+    return _shoot(plotter, path)
+
+
+Label = tuple[str, float, float, str]
+"""Words, their place in shares of the picture, from its lower left corner, and their colour."""
+
+
+def _labels(caption: str, loaded: bool, size: tuple[int, int]) -> list[Label]:
+    """The line at the foot, and the names of what has its colour."""
+    top = 1.0 - 70.0 / size[1]
+    labels = [(caption, 0.5, 0.03, "black"), ("d₁", 1.0 - 104.0 / size[0], top, FIRST)]
+    labels += [("d₂", 1.0 - 48.0 / size[0], top, SECOND)]
+    return labels + ([("load", 1.0 - 184.0 / size[0], top, LOAD)] if loaded else [])
+
+
+def _notes(state: State) -> list[Label]:
+    """What of a state is not drawn."""
+    notes = state.setting.notes
+    return [("not drawn: " + ", ".join(notes), 0.5, 0.095, DARK)] if notes else []
+
+
+def _write(plotter: Any, labels: Sequence[Label], size: tuple[int, int]) -> None:
+    """Write labels, each in one line that fits the picture."""
+    font = str(Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf"))
     for label, x, y, colour in filter(lambda item: item[0], labels):
         style = {"font_size": min(20, int(0.875 * size[0]) // len(label)), "color": colour, "font_file": font}
         actor = plotter.add_text(label, position=(x, y), viewport=True, **style)
         actor.GetTextProperty().SetJustificationToCentered()
+
+
+def _shoot(plotter: Any, path: Path) -> Path:
+    """Write the picture, and close the plotter; raises RuntimeError for a blank one."""
     plotter.enable_anti_aliasing("ssaa")
     path.parent.mkdir(parents=True, exist_ok=True)
     with draft_of(path) as draft:
@@ -161,6 +184,11 @@ class State:
         held, moved = self.setting, self.centres - self.reference
         axis, side, feet = axis_of(held, self.reference), held.widest(self.directors[0]), on_feet(held)
         return view_of(self.reference, moved, axis=axis, down=held.down, load=held.force, side=side, feet=feet)
+
+    def thickness(self) -> float:
+        """Mean radius with which the rod is drawn."""
+        length = np.linalg.norm(np.diff(self.centres, axis=0), axis=1).sum()
+        return float(min(length / 90.0, np.linalg.norm(np.ptp(self.centres, axis=0)) / 40.0))
 
     def solids(self, radius: float, view: Floats) -> list[Solid]:
         """The rod, its stripe, what holds it and what loads it."""

@@ -71,17 +71,35 @@ class Parameter:
             raise SceneError(f"{name} = {value:g} is outside its admissible range: choose {low:g} < {name} < {high:g}.")
 
 
+def _massless(c: Constants) -> float:
+    return 0.0
+
+
+def _unit_rotary(c: Constants) -> Vector:
+    return (1.0, 1.0, 1.0)
+
+
+def _no_rotary(c: Constants) -> Vector:
+    return (0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True)
 class Inertia:
     """Mass ``rho_A(c)`` and rotary inertia ``rho_I(c)`` about the directors, both per unit length.
 
-    Only frequencies need them, and the stability of states under loads without a potential.
+    Only frequencies need them, and the stability of states under loads without a potential.  Of a rod with a mass and
+    no ``rho_I`` the rotary inertia is zero, as of a slender one; without either it is one, by which eigenvalues count.
     """
 
-    rho_A: Callable[[Constants], Any] = role_field(Role("mass per length", "f(c)", 0, along=True), lambda c: 0.0)
+    rho_A: Callable[[Constants], Any] = role_field(Role("mass per length", "f(c)", 0, along=True), _massless)
     rho_I: Callable[[Constants], Vector] = role_field(
-        Role("rotary inertia per length", "f(c)", 3, along=True), lambda c: (1.0, 1.0, 1.0)
+        Role("rotary inertia per length", "f(c)", 3, along=True), _unit_rotary
     )
+
+    def __post_init__(self) -> None:
+        """Give a rod with a mass no rotary inertia but its own."""
+        if self.rho_A is not _massless and self.rho_I is _unit_rotary:
+            object.__setattr__(self, "rho_I", _no_rotary)
 
 
 def _role_of_ordinate(ordinate: Ordinate) -> Role:

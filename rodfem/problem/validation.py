@@ -217,7 +217,8 @@ def check_inertia(scene: Scene) -> None:
     beyond = [x for x in masses + rotary if x and not TINIEST < x < LARGEST]
     if beyond:
         raise SceneError(f"A mass or rotary inertia of {beyond[0]:g} has powers that are no floats: use other units.")
-    if not scene.conservative and max(masses) == 0 and scene.inertia == type(scene.inertia)():
+    given = max(masses + rotary) > 0 and scene.inertia != type(scene.inertia)()
+    if not scene.conservative and max(masses) == 0 and not given:
         raise SceneError(
             f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter of "
             "motion, so give it an inertia, as in inertia=Inertia(rho_A=lambda c: 1.0)."

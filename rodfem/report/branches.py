@@ -11,6 +11,8 @@ import numpy as np
 from rodfem.continuation.kinds import KINDS
 from rodfem.output.endings import endings
 from rodfem.output.plot_pieces import pieces_of
+from rodfem.output.smooth import between
+from rodfem.report.frequencies import frequencies_of
 from rodfem.report.packing import plain
 from rodfem.report.readings import readings_of
 from rodfem.report.shapes import Shapes
@@ -32,6 +34,7 @@ def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str, natural:
     columns = branch["columns"]
     words = words_of(branch)
     told = list(dict.fromkeys(words))
+    ordinates = {name: plain(np.array(columns[name], dtype=float)) for name in _listed(columns)} | _derived(shapes)
     return {
         "name": branch["name"],
         "colour": colour,
@@ -40,8 +43,8 @@ def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str, natural:
         "endings": [list(ending) for ending in endings(branch)],
         "load": columns["load"],
         "negative": columns["negative"],
-        "ordinates": {name: plain(np.array(columns[name], dtype=float)) for name in _listed(columns)}
-        | _derived(shapes),
+        "ordinates": ordinates,
+        "between": _between(branch, ordinates),
         "readings": readings_of(branch, natural),
         "pieces": _pieces(branch, colour),
         "special": [_special(x) for x in branch["special"]],
@@ -49,9 +52,15 @@ def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str, natural:
         "told": [asdict(each) for each in told],
         "spectrum": columns.get("spectrum"),
         "omega2": columns.get("omega2"),
-        "motion": columns.get("motion"),
+        "frequencies": frequencies_of(branch),
         "unexplained": [change["row"] for change in branch.get("unexplained") or ()],
     }
+
+
+def _between(branch: Mapping[str, Any], ordinates: Mapping[str, Any]) -> dict[str, dict[int, list[list[float]]]]:
+    """Loads and values of each ordinate between rows, by the row before, where these are far from each other."""
+    more = {**branch, "columns": {**branch["columns"], **ordinates}}
+    return {name: {row: found.T.tolist() for row, found in between(more, name).items()} for name in ordinates}
 
 
 def ordinates_of(data: Mapping[str, Any]) -> list[str]:

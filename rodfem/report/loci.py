@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -11,15 +11,43 @@ from rodfem.errors import InputError
 from rodfem.file_format import LOCUS, read_json
 from rodfem.output.digits import with_unit
 from rodfem.output.plot_locus import LINES
+from rodfem.output.stable_region import stable_region
 from rodfem.report.labels import html_of
+from rodfem.tolerances import SAME_SPECIAL, unit
 
-NEEDED = ("parameters", "columns", "marks", "start", "labels", "kind")
+NEEDED = ("parameters", "columns", "marks", "start", "labels", "kind", "bounds")
+REGION = 120
+"""Values of the second parameter at which the page has the bounds of a region."""
 
 
 def loci_of(folder: Path, data: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Loci of a folder in the order of their numbers; raises :class:`InputError` for one of another load."""
     files = sorted(folder.glob("locus-*.json"), key=lambda path: (len(path.name), path.name))
-    return [_locus(path, data) for path in files]
+    read = [read_json(path, LOCUS, NEEDED) for path in files]
+    found = [_locus(path, one, data) for path, one in zip(files, read, strict=True)]
+    return [shown | {"region": _region(one, read)} for shown, one in zip(found, read, strict=True)]
+
+
+def _region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]]) -> list[list[float]] | None:
+    """The stable region beside a locus: values of the second parameter, and its two bounds of the load there."""
+    same = [other for other in loci if other["parameters"] == one["parameters"]]
+    region = stable_region(one, same, REGION)
+    return region and [column.tolist() for column in region]
+
+
+def _special_points(one: Mapping[str, Any], data: Mapping[str, Any]) -> list[list[int]]:
+    """Branch and row of each special point of the diagram that the locus passes, by their numbers."""
+    return [
+        [number, special["row"]]
+        for number, branch in enumerate(data["branches"])
+        for special in branch["special"]
+        if special["kind"] == one["kind"] and any(_same(special, place) for place in one.get("crossings", ()))
+    ]
+
+
+def _same(special: Mapping[str, Any], place: Sequence[float]) -> bool:
+    here = special["load"], special["ordinate"]
+    return all(abs(x - y) <= SAME_SPECIAL * unit(x, y, one=1.0) for x, y in zip(here, place, strict=True))
 
 
 def _label(one: Mapping[str, Any]) -> str:
@@ -29,8 +57,7 @@ def _label(one: Mapping[str, Any]) -> str:
     return " ".join(filter(None, (escape(words), symbol, escape(with_unit("", unit).strip()))))
 
 
-def _locus(path: Path, data: Mapping[str, Any]) -> dict[str, Any]:
-    one = read_json(path, LOCUS, NEEDED)
+def _locus(path: Path, one: Mapping[str, Any], data: Mapping[str, Any]) -> dict[str, Any]:
     load, other = one["parameters"]
     if load != data["parameter"] or other not in data["constants"] or one["kind"] not in LINES:
         raise InputError(f"{path} is no locus of the diagram beside it: keep the files of one run together.")
@@ -53,5 +80,6 @@ def _locus(path: Path, data: Mapping[str, Any]) -> dict[str, Any]:
         "marks": [{"row": row, "kind": kind} for row, kind in marks],
         "parameter": other,
         "label": _label(one),
+        "special": _special_points(one, data),
         "here": data["constants"][other],
     }

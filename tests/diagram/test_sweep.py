@@ -24,7 +24,8 @@ from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
-from rodfem.output.plot_frequencies import curves, draw_frequencies
+from rodfem.output.frequency_curves import curves
+from rodfem.output.plot_frequencies import draw_frequencies
 from rodfem.problem.end import End
 from rodfem.problem.scene import Scene
 from rodfem.stability.nonsymmetric import NonsymmetricSolver

@@ -119,3 +119,10 @@ def test_versions_are_known_without_the_package_manager(order: str) -> None:
         "assert pkg_resources.parse_version is parse_version"
     )
     subprocess.run([sys.executable, "-c", program], check=True, cwd=HOME)
+
+
+def test_a_star_brings_all_public_names_and_help_stays_short() -> None:
+    names: dict[str, object] = {}
+    exec("from rodfem import *", names)
+    assert set(names) - {"__builtins__"} == set(rodfem._HOMES) and names["Scene"] is rodfem.Scene
+    assert len(pydoc.plaintext.document(rodfem).splitlines()) < 300

@@ -11,9 +11,10 @@ from rodfem.app import console
 from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
 from rodfem.output.files import COLUMNS, MEANING, OPTIONAL, SPECIAL
+from rodfem.output.frequency_curves import COLORS
 from rodfem.output.glossary import ENTRIES, NAMES, explanation
 from rodfem.output.plot_diagram import MARKERS
-from rodfem.output.plot_frequencies import COLORS, PARTS
+from rodfem.output.plot_frequencies import PARTS
 from rodfem.output.plot_locus import POINTS
 from rodfem.output.plot_pieces import STYLES
 
@@ -63,3 +64,7 @@ def test_words_on_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(listed) == len(ENTRIES) and "fold, LP" in listed
     with pytest.raises(InputError, match="no entry 'foldd': try fold"):
         explanation("foldd")
+    with pytest.raises(InputError, match="no entry 'circle': try circle of states, or rodfem explain"):
+        explanation("circle")
+    with pytest.raises(InputError, match="no entry 'gravity': try rodfem explain, which lists all"):
+        explanation("gravity")

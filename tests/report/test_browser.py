@@ -26,6 +26,7 @@ from scipy.ndimage import uniform_filter
 from rodfem.app.run import run
 from rodfem.diagram.plan import Plan
 from rodfem.output.view import POINT
+from rodfem.report.loci import REGION
 from rodfem.report.packing import packed
 from rodfem.report.page import page_of
 from rodfem.report.payload import payload_of
@@ -135,7 +136,10 @@ def click_at(browser: Any, branch: int, row: int) -> None:
         const i = trace.customdata.findIndex((c) => c[0] === arguments[0] && c[1] === arguments[1]);
         const box = plot.getBoundingClientRect();
         return [box.x + xaxis._offset + xaxis.l2p(trace.x[i]), box.y + yaxis._offset + yaxis.l2p(trace.y[i])]"""
-    x, y = browser.execute_script(script, branch, row)
+    click(browser, *browser.execute_script(script, branch, row))
+
+
+def click(browser: Any, x: float, y: float) -> None:
     for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
         given = {"type": kind, "x": x, "y": y, "button": "left", "clickCount": 1}
         browser.execute_cdp_cmd("Input.dispatchMouseEvent", given)
@@ -310,6 +314,46 @@ def test_loci_ordinates_views_and_exports_work(opened: Callable[..., Any]) -> No
     assert "dolfinx" in page.find_element(By.ID, "origin").text
 
 
+def test_the_plane_of_loci_shows_states(opened: Callable[..., Any]) -> None:
+    """A click on a locus shows the special point it starts from, one elsewhere a state at that load."""
+    page = opened("locus")
+    page.find_elements(By.CSS_SELECTOR, "#diagram-tabs button")[1].click()
+    until(page, lambda: page.find_elements(By.CSS_SELECTOR, "#loci .scatterlayer .trace"))
+    locus = page.execute_script("return import('report/data').then(({ data }) => data.loci[0])")
+    ((branch, row),) = locus["special"]
+    script = """const plot = document.getElementById("loci"), { xaxis, yaxis } = plot._fullLayout;
+        const box = plot.getBoundingClientRect();
+        return [box.x + xaxis._offset + xaxis.l2p(arguments[0]), box.y + yaxis._offset + yaxis.l2p(arguments[1])]"""
+    names = page.execute_script("return import('report/data').then(({ data }) => data.branches.map((b) => b.name))")
+    last = len(locus["x"]) - 1
+    click(page, *page.execute_script(script, locus["x"][last // 4], locus["load"][last // 4]))
+    until(page, lambda: shown(page) == (names[branch], row))
+    other, edge, end = (column[REGION // 2] for column in locus["region"])
+    click(page, *page.execute_script(script, other, 0.3 * edge + 0.7 * end))
+    until(page, lambda: shown(page) != (names[branch], row))
+    load = page.execute_script("return import('report/store').then((store) => store.state.load)")
+    assert load == pytest.approx(0.3 * edge + 0.7 * end, abs=0.02 * abs(edge - end))
+    assert page.find_element(By.ID, "badge").text.startswith("STABLE")
+
+
+def test_frequencies_come_first_for_a_follower_load(opened: Callable[..., Any]) -> None:
+    """Leipholz's column (1962): two frequencies meet at q = 40.05, and the range above is shaded."""
+    page = opened("follower")
+    script = """const plot = document.getElementById("diagram"), star = plot.data.at(-1), { shapes } = plot.layout;
+        return [star.x[0], star.customdata[0][1], shapes.map((shape) => [shape.x0, shape.x1])]"""
+    load, row, ((low, high),) = page.execute_script(script)
+    assert load == pytest.approx(40.05, abs=5e-3) and low == pytest.approx(load) and high > low
+    assert "range of flutter" in page.find_element(By.ID, "legend").text
+    first = page.execute_script(
+        "return document.getElementById('diagram').data.filter((t) => t.mode == 'lines').map((t) => t.y[0])"
+    )
+    assert min(y for y in first if y is not None) == pytest.approx(3.51602, abs=1e-3)  # of the cantilever, at P = 0
+    click_at(page, 0, row)
+    until(page, lambda: shown(page)[1] == row)
+    page.find_elements(By.CSS_SELECTOR, "#ordinate option")[1].click()
+    until(page, lambda: "range of flutter" not in page.find_element(By.ID, "legend").text)
+
+
 def long(payload: dict[str, Any]) -> dict[str, Any]:
     """The same with a first branch of very many states."""
     branch = dict(payload["branches"][0])
@@ -330,8 +374,8 @@ def long(payload: dict[str, Any]) -> dict[str, Any]:
         "jumps": {symbol: [POINT] * POINTS for symbol in "vknm"},
         "bodies": [numbers] * POINTS,
         "maps": packed(maps),
-        **dict.fromkeys(("spectrum", "omega2", "motion")),
-        **{"special": [], "unexplained": [], "modes": {}, "readings": [], "endings": [], "image": ""},
+        **dict.fromkeys(("spectrum", "omega2", "frequencies")),
+        **{"special": [], "unexplained": [], "modes": {}, "readings": [], "endings": [], "image": "", "between": {}},
     }
     return payload | {"branches": [branch], "start": [0, 0], "loci": []}
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from rodfem.app.cli import Parser
 from rodfem.app.persons_file import load
+from rodfem.app.pipes import end_quietly
 from rodfem.course.answers import answer_to, answers
 from rodfem.errors import InputError
 
@@ -36,6 +37,7 @@ def main(words: Sequence[str]) -> None:
 
 def answer_of(program: Path) -> Any:
     """Value that a program assigns to ``answer``; raises :class:`~rodfem.errors.InputError` where it does not."""
+    end_quietly()
     names = vars(load(program, "__main__"))
     if "answer" not in names:
         raise InputError(f"{program} assigns nothing to answer: end it with a line like answer = 9.8696.")

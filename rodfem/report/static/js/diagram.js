@@ -1,19 +1,24 @@
-// The bifurcation diagram: a trace for each piece of one index, special points, and the state that is shown.
+// The bifurcation diagram: a trace for each piece of one index, special points, and the state that is shown; of loads
+// without a potential the frequencies come first.
 
 import { data, escaped, reading } from "report/data";
 import { select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
+import * as frequencies from "report/frequencies";
 import { draw, layout } from "report/plotting";
 import { DASHES, ENDS, SYMBOLS, UNEXPLAINED, WIDTHS } from "report/styles";
 
 const plot = document.getElementById("diagram");
 const choice = document.getElementById("ordinate");
-let ordinate = data.ordinates[0];
+const FREQUENCIES = { key: "frequencies", name: "frequencies" };
+const ordinates = [...(frequencies.ANY ? [FREQUENCIES] : []), ...data.ordinates];
+let ordinate = ordinates[0];
 let cursor = null;
 
 const heights = (branch) => branch.ordinates[ordinate.key];
 
-function hover(branch, row) {
+// What is said of a row of a branch.
+export function hover(branch, row) {
   const words = branch.told[branch.words[row]];
   const special = branch.special.find((x) => x.row === row);
   const lines = [
@@ -27,13 +32,18 @@ function hover(branch, row) {
   return lines.filter(Boolean).join("<br>");
 }
 
+// Points between a row and the next, each with the row that it is nearest to.
+const more = (found, row) => (found?.[0] ?? []).map((load, i, all) => [load, found[1][i], 2 * i < all.length ? row : row + 1]);
+
 function line(branch, number, piece) {
-  const [a, b] = piece.rows, rows = Array.from({ length: b - a + 1 }, (_, i) => a + i);
+  const [a, b] = piece.rows, between = branch.between[ordinate.key] ?? {};
+  const rows = Array.from({ length: b - a + 1 }, (_, i) => a + i);
+  const points = rows.flatMap((row) => [[branch.load[row], heights(branch)[row], row], ...(row < b ? more(between[row], row) : [])]);
   return {
-    x: rows.map((row) => branch.load[row]),
-    y: rows.map((row) => heights(branch)[row]),
-    customdata: rows.map((row) => [number, row]),
-    text: rows.map((row) => hover(branch, row)),
+    x: points.map(([load]) => load),
+    y: points.map(([, value]) => value),
+    customdata: points.map(([, , near]) => [number, near]),
+    text: points.map(([, , near]) => hover(branch, near)),
     hovertemplate: "%{text}<extra></extra>",
     mode: "lines",
     line: { color: branch.colour, width: WIDTHS[piece.kind], dash: DASHES[piece.kind], simplify: false },
@@ -97,18 +107,20 @@ function traces() {
 }
 
 function redraw() {
+  document.body.dataset.ordinate = ordinate.key;
+  if (ordinate === FREQUENCIES) return draw(plot, frequencies.traces(), frequencies.frame());
   return draw(plot, traces(), layout(data.label, ordinate.label, { annotations: labels(), uirevision: ordinate.key }));
 }
 
 function moveCursor() {
   const b = data.branches[state.branch];
-  cursor(b.load[state.row], heights(b)[state.row] ?? undefined);
+  cursor(b.load[state.row], ordinate === FREQUENCIES ? null : (heights(b)[state.row] ?? undefined));
 }
 
 export async function start() {
-  for (const [i, each] of data.ordinates.entries()) choice.add(new Option(each.name, i));
+  for (const [i, each] of ordinates.entries()) choice.add(new Option(each.name, i));
   choice.addEventListener("change", async () => {
-    ordinate = data.ordinates[choice.value];
+    ordinate = ordinates[choice.value];
     await redraw();
     moveCursor();
   });

@@ -34,3 +34,5 @@ export function item(drawn, text, element = "span") {
 
 export const lineIcon = (colour, width, dash = "solid") =>
   icon(30, "M1 6.5H29", { stroke: colour, "stroke-width": width, "stroke-dasharray": dash === "solid" ? "none" : dash });
+
+export const area = (colour) => icon(20, "M1 1H19V12H1z", { fill: colour, stroke: "#8bb8a6" });

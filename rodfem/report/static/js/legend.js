@@ -2,7 +2,8 @@
 
 import { data } from "report/data";
 import { select, state, subscribe } from "report/store";
-import { item, lineIcon, symbol } from "report/icons";
+import * as frequencies from "report/frequencies";
+import { area, item, lineIcon, symbol } from "report/icons";
 import { DASHES, ENDS, SYMBOLS, UNEXPLAINED, WIDTHS } from "report/styles";
 
 function swatch(colour) {
@@ -11,6 +12,15 @@ function swatch(colour) {
   drawn.style.background = colour;
   return drawn;
 }
+
+// Entries that belong to one kind of picture: they stand where it does.
+const only = (name, items) => items.map((one) => (one.classList.add(name), one));
+
+const ofFrequencies = () => [
+  ...frequencies.motions().map(({ motion, colour }) => item(lineIcon(colour, 3), motion)),
+  ...frequencies.parts().slice(1).map((part) => item(lineIcon("#555", frequencies.PARTS[part].width, frequencies.PARTS[part].dash), part)),
+  ...frequencies.ranges().map(({ words, shade }) => item(area(shade), words)),
+];
 
 export function start() {
   const legend = document.getElementById("legend");
@@ -27,10 +37,9 @@ export function start() {
   const names = { user: "requested load" };
   legend.append(
     ...buttons,
-    ...lines.map((kind) =>
-      item(lineIcon("#555", WIDTHS[kind], DASHES[kind]), kind),
-    ),
-    ...Object.keys(SYMBOLS).filter((kind) => special.has(kind)).map((kind) => item(symbol(SYMBOLS[kind]), names[kind] ?? kind)),
+    ...only("of-rows", lines.map((kind) => item(lineIcon("#555", WIDTHS[kind], DASHES[kind]), kind))),
+    ...only("of-frequencies", ofFrequencies()),
+    ...Object.keys(SYMBOLS).filter((kind) => special.has(kind)).flatMap((kind) => only(frequencies.marked().has(kind) ? "of-both" : "of-rows", [item(symbol(SYMBOLS[kind]), names[kind] ?? kind)])),
     ...[...new Set(data.branches.map((b) => b.image).filter(Boolean))].map((words) => item(lineIcon("#555", 1.1), `image, not traced: ${words}`)),
     ...[...new Set(data.branches.flatMap((b) => b.endings.map(([, reason]) => reason)))].map((reason) => item(symbol(ENDS), `ends: ${reason}`)),
     ...(data.branches.some((b) => b.unexplained.length) ? [item(symbol(UNEXPLAINED), "index change unexplained")] : []),

@@ -1,76 +1,64 @@
-// Loci of special points in the plane of the load and another parameter, linked to the load of the diagram.
+// Loci of special points: their tab, their legend, and what a click in their plane shows.
 
-import { data, digits, escaped } from "report/data";
+import { data } from "report/data";
 import { select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
-import { item, lineIcon, symbol } from "report/icons";
-import { draw, layout } from "report/plotting";
+import { area, item, lineIcon, symbol } from "report/icons";
+import { bounds, drawPlane, MARK, REGION, STRIPE } from "report/plane";
 import { BLUE, STABLE } from "report/styles";
 
 const plot = document.getElementById("loci"), diagram = document.getElementById("diagram");
-const DASHES = { "branch point": "solid", fold: "7px,3px", flutter: "7px,2px,2px,2px", divergence: "3px,3px" };
-const MARK = { symbol: "triangle-up", size: 10, color: "white", line: { color: "black", width: 1.5 } };
-const legend = document.getElementById("loci-legend");
+const legend = document.getElementById("loci-legend"), STILL = 4; // pixels that a click may move
 let cursor = null;
 
-const bounds = (pair) => pair[0] === 0;
-
-function curve(locus) {
-  const names = `${escaped(data.symbol)} = `;
-  return {
-    x: locus.x,
-    y: locus.load,
-    customdata: locus.load,
-    text: locus.index.map((pair, i) => `${escaped(locus.kind)}, ${escaped(locus.file.replace(".json", ""))}<br>${names}${digits(locus.load[i])}<br>${escaped(locus.parameter)} = ${digits(locus.x[i])}${pair[0] < 0 ? "" : `<br>index ${pair[0]} on one side, ${pair[1]} on the other`}`),
-    hovertemplate: "%{text}<extra></extra>",
-    mode: "lines",
-    line: { color: locus.colour, width: locus.index.some(bounds) ? 4 : 2, dash: DASHES[locus.kind] ?? "solid" },
-  };
-}
-
-const label = (locus) => {
-  const i = Math.floor(locus.x.length / 2), [low, high] = locus.index[i] ?? [-1];
-  const text = low < 0 ? locus.kind : `${locus.kind} ${low}|${high}`;
-  return { x: locus.x[i], y: locus.load[i], text: `<b>${escaped(text)}</b>`, showarrow: false, yshift: 12, font: { color: locus.colour, size: 13 }, bgcolor: "rgba(255,255,255,0.8)" };
-};
-
-const marks = (locus) => ({
-  x: locus.marks.map((mark) => locus.x[mark.row]),
-  y: locus.marks.map((mark) => locus.load[mark.row]),
-  text: locus.marks.map((mark) => escaped(mark.kind)),
-  hovertemplate: "%{text}<extra></extra>",
-  mode: "markers",
-  marker: MARK,
-});
-
-// Loads at which a branch of the diagram is stable, at the constant that it was computed for.
-function stable(here) {
-  const pieces = data.branches.flatMap((b) => b.pieces.filter((p) => p.kind === STABLE).map((p) => b.load.slice(p.rows[0], p.rows[1] + 1)));
-  const ends = pieces.flatMap((loads) => [Math.min(...loads), Math.max(...loads), null]);
-  return { x: ends.map((y) => (y === null ? null : here)), y: ends, mode: "lines", line: { color: BLUE, width: 7 }, opacity: 0.45, hovertemplate: "a stable state in the diagram<extra></extra>" };
-}
-
-function redraw() {
-  const [first] = data.loci, here = { type: "line", x0: first.here, x1: first.here, y0: 0, y1: 1, yref: "paper", line: { color: "#8b95a1", width: 1.2, dash: "dot" } };
-  const note = { x: first.here, y: 1, yref: "paper", text: `this diagram: ${escaped(first.parameter)} = ${digits(first.here)}`, showarrow: false, xanchor: "left", yanchor: "top", xshift: 5, font: { color: "#66707c" } };
-  const traces = [stable(first.here), ...data.loci.map(curve), ...data.loci.map(marks)];
-  return draw(plot, traces, layout(first.label, data.label, { shapes: [here], annotations: [...data.loci.map(label), note] }));
-}
-
-// Row of the branch that is shown, nearest to a load.
+// The state at a load: of the branch that is shown if it has the load, and of a stable piece if there is one.
 function atLoad(load) {
-  const loads = data.branches[state.branch].load;
-  const row = loads.reduce((best, x, i) => (Math.abs(x - load) < Math.abs(loads[best] - load) ? i : best), 0);
-  select(state.branch, row, load);
+  const found = data.branches.flatMap((b, number) => b.pieces.map(({ kind, rows: [a, z] }) => {
+    const rows = Array.from({ length: z - a + 1 }, (_, i) => a + i), away = (row) => Math.abs(b.load[row] - load);
+    const row = rows.reduce((best, each) => (away(each) < away(best) ? each : best)), loads = rows.map((each) => b.load[each]);
+    const outside = load < loads.reduce((p, q) => Math.min(p, q)) || load > loads.reduce((p, q) => Math.max(p, q));
+    return { number, row, cost: [outside ? away(row) + 1e-9 : 0, kind === STABLE ? 0 : 1, number === state.branch ? 0 : 1] };
+  }));
+  const before = (p, q) => p.cost.map((x, i) => x - q.cost[i]).find((x) => x) < 0;
+  const best = found.reduce((one, other) => (before(other, one) ? other : one));
+  select(best.number, best.row, load);
+}
+
+// A click on a curve or on the line shows that state, one elsewhere the state of the diagram at that load.
+function listen() {
+  let from = null;
+  plot.on("plotly_click", (event) => {
+    const place = event.points.find((point) => point.customdata)?.customdata;
+    if (place) select(...place);
+  });
+  plot.addEventListener("pointerdown", (event) => (from = event), true);
+  window.addEventListener("pointerup", (event) => {
+    const still = from && Math.hypot(event.clientX - from.clientX, event.clientY - from.clientY) < STILL;
+    from = null;
+    if (!still || plot._hoverdata?.some((point) => point.customdata)) return;
+    const { yaxis } = plot._fullLayout, y = event.clientY - plot.getBoundingClientRect().y - yaxis._offset;
+    if (y >= 0 && y <= yaxis._length) atLoad(yaxis.p2l(y));
+  });
 }
 
 function explain() {
+  const has = (test) => data.loci.some((locus) => locus.index.some(test));
   legend.append(
-    item(lineIcon(BLUE, 7), "loads of this diagram with a stable state"),
-    ...(data.loci.some((locus) => locus.index.some(bounds)) ? [item(lineIcon("#555", 4), "index 0 on one side")] : []),
-    ...(data.loci.some((locus) => locus.index.some(([low]) => low > 0)) ? [item(lineIcon("#555", 2), "greater index on both sides")] : []),
+    ...(data.loci.some((locus) => locus.region) ? [item(area(REGION), "stable, as far as these curves tell")] : []),
+    item(lineIcon(BLUE, STRIPE), "stable states of this diagram"),
+    ...(has(bounds) ? [item(lineIcon("#555", 4), "index 0 on one side")] : []),
+    ...(has(([low]) => low > 0) ? [item(lineIcon("#555", 2), "greater index on both sides")] : []),
     ...(data.loci.some((locus) => locus.marks.length) ? [item(symbol(MARK), "turning point, cusp, end")] : []),
   );
+}
+
+async function show(wanted) {
+  if (!wanted) return;
+  await drawPlane(plot);
+  if (cursor) return;
+  cursor = cursorOf(plot);
+  cursor(data.loci[0].here, state.load);
+  listen();
 }
 
 export async function start() {
@@ -87,18 +75,12 @@ export async function start() {
     for (const [other, each] of Object.entries(plots)) each.hidden = other !== name;
     for (const id of ["legend", "ordinate-label"]) document.getElementById(id).hidden = name !== "Diagram";
     legend.hidden = name !== "Loci";
-    if (name === "Loci") {
-      await redraw();
-      cursor ??= cursorOf(plot);
-      cursor(data.loci[0].here, state.load);
-      if (!plot.linked) plot.on("plotly_click", (event) => atLoad(event.points[0].y));
-      plot.linked = true;
-    }
+    await show(name === "Loci");
     window.dispatchEvent(new Event("resize"));
   };
   if (buttons.length > 1) tabs.append(...buttons);
   else tabs.textContent = "Bifurcation diagram";
-  explain();
+  if (data.loci.length) explain();
   buttons[0].setAttribute("aria-selected", true);
   subscribe(() => cursor?.(data.loci[0].here, state.load));
 }

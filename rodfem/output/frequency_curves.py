@@ -1,0 +1,110 @@
+"""Frequencies of a branch of ``diagram.json`` as curves over the load, and the ranges of the load that are unstable."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
+from rodfem.output.intervals import intervals_of
+from rodfem.output.plot_pieces import STABLE
+from rodfem.output.sheet import PALETTE
+
+COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5, "rigid motion": 6}
+"""Places in the palette."""
+RANGES = ("#E9E4F3", "#FBE6D9")
+"""Shades of ranges of divergence, and of those of flutter."""
+REAL = 1e-6
+"""An imaginary part smaller than this is none, relative to the root."""
+PAIR, GROWTH, DIVERGED = "complex pair, real part", "complex pair, imaginary part", "diverged, growth rate"
+LEAST = 1e-3
+"""Least frequency at the top of a picture."""
+
+
+@dataclass(frozen=True)
+class FrequencyCurve:
+    """A curve of frequencies, named by its ``motion``.
+
+    ``loads``, ``rows`` of the branch and ``roots`` with non-negative real part have the shape (n,).
+    A conjugate pair is two curves, of which one has its roots left out of ``real`` and ``parts``.
+    """
+
+    motion: str
+    loads: NDArray[np.float64]
+    rows: NDArray[np.int64]
+    roots: NDArray[np.complex128]
+
+    @property
+    def colour(self) -> str:
+        """Colour of the motion."""
+        return PALETTE[COLORS.get(self.motion, 7) % len(PALETTE)]
+
+    @property
+    def real(self) -> NDArray[np.float64]:
+        """Real frequencies (n,), nan where there is none."""
+        return np.where(abs(self.roots.imag) <= REAL * abs(self.roots), self.roots.real, np.nan)
+
+    @property
+    def parts(self) -> dict[str, NDArray[np.float64]]:
+        """Real and imaginary part of a complex pair, and growth rate of what has diverged, (n,), nan where none is."""
+        w = self.roots
+        straight, lower = abs(w.imag) <= REAL * abs(w), w.imag < -REAL * abs(w)
+        sideways = (w.real <= REAL * abs(w)) & ~straight
+        pair = ~straight & ~lower & ~sideways
+        values = (pair, w.real), (pair, w.imag), (sideways, abs(w.imag))
+        named = zip((PAIR, GROWTH, DIVERGED), values, strict=True)
+        return {what: np.where(chosen, part, np.nan) for what, (chosen, part) in named}
+
+
+class Range(NamedTuple):
+    """An unstable range of the load, from ``low`` to ``high``, in ``words`` and in its ``shade``."""
+
+    low: float
+    high: float
+    words: str
+    shade: str
+
+
+def curves(columns: Mapping[str, Any]) -> list[FrequencyCurve]:
+    """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve."""
+    found: dict[int, list[tuple[float, int, complex, str]]] = {}
+    for row, (load, pairs, motions, numbers) in enumerate(
+        zip(columns["load"], columns["omega2"], columns["motion"], columns["curve"], strict=True)
+    ):
+        for pair, motion, number in zip(pairs, motions, numbers, strict=True):
+            found.setdefault(number, []).append((load, row, complex(*pair) ** 0.5, motion))
+    out = []
+    for members in found.values():
+        members.sort(key=lambda member: member[0])
+        (motion, _), *_ = Counter(member[3] for member in members).most_common()
+        loads, rows, roots, _ = zip(*members, strict=True)
+        out.append(FrequencyCurve(motion, np.array(loads), np.array(rows), np.array(roots)))
+    return sorted(out, key=lambda curve: (curve.motion, abs(curve.roots[0])))
+
+
+def ranges_of(branch: Mapping[str, Any]) -> Iterator[Range]:
+    """Ranges of the load in which a branch is unstable."""
+    columns = branch["columns"]
+    for interval in intervals_of(branch):
+        if interval.kind == STABLE:
+            continue
+        values = [complex(*v) for row in columns["omega2"][interval.first : interval.last + 1] for v in row]
+        real = [v.real for v in values if abs(v.imag) <= REAL * abs(v)]
+        least = REAL * max(map(abs, values))
+        found = {FLUTTER: len(real) < len(values), DIVERGENCE: any(x < -least for x in real)}
+        words = "range of " + (" and ".join(kind for kind, there in found.items() if there) or "instability")
+        yield Range(*interval.covers, words, RANGES[found[FLUTTER]])
+
+
+def top(columns: Mapping[str, Any], most: int) -> float:
+    """Greatest imaginary part of all roots, and real part of the ``most`` left-most, at any load."""
+    highest = LEAST
+    for pairs in columns["omega2"]:
+        roots = [complex(*pair) ** 0.5 for pair in pairs]  # in ascending order of the real parts of the squares
+        highest = max([highest, *(w.imag for w in roots), *(w.real for w in roots[:most])])
+    return highest

@@ -1,0 +1,69 @@
+"""Where an equilibrium is stable in the plane of two parameters, as far as the loci of its special points tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+COUNT = 400
+"""Values of the second parameter at which a region has its bounds."""
+WORDS = "stable, as far as these curves tell"
+
+
+class StableRegion(NamedTuple):
+    """Between two loads at each value of the second parameter, all (k,): the locus, and what bounds its stable side."""
+
+    other: Floats
+    edge: Floats
+    end: Floats
+
+
+def stable_region(one: Mapping[str, Any], loci: Sequence[Mapping[str, Any]], count: int = COUNT) -> StableRegion | None:
+    """Return what lies between the stable side of a locus of branch points and the next locus, or the load's bound.
+
+    Parameters
+    ----------
+    one
+        Contents of the file of the locus; its stable side is that on which its index is zero.
+    loci
+        Those of all loci of the plane, ``one`` among them.
+    count
+        At how many values of the second parameter the bounds are given.
+
+    Returns
+    -------
+    region
+        None where neither side is stable all along the locus, where it is not known which side is, or where the locus
+        has more than one load at a value of the second parameter.
+    """
+    columns, (load, other) = one["columns"], one["parameters"]
+    x, y = (np.asarray(columns[name], dtype=float) for name in (other, load))
+    side, low = one.get("lower"), [pair[0] for pair in columns["index"]]
+    steps = np.diff(x)
+    if not side or any(low) or len(x) < 2 or not ((steps > 0).all() or (steps < 0).all()):
+        return None
+    order = np.argsort(x)
+    grid = np.linspace(x.min(), x.max(), count)
+    edge = np.interp(grid, x[order], y[order])
+    end = np.full(len(grid), float(one["bounds"][0][int(side > 0)]))
+    for another in loci:
+        for level in _levels(another, grid) if another is not one else ():
+            between = side * (level - edge) > 0
+            end = np.where(between & (side * (level - end) < 0), level, end)
+    return StableRegion(grid, edge, end)
+
+
+def _levels(one: Mapping[str, Any], grid: Floats) -> list[Floats]:
+    """Loads (len(grid),) at which each segment of a locus has these values of the second parameter; nan where none."""
+    load, other = one["parameters"]
+    x, y = (np.asarray(one["columns"][name], dtype=float) for name in (other, load))
+    found = []
+    for i in np.flatnonzero(np.diff(x) != 0):
+        share = (grid - x[i]) / (x[i + 1] - x[i])
+        found.append(np.where((share >= 0) & (share <= 1), y[i] + share * (y[i + 1] - y[i]), np.nan))
+    return found

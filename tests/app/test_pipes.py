@@ -1,0 +1,32 @@
+"""A reader that leaves, as ``head`` does: the program ends there, without a word."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROGRAMS = {
+    "lesson": "import rodfem.app.script as script\nif script.lesson(__name__):\n    from petsc4py import PETSc\n",
+    "check": "import rodfem.app.console as console\nfrom petsc4py import PETSc\n",
+}
+LINES = "    for _ in range(100_000): print('a line')\n"
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("kind", PROGRAMS)
+def test_a_reader_that_leaves_ends_the_program_quietly(tmp_path: Path, kind: str) -> None:
+    program = tmp_path / "mine.py"
+    loop = LINES if kind == "lesson" else LINES.lstrip() + "answer = 1\n"
+    program.write_text(PROGRAMS[kind] + loop)
+    command = [str(program)] if kind == "lesson" else ["-m", "rodfem", "check", "1", str(program)]
+    with subprocess.Popen(
+        [sys.executable, *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
+    ) as run:
+        assert run.stdout is not None and run.stderr is not None
+        assert run.stdout.readline() == "a line\n"
+        run.stdout.close()
+        assert run.stderr.read() == ""
+    assert run.returncode == -13
