@@ -59,6 +59,7 @@ FAULTS = {
         "    set_phase(step, step->x);\n    int moved",
         "    int moved",
         STEP,
+    ),
     "a-mass-brings-a-unit-rotary-inertia": Fault(
         "rodfem/problem/scene.py", '"rho_I", _no_rotary)', '"rho_I", _unit_rotary)', "tests/problem/test_inertia.py"
     ),
