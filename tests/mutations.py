@@ -189,12 +189,15 @@ FAULTS = {
     ),
     # error bars
     "bound-without-what-is-left": Fault(
-        "rodfem/adaptivity/error_estimate.py", "abs(richer - value) / (1 - rho) + left", "abs(richer - value)", ERRORS
+        "rodfem/adaptivity/error_estimate.py", "change + rho / (1 - rho) * max(change, about) + left", "change", ERRORS
+    ),
+    "bound-of-a-place-by-itself": Fault(
+        "rodfem/adaptivity/error_estimate.py", "max(change, about) + left", "change + left", ERRORS
     ),
     "bound-is-a-tenth": Fault(
         "rodfem/adaptivity/error_estimate.py",
-        "abs(richer - value) / (1 - rho) + left",
-        "0.1 * abs(richer - value) + left",
+        "change + rho / (1 - rho) * max(change, about) + left",
+        "0.1 * change + left",
         ERRORS,
     ),
     "ordinate-of-a-load-that-is-exact": Fault(
