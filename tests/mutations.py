@@ -105,6 +105,12 @@ FAULTS = {
         'return NormalForm("pitchfork", -best,',
         f"{ERRORS}",
     ),
+    "law-of-an-ordinate-that-says-nothing": Fault(
+        f"{CONTINUATION}normal_form.py",
+        "if not (seen and _determined(amplitudes, ordinates / one, odd)):",
+        "if False:",
+        "tests/literature/test_postbuckling.py",
+    ),
     # index
     "constraints-are-miscounted": Fault(
         f"{STABILITY}inertia.py",

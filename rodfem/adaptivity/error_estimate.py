@@ -30,7 +30,7 @@ from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.locate import WINDOW, Curve, locate_event, refine
-from rodfem.continuation.normal_form import Origin, normal_form_of, ordinate_along
+from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
@@ -180,7 +180,7 @@ class Enriched:
         for known, origin, left in self.origins:
             if known is special:
                 again, rho = normal_form_of(self.solver, origin, way), left
-        if again is None or (again.kind, again.power) != (law.kind, law.power):
+        if again is None or not alike(again, law):
             law.uncertainty = float("inf")
         else:
             law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
