@@ -105,6 +105,12 @@ FAULTS = {
         'return NormalForm("pitchfork", -best,',
         f"{ERRORS}",
     ),
+    "no-fold-next-to-a-branch-point": Fault(
+        f"{CONTINUATION}special_points.py",
+        "if odd * even >= 0 or abs(odd) >= 2 * abs(even):",
+        "if True:",
+        "tests/literature/test_postbuckling.py",
+    ),
     "law-of-an-ordinate-that-says-nothing": Fault(
         f"{CONTINUATION}normal_form.py",
         "if not (seen and _determined(amplitudes, ordinates / one, odd)):",

@@ -32,6 +32,7 @@ from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.locate import WINDOW, Curve, locate_event, refine
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
 from rodfem.continuation.solvers import BranchSolver
+from rodfem.continuation.special_points import NEAREST
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.transfer import Transfer, richer_system
@@ -212,7 +213,7 @@ class Enriched:
         mode.scale(1.0 / self.system.norm(mode))
         curve = _straight(x, tangent)
         # few nodes tell where an eigenvalue crosses zero better than where the load has its extremum
-        test_function = "mu" if special.kind == FOLD else special.test_function
+        test_function = "mu" if special.kind == FOLD and point.arclength > NEAREST else special.test_function
         # a pitchfork on one of its sides is passed where the bordered matrix is singular: the nearer the nodes lie to
         # it, the fewer digits their loads have
         narrow = NARROW if test_function == "mu" else 1.0
