@@ -29,10 +29,9 @@ from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
 from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.kinds import FOLD
-from rodfem.continuation.locate import WINDOW, Curve, locate_event, refine
+from rodfem.continuation.locate import NEAREST, WINDOW, Curve, locate_event, refine
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
 from rodfem.continuation.solvers import BranchSolver
-from rodfem.continuation.special_points import NEAREST
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.transfer import Transfer, richer_system

@@ -17,7 +17,17 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.locate import WINDOW, Located, across, locate, locate_mode, refine, solve_at, solve_at_load
+from rodfem.continuation.locate import (
+    NEAREST,
+    WINDOW,
+    Located,
+    across,
+    locate,
+    locate_mode,
+    refine,
+    solve_at,
+    solve_at_load,
+)
 from rodfem.continuation.prediction import hermite
 from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
@@ -35,8 +45,8 @@ LEVEL = 1e-3
 """Slope of the load, relative to its span, below which it is taken for zero."""
 INSENSITIVE = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
-FIRST, NEAREST = 0.05, 1e-3
-"""Distance of the first point of a branch from the branch point that it leaves: usually, and at least."""
+FIRST = 0.05
+"""Distance of the first point of a branch from the branch point that it leaves; at least it is :data:`NEAREST`."""
 SHORTEST = 1e-4
 """Amplitude, in the metric, below which no further one is tried from a branch point."""
 SEEN = 100
