@@ -256,8 +256,8 @@ def check_convexity(scene: Scene) -> None:
             )
         if not stiffness.any():
             raise SceneError(
-                f"The stored energy is flat at the undeformed state{where}: write it as a function of the strains v and k "
-                "whose second derivative there is not zero, with UFL (ufl.cosh), without math and numpy."
+                f"The stored energy is flat at the undeformed state{where}: write it as a function of the strains v "
+                "and k whose second derivative there is not zero, with UFL (ufl.cosh), without math and numpy."
             )
         if not TINIEST / scene.length**2 < abs(stiffness).max() < LARGEST / scene.length**2:
             raise SceneError(
