@@ -11,7 +11,8 @@ All of this is asymptotic.  Errors of loads and positions are of second order in
 small, and a single value may agree on two meshes by accident, where what it has of either sign cancels; norms do not
 cancel.  Where the strains of the state, or of its null vector, differ between the two meshes by more than
 :data:`RESOLVED_TO` of themselves, the first mesh does not resolve the state, and ``d`` is no bound but what its error
-may well exceed.
+may well exceed.  Of an ordinate that is taken inside of an element ``rho`` is of the largest change over that element,
+in which its error oscillates (:mod:`rodfem.adaptivity.inside`).
 
 The state, its tangent and the null vector are interpolated, so that this costs a few solves.
 """
@@ -25,10 +26,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
+from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.kinds import FOLD
-from rodfem.continuation.locate import WINDOW, Curve, locate_event, refine
-from rodfem.continuation.normal_form import Origin, normal_form_of, ordinate_along
+from rodfem.continuation.locate import NEAREST, WINDOW, Curve, locate_event, refine
+from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
 from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
@@ -55,12 +57,14 @@ def halved(degree: int) -> float:
     return float(0.5 ** (degree + 1))
 
 
-def bound(value: complex, richer: complex, left: float, rho: float) -> float:
+def bound(value: complex, richer: complex, left: float, rho: float, about: float = 0.0) -> float:
     """Bound of the error of a value of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``.
 
-    Both results ``value`` and ``richer`` are loads, ordinates or coefficients, and ``left`` is in their unit.
+    Both results ``value`` and ``richer`` are loads, ordinates or coefficients, and ``left`` is in their unit, as is the
+    largest change ``about`` such a value: by accident the value itself may change by less.
     """
-    return abs(richer - value) / (1 - rho) + left
+    change = abs(richer - value)
+    return change + rho / (1 - rho) * max(change, about) + left
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,8 @@ class Again:
     """A point computed again: state ``x``, ``load``, ``ordinate``, and uncertainties of the two by location, round-off.
 
     These are ``load_left`` and ``ordinate_left``.  ``rho`` is the part of the first errors that is left,
-    ``changed`` the relative change of the strains of the state or of its null vector, the larger one.
+    ``changed`` the relative change of the strains of the state or of its null vector, the larger one, and ``about`` the
+    largest change of the ordinate over the element inside of which it is taken.
     """
 
     x: PETSc.Vec
@@ -78,6 +83,7 @@ class Again:
     ordinate_left: float
     rho: float
     changed: float
+    about: float
 
     @property
     def resolved(self) -> bool:
@@ -87,7 +93,7 @@ class Again:
     def errors(self, point: Point) -> tuple[float, float]:
         """Bounds of the errors in load and ordinate of the point as first computed."""
         load = bound(point.load, self.load, self.load_left, self.rho)
-        return load, bound(point.ordinate, self.ordinate, self.ordinate_left, self.rho)
+        return load, bound(point.ordinate, self.ordinate, self.ordinate_left, self.rho, self.about)
 
 
 class Enriched:
@@ -103,6 +109,7 @@ class Enriched:
         self.solver = BranchSolver(self.system)
         self.transfer = Transfer(solver.system, self.system)
         self.origins: list[tuple[SpecialPoint, Origin, float]] = []
+        self._inside = Inside(solver.shape, self.solver.shape)
         weights = weights_of(self.system.scene)
         self._indicators = SmoothnessIndicator(solver, weights), SmoothnessIndicator(self.solver, weights)
 
@@ -163,7 +170,8 @@ class Enriched:
         moved = np.abs(np.subtract(last, (load, ordinate)))
         left = STEADY * moved + ROUND_OFF * np.maximum((units.load, units.ordinate), np.abs(last))
         changed = self._indicators[1].changed(first, x, state=True)
-        return Again(x, *last, float(left[0]), float(left[1]), self.rho([point.x], [x]), changed)
+        rho, about = self.rho([point.x], [x]), self._inside.change(point.x, x)
+        return Again(x, *last, float(left[0]), float(left[1]), rho, changed, about)
 
     def law(self, special: SpecialPoint, direction: PETSc.Vec, law: NormalForm) -> None:
         """Set the uncertainty of a law of the first discretisation: that of the rod's law, infinite without another."""
@@ -172,7 +180,7 @@ class Enriched:
         for known, origin, left in self.origins:
             if known is special:
                 again, rho = normal_form_of(self.solver, origin, way), left
-        if again is None or (again.kind, again.power) != (law.kind, law.power):
+        if again is None or not alike(again, law):
             law.uncertainty = float("inf")
         else:
             law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
@@ -190,7 +198,8 @@ class Enriched:
             slope * along + round_off(ordinate, units.ordinate),
         )
         changed = self._indicators[1].changed(x, found, state=True)
-        return Again(found, load, ordinate, *left, self.rho([point.x], [found]), changed)
+        rho, about = self.rho([point.x], [found]), self._inside.change(point.x, found)
+        return Again(found, load, ordinate, *left, rho, changed, about)
 
     def _located(self, special: SpecialPoint) -> Again:
         """The fold or branch point on the richer discretisation, and its ordinate."""
@@ -203,7 +212,7 @@ class Enriched:
         mode.scale(1.0 / self.system.norm(mode))
         curve = _straight(x, tangent)
         # few nodes tell where an eigenvalue crosses zero better than where the load has its extremum
-        test_function = "mu" if special.kind == FOLD else special.test_function
+        test_function = "mu" if special.kind == FOLD and point.arclength > NEAREST else special.test_function
         # a pitchfork on one of its sides is passed where the bordered matrix is singular: the nearer the nodes lie to
         # it, the fewer digits their loads have
         narrow = NARROW if test_function == "mu" else 1.0
@@ -218,7 +227,8 @@ class Enriched:
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(indicator.changed(x, found.x, state=True), indicator.changed(mode, sharp, state=False))
         self.origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
-        return Again(found.x, found.load, ordinate, found.uncertainty, left, rho, changed)
+        about = self._inside.change(point.x, found.x)
+        return Again(found.x, found.load, ordinate, found.uncertainty, left, rho, changed, about)
 
 
 def _straight(x: PETSc.Vec, tangent: PETSc.Vec) -> Curve:

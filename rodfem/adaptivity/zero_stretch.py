@@ -23,6 +23,31 @@ FIRST = 2e-4
 """First step, in spans, from there to where it vanishes on a richer mesh."""
 
 
+class Stretch:
+    """Smallest stretch as a function of the load, solved for once at each from the state before.
+
+    Attributes
+    ----------
+    known
+        State and smallest stretch at each load so far.
+    """
+
+    def __init__(self, solver: StaticSolver, x: PETSc.Vec) -> None:
+        """Begin with a state ``x`` near those to come."""
+        self.solver, self.known = solver, dict[float, tuple[PETSc.Vec, float]]()
+        self._last = x
+
+    def __call__(self, load: float) -> float:
+        """Smallest stretch at a ``load``; raises :class:`ConvergenceError` where no equilibrium is found."""
+        if load not in self.known:
+            x, outcome = self.solver.at_load(self._last, load, reach=1.0)
+            if not outcome.converged:
+                raise ConvergenceError(f"no equilibrium near load {load:.8g} on the finer mesh")
+            self._last = x
+            self.known[load] = x, self.solver.shape.stretch(x)
+        return self.known[load][1]
+
+
 def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
     """Sharpen the point at which the smallest stretch vanishes; raises :class:`ConvergenceError` where that fails.
 
@@ -36,17 +61,9 @@ def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
     for factor in (2, 4):
         mesh = d.finer(factor, richer=int(d.degree < HIGHEST))
         fine = StaticSolver(System(system.scene, mesh, system.comm, system.clock, symmetries=system.symmetries))
-        state = fine.shape.restore(sample)
-
-        def stretch(load: float, fine: StaticSolver = fine, guess: PETSc.Vec = state) -> float:
-            x, outcome = fine.at_load(guess, load, reach=1.0)
-            if not outcome.converged:
-                raise ConvergenceError(f"no equilibrium near load {load:.8g} on the finer mesh")
-            x.copy(guess)
-            return fine.shape.stretch(guess)
-
+        stretch = Stretch(fine, fine.shape.restore(sample))
         load = _bracketed_zero(stretch, coarse, abs(system.scene.span[1] - system.scene.span[0]))
-        last = stretch(load)
+        state, last = stretch.known[load]
         found.append((load, fine.shape.ordinate(state), fine.energy(state), last))
         sample = fine.shape.sample(state)
     (load2, ordinate2, *_), (load, ordinate, energy, last) = found
@@ -70,7 +87,7 @@ def zero_stretch(solver: BranchSolver, coarse: Point) -> SpecialPoint:
 def _bracketed_zero(stretch: Callable[[float], float], coarse: Point, span: float) -> float:
     """Load at which ``stretch`` vanishes: bracketed by steps from the coarse load along the branch, then solved for.
 
-    Within round-off of zero a stretch has no sign, and another one when it is computed again.
+    Within round-off of zero a stretch has no sign.
     """
     a, value = coarse.load, stretch(coarse.load)
     if abs(value) <= ROUND_OFF:

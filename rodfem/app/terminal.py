@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from forms.kinematics import RODS
 from rodfem.app.colour import painted, wanted
-from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint, not_followed
+from rodfem.continuation.branch import ORDINATE, Branch, NormalForm, Point, SpecialPoint, not_followed
 from rodfem.continuation.kinds import END, FLUTTER
 from rodfem.continuation.observer import Observer
 from rodfem.errors import Argument
@@ -40,7 +40,8 @@ def _law(law: NormalForm, resolved: bool | None) -> str:
     """Local law of a branch point, whose state the mesh has ``resolved`` or not, in words."""
     if law.side == 0:
         return f"{law.kind}: a family of equilibria at one and the same load"
-    sign, x = "-" if law.coefficient < 0 else "+", "x" if law.power == 1 else f"x^{law.power}"
+    sign, x = "-" if law.coefficient < 0 else "+", "x" if law.of == ORDINATE else "a"
+    x += f"^{law.power}" if law.power > 1 else ""
     if isfinite(law.uncertainty) and law.uncertainty >= abs(law.coefficient):
         return f"{law.kind}, load = load_b + c {x} + ..., where c is not told from zero"
     return f"{law.kind}, load = load_b {sign} {number(abs(law.coefficient), law.uncertainty, resolved)} {x} + ..."
@@ -190,6 +191,8 @@ class Report(Observer):
             law = _law(special.law, special.resolved)
             even = special.law.power == 1 and "pitchfork" in special.law.kind
             what = "x is the change of the ordinate" + ", of second order in the amplitude" * even
+            if special.law.of != ORDINATE:
+                what = "a is the distance from there in the metric, as the ordinate does not change to leading order"
             self.say(f"\nAt load {special.point.load:.8g}: {law}; {what}")
 
     def finished(self, branch: Branch) -> None:

@@ -117,11 +117,16 @@ class Point:
         return f"<Point at load {self.load:.10g}: ordinate {self.ordinate:.6g}, {word}>"
 
 
+ORDINATE, DISTANCE = "ordinate", "distance"
+"""What a normal form is a function of."""
+
+
 @dataclass
 class NormalForm:
     """``load = load_b + coefficient x^power + ...`` at a bifurcation of a ``kind``; the coefficient's ``uncertainty``.
 
-    ``side`` is the sign of the load's change on the bifurcating branch.
+    ``side`` is the sign of the load's change on the bifurcating branch, and ``x`` the change ``of`` the ordinate.
+    Where the ordinate does not change to leading order it is the distance from the branch point, in the metric.
     """
 
     kind: str
@@ -129,6 +134,7 @@ class NormalForm:
     power: int
     uncertainty: float
     side: int
+    of: str = ORDINATE
 
     def classify(self, index_below: int, index_above: int) -> None:
         """Name a pitchfork by the index of the branch that it leaves at loads just below and just above."""

@@ -39,6 +39,8 @@ NARROW = 0.25
 """Part of it that will do for an eigenvalue, whose zero is known to a tenth of it: a wider one is always narrowed."""
 SHARP = 1e-11
 """Uncertainty of a load on the given mesh below which the interpolation is not refined further."""
+NEAREST = 1e-3
+"""Distance of a fold from the branch point that its branch leaves, within which eigenvalues are zero to round-off."""
 PART = 0.02
 """Relative uncertainty at which the difference of two loads is accepted."""
 

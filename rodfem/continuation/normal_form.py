@@ -2,7 +2,9 @@
 
 With ``x`` the change of the scene's ordinate, a pitchfork obeys ``load = load_b + c x + ...`` where ``x`` is
 quadratic in the amplitude (a shortening, say), ``load = load_b + c x^2 + ...`` where it is linear (a
-displacement).  A pitchfork is supercritical where the branch exists on the side on which the index of the branch
+displacement).  An ordinate that does not change along the branch to leading order, such as a position on the axis, or
+the size of a displacement where the load is no even function of it, says nothing of it: ``x`` is the distance
+in the metric then.  A pitchfork is supercritical where the branch exists on the side on which the index of the branch
 that it leaves is higher, else subcritical.
 
 The power series of a load in the amplitude converges up to the nearest other point at which the branch turns, or meets
@@ -13,12 +15,12 @@ Amplitudes are made smaller until the series is resolved.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import NormalForm, SpecialPoint
+from rodfem.continuation.branch import DISTANCE, ORDINATE, NormalForm, SpecialPoint
 from rodfem.continuation.solvers import VERTICAL, BranchSolver
 from rodfem.fem.newton import correct
 from rodfem.tolerances import round_off
@@ -83,9 +85,11 @@ def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -
         if found is None:
             continue
         form, odd, change = found
-        if best is not None and odd * change <= seen and form.kind != best.kind:
+        if best is not None and form.of == DISTANCE != best.of:
+            break  # what the ordinate changes by is round-off
+        if best is not None and odd * change <= seen and not alike(form, best):
             break  # what is odd, or even, is round-off
-        if best is None or form.kind != best.kind or form.uncertainty < best.uncertainty:
+        if best is None or not alike(form, best) or form.uncertainty < best.uncertainty:
             best = form
         settled = odd > OPPOSITE or odd < RESOLVED or form.kind == VERTICAL_BRANCH
         if change <= seen or (settled and form.uncertainty <= RESOLVED * abs(form.coefficient)):
@@ -93,12 +97,17 @@ def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -
     return best
 
 
+def alike(a: NormalForm, b: NormalForm) -> bool:
+    """Whether two normal forms differ in the coefficient only."""
+    return (a.kind, a.power, a.of) == (b.kind, b.power, b.of)
+
+
 def _at_scale(
     solver: BranchSolver, origin: Origin, direction: PETSc.Vec, row: PETSc.Vec, scale: float
 ) -> tuple[NormalForm, float, float] | None:
     """Normal form by amplitudes of a scale, the part of the load that is odd, and its change at the least amplitude.
 
-    None where an equilibrium was not found at one of them, or the ordinate does not change.
+    None where an equilibrium was not found at one of them.
     """
     amplitudes = AMPLITUDES * scale
 
@@ -112,8 +121,9 @@ def _at_scale(
     plus, minus = loads[-2], loads[-1]
     span = solver.system.scene.span
     if max(map(abs, loads)) < VERTICAL * abs(span[1] - span[0]) * scale**2:
-        left = max(map(abs, loads)) / max(map(abs, ordinates))
-        return NormalForm(VERTICAL_BRANCH, 0.0, 1, left, 0), 0.0, 0.0
+        of = ORDINATE if max(map(abs, ordinates)) > SEEN * origin.ordinate_left else DISTANCE
+        left = max(map(abs, loads)) / max(map(abs, ordinates if of == ORDINATE else amplitudes))
+        return NormalForm(VERTICAL_BRANCH, 0.0, 1, left, 0, of), 0.0, 0.0
     change = abs(plus) + abs(minus)
     uneven = abs(plus - minus) / change
     if uneven > ODD:
@@ -122,22 +132,47 @@ def _at_scale(
             return None
         pairs = np.stack([loads, ordinates], axis=1)
         loads, ordinates = np.array([pairs[-3], farther, pairs[-2], pairs[-1]]).T
-        best = _slope(loads, ordinates)
-        left = abs(best - _slope(loads[:2], ordinates[:2])) + _left(_slope, loads, ordinates, origin)
-        return NormalForm("transcritical", best, 1, left, int(np.sign(plus - minus))), uneven, change
-    growth = abs(ordinates[0] / ordinates[3]) if ordinates[3] else np.inf
-    odd = growth < (AMPLITUDES[0] / AMPLITUDES[3]) ** 1.5
+        return _transcritical(loads, ordinates, amplitudes, origin), uneven, change
+    form = _pitchfork(loads[:4], ordinates[:4], amplitudes, origin, solver.units.ordinate)
+    form.uncertainty += uneven * abs(form.coefficient)
+    form.side = int(np.sign(plus))
+    return form, uneven, change
 
-    one = solver.units.ordinate
+
+def _transcritical(loads: np.ndarray, ordinates: np.ndarray, amplitudes: np.ndarray, origin: Origin) -> NormalForm:
+    """Slope of the load in the ordinate, from loads and ordinates at the last two amplitudes on both sides, (4,).
+
+    In the distance where the ordinate does not change, or is an even function, of the amplitude.
+    """
+    of, apart = ORDINATE, abs(ordinates[-2] - ordinates[-1])
+    if apart <= max(SEEN * origin.ordinate_left, ODD * (abs(ordinates[-2]) + abs(ordinates[-1]))):
+        a, b = amplitudes[-2:]
+        of, ordinates, origin = DISTANCE, np.array([a, -a, b, -b]), replace(origin, ordinate_left=0.0)
+    best = _slope(loads, ordinates)
+    left = abs(best - _slope(loads[:2], ordinates[:2])) + _left(_slope, loads, ordinates, origin)
+    side = int(np.sign(loads[-2] - loads[-1]))
+    return NormalForm("transcritical", best if of == ORDINATE else abs(best), 1, left, side, of)
+
+
+def _pitchfork(
+    loads: np.ndarray, ordinates: np.ndarray, amplitudes: np.ndarray, origin: Origin, one: float
+) -> NormalForm:
+    """Leading coefficient of the load in the ordinate, of the natural size ``one``, from both at the amplitudes, (4,).
+
+    In the distance where the leading coefficient of the ordinate is not told from zero.
+    """
+    growth = abs(ordinates[0] / ordinates[3]) if ordinates[3] else np.inf
+    odd, of = bool(growth < (AMPLITUDES[0] / AMPLITUDES[3]) ** 1.5), ORDINATE
+    seen = max(map(abs, ordinates)) > SEEN * origin.ordinate_left
+    if not (seen and _determined(amplitudes, ordinates / one, odd)):
+        odd, of, ordinates, one, origin = True, DISTANCE, amplitudes, 1.0, replace(origin, ordinate_left=0.0)
 
     def leading(loads: np.ndarray, ordinates: np.ndarray, count: int = 4) -> float:
-        return _leading(amplitudes, loads[:4], ordinates[:4] / one, odd, count) / one ** (2 if odd else 1)
+        return _leading(amplitudes, loads, ordinates / one, odd, count) / one ** (2 if odd else 1)
 
     best = leading(loads, ordinates)
-    if not np.isfinite(best):
-        return None
-    left = abs(best - leading(loads, ordinates, 3)) + uneven * abs(best) + _left(leading, loads, ordinates, origin)
-    return NormalForm("pitchfork", best, 2 if odd else 1, left, int(np.sign(plus))), uneven, change
+    left = abs(best - leading(loads, ordinates, 3)) + _left(leading, loads, ordinates, origin)
+    return NormalForm("pitchfork", best, 2 if odd else 1, left, 0, of)
 
 
 def _near(
@@ -169,9 +204,18 @@ def _slope(loads: np.ndarray, ordinates: np.ndarray) -> float:
 
 def _leading(amplitudes: np.ndarray, loads: np.ndarray, ordinates: np.ndarray, odd: bool, count: int) -> float:
     """Ratio of the leading coefficients of the load and of the ordinate (squared if odd) in the amplitude."""
+    x = _first(amplitudes, ordinates, odd, count)
+    return _first(amplitudes, loads, False, count) / (x**2 if odd else x)
+
+
+def _first(amplitudes: np.ndarray, values: np.ndarray, odd: bool, count: int) -> float:
+    """Leading coefficient of an even function of the amplitude, or of an odd one, from the least ``count`` of them."""
     a = amplitudes[-count:]
     powers = np.vander(a**2, count, increasing=True)
-    load = np.linalg.solve(powers, loads[-count:] / a**2)[0]
-    x = np.linalg.solve(powers, ordinates[-count:] / (a if odd else a**2))[0]
-    scale = x**2 if odd else x
-    return float(load / scale) if abs(scale) > CONSTANT else float("nan")
+    return float(np.linalg.solve(powers, values[-count:] / (a if odd else a**2))[0])
+
+
+def _determined(amplitudes: np.ndarray, ordinates: np.ndarray, odd: bool) -> bool:
+    """Whether the leading coefficient of the ordinate, over its natural size, is told from zero."""
+    x = _first(amplitudes, ordinates, odd, 4)
+    return abs(x) > max(CONSTANT, abs(x - _first(amplitudes, ordinates, odd, 3)))

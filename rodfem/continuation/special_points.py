@@ -17,7 +17,17 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.locate import Located, across, locate, locate_mode, solve_at, solve_at_load
+from rodfem.continuation.locate import (
+    NEAREST,
+    WINDOW,
+    Located,
+    across,
+    locate,
+    locate_mode,
+    refine,
+    solve_at,
+    solve_at_load,
+)
 from rodfem.continuation.prediction import hermite
 from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
@@ -35,10 +45,12 @@ LEVEL = 1e-3
 """Slope of the load, relative to its span, below which it is taken for zero."""
 INSENSITIVE = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
-FIRST, NEAREST = 0.05, 1e-3
-"""Distance of the first point of a branch from the branch point that it leaves: usually, and at least."""
+FIRST = 0.05
+"""Distance of the first point of a branch from the branch point that it leaves; at least it is :data:`NEAREST`."""
 SHORTEST = 1e-4
 """Amplitude, in the metric, below which no further one is tried from a branch point."""
+SEEN = 100
+"""Ratio of the distance of a fold from a branch point, in load, to the uncertainty of that, for which it is located."""
 CLOSE, STEEP = 2.0, 50.0
 """How far from its prediction the first point of a branch may lie, in amplitudes: usually, and at most."""
 AROUND = 12
@@ -303,21 +315,23 @@ def lines(solver: BranchSolver, special: SpecialPoint, ways: Sequence[PETSc.Vec]
     return [combine(list(ways), weights) for weights in found] or list(ways)
 
 
-def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, first: float) -> Point | None:
+def leave(
+    solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, first: float, shortest: float = SHORTEST
+) -> Point | None:
     """First point of the branch that leaves ``special`` along ``direction``, about ``first`` away, or None.
 
     The amplitude is halved until the point lies where the direction says, within half of its distance.  Where that
     fails, a family of equilibria may leave at once, at each of which the Jacobian is singular (an elastica whose ends
     meet turns as a rigid body about any axis): then Newton's method is damped along the family.  ``solver`` has the
     mesh, ``first`` is a length in the metric.  A transcritical branch whose load changes much faster than its state is
-    farther away: it is tried last.
+    farther away: it is tried last.  No amplitude is tried below the ``shortest``.
     """
     system = solver.system
     row, before = solver.row(direction), system.damping
     dampings = dict.fromkeys((before, before or solver.inertia.tolerance))
     for damping, reach in (*((damping, CLOSE) for damping in dampings), (before, STEEP)):
         system.damping, amplitude = damping, first
-        while amplitude > SHORTEST:
+        while amplitude > shortest:
             x = special.point.x + direction * amplitude
             outcome = correct(system, x, row, reach=reach * amplitude)
             if outcome.converged:
@@ -368,15 +382,27 @@ def start_branch(
     first = leave(solver, special, direction, amplitude)
     if first is None:
         return None
+    origin = replace(special.point, tangent=direction, arclength=0.0, slope=solver.system.scalar(direction))
+    fold = fold_beside(solver, special, direction) if ways == 1 else None
+    if fold is not None and (beyond := leave(solver, special, direction, NEAREST)) is not None:
+        return _through(special, fold, Branch(name, parent, depth, [origin, beyond]))
     side = _side(solver, special, direction)
     while amplitude > NEAREST and (not bounds[0] <= first.load <= bounds[1] or _changed(special, side, ways, first)):
         amplitude /= 4
         first = leave(solver, special, direction, amplitude) or first
-    origin = replace(special.point, tangent=direction, arclength=0.0, slope=solver.system.scalar(direction))
     span = solver.system.scene.span
     vertical = abs(first.slope) < VERTICAL * abs(span[1] - span[0])  # the load changes by round-off
     begins = None if vertical else index_beside(special, first.load, ways)
     return Branch(name, parent, depth, [origin, first], begins=begins)
+
+
+def _through(special: SpecialPoint, fold: SpecialPoint, branch: Branch) -> Branch:
+    """The ``branch`` that leaves ``special`` with the ``fold`` before its second point."""
+    branch.begins = index_beside(special, fold.point.load, 1)
+    fold.negative_after = branch.points[1].negative
+    fold.negative_before = fold.negative_after if branch.begins is None else branch.begins
+    branch.insert(fold)
+    return branch
 
 
 def index_beside(special: SpecialPoint, load: float, ways: int) -> int | None:
@@ -402,6 +428,43 @@ def _side(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec) -> 
     # of a transcritical branch one side may turn back at once, in a fold: the slope is that right at the point
     near = leave(solver, special, direction, FIRST / 4 if special.law is None else NEAREST)
     return 0.0 if near is None else float(np.sign(near.load - special.point.load))
+
+
+def fold_beside(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec) -> SpecialPoint | None:
+    """Fold of the branch that leaves ``special`` along ``direction``, nearer than :data:`NEAREST`; None without one.
+
+    With ``load = load_b + b a + c a^2`` in the amplitude a there is one at ``a = -b/(2 c)``, and ``b^2/(4 |c|)`` from
+    the branch point: eigenvalues and loads there are round-off next to each other.  The load as a function of the
+    amplitude is regular at the branch point, and is interpolated about it.  Where the two loads differ by less than
+    :data:`SEEN` times their uncertainty a note says so, and by less than that they are one.  ``solver`` has the mesh.
+    """
+    if special.test_function != "mu" or (special.law is not None and special.law.kind == "vertical branch"):
+        return None
+    loads = []
+    for amplitude in (NEAREST, -NEAREST):
+        x = special.point.x + direction * amplitude
+        if not correct(solver.system, x, solver.row(direction), reach=CLOSE * NEAREST).converged:
+            return None
+        loads.append(solver.system.scalar(x) - special.point.load)
+    odd, even = (loads[0] - loads[1]) / 2, (loads[0] + loads[1]) / 2
+    if odd * even >= 0 or abs(odd) >= 2 * abs(even):
+        return None
+    apart = odd * odd / (4 * abs(even))
+    if apart <= SEEN * special.located_to:
+        if apart > special.located_to:
+            special.note = f"a branch that leaves here turns back in a fold that is {apart:.0e} away in load"
+        return None
+    located = refine(
+        solver,
+        lambda s: (special.point.x + direction * s, direction),
+        -NEAREST * odd / (2 * even),
+        WINDOW,
+        special.null_vectors[0],
+        "slope",
+    )
+    fold = special_at(solver, located, distance(solver.system, special.point.x, located.x))
+    fold.kind, fold.test_function = FOLD, "slope"
+    return fold
 
 
 def _changed(special: SpecialPoint, side: float, ways: int, first: Point) -> bool:

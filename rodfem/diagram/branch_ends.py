@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from petsc4py import PETSc
+
 from rodfem.adaptivity.zero_stretch import LOCATED, zero_stretch
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.kinds import END
@@ -32,15 +34,15 @@ Alike = Callable[[Point, Point, float], bool]
 
 def last_admissible(solver: BranchSolver, a: Point, b: Point) -> Point:
     """The point between ``a`` and ``b`` at which the smallest stretch vanishes."""
-    shape = solver.shape
+    states: dict[float, PETSc.Vec] = {}
 
     def stretch(s: float) -> float:
-        return shape.stretch(solve_at(solver, lambda t: hermite(a, b, t), s))
+        states[s] = solve_at(solver, lambda t: hermite(a, b, t), s)
+        return solver.shape.stretch(states[s])
 
     s = zero_between(stretch, a.arclength + INSIDE * (b.arclength - a.arclength), b.arclength, ALONG)
-    x = solve_at(solver, lambda t: hermite(a, b, t), s)
     row = solver.row(hermite(a, b, s)[1])
-    return solver.point(x, s, solver.tangent(row, at=x))
+    return solver.point(states[s], s, solver.tangent(row, at=states[s]))
 
 
 def end_at_zero_stretch(solver: BranchSolver, last: Point, *, error_bars: bool) -> SpecialPoint:

@@ -18,6 +18,7 @@ from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import bound, halved
+from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
@@ -338,13 +339,14 @@ class Sweep:
             system = self.solver.system
             richer = StaticSolver(richer_system(system))
             eigensolver, transfer = NonsymmetricSolver(richer.system), Transfer(system, richer.system)
-            rho = halved(system.fields.discretization.degree)
+            rho, inside = halved(system.fields.discretization.degree), Inside(self.solver.shape, richer.shape)
             for s in branch.special:
                 point = s.point
                 guess = transfer(point.x, state=True)
                 x = at_load(richer, guess, point.load)
                 left = round_off(point.ordinate, self.units.ordinate)
-                s.ordinate_error = s.error_estimate = bound(point.ordinate, richer.shape.ordinate(x), left, rho)
+                again, about = richer.shape.ordinate(x), inside.change(point.x, x)
+                s.ordinate_error = s.error_estimate = bound(point.ordinate, again, left, rho, about)
                 if s.kind == FLUTTER:
                     load, left, mu = self._richer_flutter(richer, eigensolver, transfer, guess, s)
                     s.error_estimate = max(bound(point.load, load, left, rho), s.located_to)

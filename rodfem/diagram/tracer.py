@@ -234,10 +234,14 @@ class Tracer:
 
     def _first_specials(self, branch: Branch) -> None:
         """Insert special points between the branch point that a branch leaves and its first point."""
-        if len(branch.points) != 2 or branch.parent is None:
+        folds = list(branch.special)
+        if len(branch.points) != 2 + len(folds) or branch.parent is None:
             return
-        a, b = map(self.here, branch.points)
-        step = Step(self.solver, a, b, begins=a is branch.points[0])
+        a, b = self.here(branch.points[0]), self.here(branch.points[-1])
+        for fold in folds:
+            self.control.special(fold)
+            self.observer.special(branch, fold)
+        step = Step(self.solver, a, b, folds, begins=a is branch.points[0])
         for special in (s for finder in self.finders if finder.at_start for s in finder.between(step)):
             self.control.special(special)
             branch.insert(special)

@@ -88,7 +88,7 @@ class Shape:
         self._v_at_gauss = compat.lagrange_basis(k - 1, self.gauss.points)
         self._compiled = CompiledShape(f, self.gauss.points)
         self._v_to_powers = np.linalg.inv(np.vander(2 * compat.nodes(k - 1) - 1, k, increasing=True))
-        self._probe_weights = [self._position_weights(s) for s in system.scene.ordinate.places]
+        self._probe_weights = [self.weights(s) for s in system.scene.ordinate.places]
         self.cells = cells
         self.s = self.start[:, None] + self.size[:, None] * self.nodes
         starts = self.gather(self.start)
@@ -98,7 +98,7 @@ class Shape:
     def ordinate(self, x: PETSc.Vec) -> float:
         """Ordinate of the scene at the state ``x``."""
         state, of, integral = self.system.at(x), self.system.scene.ordinate, self.system.equations.ordinate
-        return state.integral(integral) if integral is not None else float(of.of(*self._at(state, of.s or 0.0)))
+        return state.integral(integral) if integral is not None else float(of.of(*self.place(state, of.s or 0.0)))
 
     def stretch(self, x: PETSc.Vec) -> float:
         """Smallest stretch ``v3`` along the rod; 1 for an inextensible rod.
@@ -159,6 +159,42 @@ class Shape:
         system.fields.formulation.store(self, out, c, r, (a, b))
         return system.vector(out)
 
+    def weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
+        """Weights at an arclength ``s``, for :meth:`place`.
+
+        Of slopes at Gauss points in their integrals to ``s`` and over the rod, (2, cells * points), and of nodal values
+        at ``s``, (cells * nodes,).
+        """
+        local = (s - self.start) / self.size
+        integral = self.gauss.integrals(np.clip(local, 0, 1)) * self.size[:, None]
+        first = self.system.scene.interval[0]
+        inside = (local > 0) & (local <= 1) if s > first else np.isclose(self.start, first)
+        value = np.zeros((len(local), len(self.nodes)))
+        value[inside] = compat.lagrange_basis(len(self.nodes) - 1, local[inside])
+        whole = np.outer(self.size, self.gauss.weights)
+        return np.stack([integral.ravel(), whole.ravel()]), value.ravel()
+
+    def place(
+        self, state: NodalValues, s: float, weights: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Centreline (3,) and unit quaternion (4,) of a ``state`` at an arclength ``s`` of these ``weights``.
+
+        Without weights ``s`` is the arclength of the ordinate.
+        """
+        system, f = self.system, self.system.fields
+        integral, value = weights or self._probe_weights[0]
+        size = f.turning.size
+        turned, sums = (
+            value @ state.turned[self.cells].reshape(-1, size),
+            f.formulation.sums(self, state, integral, value),
+        )
+        if system.comm.size > 1:
+            turned, sums = (system.comm.allreduce(part) for part in (turned, sums))
+        place, chord = sums if sums.ndim > 1 else (sums, sums)
+        r = place + f.formulation.offset(f, state, np.array(s), chord)
+        q = f.turning.quaternion(turned)
+        return r, q / sqrt(q @ q)
+
     # --- inside ------------------------------------------------------------------------------------------------
 
     @staticmethod
@@ -211,33 +247,6 @@ class Shape:
     def slopes(self, state: NodalValues) -> np.ndarray:
         """``r' = R v`` at the Gauss points of the owned cells, (cells, points, 3)."""
         return self._compiled.slopes(state.local)
-
-    def _position_weights(self, s: float) -> tuple[np.ndarray, np.ndarray]:
-        """Weights of slopes at Gauss points in their integrals to ``s`` and over the rod, of nodal values at ``s``."""
-        local = (s - self.start) / self.size
-        integral = self.gauss.integrals(np.clip(local, 0, 1)) * self.size[:, None]
-        first = self.system.scene.interval[0]
-        inside = (local > 0) & (local <= 1) if s > first else np.isclose(self.start, first)
-        value = np.zeros((len(local), len(self.nodes)))
-        value[inside] = compat.lagrange_basis(len(self.nodes) - 1, local[inside])
-        whole = np.outer(self.size, self.gauss.weights)
-        return np.stack([integral.ravel(), whole.ravel()]), value.ravel()
-
-    def _at(self, state: NodalValues, s: float) -> tuple[np.ndarray, np.ndarray]:
-        """Centreline (3,) and unit quaternion (4,) at the ordinate's arclength."""
-        system, f = self.system, self.system.fields
-        ((integral, value),) = self._probe_weights
-        size = f.turning.size
-        turned, sums = (
-            value @ state.turned[self.cells].reshape(-1, size),
-            f.formulation.sums(self, state, integral, value),
-        )
-        if system.comm.size > 1:
-            turned, sums = (system.comm.allreduce(part) for part in (turned, sums))
-        place, chord = sums if sums.ndim > 1 else (sums, sums)
-        r = place + f.formulation.offset(f, state, np.array(s), chord)
-        q = f.turning.quaternion(turned)
-        return r, q / sqrt(q @ q)
 
 
 def unique(values: np.ndarray) -> np.ndarray:

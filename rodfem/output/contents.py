@@ -115,7 +115,7 @@ SPECIAL: Kinds = {
     "law": (_or_none(_is_object), "an object or null"),
     "note": (_or_none(_is_text), "a text or null"),
 }
-LAW: Kinds = {"kind": TEXT, "coefficient": MAYBE, "power": COUNT, "uncertainty": MAYBE, "side": NUMBER}
+LAW: Kinds = {"kind": TEXT, "coefficient": MAYBE, "power": COUNT, "uncertainty": MAYBE, "side": NUMBER, "of": TEXT}
 
 
 def read_diagram(path: Path, needs: tuple[str, ...]) -> dict[str, Any]:

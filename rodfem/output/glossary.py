@@ -100,7 +100,7 @@ ENTRIES = {
     # the local law
     "normal form | law": (
         "load = load_b + c x^p + ...: the load along the branch that leaves a branch point, in the change x of "
-        "the ordinate."
+        "the ordinate, or in the distance a from there where the ordinate does not change."
     ),
     "pitchfork": "A branch and its mirror image leave on one side of the critical load.",
     "supercritical pitchfork | supercritical": (

@@ -96,7 +96,8 @@ def elastic(
     :func:`forms.loads.spring` and :func:`forms.loads.rotational_spring` (linear in the angle while it is small).
 
     ``translation(c)`` is in force per length, ``rotation(c)`` in moment per radian; None is no spring.  ``force(c)``
-    (3,) is a dead force.  Raises :class:`InputError` for an anchor or directors that are none.
+    (3,) is a dead force.  Raises :class:`InputError` for an anchor or directors that are none, and the scene refuses a
+    number below zero: what pushes away is no spring, but an ``energy``.
     """
     for name, given in (("translation", translation), ("rotation", rotation)):
         if given is not None:
@@ -106,7 +107,15 @@ def elastic(
         raise InputError("The directors of an elastic end are the zero quaternion: give one of unit norm.")
 
     def energy(x: Place, c: Constants) -> Any:
-        out = 0 if translation is None else loads.spring(x.r, translation(c), anchor)
-        return out + (0 if rotation is None else loads.rotational_spring(x.q, rotation(c), directors))
+        out = 0 if translation is None else loads.spring(x.r, _held_by(translation(c)), anchor)
+        return out + (0 if rotation is None else loads.rotational_spring(x.q, _held_by(rotation(c)), directors))
 
     return End(energy=energy, force=force)
+
+
+def _held_by(stiffness: Any) -> Any:
+    """Stiffness of a spring that holds; raises :class:`ValueError` for a number below zero."""
+    for k in stiffness if isinstance(stiffness, list | tuple) else [stiffness]:
+        if isinstance(k, int | float) and k < 0:
+            raise ValueError(f"a stiffness of {k:g} pushes away: give zero or more, or End(energy=...)")
+    return stiffness

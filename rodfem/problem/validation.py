@@ -255,6 +255,11 @@ def check_convexity(scene: Scene) -> None:
                 f"The second derivative of the stored energy at the undeformed state is not finite{where}: choose "
                 "constants for which it is."
             )
+        if not stiffness.any():
+            raise SceneError(
+                f"The stored energy is flat at the undeformed state{where}: write it as a function of the strains v "
+                "and k whose second derivative there is not zero, with UFL (ufl.cosh), without math and numpy."
+            )
         if not TINIEST / scene.length**2 < abs(stiffness).max() < LARGEST / scene.length**2:
             raise SceneError(
                 f"The stiffness of {abs(stiffness).max():.3g}{where} is so far from one that its powers are no floats: "

@@ -181,6 +181,9 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     (lambda: {"ends": (clamped(), elastic(lambda c: 1.0, anchor=(0, 0)))}, "anchor is"),  # type: ignore[arg-type]
     (lambda: {"ends": (clamped(), elastic(None, lambda c: 1.0, directors=(0, 0, 0, 0)))}, "zero quaternion"),
     ({"ends": (clamped(), elastic(lambda c: (1, 2, 3, 4)))}, "one number or three, not 4"),
+    ({"ends": (clamped(), elastic(lambda c: (1.0, -2.0, 0.0), force=lambda c: (0, 0, -c.P)))}, "of -2 pushes away"),
+    ({"energy": lambda v, k, c: 1.0}, "stored energy is flat"),
+    ({"energy": lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + k[2] ** 2) ** 2}, "stored energy is flat"),
     ({"ends": (clamped(), elastic(lambda c: NAN, force=lambda c: (0, 0, -c.P)))}, "nan in it"),
     (lambda: {"ends": (clamped(), sliding_hinge((1, 0, 0), (NAN, 0, 1)))}, "direction in which a hinge slides"),
     (lambda: {"ends": (clamped(), sliding_hinge((1, 0, 0), (0, 0, 1), force=3))}, "force is 3: give a function"),  # type: ignore[arg-type]

@@ -1,0 +1,55 @@
+"""How much an ordinate that is taken inside of an element changes on a richer mesh, at its place and about it.
+
+A centreline misses ``h^(2d)`` at vertices, and inside of elements of degree d far more: ``h^(d+2)`` times an
+oscillating polynomial, a combination of ``P_d`` and its neighbours.  Near a zero of it two meshes agree by accident,
+and the richer one, whose polynomial has other zeros, may miss as much as the first.  What the polynomial amounts to on
+the whole element does not cancel.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.fem.shape import Shape
+from rodfem.tolerances import same_place
+
+TRIED = 3
+"""Places on an element for each degree: three for each zero of the polynomial."""
+
+
+class Inside:
+    """Changes of the ordinate over the element in which it is taken; none at a vertex, or of one that is an integral.
+
+    Of states on the discretisation of the ``coarse`` shape and on that of the ``richer`` one; collective.
+    """
+
+    def __init__(self, coarse: Shape, richer: Shape) -> None:
+        """Tabulate the weights of positions on the element."""
+        self.coarse, self.richer = coarse, richer
+        scene, fields = coarse.system.scene, coarse.system.fields
+        vertices = fields.all_vertices()
+        places = [p for p in scene.ordinate.places if not any(same_place(p, v, scene.length) for v in vertices)]
+        tried = np.empty(0)
+        for p in places:
+            i = int(np.searchsorted(vertices, p))
+            tried = np.linspace(vertices[i - 1], vertices[i], TRIED * fields.discretization.degree + 2)[1:-1]
+        self._tried = [(float(s), coarse.weights(float(s)), richer.weights(float(s))) for s in tried]
+
+    def change(self, x: PETSc.Vec, again: PETSc.Vec) -> float:
+        """Largest change of the ordinate from a state ``x`` on the coarse mesh to ``again``, that on the richer.
+
+        The ordinate is evaluated at its own place, with the changes of position and rotation of all others.
+        """
+        if not self._tried:
+            return 0.0
+        first, second = self.coarse.system.at(x), self.richer.system.at(again)
+        of = self.richer.system.scene.ordinate
+        r, q = self.richer.place(second, of.s or 0.0)
+        value, largest = float(of.of(r, q)), 0.0
+        for s, weights, richer in self._tried:
+            before, after = self.coarse.place(first, s, weights), self.richer.place(second, s, richer)
+            turned = q + after[1] - before[1]
+            beside = of.of(r + after[0] - before[0], turned / np.sqrt(turned @ turned))
+            largest = max(largest, abs(float(beside) - value))
+        return largest

@@ -1,0 +1,40 @@
+"""The end at which a rod is pressed to no length: its load in closed form, and each state that leads there once."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import pytest
+import ufl
+from classics import SUPPORTS, WIDE, column
+
+from forms.energy import bending_and_twist
+from rodfem import Discretization, Plan, trace
+from rodfem.continuation.solvers import StaticSolver
+
+
+def stretched(v: Any, k: Any, c: Any) -> Any:
+    """Linear; the compliance in stretch is ``(1 + a sin(3 s))/2``."""
+    return (v[2] - 1) ** 2 / (1 + c.a * ufl.sin(3 * c.s)) + bending_and_twist(k, (9.0, 9.0, 9.0))
+
+
+def test_no_state_is_computed_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """``v3 = 1 - P (1 + a sin(3 s))/2`` vanishes first at ``s = pi/6``, inside of an element, and ``P = 2/(1 + a)``."""
+    asked: Counter[tuple[int, float]] = Counter()
+    at_load = StaticSolver.at_load
+
+    def counted(self: StaticSolver, guess: Any, load: float, reach: float = 1e3) -> Any:
+        asked[self.system.fields.discretization.elements, load] += 1
+        return at_load(self, guess, load, reach)
+
+    monkeypatch.setattr(StaticSolver, "at_load", counted)
+    more: dict[str, Any] = {"rod": "unshearable", "energy": stretched, "constants": {"a": 0.7}}
+    rod = column("pressed", SUPPORTS["clamped-free"], (0.0, 3.0), **more)
+    (branch,) = trace(rod, Discretization(elements=2, degree=3), Plan(depth=0, steps=WIDE)).branches
+    assert branch.ended == "stretch reaches zero"
+    end = branch.special[-1]
+    assert abs(end.point.load - 2 / 1.7) <= end.error_estimate < 1e-2
+    finer = [times for (elements, _), times in asked.items() if elements > 2]
+    assert len(finer) > 4
+    assert set(finer) == {1}
