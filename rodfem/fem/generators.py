@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,11 +35,22 @@ class Generators:
         self.system, self.count = system, len(self.motions)
         scalars = fields.copies[0] if system.has_scalars else np.zeros(0, int)
         self._rows, self._columns = np.concatenate([fields.free_owned, scalars]), np.flatnonzero(fields.number >= 0)
-        every = [symmetry.linear(fields) for symmetry in self.motions]
-        none = sp.csr_matrix((0, len(self._columns)))
-        self._forth = sp.vstack([none, *(A[self._rows][:, self._columns] for A in every)]).tocsr()
-        self._back = sp.vstack([none, *(A.T.tocsr()[self._rows][:, self._columns] for A in every)]).tocsr()
+        self._linear = [symmetry.linear(fields) for symmetry in self.motions]
+        self._forth = self._stacked(self._linear)
         self._line: Line | None = None
+
+    def _stacked(self, every: list[sp.csr_matrix]) -> sp.csr_matrix:
+        """Own rows and free columns of matrices between all local degrees of freedom, one below the other."""
+        if not every:
+            return sp.csr_matrix((0, len(self._columns)))
+        size = every[0].shape[0]
+        rows = (np.arange(len(every))[:, None] * size + self._rows).ravel()
+        return sp.vstack(every, format="csr")[rows][:, self._columns]
+
+    @cached_property
+    def _back(self) -> sp.csr_matrix:
+        """``A^t`` of all generators, one below the other."""
+        return self._stacked([A.T.tocsr() for A in self._linear])
 
     def _constant(self, state: State) -> np.ndarray:
         """``c`` of all generators: with ends that are held, and forces that are known, they vary with the load."""
