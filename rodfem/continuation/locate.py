@@ -144,7 +144,9 @@ def _expected(solver: BranchSolver, curve: Curve, p: Point, q: Point, load: floa
         x, direction = curve(s)
         slope = solver.system.scalar(direction)
         if slope:
-            s = min(max(s + (load - solver.system.scalar(x)) / slope, p.arclength), q.arclength)
+            there = s + (load - solver.system.scalar(x)) / slope
+            # never onto an end, at another load: beside a branch point that is a state of the other branch
+            s = min(max(there, (p.arclength + s) / 2), (s + q.arclength) / 2)
     return s
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi, sqrt
 from pathlib import Path
 from typing import Any
@@ -23,9 +24,9 @@ Energy = Any
 
 def traced(span: tuple[float, float], energy: Energy, constants: dict[str, float], **more: Any) -> Diagram:
     """A pinned column in the plane across e2, bent about d2 with the stiffness one; ``ends`` may be given."""
-    ends = more.pop("ends", PINNED)
+    ends, plan = more.pop("ends", PINNED), more.pop("plan", ONCE)
     given = {"planar": "e2", "ordinate": ACROSS, "energy": energy, "constants": constants} | more
-    return rodfem.trace(column("postbuckling", ends, span, **given), plan=ONCE)
+    return rodfem.trace(column("postbuckling", ends, span, **given), plan=plan)
 
 
 def quartic(v: Any, k: Any, c: Any) -> Any:
@@ -161,6 +162,22 @@ def test_foundation_that_is_softer_on_one_side(beta: float) -> None:
     assert point.point.load - fold.point.load == pytest.approx(slope**2 / (pi**4 / 2), rel=2e-3)
     assert abs(fold.point.load - pi**2 + slope**2 / (pi**4 / 2)) <= max(fold.error_estimate, 2e-3 * slope**2)
     assert not any(branch.unexplained for branch in diagram) and not diagram.warnings
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_loads_between_a_fold_and_its_branch_point(asked: bool) -> None:
+    """Two bent states, the roots of ``8 beta/pi^3 x + pi^4/8 x^2 = P - pi^2``, beside the straight one."""
+    load, linear, square = pi**2 - 5e-8, 8 * 0.01 / pi**3, pi**4 / 8
+    quadratic = lambda v, k, c: bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
+    plan = replace(ONCE, at=(load,)) if asked else ONCE
+    more = {"potential": lambda x, c: c.k * x.r[0] ** 3, "plan": plan}
+    diagram = traced((9.5, 10.5), quadratic, {"k": 0.01}, **more)
+    assert not diagram.warnings
+    root = sqrt(linear**2 - 4 * square * 5e-8)
+    exact = [0.0, (-linear + root) / (2 * square), (-linear - root) / (2 * square)]
+    found = diagram.at(load)
+    assert [p.ordinate for p in found] == pytest.approx(exact, rel=2e-3)
+    assert [p.negative for p in found] == [0, 1, 0]
 
 
 def test_fold_within_the_uncertainty_of_a_branch_point() -> None:
