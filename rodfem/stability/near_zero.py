@@ -22,6 +22,8 @@ from rodfem.stability.soft_mode import Judgement, SoftMode
 
 SOFT = 1e-4
 """Eigenvalues nearer to zero than this, over the lowest bending eigenvalue, are soft."""
+FIRM = 1e-4
+"""Relative change at which eigenvalues have converged that are not soft."""
 CLEAR = 10.0
 """Times that limit beyond which a rough estimate of the nearest eigenvalue says that none is soft."""
 
@@ -72,10 +74,15 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
     if not inside + least and abs(found.nearest(1, ROUGH)[0][0]) > CLEAR * limit:
         inertia.vectors = kept
         return NearZero(np.zeros(0), [], np.zeros(0), index.negative, index.zero)
-    values, vectors = found.nearest(number, NULL)
+    values, vectors = found.nearest(number, FIRM)
     while (abs(values) < limit).all() and number < MANY:
         number *= 2
-        values, vectors = found.nearest(number, NULL)
+        values, vectors = found.nearest(number, FIRM)
+    # what is far from zero need not be as sharp: the values there lie dense on coarse meshes, and converge slowly
+    close = max(int((abs(values) < CLEAR * limit).sum()), inside)
+    if close:
+        sharp = found.nearest(close, NULL, spare=number - close)
+        values, vectors = np.append(sharp[0], values[close:]), [*sharp[1], *vectors[close:]]
     inertia.vectors = kept
     chosen = np.flatnonzero((abs(values) < limit) | (np.arange(number) < least))
     if len(chosen) < inside or len(chosen) == number:

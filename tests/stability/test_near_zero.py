@@ -1,0 +1,55 @@
+"""Eigenvalues nearest zero on a coarse mesh of linear elements, beside dense linear algebra of numpy and scipy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg
+from demo_cases import scene
+
+from rodfem import Diagram, Discretization, Plan, trace
+from rodfem.continuation.branch import Point
+from rodfem.linalg.matrices import local_rows
+from rodfem.stability.inertia import Factored, Inertia
+from rodfem.stability.near_zero import near_zero
+
+pytestmark = pytest.mark.alone
+
+
+@pytest.fixture(scope="module")
+def ruler() -> Diagram:
+    return trace(scene("ruler"), Discretization("reduced", 40, 1), Plan(depth=1, error_bars=False))
+
+
+def dense(inertia: Inertia, x: Point) -> np.ndarray:
+    """All eigenvalues of K on the null space of the constraints, relative to the metric."""
+    inertia.at(x.x)
+    S, M = (local_rows(a).toarray() for a in (inertia.matrix, inertia.metric))
+    weighted = np.flatnonzero(abs(M).sum(axis=1) > 0)
+    others = np.setdiff1d(np.arange(len(S)), weighted)
+    others = others[abs(S[np.ix_(others, weighted)]).sum(axis=1) > 0]  # multipliers; the load has a row of its own
+    null = scipy.linalg.null_space(S[np.ix_(others, weighted)])
+    K, M = (null.T @ a[np.ix_(weighted, weighted)] @ null for a in (S, M))
+    return np.asarray(scipy.linalg.eigh(K, M, eigvals_only=True))
+
+
+def test_values_and_what_they_cost(ruler: Diagram, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three are asked for, whose neighbours lie dense: a soft one is sharp, the others tell their signs."""
+    solves, inverse = [0], Factored._inverse
+    solver = ruler.solvers[0]
+
+    def counted(self: Factored, vectors: list) -> list:  # type: ignore[type-arg]
+        solves[0] += len(vectors)
+        return inverse(self, vectors)
+
+    monkeypatch.setattr(Factored, "_inverse", counted)
+    for point in ruler[1].points[1::8]:
+        exact = dense(solver.inertia, point)
+        exact = exact[np.argsort(abs(exact))][:3]
+        solves[0] = 0
+        found = near_zero(solver.inertia.at(point.x), least=3)
+        assert solves[0] < 150
+        np.testing.assert_allclose(found.values, np.sort(exact), rtol=1e-2)
+        nearest = found.values[np.argmin(abs(found.values))]
+        assert abs(nearest - exact[0]) < 1e-6 * abs(exact[0])
+        assert found.firm + int((found.values < 0).sum()) == point.negative
