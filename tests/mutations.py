@@ -61,7 +61,7 @@ FAULTS = {
         STEP,
     ),
     "a-mass-brings-a-unit-rotary-inertia": Fault(
-        "rodfem/problem/scene.py", '"rho_I", _no_rotary)', '"rho_I", _unit_rotary)', "tests/problem/test_inertia.py"
+        "rodfem/problem/scene.py", '"rho_I", _no_rotary)', '"rho_I", _unit_rotary)', "tests/problem/test_mass.py"
     ),
     "pictures-draw-chords": Fault(
         "rodfem/output/smooth.py",

@@ -114,3 +114,9 @@ def test_wheel_in_a_bare_environment_runs_the_example_of_the_readme(built: dict[
     assert bound and abs(float(bound[1]) - (81 - 4 * pi**2)) < 1e-8
     version = subprocess.run([python.parent / "rodfem", "--version"], capture_output=True, text=True, env=environment)
     assert version.stdout.startswith(f"rodfem  {rodfem.__version__}\n"), version.stderr
+
+
+def test_test_files_have_names_of_their_own() -> None:
+    """Tests are no package: of two files with one name pytest refuses the second."""
+    names = [path.name for path in (HOME / "tests").rglob("test_*.py")]
+    assert sorted(set(names)) == sorted(names)
