@@ -112,7 +112,9 @@ class CompiledStep:
         step.rod, step.block, step.newton = corrector.rod, corrector.block, newton
         step.iterations = self._theirs("int *", theirs.addressof(newton, "iterations"))
         step.error = self._theirs("double *", theirs.addressof(newton, "error"))
-        step.null, step.u = (self._theirs("double *", x) for x in (corrector.block.tangent, corrector.rod.u))
+        step.factored_tangent, step.u = (
+            self._theirs("double *", x) for x in (corrector.block.tangent, corrector.rod.u)
+        )
         step.n, step.load, step.drifts = n, system.load_index, n - len(system.drifts)
         metric, saddle = shared(system.metric), shared(corrector.matrix)
         assert metric is not None
@@ -157,7 +159,7 @@ class CompiledStep:
         return self._kept[-1]
 
     def _sparse(self, sparse: Any, pattern: sp.csr_matrix, values: np.ndarray) -> None:
-        sparse.rows, sparse.columns = pattern.shape
+        sparse.rows = pattern.shape[0]
         sparse.starts = self._array(pattern.indptr.astype(np.int32), "int")
         sparse.indices = self._array(pattern.indices.astype(np.int32), "int")
         sparse.values = self._array(values)

@@ -17,7 +17,7 @@ typedef int equations_at(const void *, const double *, double *);
 typedef int assemble_form(const void *, const void *, const double *, const double *, double *);
 
 typedef struct {
-    int rows, columns;
+    int rows;
     const int *starts, *indices;
     const double *values;
 } Sparse;
@@ -28,7 +28,7 @@ typedef struct {
     void *block, *newton;       /* structures of newton.c */
     const int *iterations;      /* of the Newton iteration, and its error: they are in newton */
     const double *error;
-    const double *null;         /* unit tangent at the state last factored: in block */
+    const double *factored_tangent; /* unit tangent at the state last factored: in block */
     int n, load, drifts;        /* unknowns, the load's number, and that of the first drift: drifts come last */
     Sparse metric, saddle;      /* M, and S with its border */
     const double *sizes;        /* natural size of each unknown; NULL: one */
@@ -236,7 +236,7 @@ int advance(Step *step, int known, const double **states, const double *value, c
     int moved = *step->iterations > 1 || !(*step->error <= same) || step->broken != broken;
     if (moved && ((factor_at *)step->factor)(step->rod, step->block, step->x)) return SINGULAR;
     step->verified = verified(step);
-    memcpy(step->tangent, step->null, n * sizeof(double));
+    memcpy(step->tangent, step->factored_tangent, n * sizeof(double));
     step->along = dot(n, step->row, step->tangent);
     if (step->along < 0) {
         step->along = -step->along;
