@@ -50,7 +50,8 @@ def module(name: str, declarations: str, beside: Path = _HERE) -> Any:
 def _named(name: str, declarations: str, beside: Path) -> tuple[str, str]:
     """Name in the cache, which tells all that the compiled code depends on, and the code of ``name.c``."""
     code = (beside / f"{name}.c").read_text()
-    key = hashlib.sha1("\n".join([code, declarations, *FLAGS, sys.version, code_cache.processor()]).encode()).hexdigest()[:16]
+    depends = [code, declarations, *FLAGS, sys.version, code_cache.processor()]
+    key = hashlib.sha1("\n".join(depends).encode()).hexdigest()[:16]
     return f"rodfem_{name}_{key}", code
 
 
