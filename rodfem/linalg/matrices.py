@@ -84,6 +84,18 @@ def shared(matrix: PETSc.Mat) -> Shared | None:
     return found
 
 
+def places_in(pattern: sp.csr_matrix, part: sp.csr_matrix) -> np.ndarray:
+    """Places of the entries of a ``part`` among those of a ``pattern`` that has all of them, (entries,).
+
+    The indices of both are sorted.
+    """
+    rows, columns = pattern.shape
+    every, wanted = (
+        np.repeat(np.arange(rows), np.diff(matrix.indptr)) * columns + matrix.indices for matrix in (pattern, part)
+    )
+    return np.searchsorted(every, wanted)
+
+
 STORED = """
 int MatMPIAIJGetSeqAIJ(void *matrix, void **block, void **rest, void *columns);
 int MatSeqAIJGetArrayRead(void *matrix, void **values);
