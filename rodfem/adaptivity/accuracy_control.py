@@ -16,8 +16,8 @@ import numpy as np
 from rodfem.adaptivity.error_estimate import Again, Enriched
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.stability.inertia import ROUGH

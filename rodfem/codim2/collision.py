@@ -14,7 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure
 from rodfem.stability.nonsymmetric import NonsymmetricSolver

@@ -26,8 +26,9 @@ from rodfem.codim2.curve import Criterion, Half, Tracer
 from rodfem.codim2.parameter_plane import Interval, LocusPoint, Plane
 from rodfem.codim2.singular import Singular, null_vectors
 from rodfem.continuation.branch import SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, KINDS
-from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.transfer import Transfer, richer_system
@@ -231,8 +232,8 @@ def locus(
     Parameters
     ----------
     solver
-        The :class:`~rodfem.continuation.solvers.BranchSolver` that found the special point, or for flutter and
-        divergence the :class:`~rodfem.continuation.solvers.StaticSolver` of the sweep.  It is left as it was found.
+        The :class:`~rodfem.continuation.branch_solver.BranchSolver` that found the special point, or for flutter and
+        divergence the :class:`~rodfem.continuation.static_solver.StaticSolver` of the sweep.  It is left as it was.
     special
         A fold, a branch point, a flutter load or a divergence load.
     parameter

@@ -43,7 +43,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
-from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import KEPT, SHRUNK, STALLED, TOLERANCE
 from rodfem.linalg.orthogonal import combine, orthonormalize, project_out

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rodfem.continuation.locate import SHARP, real_root, zero_uncertainty
+from rodfem.continuation.interpolant import real_root, zero_uncertainty
+from rodfem.continuation.locate import SHARP
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured
 from rodfem.stability.nonsymmetric import MULTIPLE, Frequencies, groups

@@ -12,9 +12,10 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.gaps import Gap, arms
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
-from rodfem.continuation.solvers import ON_BOUND
-from rodfem.continuation.special_points import COUPLED, between, coupling_of, directions, lines, start_branch
+from rodfem.continuation.special_points import COUPLED, coupling_of
+from rodfem.continuation.switching import between, directions, lines, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
 from rodfem.diagram.equivalence import SAME_DETERMINANT, equally_stable, equivalent, near

@@ -14,8 +14,9 @@ from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.continuation import compiled_step
 from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.deflation.search import find_equilibria
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
@@ -75,8 +76,8 @@ class Solver:
     Attributes
     ----------
     equilibria
-        What the numerics work with: a :class:`~rodfem.continuation.solvers.BranchSolver`, or an
-        :class:`~rodfem.continuation.solvers.StaticSolver` where a load has no potential.
+        What the numerics work with: a :class:`~rodfem.continuation.branch_solver.BranchSolver`, or an
+        :class:`~rodfem.continuation.static_solver.StaticSolver` where a load has no potential.
     """
 
     @checked(scene=SCENE, discretization=MESH, comm=RANKS, spectrum=count(4), clock=a(Clock, "a Clock"))

@@ -22,10 +22,11 @@ from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
+from rodfem.continuation.interpolant import real_root, zero_uncertainty
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER, Kind
-from rodfem.continuation.locate import SHARP, real_root, zero_uncertainty
+from rodfem.continuation.locate import SHARP
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.first_name import name_of_first
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, SHIFT, FrequencyRows, Row, differ, leftmost
 from rodfem.diagram.plan import Plan

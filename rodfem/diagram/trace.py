@@ -8,8 +8,8 @@ from mpi4py import MPI
 
 from rodfem import compat
 from rodfem.adaptivity.mesh_sequence import start_mesh
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer, Recorder
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.diagram.asked import as_asked
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer

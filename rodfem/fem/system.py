@@ -198,6 +198,10 @@ class System:
         self.metric.mult(d, self.workspace)
         return float(max(self.workspace.dot(d).real, 0.0)) ** 0.5
 
+    def distance(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
+        """Distance of two states in the metric."""
+        return self.norm(a - b)
+
     def at(self, x: PETSc.Vec, line: Line | None = None) -> State:
         """State of the values ``x`` has now, with the parameters of a ``line``, :attr:`line` unless given.
 

@@ -25,7 +25,7 @@ from shooting_solver import Problem, Rod
 from forms.energy import bending_and_twist
 from rodfem.codim2.locus import Locus, locus
 from rodfem.continuation.branch import Branch, SpecialPoint
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan

@@ -15,8 +15,8 @@ from petsc4py import PETSc
 from forms.symmetry import AXES, cross, left
 from rodfem import Discretization, Plan, Solver, clamped, free, trace
 from rodfem.continuation.branch import Point
+from rodfem.continuation.branch_solver import BranchSolver, Step
 from rodfem.continuation.invariants import Invariants
-from rodfem.continuation.solvers import BranchSolver, Step
 from rodfem.errors import ConvergenceError
 from rodfem.fem.symmetries import add_change
 from rodfem.fem.system import System
