@@ -38,6 +38,8 @@ OTHERS: dict[str, Callable[[], Scene]] = {
 
 FAMILIES = {"michell"}
 """Scenes whose side branches are families of equilibria at one load: which of them is followed is up to round-off."""
+NOT_CONSERVATIVE = ("demo follower", "classic Beck", "docs pflueger", "docs leipholz")
+"""Cases without a potential, named, so that nobody has to state all scenes to tell them apart."""
 
 
 def cases() -> dict[str, Callable[[], Scene]]:
@@ -46,6 +48,11 @@ def cases() -> dict[str, Callable[[], Scene]]:
     found |= {f"classic {name}": entry[0] for name, entry in test_classics.CRITICAL.items()}
     found |= {f"classic {name}": scene for name, scene in OTHERS.items()}
     return found | {f"docs {name}": (lambda s=scene: s) for name, scene in test_docs.scenes().items()}
+
+
+def single_branches() -> list[str]:
+    """Names of the conservative cases without such families, whose scenes are not stated for that."""
+    return [name for name in cases() if name not in NOT_CONSERVATIVE and name.split(" ")[1] not in FAMILIES]
 
 
 def trace(scene: Scene, *, error_bars: bool = True) -> rodfem.Diagram:

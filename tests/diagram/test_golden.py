@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from every_row import disagreements
-from golden_cases import cases, record
+from golden_cases import FAMILIES, NOT_CONSERVATIVE, cases, record, single_branches
 
 pytestmark = [pytest.mark.alone, pytest.mark.versions]
 NUMBERS: dict[str, Any] = json.loads((Path(__file__).parents[1] / "golden" / "numbers.json").read_text())
@@ -19,6 +19,10 @@ NUMBERS: dict[str, Any] = json.loads((Path(__file__).parents[1] / "golden" / "nu
 
 def test_all_cases_are_recorded() -> None:
     assert list(NUMBERS) == list(cases())
+    scenes = {name: scene() for name, scene in cases().items()}
+    assert {name for name, scene in scenes.items() if not scene.conservative} == set(NOT_CONSERVATIVE)
+    families = {name for name, scene in scenes.items() if scene.name in FAMILIES}
+    assert set(single_branches()) == set(scenes) - families - set(NOT_CONSERVATIVE)
 
 
 @pytest.mark.parametrize("name", NUMBERS)
