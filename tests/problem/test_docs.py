@@ -29,6 +29,8 @@ from rodfem.problem.ends import Attachment, clamped, free, pinned, sliding
 from rodfem.problem.local_state import needs_centreline
 from rodfem.problem.scene import Inertia, Scene
 
+pytestmark = pytest.mark.alone
+
 PAGE = Path(__file__).parents[2] / "docs" / "rods.md"
 
 
@@ -82,7 +84,7 @@ TANGENT = TORQUE / 2
 """The first positive root of tan x = x."""
 
 
-@pytest.mark.short
+@pytest.mark.versions
 def test_every_scene_of_the_page() -> None:
     found = list(scenes().values())
     assert len(found) > 20
@@ -99,7 +101,6 @@ def traced(name: str) -> tuple[list[Branch], str]:
     return diagram.branches, terminal.getvalue()
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("name", [name for name, scene in scenes().items() if scene.conservative])
 def test_scenes_of_the_page_are_traced_without_a_warning(name: str) -> None:
     branches, words = traced(name)
@@ -153,7 +154,6 @@ def test_numbers_of_the_page_are_those_of_their_sources() -> None:
             assert abs(float(text) - value) <= 0.51 * 10.0 ** -len(text.partition(".")[2]), (name, value)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("name", [name for name, scene in scenes().items() if scene.conservative])
 def test_scenes_of_the_page_do_what_it_says(name: str) -> None:
     first = traced(name)[0][0]
