@@ -38,6 +38,8 @@ OTHERS: dict[str, Callable[[], Scene]] = {
 
 FAMILIES = {"michell"}
 """Scenes whose side branches are families of equilibria at one load: which of them is followed is up to round-off."""
+NOT_CONSERVATIVE = ("demo follower", "classic Beck", "docs pflueger", "docs leipholz")
+"""Cases without a potential, named, so that nobody has to state all scenes to tell them apart."""
 
 
 def cases() -> dict[str, Callable[[], Scene]]:
@@ -46,6 +48,54 @@ def cases() -> dict[str, Callable[[], Scene]]:
     found |= {f"classic {name}": entry[0] for name, entry in test_classics.CRITICAL.items()}
     found |= {f"classic {name}": scene for name, scene in OTHERS.items()}
     return found | {f"docs {name}": (lambda s=scene: s) for name, scene in test_docs.scenes().items()}
+
+
+ON_RANKS = (
+    "demo hemitropic",
+    "demo cord",
+    "demo ruler",
+    "demo follower",
+    "demo ring",
+    "classic stepped",
+    "classic michell",
+    "classic semi-tangential",
+    "classic arch under dead load",
+    "classic tip on a plane",
+    "classic no mean deflection",
+    "classic in a plane",
+    "docs hinge",
+    "docs sprung",
+    "docs midway",
+)
+"""Cases with all that a mesh may have where ranks cut it: closed and planar rods, joints, constraints of all kinds."""
+
+
+REPEATED = (
+    "shearable",
+    "stepped",
+    "twisted",
+    "ring",
+    "sprung",
+    "heavy",
+    "winkler",
+    "midway",
+    "bow",
+    "in_plane",
+    "on_a_plane",
+)
+"""Scenes of the documentation that state a classical problem once more, with other numbers at most."""
+
+
+def distinct() -> list[str]:
+    """Names of the cases with forms of their own: a comparison of two codes learns nothing from the others."""
+    return [name for name in cases() if name.removeprefix("docs ") not in REPEATED]
+
+
+def single_branches() -> list[str]:
+    """Names of the conservative ones of these without families, whose scenes are not stated for that."""
+    return [
+        name for name in distinct() if name not in NOT_CONSERVATIVE and name.removeprefix("classic ") not in FAMILIES
+    ]
 
 
 def trace(scene: Scene, *, error_bars: bool = True) -> rodfem.Diagram:

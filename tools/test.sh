@@ -4,18 +4,12 @@
 #
 #     tools/test.sh PYTHON MPIRUN SECONDS [options for pytest]        (as `make test` does)
 #
-# Two ranks do without the tests marked `alone` that are not `short`.  With quick=yes in the environment the serial run
-# has those marked `short` or `versions`, two ranks run the short ones only, and three ranks none; with quick=short the
-# serial run has the short ones only, too.
+# Two ranks do without the tests marked `alone` that are not `short`.  With quick=yes in the environment there are only
+# the tests marked `versions`: serially, and of them on two ranks what two ranks run.
 set -eu
 cd "$(dirname "$0")/.."
 marks="not alone or short" serial=
-quick=${quick-}
-case "$quick" in
-    yes) serial="short or versions" marks=short ;;
-    short) serial=short marks=short ;;
-    *) quick= ;;
-esac
+[ "${quick-}" != yes ] || marks="versions and ($marks)" serial=versions
 python=$1 mpirun=$2 limit=$3
 shift 3
 
@@ -42,19 +36,12 @@ run() {
 }
 
 run "serially, in two processes" "$python" -m pytest -n 2 --dist loadfile -m "$serial" "$@"
-ranks() { # ranks NUMBER MARKS WHICH [options for pytest]
-    number=$1 chosen=$2 which=$3
-    shift 3
-    run "on $number ranks ($which)" $mpirun -n "$number" sh -c "$rank" sh "$python" -m pytest --color=no \
+ranks() { # ranks NUMBER MARKS [options for pytest]
+    number=$1 chosen=$2
+    shift 2
+    run "on $number ranks ($chosen)" $mpirun -n "$number" sh -c "$rank" sh "$python" -m pytest --color=no \
         -p no:cacheprovider -m "$chosen" "$@"
 }
-if [ "$quick" = short ]; then
-    # On Debian sid PETSc 3.25.5 ended both ranks without a word (its error 63, by MPI_Abort) in or after
-    # tests/stability/test_inertia.py when all the other folders came before; that folder alone passes, the others too.
-    ranks 2 "$marks" "$marks, but tests/stability" --ignore=tests/stability "$@"
-    ranks 2 "$marks" "$marks, tests/stability" tests/stability "$@"
-else
-    ranks 2 "$marks" "$marks" "$@"
-fi
-[ -n "$quick" ] || ranks 3 short "the short ones" "$@"
+ranks 2 "$marks" "$@"
+[ "${quick-}" = yes ] || ranks 3 short "$@"
 echo "== Passed"

@@ -156,6 +156,7 @@ def test_what_was_used_where(folder: Path) -> None:
         assert other.shape.ordinate(x) == pytest.approx(rows["ordinate"][row], abs=1e-5)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("accuracy", [0.0, -1e-6, 1e-20, 1.0, float("nan"), float("inf")])
 def test_bad_accuracy(accuracy: float) -> None:
     scene = hemitropic_cases.scene()
@@ -182,6 +183,7 @@ def test_accuracy_of_a_sweep(accuracy: float, number: int, tmp_path: Path, capfd
             assert np.nanmin(np.abs(np.array(planes) - mu)) < accuracy * abs(mu)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("words", [("--elements", "8"), ("--degree=6",), ("--elem", "8")])
 def test_accuracy_and_a_mesh(words: tuple[str, ...], capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as left:
@@ -191,6 +193,7 @@ def test_accuracy_and_a_mesh(words: tuple[str, ...], capfd: pytest.CaptureFixtur
         assert "error: --accuracy chooses elements and degree itself: leave out --" in capfd.readouterr().err
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     ("vertices", "words"),
     [((0.0, 0.5), "2 vertices"), ((0.0, 0.7, 0.5, 1.0), "ascend"), ((0.0, 0.2, 0.5, 0.9), "begin and end at 0 and 1")],

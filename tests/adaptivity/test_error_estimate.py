@@ -53,7 +53,10 @@ def tip(P: float) -> float:
     return float(2 * sqrt(brentq(lambda m: ellipk(m) - sqrt(P), 0.0, 1 - 1e-12, xtol=1e-16) / P))
 
 
-@pytest.mark.parametrize("mesh", [(8, 1), (3, 2), (4, 3), (2, 4), (4, 5), (2, 6), (8, 6)])
+@pytest.mark.parametrize(
+    "mesh",
+    [*(pytest.param(x, marks=pytest.mark.alone) for x in [(8, 1), (3, 2), (4, 3), (2, 4), (4, 5), (2, 6)]), (8, 6)],
+)
 def test_elastica(mesh: tuple[int, int]) -> None:
     """Buckling loads, and deflections between the elements' ends and at one of them."""
     stops = (3.0, 6.0)
@@ -77,6 +80,7 @@ def bent(P: float) -> OdeSolution:
     return from_clamp(brentq(lambda k: from_clamp(k).y[1, -1], P / 2, 2 * P, xtol=1e-15)).sol
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     ("mesh", "place"), [pytest.param((1, 4), 0.102, marks=pytest.mark.alone), ((2, 3), 0.078), ((2, 5), 0.622)]
 )
@@ -90,7 +94,7 @@ def test_deflection_inside_of_an_element(mesh: tuple[int, int], place: float) ->
     assert abs(found.point.ordinate - bent(3.0)(place)[2]) <= found.ordinate_error
 
 
-@pytest.mark.parametrize("mesh", [(6, 4), (8, 5), pytest.param((12, 4), marks=pytest.mark.alone)])
+@pytest.mark.parametrize("mesh", [(6, 4), *(pytest.param(x, marks=pytest.mark.alone) for x in [(8, 5), (12, 4)])])
 def test_ring(mesh: tuple[int, int]) -> None:
     """Michell's ring: ``C t = sqrt(n^2 - 1)``; what one degree more still misses counts."""
     (circle,) = explored(classics.ring(), mesh)
@@ -125,6 +129,7 @@ def test_arithmetic_of_many_elements() -> None:
         assert abs(s.point.load - pi**2 / 4) <= s.located_to <= s.error_estimate < 1e-8
 
 
+@pytest.mark.alone
 def test_highest_degree() -> None:
     """Of the highest degree there is none richer: halves of the elements do."""
     (branch,) = explored(classics.elastica(3.0), (4, 12))
@@ -141,6 +146,7 @@ def coarse(accuracy: float | None) -> Diagram:
     return trace(hemitropic_cases.scene(), mesh, Plan((0.0, 0.55), (0.5,), 1, accuracy=accuracy))
 
 
+@pytest.mark.alone
 def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
     """At 0.5 two meshes agree by accident in the ordinate, not in the strains: its bar is a tenth of its error."""
     diagram = coarse(None)
@@ -213,6 +219,7 @@ def test_coefficient_of_a_pitchfork(name: str, mesh: tuple[int, int]) -> None:
 # --- what is printed ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.alone
 def test_printed_bars_hold() -> None:
     """Digits that are left out count: the bar printed is one of the number printed."""
     rng = np.random.default_rng(5)

@@ -13,6 +13,8 @@ from forms.energy import bending_and_twist
 from rodfem import Discretization, Plan, trace
 from rodfem.continuation.static_solver import StaticSolver
 
+pytestmark = pytest.mark.alone
+
 
 def stretched(v: Any, k: Any, c: Any) -> Any:
     """Linear; the compliance in stretch is ``(1 + a sin(3 s))/2``."""

@@ -78,10 +78,14 @@ LINES = {
 }
 AFTER_SET_UP = ("--half-length 1e3", "--bending 1e-5")
 """What is found with the discrete rod, in a folder that has been made."""
+ON_RANKS = (*AFTER_SET_UP, "--output /etc/passwd/x", "-- -foo")
+"""What ranks find together, or in what they share."""
 
 
-@pytest.mark.short
-@pytest.mark.parametrize("line", LINES)
+@pytest.mark.versions
+@pytest.mark.parametrize(
+    "line", [pytest.param(x, marks=pytest.mark.short if x in ON_RANKS else pytest.mark.alone) for x in LINES]
+)
 def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     def compute(*_: object, **__: object) -> None:
         raise AssertionError("set up a system for bad input")
@@ -105,7 +109,8 @@ def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, cap
         assert out == err == ""
 
 
-@pytest.mark.short
+@pytest.mark.versions
+@pytest.mark.alone
 def test_options_of_petsc_that_are_read() -> None:
     petsc_options.check(["-log_view", ":file", "-rodfem_eps_tol", "-1e-9", "-mat_type", "aij", "-help"])
     for words in (["x"], ["-"], ["--"], ["-log_view", ":a", "b"], ["-st_type", "sinvert"]):

@@ -19,6 +19,7 @@ from rodfem.problem.scene import Scene
 COMM = MPI.COMM_WORLD
 
 
+@pytest.mark.versions
 @pytest.mark.short
 def test_shared_kept_and_taken_up_again(folder: Path) -> None:
     rods = [scene("cord", turns=float(turns)) for turns in (1.0, 1.5, 2.0, 2.5, 3.0)]
@@ -44,6 +45,7 @@ def test_shared_kept_and_taken_up_again(folder: Path) -> None:
     assert COMM.allreduce(len(done)) == 2  # the one that was cut off, the one that has changed
 
 
+@pytest.mark.alone
 def test_another_energy_or_other_work_is_computed_anew(folder: Path) -> None:
     def softer(v: Any, k: Any, c: Any) -> Any:
         return 0.5 * given(v, k, c)
@@ -63,7 +65,7 @@ def test_another_energy_or_other_work_is_computed_anew(folder: Path) -> None:
         assert many(rods, lambda rod, loads=loads: {"last": loads[-1]}, folder) == [{"last": loads[-1]}]
 
 
-@pytest.mark.short
+@pytest.mark.alone
 def test_a_result_of_a_newer_format_is_kept(folder: Path) -> None:
     """It is refused on every rank, and not written over."""
     rods = [scene("cord", turns=float(turns)) for turns in (1.0, 1.5, 2.0)]

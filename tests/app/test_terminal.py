@@ -29,6 +29,8 @@ from rodfem.fem.fields import Discretization
 from rodfem.problem.ends import Attachment, clamped, free
 from rodfem.problem.scene import Inertia, Ordinate, Scene
 
+pytestmark = pytest.mark.alone
+
 HOME = Path(__file__).parents[2]
 FIRST = MPI.COMM_WORLD.rank == 0
 MESH = Discretization("reduced", 6, 3)
@@ -188,7 +190,6 @@ def test_what_is_no_module_is_named() -> None:
     assert "Modes of one state" in pydoc.render_doc(rodfem.modes.modes)
 
 
-@pytest.mark.alone
 def test_python_of_the_readme(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     """All its blocks, one after the other, as they stand."""
     monkeypatch.setattr("rodfem.app.run.draw", lambda *_: None)

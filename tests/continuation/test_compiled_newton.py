@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from golden_cases import FAMILIES, cases
+from golden_cases import cases, single_branches
 
 import rodfem.fem.system
 from rodfem import Discretization, Plan, trace
@@ -19,10 +19,9 @@ SAME = 1e-9
 """Difference of loads and ordinates, relative to numbers greater than one, of two ways to the same state."""
 LOOSE = 1e-6
 """The same where a row is nearly singular: what Newton's tolerance leaves there is larger."""
-CONSERVATIVE = [name for name, scene in cases().items() if scene().conservative and scene().name not in FAMILIES]
 
 
-@pytest.mark.parametrize("name", CONSERVATIVE)
+@pytest.mark.parametrize("name", single_branches())
 def test_every_row_of_every_scene(name: str) -> None:
     """The first branch: the same steps, loads, ordinates, energies, indices and determinants."""
     scene = cases()[name]()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from golden_cases import FAMILIES, cases
+from golden_cases import cases, single_branches
 
 from rodfem import Diagram, Discretization, Plan, trace
 from rodfem.continuation.compiled_step import CompiledStep, Made
@@ -14,7 +14,6 @@ from rodfem.fem.verification import Verification
 pytestmark = pytest.mark.alone
 SAME = 1e-10
 """Difference of loads, ordinates, energies and stretches, relative to numbers greater than one."""
-CONSERVATIVE = [name for name, scene in cases().items() if scene().conservative and scene().name not in FAMILIES]
 
 
 def traced(name: str) -> Diagram:
@@ -23,7 +22,7 @@ def traced(name: str) -> Diagram:
     return trace(scene, mesh, Plan(depth=1, error_bars=False))
 
 
-@pytest.mark.parametrize("name", CONSERVATIVE)
+@pytest.mark.parametrize("name", single_branches())
 def test_every_row_of_every_scene(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """All branches: the same rows with the same indices and special points; open rods take most steps compiled."""
     steps, whole = [], CompiledStep.__call__

@@ -26,7 +26,8 @@ WEIGHTS = 0.1 * weights
 AT = (0.05, 0.5, *GAUSS, 0.9)
 
 
-@pytest.mark.short
+@pytest.mark.alone
+@pytest.mark.versions
 def test_user_points_and_ends_lie_at_their_loads_exactly() -> None:
     straight, first, second = explored(at=AT)
     assert [s.point.load for s in specials(straight, "user")] == sorted(AT)
@@ -38,7 +39,7 @@ def test_user_points_and_ends_lie_at_their_loads_exactly() -> None:
     assert straight.points[-1].load == first.points[-1].load == 0.95
 
 
-@pytest.mark.short
+@pytest.mark.alone
 def test_energy_grows_by_the_work_of_the_ends() -> None:
     """``dE/dlam = n . d(r(l) - r(-l))/dlam = -2 l n3``, integrated by Gauss's rule, and energies found by shooting."""
     first = explored(at=AT)[1]
@@ -48,6 +49,7 @@ def test_energy_grows_by_the_work_of_the_ends() -> None:
     assert WEIGHTS @ power == pytest.approx(work, abs=5e-9)
 
 
+@pytest.mark.alone
 def test_contact_force_is_constant_and_the_same_in_both_formulations() -> None:
     rich = follower("pointwise", 8, 6)
     state = user_points(explored("pointwise", 8, 6, at=(0.5,), depth=1)[1], 0.5)[0]
@@ -95,6 +97,7 @@ def test_special_points_do_not_depend_on_the_steps() -> None:
     assert max(len(b.points) for b in coarse) < 20
 
 
+@pytest.mark.versions
 @pytest.mark.short
 def test_newton_converges_quadratically() -> None:
     """The size of a correction is the square of the one before: the Jacobian is the derivative of the equations."""
@@ -133,6 +136,7 @@ def test_restart_on_another_discretisation(formulation: str, folder: Path) -> No
     assert other.shape.ordinate(y) == pytest.approx(reference_values.FIRST[0.5][0], abs=1e-10)
 
 
+@pytest.mark.versions
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_polynomials_survive_a_finer_mesh_and_back(formulation: str) -> None:
     """A finer mesh of a higher degree holds every state of a coarse one, so that nothing is lost on the way back."""
@@ -156,6 +160,7 @@ def test_restart_from_what_is_not_there(folder: Path) -> None:
         load_state(path, "straight", 0, follower("pointwise"))
 
 
+@pytest.mark.alone
 def test_steps_that_bound_the_change_of_the_index() -> None:
     """Euler's loads of a pinned column of nearly equal stiffnesses, ``pi^2`` and ``1.004 pi^2``, with a row between."""
     rod = classics.column(

@@ -36,6 +36,7 @@ def test_index_is_that_of_two_shifts_at_every_point(name: str, formulation: str)
                 assert (index.negative, index.zero) == (point.negative, point.zero), (branch.name, point.load)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("name", BENT)
 def test_state_and_tangent_are_those_of_lu_factors(name: str) -> None:
     follower, branches = demo(name, "reduced")
@@ -60,6 +61,7 @@ def test_state_and_tangent_are_those_of_lu_factors(name: str) -> None:
     assert image.norm() < 1e-9 * system.matrix.norm()
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("name", ["hemitropic", "cord"])
 def test_near_singular_states_are_left_to_others(name: str) -> None:
     follower, branches = demo(name, "reduced")

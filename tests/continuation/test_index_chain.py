@@ -47,6 +47,8 @@ from rodfem.diagram.explorer import Explorer
 from rodfem.output.files import _branch_data
 from rodfem.stability.assessment import assess
 
+pytestmark = pytest.mark.alone
+
 EULER = pi**2 / 4
 """Buckling load of the clamped-free column."""
 
@@ -63,7 +65,6 @@ def localised(turns: int = 27) -> Scene:
     )  # fmt: skip
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize(("elements", "told"), [(16, True), (40, False)])
 def test_a_mesh_too_coarse_for_the_turns_of_a_rod_is_told(elements: int, told: bool) -> None:
     """The straight rod is stable under a high tension: m < 2 sqrt(T), whatever a mesh says."""
@@ -74,7 +75,6 @@ def test_a_mesh_too_coarse_for_the_turns_of_a_rod_is_told(elements: int, told: b
     assert (diagram[0].points[0].negative == 0) != told
 
 
-@pytest.mark.alone
 def test_a_rod_under_high_tension() -> None:
     """Its eigenvalues are a thousand times as sensitive to its state as those of a rod without load.
 
@@ -115,7 +115,6 @@ def test_a_range_about_the_buckling_load(half: float) -> None:
     assert (special.negative_before, special.negative_after) == (0, 1)
 
 
-@pytest.mark.alone
 def test_a_double_point_that_the_mesh_splits() -> None:
     """Michell's ring of C = 1.5 at its fourth mode, C t0 = sqrt(15): one point, where two eigenvalues vanish."""
     scene = column(
@@ -130,6 +129,7 @@ def test_a_double_point_that_the_mesh_splits() -> None:
     assert not branch.unexplained
 
 
+@pytest.mark.short
 def test_a_family_at_the_first_load() -> None:
     """At P = 0 a ring under a radial dead load may turn freely; its branch leads across that family.
 
@@ -150,7 +150,6 @@ def test_a_family_at_the_first_load() -> None:
     assert [s.point.load for s in branch.special if s.kind == BRANCH_POINT] == pytest.approx([4.0], abs=1e-8)
 
 
-@pytest.mark.alone
 def test_a_fold_beside_the_branch_point_that_it_comes_from() -> None:
     """At A = -2.31 the second branch of the hemitropic rod turns back 0.04 from where it begins.
 
@@ -167,7 +166,6 @@ def test_a_fold_beside_the_branch_point_that_it_comes_from() -> None:
     assert found.values[row] == pytest.approx([fold.point.load, -2.31], abs=1e-9)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("largest", [0.05, 0.15])
 def test_a_fold_and_a_branch_point_of_opposite_sign_in_one_step(largest: float) -> None:
     """On a foundation of k = 240 the second branch turns back 0.017 after its index has gone from 3 to 4.
@@ -183,7 +181,6 @@ def test_a_fold_and_a_branch_point_of_opposite_sign_in_one_step(largest: float) 
     assert [s.point.load for s in branch.special[1:3]] == pytest.approx([31.28043, 31.27381], abs=1e-5)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize(("longer", "apart"), [(1e-3, 0.0265), (1e-4, 8.39e-3), (1e-6, 8.39e-4)])
 def test_an_eigenvalue_that_passes_zero_twice_in_one_step(longer: float, apart: float) -> None:
     """Two double branch points of the straight rod, ``apart`` by the closed form: the index is 2 on either side.
@@ -215,7 +212,6 @@ def test_a_row_beside_a_pair_of_crossings() -> None:
     assert [(s.negative_before, s.negative_after) for s in found] == [(0, 2), (2, 4), (4, 2), (2, 0)]
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize(("low", "high", "largest"), [
     (0.2950, 0.4994, 0.2), (0.0550, 0.4991, 0.3), (0.2950, 0.4990121, 0.1),  # beside the last row
     (0.4946, 0.6990, 0.3), (0.4940, 0.5490, 0.05),  # beside the first row
@@ -233,7 +229,6 @@ def test_a_pair_of_crossings_beside_an_end_of_a_range(low: float, high: float, l
     assert not straight.unexplained
 
 
-@pytest.mark.alone
 def test_a_pair_of_crossings_is_listed_once() -> None:
     """The row after a step with a pair may be so near to it that its determinant is far below its neighbours'."""
     constants = (0.1956061749617919, 1.0, 1.0, 3.9702302229890574)
@@ -243,7 +238,6 @@ def test_a_pair_of_crossings_is_listed_once() -> None:
     assert found == pytest.approx([x for x in buckling_loads(*constants) if 0.42077 < x < 0.7111], abs=1e-9)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize(("slope", "largest"), [(2.0, 0.15), (2.8, 0.15), (2.8, 0.3), (-2.2, 0.15)])
 def test_a_pair_of_crossings_that_no_parabola_shows(slope: float, largest: float) -> None:
     """The eigenvalue ``(P^2 - d^2)(1 + slope P)``: the parabola through three rows has its vertex too high, or in the
@@ -261,7 +255,6 @@ def test_a_pair_of_crossings_that_no_parabola_shows(slope: float, largest: float
     assert [s.point.load for s in found] == pytest.approx([-apart / 2, apart / 2], abs=1e-10)
 
 
-@pytest.mark.alone
 def test_every_row_of_the_ring_demo() -> None:
     scene = demo_cases.scene("ring")
     diagram = trace(scene, Discretization("auto", 8, 6), Plan(error_bars=False))
@@ -295,7 +288,6 @@ def test_what_is_not_explained_is_kept() -> None:
     assert not chained(a.low, a.high, singular[::-1], b.low, b.high)
 
 
-@pytest.mark.alone
 def test_steps_that_do_not_explain_are_repeated() -> None:
     """A ring whose stiffness varies by 1e-4 along it: the double point at P = 3 is broken, and passed without a jump.
 
@@ -317,7 +309,6 @@ def test_steps_that_do_not_explain_are_repeated() -> None:
     assert abs(branch.points[-1].ordinate - 2.0) > 0.3
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("short", [0.0, 1e-9, 1e-4])
 def test_branches_that_leave_at_the_end_of_the_range(short: float) -> None:
     """All rows are within the range; a branch of which it has nothing is none."""
@@ -350,7 +341,6 @@ def test_eigenvalues_beside_a_critical_load_are_no_family_of_equilibria() -> Non
     assert "without being zero: a critical load is close to P = 2.4674011" in said
 
 
-@pytest.mark.alone
 def test_mirror_images_are_compared_at_one_load() -> None:
     """First points at distances that differ by 1e-4, relative, are of a branch and its image all the same."""
     scene = column("mirror", (clamped(), free(push)), (0.0, 6.0))

@@ -17,6 +17,8 @@ from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.unfolding import unfold
 
+pytestmark = pytest.mark.alone
+
 EULER = pi**2 / 4
 
 
@@ -59,7 +61,7 @@ def fold_of(lateral: float) -> float:
     return float(found.fun)
 
 
-@pytest.mark.parametrize("lateral", [*(pytest.param(e, marks=pytest.mark.alone) for e in (1e-3, 1e-9, 1e-12)), 1e-6])
+@pytest.mark.parametrize("lateral", [1e-3, 1e-9, 1e-12, 1e-6])
 def test_both_pieces_of_a_broken_pitchfork(lateral: float) -> None:
     """The first branch is stable all along; the detached one has a fold, and no branch point is left.
 
@@ -101,7 +103,6 @@ def test_unfolding_is_the_work_of_the_imperfection() -> None:
     assert values[1].size > values[1].noise
 
 
-@pytest.mark.alone
 def test_perfect_points_stay_what_they_are() -> None:
     found = diagram(cantilever(0.0))
     (special,) = found.special()
@@ -112,7 +113,6 @@ def test_perfect_points_stay_what_they_are() -> None:
     assert special.law.kind == "supercritical pitchfork"
 
 
-@pytest.mark.alone
 def test_a_mesh_without_the_symmetry_of_the_rod() -> None:
     """Unequal elements take a pitchfork apart that the reversal of the rod makes: a richer mesh tells."""
     ends = (pinned(), pinned(ON_AXIS, push))
@@ -125,7 +125,6 @@ def test_a_mesh_without_the_symmetry_of_the_rod() -> None:
     assert IMPERFECT not in kinds
 
 
-@pytest.mark.alone
 def test_what_steps_do_not_resolve_is_called_imperfect() -> None:
     """The bend of 1e-13 is sharper than the least step: the point is recorded with the size of its unfolding."""
     found = diagram(cantilever(1e-13), depth=0)
@@ -135,7 +134,6 @@ def test_what_steps_do_not_resolve_is_called_imperfect() -> None:
     assert special.unfolding == pytest.approx(1e-13 * np.sqrt(2) * 2 / pi, rel=1e-3)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("beside", [1e-11, 1e-9, 1e-6])
 def test_a_load_beside_a_branch_point(beside: float) -> None:
     """The branch that leaves there has its row at that load, and goes on: sqrt(P) = K(k), tip 2 k / sqrt(P).
@@ -155,7 +153,6 @@ def test_a_load_beside_a_branch_point(beside: float) -> None:
     assert abs(row.ordinate) == pytest.approx(expected, rel=4e-15 / beside + 1e-8)
 
 
-@pytest.mark.alone
 def test_a_search_finds_the_detached_branch_once() -> None:
     """Its mirror image is nearly an equilibrium at 1e-9: deflating that would hide it."""
     found = diagram(cantilever(1e-9), 0, at=(3.0,), tries=2)
@@ -163,7 +160,6 @@ def test_a_search_finds_the_detached_branch_once() -> None:
     assert [s.kind for s in found.branches[1].special if s.kind != "user"] == ["end", "fold", "end"]
 
 
-@pytest.mark.alone
 def test_folds_that_are_nearly_uncoupled_from_the_load() -> None:
     """Past a turn of 2 pi the null vector of a clamped rod is nearly orthogonal to the load derivative, also at a fold.
 
@@ -191,7 +187,6 @@ def test_folds_that_are_nearly_uncoupled_from_the_load() -> None:
     assert below[1] / below[2] == pytest.approx(10 ** (2 / 3), rel=1e-3)
 
 
-@pytest.mark.alone
 def test_the_bend_of_a_broken_pitchfork_with_default_steps() -> None:
     """A twisted rod, curved a little, under thrust: its branch bends at 39.2, where a step may end just before.
 

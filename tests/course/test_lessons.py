@@ -34,6 +34,7 @@ def judged(path: Path) -> tuple[bool, str]:
     return answer_to(question(path)).judge(runpy.run_path(str(path))["answer"])
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_a_lesson_ends_with_its_number(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)

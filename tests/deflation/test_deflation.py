@@ -76,6 +76,7 @@ def test_cord() -> None:
     assert len(search.tally.tries) == 24
 
 
+@pytest.mark.alone
 def test_cord_beyond_what_was_explored() -> None:
     """With all explored states given, only others are found: they are on branches that exploring did not reach."""
     found = cord()
@@ -104,6 +105,7 @@ def test_hemitropic() -> None:
                 assert force(follower, x) < 1e-9
 
 
+@pytest.mark.alone
 def test_ring_in_its_plane() -> None:
     """Moved, turned, or run around along itself it is the same ring: a circle, and beyond 3 the pressed one."""
     follower = Solver(classics.pressed_ring(), Discretization("auto", 12, 6)).equilibria
@@ -152,6 +154,7 @@ def test_ruler() -> None:
     assert down.points[-1].load == pytest.approx(4.42594840243, abs=1e-9)
 
 
+@pytest.mark.alone
 def test_nothing_to_find() -> None:
     """Under a small load there is one equilibrium: it is found, nothing else is, and the report says so."""
     follower = Solver(scene("ruler", direction="e2"), Discretization()).equilibria
@@ -168,6 +171,7 @@ def test_nothing_to_find() -> None:
         assert "no proof" in out.getvalue()
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("planar", [None, "e1"])
 def test_a_column_that_hangs(planar: str | None) -> None:
     """Between pins, one of which slides: turned over, what pressed the column pulls it straight, at any load."""
@@ -179,11 +183,13 @@ def test_a_column_that_hangs(planar: str | None) -> None:
     assert hangs.energy == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.alone
 def test_known_state_at_another_load() -> None:
     with pytest.raises(InputError, match=r"not 6\.5"):
         Deflation(ruler().follower, 6.5, hemitropic_cases.user_points(ruler()["plane"], 6.0))
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_mirrors_are_those_of_the_equations(formulation: str) -> None:
     expected = {"cord": {(1, -1, 1), (1, 1, -1), (1, -1, -1)}, "ruler": {(1, -1, 1)}}

@@ -11,10 +11,11 @@ from hard.isolas import scene
 from forms.energy import bending_and_twist
 from rodfem import Discretization, Ordinate, Plan, Ring, Scene, StepControl, trace
 
+pytestmark = pytest.mark.alone
+
 EXCESS = 0.04
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("at", [0.0, 0.07])
 def test_a_closed_branch_ends_at_its_start(at: float) -> None:
     """At a load between the folds there are two states of the isola: each is reported once."""

@@ -28,6 +28,7 @@ def diagram() -> Diagram:
     return rodfem.trace(demo_cases.scene("cord"), MESH, SHORT)
 
 
+@pytest.mark.alone
 def test_nothing_is_printed_and_no_file_is_written(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -38,6 +39,7 @@ def test_nothing_is_printed_and_no_file_is_written(
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.alone
 def test_nothing_outside_the_package_assembles_what_traces() -> None:
     """Demos, benchmarks and documentation state scenes and call :func:`rodfem.trace`, or compute by a Solver."""
     home = Path(__file__).parents[2]
@@ -108,6 +110,7 @@ def test_a_saved_diagram_is_a_diagram(diagram: Diagram, folder: Path) -> None:
     assert len(wider.at(25.0)) == 1
 
 
+@pytest.mark.alone
 def test_files_of_another_scene(diagram: Diagram, folder: Path) -> None:
     saved = diagram.save(folder / "cord")
     with pytest.raises(InputError, match=r"holds the scene 'cord' with the load lam, not 'hemitropic' with lam: give"):
@@ -137,6 +140,7 @@ def test_loads_without_a_potential(folder: Path) -> None:
         found.search(15.0)
 
 
+@pytest.mark.alone
 def test_an_observer_hears_of_all(diagram: Diagram) -> None:
     heard: list[Any] = []
 

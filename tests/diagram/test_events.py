@@ -11,8 +11,10 @@ from scipy.special import ellipe, ellipk
 import rodfem
 from rodfem import Discretization, Event, InputError, Plan
 
+pytestmark = pytest.mark.alone
 
-@pytest.mark.parametrize("apart", [*(pytest.param(a, marks=pytest.mark.alone) for a in (0.5, 0.0)), -0.1])
+
+@pytest.mark.parametrize("apart", [0.5, 0.0, -0.1])
 def test_the_distance_of_the_ends_of_an_elastica(apart: float) -> None:
     """That of a pinned column is ``2 E(m)/K(m) - 1`` at ``P = 4 K(m)^2``; where they meet the loop may turn, too."""
     m = brentq(lambda m: 2 * ellipe(m) / ellipk(m) - 1 - apart, 0.01, 0.99)

@@ -13,6 +13,8 @@ import pytest
 from rodfem import Discretization, Plan, Scene, trace
 from rodfem.diagram.first_name import is_straight
 
+pytestmark = pytest.mark.alone
+
 MESH = Discretization("auto", 6, 4)
 
 

@@ -9,7 +9,7 @@ import classics
 import numpy as np
 import pytest
 from fem.test_free_motion import scene as pinned
-from golden_cases import cases
+from golden_cases import NOT_CONSERVATIVE, cases
 from literature.test_free_rods import floating
 from scipy.optimize import linear_sum_assignment
 
@@ -25,7 +25,7 @@ from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil, Nonsy
 
 pytestmark = pytest.mark.alone
 THRUST = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
-SCENES: dict[str, Callable[[], Scene]] = {name: s for name, s in cases().items() if not s().conservative} | {
+SCENES: dict[str, Callable[[], Scene]] = {name: cases()[name] for name in NOT_CONSERVATIVE} | {
     "Leipholz": classics.leipholz,
     "divergence": lambda: classics.partly_following(0.4, (0.0, 25.0)),
     "double": lambda: classics.partly_following(0.2, (0.0, 25.0), 1.0),

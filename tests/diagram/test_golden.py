@@ -11,17 +11,28 @@ from typing import Any
 
 import pytest
 from every_row import disagreements
-from golden_cases import cases, record
+from golden_cases import DEMOS, FAMILIES, NOT_CONSERVATIVE, ON_RANKS, REPEATED, cases, distinct, record, single_branches
 
-pytestmark = [pytest.mark.alone, pytest.mark.versions]
 NUMBERS: dict[str, Any] = json.loads((Path(__file__).parents[1] / "golden" / "numbers.json").read_text())
 
 
+@pytest.mark.alone
 def test_all_cases_are_recorded() -> None:
     assert list(NUMBERS) == list(cases())
+    scenes = {name: scene() for name, scene in cases().items()}
+    assert {name for name, scene in scenes.items() if not scene.conservative} == set(NOT_CONSERVATIVE)
+    families = {name for name, scene in scenes.items() if scene.name in FAMILIES}
+    assert set(single_branches()) == set(distinct()) - families - set(NOT_CONSERVATIVE)
+    assert len(distinct()) == len(scenes) - len(REPEATED)
 
 
-@pytest.mark.parametrize("name", NUMBERS)
+def marked(name: str) -> Any:
+    """A case with the runs that have it besides the serial one."""
+    marks = [] if name in ON_RANKS else [pytest.mark.alone]
+    return pytest.param(name, marks=[*marks, pytest.mark.versions] if name.removeprefix("demo ") in DEMOS else marks)
+
+
+@pytest.mark.parametrize("name", map(marked, NUMBERS))
 def test_nothing_has_changed(name: str) -> None:
     found, recorded = record(cases()[name]()), NUMBERS[name]
     for key in ("name", "ended", "indices"):
@@ -35,6 +46,7 @@ def test_nothing_has_changed(name: str) -> None:
             assert s.get("omega2") == (pytest.approx(t["omega2"], rel=1e-8) if "omega2" in t else None)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("name", ["demo hemitropic", "demo cord", "demo ruler", "demo ring"])
 def test_index_of_every_row(name: str) -> None:
     """By three other methods; ``python -m tests.every_row`` does the same for all conservative scenes."""

@@ -64,6 +64,7 @@ def test_flutter_at_any_torque(span: tuple[float, float], loads: int, monkeypatc
     assert all(p.negative > 0 for p in branch.points if p.load != 0.0)
 
 
+@pytest.mark.alone
 def test_curves_go_on_where_they_cross(monkeypatch: pytest.MonkeyPatch) -> None:
     """The strong plane's frequency passes between those of the weak one, each a curve of one motion: Beck's column."""
     branch, data, _ = swept(classics.partly_following(1.0, (0.0, 25.0)), monkeypatch)
@@ -129,12 +130,14 @@ TWICE_HELD = replace(
 """A straight rod that bends about d2 alone, whose end is kept on the axis twice."""
 
 
+@pytest.mark.alone
 def test_constraints_that_follow_from_others_are_refused() -> None:
     """Without it a singular pencil, with an eigenvalue that is any number, is what frequencies are computed of."""
     with pytest.raises(SceneError, match="Constraints depend on one another"):
         trace(TWICE_HELD, Discretization(elements=5, degree=6))
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(("elements", "degree"), [(4, 5), (6, 6), (5, 7)])
 def test_eigenvalues_that_change_with_the_shift_are_said(
     elements: int, degree: int, monkeypatch: pytest.MonkeyPatch
@@ -147,6 +150,7 @@ def test_eigenvalues_that_change_with_the_shift_are_said(
     assert said or diagram[0].points[0].omega2[0] == pytest.approx([TURNING**4, 0.0], rel=1e-6)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(("length", "stiffness"), [(1.0, 1.0), (1e-3, 7e-13), (1e-3, 3e-5), (1e4, 1e9)])
 def test_frequencies_of_a_rod_that_turns_freely_in_any_units(length: float, stiffness: float) -> None:
     """A pinned and free beam, tan(b) = tanh(b): b = 3.92660231, 7.06858275, and rigid rotations left out.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from dolfinx import fem
-from golden_cases import cases
+from golden_cases import cases, distinct
 from mpi4py import MPI
 from petsc4py import PETSc
 from small_states import scene
@@ -19,7 +19,7 @@ EXACT = 1e-14
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("name", list(cases()))
+@pytest.mark.parametrize("name", distinct())
 def test_forms_of_every_scene(name: str) -> None:
     """Energy, equations, Jacobian with and without the load, and kinetic metric, at bent states of a graded mesh."""
     made = cases()[name]()
@@ -54,6 +54,7 @@ def test_forms_of_every_scene(name: str) -> None:
         assert theirs.norm(PETSc.NormType.INFINITY) <= EXACT * size
 
 
+@pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize(("name", "formulation"), [("cord", "reduced"), ("hemitropic", "pointwise"), ("ring", "auto")])
 def test_matrices_on_all_ranks(name: str, formulation: str) -> None:

@@ -20,6 +20,8 @@ from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 
+pytestmark = pytest.mark.versions
+
 COMM = MPI.COMM_WORLD
 KEYWORD = "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
 DEGREES = pytest.mark.parametrize("degree", [1, 2, 3, 6, 8])
@@ -31,11 +33,13 @@ def lobatto(degree: int) -> np.ndarray:
     return (np.array([-1.0, *np.sort(inner), 1.0]) + 1) / 2
 
 
+@pytest.mark.alone
 @DEGREES
 def test_nodes_are_those_of_lobatto(degree: int) -> None:
     np.testing.assert_allclose(np.sort(compat.nodes(degree)), lobatto(degree), rtol=0, atol=1e-14)
 
 
+@pytest.mark.alone
 @DEGREES
 def test_basis_is_nodal_and_reproduces_polynomials(degree: int) -> None:
     x = np.linspace(0, 1, 17)
@@ -45,6 +49,7 @@ def test_basis_is_nodal_and_reproduces_polynomials(degree: int) -> None:
     np.testing.assert_allclose(basis @ compat.nodes(degree) ** degree, x**degree, rtol=0, atol=1e-13)
 
 
+@pytest.mark.alone
 def test_constants() -> None:
     np.testing.assert_array_equal(compat.lagrange_basis(0, np.array([0.1, 0.9])), [[1], [1]])
     assert compat.lagrange_basis(3, np.array([])).shape == (0, 4)
@@ -166,6 +171,7 @@ def test_complex_petsc_gives_one_sentence(
         assert (out, err.count("\n"), err[:7]) == ("", 1, "error: ")
 
 
+@pytest.mark.alone
 def test_locked_cache_gives_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     def locked(*_: object, **__: object) -> None:
         raise TimeoutError("JIT compilation timed out")

@@ -80,7 +80,6 @@ def circle_at(found: StaticSolver, p: float) -> Any:
     return x
 
 
-@pytest.mark.short
 @pytest.mark.parametrize("p", [0.5, 4.5, 9.5])
 @pytest.mark.parametrize(("planar", "B2", "C"), [("e2", 1.0, 1.0), (None, 1.0, 1.0), (None, 1.3, 0.7)])
 def test_index_of_the_circle(planar: str | None, B2: float, C: float, p: float) -> None:
@@ -94,6 +93,7 @@ def test_index_of_the_circle(planar: str | None, B2: float, C: float, p: float) 
     assert mu[0] <= -p + 1e-9  # a rigid rotation lowers the energy
 
 
+@pytest.mark.alone
 def test_special_points_of_the_circle() -> None:
     """It buckles in its plane at n^2, on top of the rotation."""
     plan = Plan((0.3, 9.5), depth=0, steps=StepControl(first=0.05, largest=0.15), error_bars=False)
@@ -104,6 +104,7 @@ def test_special_points_of_the_circle() -> None:
     assert {(p.negative, p.zero) for p in branch.points if abs(p.load - 4) > 0.1 and p.load < 8} == {(1, 2), (3, 2)}
 
 
+@pytest.mark.alone
 def test_a_soft_mode_is_counted_at_special_points_as_beside_them() -> None:
     """Sections that are nearly round turn at a cost of 1e-8: a factorisation has that as zero, the rows as negative."""
     scene = ring(B2=1 + 1e-8, C=0.8)
@@ -140,6 +141,7 @@ def test_symmetries_of_a_loaded_ring(load: Any, potential: Any, motions: list[st
     assert sorted(names) == sorted(always + motions)
 
 
+@pytest.mark.alone
 def test_a_false_symmetry_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rotation of the ring is none: claimed, it is dropped at the first state, and said to be."""
     found = rodfem.fem.system.find_symmetries

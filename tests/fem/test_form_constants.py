@@ -18,6 +18,8 @@ from rodfem.fem.literals import with_constants
 from rodfem.problem.ends import clamped, free
 from rodfem.problem.scene import Ordinate, Scene
 
+pytestmark = pytest.mark.alone
+
 COMM = MPI.COMM_WORLD
 
 
@@ -49,7 +51,6 @@ def test_another_number_compiles_nothing() -> None:
     assert COMM.allreduce(said, op=MPI.SUM) == []
 
 
-@pytest.mark.alone
 def test_values_are_those_of_the_numbers() -> None:
     """Also in conditions and in the base of a power; exponents, integers and the numbers of formulas stay."""
     mesh = compat.interval_mesh(MPI.COMM_SELF, 8, 0.0, 1.0)

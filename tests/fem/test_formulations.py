@@ -15,6 +15,8 @@ from rodfem.fem.formulations import AUTO, FORMULATIONS, names
 from rodfem.fem.formulations.pointwise import Pointwise
 from rodfem.problem.scene import Scene
 
+pytestmark = pytest.mark.alone
+
 HOME = Path(__file__).parents[2]
 
 

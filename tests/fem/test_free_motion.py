@@ -41,14 +41,13 @@ def straight(found: StaticSolver, load: float) -> Any:
 KINDS = pytest.mark.parametrize("kind", ["moment", "follower_moment"])
 
 
-@pytest.mark.short
 @KINDS
 def test_symmetries_without_a_potential(kind: str) -> None:
     names = {str(s) for s in solver(kind).system.symmetries}
     assert names == {"rotation about e3", "turning of the cross-sections about d3"}
 
 
-@pytest.mark.short
+@pytest.mark.versions
 @KINDS
 @pytest.mark.parametrize("method", ["shift-invert", "reduction", "dense"])
 def test_frequencies_beside_the_free_motion(kind: str, method: str) -> None:
@@ -60,6 +59,7 @@ def test_frequencies_beside_the_free_motion(kind: str, method: str) -> None:
     np.testing.assert_allclose(values, [pi**4, pi**4, (2 * pi) ** 4, (2 * pi) ** 4], rtol=1e-5)
 
 
+@pytest.mark.alone
 @KINDS
 def test_greenhill_between_pins(kind: str) -> None:
     """The straight rod diverges at M = 2 pi (Greenhill 1883)."""
@@ -70,6 +70,7 @@ def test_greenhill_between_pins(kind: str) -> None:
     assert {p.zero for p in found.branches[0].points if abs(p.load - 2 * pi) > 0.01} == {1}
 
 
+@pytest.mark.alone
 @KINDS
 def test_a_motion_that_a_load_drives(kind: str) -> None:
     """A moment at one end that nothing balances turns the rod for ever."""

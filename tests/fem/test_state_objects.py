@@ -34,6 +34,7 @@ def numbers(state: State) -> np.ndarray:
     return np.concatenate([out.array_r, image.array_r, [state.energy(), state.load], state.turned.ravel()])
 
 
+@pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize("name", ["cord", "ruler", "hemitropic"])
 def test_numbers_stay_when_another_state_is_evaluated(name: str) -> None:
@@ -64,6 +65,7 @@ def test_the_state_of_last_time_serves_the_same_values_and_line_alone() -> None:
     np.testing.assert_array_equal(system.at(x).generators, generators)
 
 
+@pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> None:
@@ -108,6 +110,7 @@ def test_only_states_write_where_forms_read() -> None:
         assert ast.unparse(tree).count("object.__setattr__") == allowed, where
 
 
+@pytest.mark.versions
 @pytest.mark.short
 def test_stale_factors_refuse() -> None:
     """Rather than tell a number of the state that took their place; so do those that were never made."""

@@ -77,6 +77,7 @@ def test_number_of_symmetries(rod: Scene, reduced: int, pointwise: int) -> None:
         assert len(System(rod, Discretization(formulation, 4, 6)).symmetries) == expected
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(("rod", "expected"), [(scene("cord"), 0), (hemitropic(DEFAULT), 1), (scene("ruler"), 0)])
 def test_a_fine_mesh_has_the_same_symmetries(rod: Scene, expected: int) -> None:
     """Those of many unknowns are sought with few elements."""
@@ -104,6 +105,7 @@ def test_generators_are_null_vectors(formulation: str) -> None:
         assert (matrix * g).norm() < 1e-9 * matrix.norm()
 
 
+@pytest.mark.alone
 def test_first_equilibrium_far_from_the_start() -> None:
     """A coiled rod let go from straight: Newton's method alone does not get there, going downhill does."""
     coiled = Scene(
@@ -126,6 +128,7 @@ def test_first_equilibrium_far_from_the_start() -> None:
     assert solver.energy(x) > 5
 
 
+@pytest.mark.alone
 def test_writhe_of_a_trefoil() -> None:
     """Of the symmetric trefoil, by the double Gauss integral."""
     t = np.linspace(0, 2 * np.pi, 1501)[:-1]
@@ -140,6 +143,7 @@ def test_writhe_of_a_trefoil() -> None:
     assert writhe(curve[::3]) == pytest.approx(gauss, abs=2e-3)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("turns", [-1, 0, 3])
 def test_link_of_a_twisted_circle(turns: int) -> None:
     s = np.linspace(0, 2 * np.pi, 97)

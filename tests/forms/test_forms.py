@@ -21,7 +21,7 @@ from forms.symmetry import cross, left, right
 from rodfem.problem import quaternions
 from rodfem.problem.quaternions import CONJUGATE, directors, of_vector
 
-pytestmark = pytest.mark.short
+pytestmark = [pytest.mark.alone, pytest.mark.versions]
 
 Q = np.array([0.9, -0.3, 0.5, 0.2]) * 1.7  # of no particular length
 P = np.array([0.1, 0.7, -0.4, 0.6])

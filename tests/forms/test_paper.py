@@ -206,6 +206,7 @@ def rotated(system: System, blocks: Blocks, x: PETSc.Vec, dq: PETSc.Vec, eps: fl
     return y
 
 
+@pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize(("name", "formulation", "load"), STATES)
 def test_tangential_hessian_is_the_second_derivative_along_rotations(name: str, formulation: str, load: float) -> None:

@@ -151,6 +151,7 @@ def cut(file: Path, part: float) -> None:
     file.write_bytes(data[: int(part * len(data))])
 
 
+@pytest.mark.versions
 @pytest.mark.parametrize("part", [0.0, 0.001, 0.5, 0.999])
 def test_own_code_that_is_cut_short_is_compiled_again(
     part: float, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
@@ -168,6 +169,7 @@ def test_own_code_that_is_cut_short_is_compiled_again(
     assert code_cache.is_whole(made)
 
 
+@pytest.mark.versions
 @pytest.mark.parametrize("broken", ["cut", "lost"])
 def test_a_form_that_is_cut_short_is_compiled_again(broken: str, tmp_path: Path) -> None:
     asked = form()

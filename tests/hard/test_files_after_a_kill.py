@@ -125,6 +125,7 @@ def files_of_at_most(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
+@pytest.mark.versions
 @pytest.mark.short
 def test_a_full_disk(folder: Path, diagrams: tuple[Diagram, Diagram]) -> None:
     """One sentence on every rank; what was saved stays, and nothing is left over."""
@@ -147,7 +148,6 @@ def test_a_full_disk(folder: Path, diagrams: tuple[Diagram, Diagram]) -> None:
     assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
 
 
-@pytest.mark.short
 def test_files_of_two_runs(folder: Path, diagrams: tuple[Diagram, Diagram]) -> None:
     for diagram in diagrams:
         diagram.save(folder / diagram.scene.name)

@@ -63,8 +63,10 @@ def failing(method: Callable[..., Any], when: Callable[[], bool], fault: Callabl
     return instead
 
 
-@pytest.mark.short
-@pytest.mark.parametrize(("fault", "sentence"), FAULTS)
+@pytest.mark.versions
+@pytest.mark.parametrize(
+    ("fault", "sentence"), [FAULTS[0], *(pytest.param(*x, marks=pytest.mark.alone) for x in FAULTS[1:])]
+)
 def test_a_branch_ends_and_others_go_on(
     fault: Callable[[], Exception], sentence: str, whole: Diagram, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -109,7 +111,7 @@ def test_a_step_with_nan_is_retried(whole: Diagram, monkeypatch: pytest.MonkeyPa
     np.testing.assert_allclose([load for _, load in found], [load for _, load in expected], rtol=0, atol=1e-9)
 
 
-@pytest.mark.short
+@pytest.mark.alone
 def test_no_error_is_estimated_where_memory_is_exhausted(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = [0]
 
@@ -125,8 +127,11 @@ def test_no_error_is_estimated_where_memory_is_exhausted(monkeypatch: pytest.Mon
     assert [w for w in diagram.warnings if "Memory is exhausted" in w and w.startswith("No error was estimated at lam")]
 
 
-@pytest.mark.short
-@pytest.mark.parametrize("fault", [lambda: ConvergenceError("SLEPc found none."), lambda: PETSc.Error(76)])
+@pytest.mark.versions
+@pytest.mark.parametrize(
+    "fault",
+    [pytest.param(lambda: ConvergenceError("SLEPc found none."), marks=pytest.mark.alone), lambda: PETSc.Error(76)],
+)
 def test_a_sweep_keeps_what_it_has(
     fault: Callable[[], Exception], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

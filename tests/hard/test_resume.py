@@ -76,7 +76,7 @@ def run_of(scene: Scene, plan: rodfem.Plan, folder: Path, comm: MPI.Comm = COMM)
     return rodfem.run(scene, MESH, plan, folder, figures=False, quiet=True, comm=comm)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [pytest.param(x, marks=[pytest.mark.alone] * (x != "hemitropic")) for x in CASES])
 def test_interrupted_at_any_moment(folder: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Twice, at random moments: in the middle third of the points, and in the first quarter after that."""
     scene, plan = CASES[name][0](), CASES[name][1]
@@ -97,6 +97,7 @@ def test_interrupted_at_any_moment(folder: Path, name: str, monkeypatch: pytest.
     assert {file.name for file in (folder / "cut").iterdir()} == {"diagram.json", "states.h5"}
 
 
+@pytest.mark.versions
 @pytest.mark.parametrize("steps", [1, 2, 3])
 def test_every_step_is_recalled(folder: Path, steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """After each step, and on another number of ranks."""
@@ -114,6 +115,7 @@ def test_every_step_is_recalled(folder: Path, steps: int, monkeypatch: pytest.Mo
     alone.Free()
 
 
+@pytest.mark.alone
 def test_loci_are_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Interrupted after the first; that is read, and the others are followed."""
     scene = cord((60.0, 5.0))
@@ -143,6 +145,7 @@ def test_loci_are_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert contents(folder / "cut") == contents(folder / "whole")
 
 
+@pytest.mark.alone
 def test_classes_of_all_that_is_recorded() -> None:
     """A class that a field of a recorded one has is one of them; a cluster belongs to a sweep, which begins anew."""
     plain = {"int", "float", "bool", "str", "list", "tuple", "None", "PETSc", "Vec", "np", "ndarray"}
@@ -167,7 +170,6 @@ def cut(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder / "cut"
 
 
-@pytest.mark.short
 def test_another_run_is_refused(cut: Path) -> None:
     """By the first entry that differs; equations are compared where all numbers agree.  Nothing is written."""
     scene, plan = hemitropic_cases.scene(), rodfem.Plan((0.0, 0.2), error_bars=False, depth=1)
@@ -193,7 +195,6 @@ def test_another_run_is_refused(cut: Path) -> None:
     assert {file.name: file.read_bytes() for file in cut.iterdir()} == before
 
 
-@pytest.mark.short
 def test_a_damaged_step(cut: Path) -> None:
     scene, step = hemitropic_cases.scene(), path_of(cut, 1)
     whole = step.read_bytes()
@@ -209,7 +210,7 @@ def test_a_damaged_step(cut: Path) -> None:
             rodfem.resume(cut, scene, figures=False, quiet=True)
 
 
-@pytest.mark.short
+@pytest.mark.alone
 def test_nothing_to_do(folder: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """An empty folder: the run begins.  A complete one: it says so.  One of an older version: it is refused."""
     scene, plan = hemitropic_cases.scene(), rodfem.Plan((0.0, 0.1), error_bars=False, depth=0)

@@ -14,6 +14,7 @@ from rodfem.fem.fields import Discretization
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one")
 
 
+@pytest.mark.versions
 @pytest.mark.parametrize("formulation", [pytest.param("reduced", marks=pytest.mark.short), "pointwise"])
 def test_ranks_change_nothing(formulation: str) -> None:
     together = explored(formulation, 7, 3)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from golden_cases import cases
+from golden_cases import cases, distinct
 from mpi4py import MPI
 from petsc4py import PETSc
 from random_chains import petsc, random_chain
@@ -31,6 +31,7 @@ BACKWARD = 1e-14
 """Backward error of a solution."""
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("symmetric", [True, False])
 def test_random_chains(symmetric: bool) -> None:
     rng, tried, delayed = np.random.default_rng(3), 0, 0
@@ -57,6 +58,7 @@ def test_random_chains(symmetric: bool) -> None:
     assert delayed > 100
 
 
+@pytest.mark.alone
 def test_what_cannot_be_factored() -> None:
     """Exactly singular, no number; and a pattern is learnt anew for another matrix."""
     dense = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -69,6 +71,7 @@ def test_what_cannot_be_factored() -> None:
     assert factors.regular and factors.inertia() == (1, 0)
 
 
+@pytest.mark.alone
 def test_an_unknown_package(monkeypatch: pytest.MonkeyPatch) -> None:
     options = PETSc.Options()
     options["rodfem_lu_pc_factor_mat_solver_type"] = "superglue"
@@ -103,7 +106,7 @@ class Both:
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("name", list(cases()))
+@pytest.mark.parametrize("name", distinct())
 def test_matrices_of_every_scene(name: str) -> None:
     """Second variations at bent states, with shifts on both sides of zero, and bordered Jacobians."""
     scene = cases()[name]()
@@ -145,6 +148,7 @@ def test_beside_special_points(name: str, formulation: str) -> None:
     assert seen >= 14
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(("formulation", "elements", "degree"), [("reduced", 3000, 1), ("reduced", 400, 6)])
 def test_few_pivots_are_delayed(formulation: str, elements: int, degree: int) -> None:
     """Couplings to the contact force add up along the rod: a scale by their largest entry would delay them all."""
@@ -174,6 +178,7 @@ def test_clean_under_the_sanitizers(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout) == (0, "0 wrong\n"), done.stdout + done.stderr
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("scene", ["cord", "hemitropic"])
 def test_the_last_resort(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without any room for delayed pivots MUMPS makes factors, the diagram is the same, and it says so."""

@@ -58,6 +58,7 @@ def check(factors: Pieces | Mumps, matrix: PETSc.Mat, right: PETSc.Vec) -> None:
     np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
 
 
+@pytest.mark.versions
 @PACKAGES
 @FORMULATIONS
 @STATES
@@ -85,6 +86,7 @@ def test_inertia_beside_a_branch_point(formulation: str, package: str) -> None:
         assert factors.inertia() == (negative, 0)
 
 
+@pytest.mark.versions
 @PACKAGES
 def test_many_right_hand_sides(package: str) -> None:
     system, x = at("hemitropic", "buckled", "pointwise", 0.2)
@@ -106,6 +108,7 @@ def test_many_right_hand_sides(package: str) -> None:
         np.testing.assert_allclose(out.getDenseArray()[:, i], one.array_r, rtol=1e-8, atol=1e-12)
 
 
+@pytest.mark.versions
 def test_natural_sizes() -> None:
     """What MUMPS factors in units of the unknowns has the inertia, the determinant and the solutions of the matrix."""
     system, x = at("hemitropic", "buckled", "pointwise", 0.2)
@@ -118,6 +121,7 @@ def test_natural_sizes() -> None:
         check(factors, matrix, inertia.seed(1))
 
 
+@pytest.mark.versions
 @PACKAGES
 @FORMULATIONS
 @pytest.mark.parametrize(("name", "load"), [("follower", 10.0), ("hemitropic", 0.3)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from golden_cases import cases
+from golden_cases import ON_RANKS, cases
 from mpi4py import MPI
 from petsc4py import PETSc
 from random_chains import chain_of_cells, petsc, random_chain
@@ -85,6 +85,7 @@ def parts_of(cells: int, vertex: int, inner: int, pieces: int, rng: np.random.Ge
     return [np.arange(*ends) for ends in zip(begin, end, strict=True)]
 
 
+@pytest.mark.alone
 @alone
 @KINDS
 @pytest.mark.parametrize("pieces", range(1, 9))
@@ -104,6 +105,7 @@ def test_random_pieces(kind: str, pieces: int) -> None:
     assert delayed > 5
 
 
+@pytest.mark.alone
 @alone
 @KINDS
 @pytest.mark.parametrize("pieces", range(2, 9))
@@ -120,6 +122,7 @@ def test_each_piece_is_singular(kind: str, pieces: int) -> None:
     cut.agrees(dense)
 
 
+@pytest.mark.alone
 @alone
 @KINDS
 def test_a_piece_without_any_pivot(kind: str) -> None:
@@ -133,6 +136,7 @@ def test_a_piece_without_any_pivot(kind: str) -> None:
     cut.agrees(dense)
 
 
+@pytest.mark.alone
 @alone
 def test_the_elimination_runs_towards_the_cut() -> None:
     """A piece at the end of a rod has its cut in its last front alone, whichever end it is."""
@@ -150,6 +154,7 @@ def distributed(right: np.ndarray, matrix: PETSc.Mat) -> PETSc.Vec:
     return out
 
 
+@pytest.mark.versions
 @pytest.mark.short
 @KINDS
 def test_random_chains_on_ranks(kind: str) -> None:
@@ -175,6 +180,7 @@ def test_random_chains_on_ranks(kind: str) -> None:
             matrix.scale(2.0)
 
 
+@pytest.mark.versions
 @pytest.mark.short
 def test_all_ranks_hear_of_trouble() -> None:
     """An entry of one rank that is no number; a matrix that is exactly singular."""
@@ -191,7 +197,7 @@ def test_all_ranks_hear_of_trouble() -> None:
 
 
 @pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="nothing is cut on one rank")
-@pytest.mark.parametrize("name", list(cases()))
+@pytest.mark.parametrize("name", ON_RANKS)
 def test_pieces_of_every_scene(name: str) -> None:
     """Rings, joints, planar rods, integral constraints: wherever the ranks cut them."""
     scene = cases()[name]()

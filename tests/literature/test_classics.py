@@ -21,6 +21,8 @@ from shooting_solver import Rod
 from rodfem import Discretization, End, Scene, Solver, clamped, free
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
+pytestmark = pytest.mark.alone
+
 
 def root(f: Callable[[float], float], a: float, b: float) -> float:
     return float(brentq(f, a, b, xtol=1e-15, rtol=1e-14))
@@ -190,7 +192,6 @@ def helix(s: np.ndarray, curvature: float, torsion: float) -> np.ndarray:
     return np.stack([np.cos(w * s / 2), 0 * s, np.sin(w * s / 2) * curvature / w, np.sin(w * s / 2) * torsion / w], 1)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_helix_of_any_pitch(formulation: str) -> None:
     """A helix is a solution for any pitch; what holds it is a force and a moment along its axis."""
@@ -205,7 +206,6 @@ def test_helix_of_any_pitch(formulation: str) -> None:
         assert abs(n - force).max() < 1e-7
 
 
-@pytest.mark.alone
 def test_helix_as_the_degree_grows() -> None:
     """Its error falls to round-off."""
     errors, t = [], 2.0

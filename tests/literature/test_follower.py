@@ -27,6 +27,8 @@ from rodfem.diagram.trace import trace
 from rodfem.fem.fields import Discretization
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 
+pytestmark = pytest.mark.alone
+
 DEMO = Path(__file__).parents[2] / "demos" / "follower.py"
 
 
@@ -76,7 +78,6 @@ def test_flutter(span: tuple[float, float], J: float) -> None:
                 assert np.nanmin([abs(column(value, p.load, *plane) - value) for plane in ((1, J), (10, 0))]) < 1e-6
 
 
-@pytest.mark.alone
 def test_ordinate_of_a_load_that_is_not_known_better() -> None:
     """A stretching column stays straight, and its length is ``1 - P/EA``: its bar is that of P over EA.
 
@@ -110,6 +111,7 @@ def test_two_planes(P: float) -> None:
             assert column(expected, P) == pytest.approx(expected, rel=1e-11)
 
 
+@pytest.mark.short
 @pytest.mark.parametrize(("P", "near"), [(40.0, 10 - 11j), (100.0, 9.4 - 35j)])
 def test_past_flutter(P: float, near: complex) -> None:
     expected = column(near**2, P)
@@ -190,6 +192,7 @@ def _complex_works(builds: list[list[Path]]) -> bool:
     return subprocess.run([sys.executable, "-c", check], env=environment, capture_output=True).returncode == 0
 
 
+@pytest.mark.short
 def test_asymmetry_has_low_rank() -> None:
     assert [vibration(P).asymmetry()[0] for P in (0.0, 10.0, 40.0)] == [0, 4, 4]
 

@@ -15,6 +15,8 @@ from forms import loads
 from forms.energy import bending_and_twist
 from rodfem import Discretization, End, Inertia, Ordinate, Parameter, Plan, Scene, SceneError, Solver, free
 
+pytestmark = pytest.mark.alone
+
 ROOTS = [brentq(lambda x: np.cos(x) - 1 / np.cosh(x), (n + 0.4) * pi, (n + 0.6) * pi, xtol=1e-14) for n in (1, 2, 3)]
 FREQUENCIES = np.square(ROOTS)
 """Of a free beam, in units of sqrt(B/(m L^4)), cos x cosh x = 1: 22.3733, 61.6728, 120.9034."""
@@ -94,7 +96,6 @@ def test_thrust_along_the_end() -> None:
     assert found.point.load == pytest.approx(109.69, abs=5e-3)
 
 
-@pytest.mark.alone
 def test_forces_that_nothing_balances() -> None:
     one_sided = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
     with pytest.raises(SceneError, match="nothing holds the rod against"):

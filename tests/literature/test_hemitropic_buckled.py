@@ -22,6 +22,8 @@ from rodfem.fem.fields import Discretization
 from rodfem.problem.ends import pinned
 from rodfem.problem.scene import Ordinate, Scene
 
+pytestmark = pytest.mark.alone
+
 AT = (0.2, 0.325, 0.5, 0.7, 0.9)
 RICH, PLAIN = (16, 8), (8, 6)
 
@@ -85,7 +87,6 @@ def test_second_branch_ends_where_the_stretch_vanishes() -> None:
     assert min(p.stretch for p in second.points[:-1]) > 0
 
 
-@pytest.mark.alone
 def test_secondary_pitchfork() -> None:
     found = branches(constants=(0.0, 1.0, 1.0, 3.0))
     first = from_point(found, "straight", 0)
@@ -98,7 +99,6 @@ def test_secondary_pitchfork() -> None:
         assert [p.ordinate for p in user_points(leaving, load)] == pytest.approx([ordinate], abs=1e-10)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize(
     ("constants", "number", "load", "before", "after"),
     [
@@ -112,14 +112,12 @@ def test_folds_of_other_rods(constants: Constants, number: int, load: float, bef
     assert (fold.negative_before, fold.negative_after) == (before, after)
 
 
-@pytest.mark.alone
 def test_third_branch_of_another_rod() -> None:
     third = from_point(branches(constants=(-2.0, 1.0, 1.0, 3.0)), "straight", 2)
     assert third.ended == "stretch reaches zero"
     assert third.points[-1].load == pytest.approx(reference_values.ZERO_STRETCH_OF_THIRD, abs=1e-7)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("constants", [DEFAULT, (0.0, 1.0, 1.0, 3.0), (-2.0, 1.0, 1.0, 3.0)])
 def test_symmetry_leaves_no_drift(constants: Constants) -> None:
     for branch in branches(constants=constants):
@@ -128,7 +126,6 @@ def test_symmetry_leaves_no_drift(constants: Constants) -> None:
             assert min(p.zero for p in branch.points[1:]) == 1  # the circle of states that each belongs to
 
 
-@pytest.mark.alone
 def test_coupling_tells_folds_from_branch_points() -> None:
     both = [
         s for constants in (DEFAULT, (0.0, 1.0, 1.0, 3.0)) for b in branches(constants=constants) for s in b.special
@@ -162,7 +159,6 @@ def errors(found: list[Branch]) -> list[tuple[str, float, float]]:
     return out
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize(
     ("formulation", "elements", "degree"),
     [("reduced", 24, 1), ("reduced", 16, 2), ("pointwise", 12, 2), ("reduced", 8, 4), ("reduced", 8, 6)],
@@ -174,7 +170,6 @@ def test_error_estimates_bound_the_error(formulation: str, elements: int, degree
         assert estimate <= most * true + 2e-11, name
 
 
-@pytest.mark.alone
 def test_formulations_agree_within_their_estimates() -> None:
     both = [branches(formulation, *PLAIN) for formulation in ("reduced", "pointwise")]
     for a, b in zip(*both, strict=True):
@@ -194,7 +189,6 @@ def test_formulations_agree_within_their_estimates() -> None:
     )
 
 
-@pytest.mark.alone
 def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
     """Where ``2 E(m) = K(m)``, at ``P0 = 4 K^2``, the ends of a pinned column meet: its loop may turn about any axis.
 
@@ -231,7 +225,6 @@ def test_an_elastica_whose_ends_meet_turns_as_a_rigid_body() -> None:
             assert (p.negative, p.zero) == (1, 2)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("apart", [1e-3, 1e-5])
 def test_a_branch_point_right_after_the_beginning_of_a_branch(apart: float) -> None:
     """Pinned column on a foundation k = 4 pi^4 (1 + d), where modes 1 and 2 nearly meet at P = 5 pi^2.

@@ -27,12 +27,13 @@ def buckling_points(formulation: str, elements: int, degree: int, constants: Con
     return specials(straight, "branch point")
 
 
-@pytest.mark.short
+@pytest.mark.alone
 @pytest.mark.parametrize("constants", REFERENCE)
 def test_closed_form(constants: Constants) -> None:
     np.testing.assert_allclose(closed_form_hemitropic.loads(*constants), REFERENCE[constants], rtol=0, atol=1e-14)
 
 
+@pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_loads_of_both_formulations(formulation: str) -> None:
@@ -60,6 +61,7 @@ def test_loads_and_indices(constants: Constants) -> None:
             assert (p.negative, p.zero) == (closed_form_hemitropic.index(p.load, *constants), 0)
 
 
+@pytest.mark.alone
 def test_straight_states() -> None:
     """Stretch 1 - lam, no displacement, and the energy 5 lam^2 per unit length."""
     for p in explored("reduced", 12, 6, depth=0)[0].points:

@@ -31,6 +31,8 @@ from rodfem import (
 )
 from rodfem.stability.methods import METHODS
 
+pytestmark = pytest.mark.alone
+
 FIRST = Plan(depth=0)
 B, C = 1.0, 0.7
 

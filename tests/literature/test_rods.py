@@ -19,6 +19,8 @@ from forms.energy import bending_and_twist, logarithmic_stretch
 from rodfem import Inertia, Ordinate, Ring, Scene, at, clamped, elastic, free, hinged, pinned, sliding
 from rodfem.output.digits import number, rounded_up
 
+pytestmark = pytest.mark.alone
+
 Found = Callable[[float], float]
 MASS = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0))
 AWAY = Ordinate("distance", s=1.0, of=lambda r, q: float(np.linalg.norm(r)))
@@ -47,7 +49,6 @@ def linearized(stiffness: Any, k: Any, m: Any, n: Any) -> np.ndarray:
 # --- many eigenvalues nearer to zero than the one that crosses ------------------------------------------------------
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("EI", [1e-3, 1e-6])
 def test_whirling_string(EI: float) -> None:
     """Pulled by T, spinning at sqrt(P): ``P = EI (n pi)^4 + T (n pi)^2``, twice each; torsion is softer by far."""
@@ -80,7 +81,6 @@ def test_divergence_under_a_force_that_turns_partly() -> None:
     assert len(after) == 1
 
 
-@pytest.mark.alone
 def test_beck_on_a_foundation() -> None:
     """An elastic foundation does not change the load of flutter (Smith & Herrmann 1972)."""
     rod = column(
@@ -90,7 +90,6 @@ def test_beck_on_a_foundation() -> None:
     assert sweep(rod).loads("flutter") == pytest.approx([20.0509536], rel=1e-8)
 
 
-@pytest.mark.alone
 def test_hauger() -> None:
     """Tangential thrust ``P (1 - s)`` along a rod that bends alike in all planes, against polynomials of degree 15."""
     x, weight = np.polynomial.legendre.leggauss(40)

@@ -13,6 +13,8 @@ from shooting_solver import Problem, Rod
 
 from rodfem.continuation.branch import Point
 
+pytestmark = pytest.mark.alone
+
 AT = (5.95, 6.0, 6.05)
 STIFFNESS = (1.0, 10.0, 1.0)
 FORCES = {"e1": (1.0, 0.0, 0.0), "e2": (0.0, 1.0, 0.0)}
@@ -99,7 +101,6 @@ def test_nothing_happens_the_easy_way() -> None:
     assert tip(found, plane.points[-1]) == pytest.approx(end[7:10], abs=1e-9)
 
 
-@pytest.mark.alone
 def test_inextensible_limit() -> None:
     stretchings = np.array([1e5, 1e6])
     loads = []
@@ -111,7 +112,6 @@ def test_inextensible_limit() -> None:
     assert limit == pytest.approx(lateral_buckling(4.62, inf), abs=1e-9)
 
 
-@pytest.mark.alone
 def test_formulations_agree() -> None:
     for one, other in zip(default("reduced").branches, default("pointwise").branches, strict=True):
         assert (one.name, one.ended) == (other.name, other.ended)

@@ -16,6 +16,8 @@ import rodfem
 from forms import loads
 from rodfem import Attachment, Ordinate, Plan, Scene, pinned
 
+pytestmark = pytest.mark.alone
+
 S = 0.37
 """Where no mode of interest has a node."""
 OFF = Ordinate("displacement", s=S, of=lambda r, q: hypot(r[0], r[1]))

@@ -27,9 +27,11 @@ from rodfem.modes.perturbation import Motions
 from rodfem.output.plot_modes import FRAMES, GROWS, amplitude, draw_modes, main
 from rodfem.problem.scene import Scene
 
-pytestmark = pytest.mark.short
+pytestmark = pytest.mark.alone
 
 FINE = Discretization("reduced", 6, 6)
+METHODS = ("shift-invert", "cayley", "slicing", "reduction")
+"""That work on all ranks."""
 
 
 def state(given: Scene, discretization: Discretization, load: float, steps: int = 1) -> tuple[StaticSolver, PETSc.Vec]:
@@ -100,7 +102,10 @@ def shape(mu: complex, P: float, s: np.ndarray, adjoint: bool) -> np.ndarray:
     return np.tensordot([row[1], -row[0]], basis(s, 0), 1)
 
 
-@pytest.mark.parametrize(("P", "near"), [(10.0, 26.8), (10.0, 345.5), (30.0, 50 + 150j)])
+@pytest.mark.versions
+@pytest.mark.parametrize(
+    ("P", "near"), [(10.0, 26.8), (10.0, 345.5), pytest.param(30.0, 50 + 150j, marks=pytest.mark.short)]
+)
 def test_beck_column(P: float, near: complex) -> None:
     """Right and left modes, before flutter and after: those of the column and of its adjoint."""
     solver, x = state(classics.beck(span=(1.0, 35.0)), Discretization("pointwise", 6, 6), P)
@@ -131,7 +136,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [pytest.param(x, marks=pytest.mark.short) if x == "cord" else x for x in CASES])
 def test_motion_is_the_derivative_of_the_shape(name: str, formulation: str) -> None:
     solver, x = CASES[name](formulation)
     motions = Motions(solver.system)
@@ -183,7 +188,8 @@ def test_energy_along_an_unstable_mode() -> None:
 # --- methods, symmetries, planes ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", ["shift-invert", "cayley", "slicing", "reduction", "dense"])
+@pytest.mark.versions
+@pytest.mark.parametrize("method", [*(pytest.param(m, marks=pytest.mark.short) for m in METHODS), "dense"])
 def test_modes_do_not_depend_on_the_method(method: str) -> None:
     """Straight, with eigenvalues in pairs, whose modes are turned to a fixed basis; and buckled, with a symmetry."""
     for system, x in (plain("hemitropic", "reduced", 6, 3, 0.2), buckled("hemitropic", "reduced", 6, 3, 0.2)):
@@ -201,6 +207,7 @@ def test_modes_do_not_depend_on_the_method(method: str) -> None:
     np.testing.assert_allclose(turned, factor * along, atol=1e-9)  # the whole rod turns about its axis
 
 
+@pytest.mark.short
 def test_ring() -> None:
     """A circle has four symmetry modes (rotations, turning of its sections) and no other eigenvalue near zero."""
     solver, x = state(classics.ring(), Discretization("reduced", 8, 6), 0.5)
@@ -228,6 +235,7 @@ def test_counting_finds_no_modes() -> None:
 # --- files and pictures ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.versions
 def test_file_and_pictures(folder: Path, capfd: pytest.CaptureFixture) -> None:
     modes = modes_of(*state(classics.beck(span=(1.0, 35.0)), Discretization("pointwise", 6, 6), 30.0), 2)
     if MPI.COMM_WORLD.rank:
@@ -263,6 +271,8 @@ def test_animation_is_a_loop_without_a_jump(root: complex, grows: bool) -> None:
         np.testing.assert_allclose(start[1:] / start[:-1], start[1] / start[0])  # exponential
 
 
+@pytest.mark.versions
+@pytest.mark.short
 def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:
     common = ("--range", "0", "0.25", "--at", "0.2", "--no-figures", "--output", str(folder))
     run_demo(*common, "--modes", "2", "--method", "cayley")
@@ -295,6 +305,7 @@ def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:
         assert MPI.COMM_WORLD.rank or sentence in err
 
 
+@pytest.mark.short
 def test_null_vectors_in_files_are_motions(folder: Path) -> None:
     """At the first buckling load the straight rod's null vector moves it sideways, and holds its ends."""
     run_demo("--range", "0", "0.2", "--no-figures", "--output", str(folder))

@@ -30,6 +30,7 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.versions
 def test_vtk_reads_the_steps(saved: Path, tmp_path: Path) -> None:
     vtk = pytest.importorskip("vtk")
     from vtk.util.numpy_support import vtk_to_numpy
@@ -64,6 +65,7 @@ def test_vtk_reads_the_steps(saved: Path, tmp_path: Path) -> None:
         assert vtk_to_numpy(found.GetArray(f"displacement {i + 1}")) == pytest.approx(expected.displacement[i])
 
 
+@pytest.mark.versions
 def test_tables(saved: Path, tmp_path: Path) -> None:
     """Numbers are those of the diagram, to the last bit."""
     rows, special = to_csv(saved, tmp_path)
@@ -74,6 +76,7 @@ def test_tables(saved: Path, tmp_path: Path) -> None:
     assert [line["kind"] for line in csv.DictReader(special.open())] == [s["kind"] for s in branch["special"]]
 
 
+@pytest.mark.versions
 def test_netcdf(saved: Path, tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
     (path,) = to_netcdf(saved, tmp_path)

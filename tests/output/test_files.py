@@ -66,6 +66,7 @@ def diagram(folder: Path) -> dict[str, Any]:
     return json.loads((folder / "diagram.json").read_text(), parse_constant=pytest.fail)  # no NaN, no Infinity
 
 
+@pytest.mark.versions
 @FORMULATIONS
 def test_diagram_says_what_was_computed(results: dict[str, Path], formulation: str) -> None:
     data = diagram(results[formulation])
@@ -114,6 +115,7 @@ def test_columns_and_special_points_belong_together(results: dict[str, Path], fo
     assert kinds[1:] == [["user", "user", "end"], ["fold", "user", "end"]]
 
 
+@pytest.mark.versions
 @FORMULATIONS
 def test_states_are_the_rows_of_the_columns(results: dict[str, Path], formulation: str) -> None:
     with h5py.File(results[formulation] / "states.h5", "r") as file:
@@ -172,6 +174,7 @@ def test_both_formulations_save_the_same_shapes(results: dict[str, Path]) -> Non
     assert shapes[0][0][0].max() == pytest.approx(reference_values.FIRST[0.2][0], abs=1e-8)
 
 
+@pytest.mark.versions
 def test_interrupted_run_keeps_finished_branches(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begun = []
     announce = Report.branch

@@ -27,6 +27,8 @@ from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE, hidden, pieces_o
 from rodfem.output.sheet import PALETTE
 from rodfem.problem.scene import Ordinate
 
+pytestmark = pytest.mark.alone
+
 
 def branch(name: str, ordinate: list[float], negative: list[int], **more: Any) -> dict[str, Any]:
     columns = {"load": [float(i) for i in range(len(negative))], "ordinate": ordinate, "negative": negative}
@@ -55,7 +57,6 @@ def test_the_legend_has_nothing_that_is_not_drawn() -> None:
     assert legend(branch("c", [0.0], [0])) == ["c"]
 
 
-@pytest.mark.alone
 def test_nothing_unstable_is_hidden_below_something_stable(folder: Path) -> None:
     """Two branches at the same place: in the pixels of their line both colours are seen."""
     both = [branch("a", [0.0] * 9, [0] * 9), branch("b", [0.0] * 9, [1] * 9)]
@@ -66,7 +67,6 @@ def test_nothing_unstable_is_hidden_below_something_stable(folder: Path) -> None
     assert dark > 2000 and blue > 500
 
 
-@pytest.mark.alone
 def test_lines_that_cross_or_touch_hide_nothing() -> None:
     x = np.arange(0.0, 200.0, 2.0)
     flat, steep = np.column_stack([x, 0 * x]), np.column_stack([x, x - 100.0])
@@ -76,7 +76,6 @@ def test_lines_that_cross_or_touch_hide_nothing() -> None:
     np.testing.assert_array_equal(part, flat[39:])
 
 
-@pytest.mark.alone
 def test_stable_in_the_plane_is_not_called_stable(folder: Path) -> None:
     """The pitchfork of a planar rod at row 4, which is unstable in space from row 2 on."""
     point = {"kind": "branch point", "row": 4, "load": 4.0, "ordinate": 0.0, "negative_before": 0, "negative_after": 1}
@@ -96,7 +95,6 @@ def test_stable_in_the_plane_is_not_called_stable(folder: Path) -> None:
     assert [p.label for p in pieces_of(planar, "black")] == ["0", "1"]
 
 
-@pytest.mark.alone
 def test_what_is_unexplained_is_marked(folder: Path) -> None:
     yellow = "#F0E442"
     plain = branch("a", [0.0, 1.0, 2.0, 3.0], [0, 0, 2, 2])
@@ -110,14 +108,12 @@ def test_what_is_unexplained_is_marked(folder: Path) -> None:
     assert abs(y - 200) < 60 and abs(x - 350) < 120 and dots.any()  # in the middle of the segment
 
 
-@pytest.mark.short
 def test_a_singular_first_state_is_marked() -> None:
     plain = branch("a", [0.0, 1.0, 2.0], [0, 1, 1])
     assert SINGULAR not in legend(plain | {"singular_start": 0})
     assert SINGULAR in legend(plain | {"singular_start": 1})
 
 
-@pytest.mark.alone
 def test_imperfect_bifurcations_have_a_mark_and_their_unfolding(folder: Path) -> None:
     def point(row: int, **more: Any) -> dict[str, Any]:
         found = {"kind": "imperfect bifurcation", "row": row, "load": float(row), "ordinate": 0.0}
@@ -140,7 +136,6 @@ def words(*branches: dict[str, Any], **more: Any) -> tuple[set[str], set[str]]:
     return {text.get_text() for text in inside}, {text.get_text() for text in legend}
 
 
-@pytest.mark.alone
 def test_names_stand_at_the_curves_where_there_is_room() -> None:
     far = [branch(name, [float(i)] * 9, [i] * 9) for i, name in enumerate(("straight", "branch 1"))]
     inside, legend = words(*far)
@@ -150,14 +145,12 @@ def test_names_stand_at_the_curves_where_there_is_room() -> None:
     assert "branch 7" not in inside and {f"branch {i}" for i in range(12)} <= legend
 
 
-@pytest.mark.alone
 def test_branches_of_one_hue_have_other_marks() -> None:
     axes = Figure().subplots()
     handles = _draw_branches(axes, [branch(f"branch {i}", [float(i)] * 9, [0] * 9) for i in range(20)])[0][:20]
     assert len({(handle.get_color(), handle.get_marker()) for handle in handles}) == 20
 
 
-@pytest.mark.alone
 def test_an_end_before_the_end_of_the_range_is_marked() -> None:
     for ended, mark in (
         ("stretch reaches zero", "ends: stretch reaches zero"),
@@ -169,7 +162,6 @@ def test_an_end_before_the_end_of_the_range_is_marked() -> None:
         assert not any(x.startswith("ends") for x in legend(branch("a", [0.0, 1.0], [0, 0], ended=ended)))
 
 
-@pytest.mark.alone
 def test_an_ordinate_that_is_round_off_is_drawn_as_zero() -> None:
     """A tip that does not move: numbers of 1e-17 are no shape, beside error bars of 1e-12."""
     end = {"kind": "end", "row": 2, "load": 2.0, "ordinate": 1e-17, "ordinate_error_estimate": 1e-12}
@@ -180,7 +172,6 @@ def test_an_ordinate_that_is_round_off_is_drawn_as_zero() -> None:
     assert figure_of(diagram(real)).axes[0].get_ylim()[1] < 1e-10
 
 
-@pytest.mark.alone
 def test_the_load_is_named_in_words() -> None:
     plain = branch("a", [0.0, 1.0], [0, 0])
     assert figure_of(diagram(plain)).axes[0].get_xlabel() == "$P$"
@@ -190,7 +181,6 @@ def test_the_load_is_named_in_words() -> None:
     assert axes.get_xlabel() == "dead force $P$ [N]" and axes.get_ylabel().endswith(" [m]")
 
 
-@pytest.mark.alone
 def test_the_stable_side_of_a_locus_is_shaded(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A curve that turns back: what is below its lower half, where it starts, is above its upper half."""
     t = np.linspace(-1.0, 1.0, 41)
@@ -209,7 +199,6 @@ def test_the_stable_side_of_a_locus_is_shaded(folder: Path, monkeypatch: pytest.
         assert not drawn[-1].axes[0].patches
 
 
-@pytest.mark.alone
 def test_what_is_stable_beside_loci_ends_at_the_next_one(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Below a line at P = 2 as far as another one from (0, 0) to (1, 1), which ends there, and then to the bound -1."""
     mesh = {"formulation": "reduced", "elements": 1, "degree": 1, "unknowns": 1}
@@ -249,7 +238,6 @@ def test_twist_of_a_ring_is_its_link_less_its_writhe() -> None:
     assert unstable and min(unstable) > 0.1  # nowhere where a circle is stable
 
 
-@pytest.mark.alone
 def test_ordinates_along_the_rod_are_checked() -> None:
     ring = scene("ring", twisting=1.5, span=(1.0, 1.2))
     for of, sentence in (
@@ -261,6 +249,7 @@ def test_ordinates_along_the_rod_are_checked() -> None:
             replace(ring, ordinate=Ordinate("twist", s=None, of=of))
 
 
+@pytest.mark.versions
 def test_pixels_are_those_of_the_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     """Loads of any size: lines are sampled at the scale at which they are drawn."""
     seen: list[int] = []

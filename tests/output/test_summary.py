@@ -16,6 +16,8 @@ from rodfem import Discretization, Plan, trace
 from rodfem.output.change_words import known_digits
 from rodfem.output.summary import in_sentences
 
+pytestmark = pytest.mark.alone
+
 
 def branch(name: str, loads: list[float], negative: list[int], **more: Any) -> dict[str, Any]:
     energy = more.pop("energy", [x**2 for x in loads])
@@ -137,7 +139,6 @@ def test_a_diagram_says_it_itself() -> None:
 LAW = {"kind": "transcritical", "coefficient": 1.0, "power": 1, "uncertainty": 0.01, "side": 1}
 
 
-@pytest.mark.short
 @pytest.mark.parametrize(
     ("more", "verb"),
     [
@@ -166,7 +167,6 @@ def test_verbs(more: dict[str, Any], verb: str) -> None:
     assert f"to 2, where it {verb}" in words
 
 
-@pytest.mark.short
 def test_digits_are_those_of_the_error_bar() -> None:
     point = special("fold", 2, 2.123456789, 0, 1, error_estimate=1e-4)
     rod = branch("straight", [0.0, 1.0, 2.123456789, 3.0, 4.0], [0, 0, 0, 1, 1], special=[point])
@@ -175,7 +175,6 @@ def test_digits_are_those_of_the_error_bar() -> None:
     assert "to 2.12346, where" in said(rod)
 
 
-@pytest.mark.short
 def test_what_is_open_is_said() -> None:
     change = [{"row": 1, "before": 0, "after": 2}]
     jump = branch("straight", [0.0, 1.0, 2.0, 4.0], [0, 0, 2, 2], unexplained=change, singular_start=1)
@@ -192,7 +191,6 @@ def test_what_is_open_is_said() -> None:
     assert "The mesh does not resolve 1 special point: use more elements." in said(rod)
 
 
-@pytest.mark.short
 def test_many_branches_and_many_intervals_are_counted() -> None:
     unstable = [branch(f"branch {i}", [0.0, 4.0], [1, 1]) for i in range(9)]
     straight = branch("straight", [0.0, 4.0], [0, 0])
@@ -203,7 +201,6 @@ def test_many_branches_and_many_intervals_are_counted() -> None:
     assert "then its stability changes" in said(winding, span=(0.0, 12.0))
 
 
-@pytest.mark.short
 def test_mirror_images_are_no_hysteresis() -> None:
     one, image = (branch(name, [0.0, 2.0, 4.0], [0, 0, 0]) for name in ("straight", "branch 1"))
     assert "coexist" not in said(one, image)

@@ -9,6 +9,8 @@ import pytest
 from forms.energy import bending_and_twist
 from rodfem import Discretization, Inertia, Ordinate, Scene, SceneError, Solver, clamped, free
 
+pytestmark = pytest.mark.alone
+
 SLENDER, STOUT = 3.516015268, 0.1
 """Lowest frequency of a cantilever of unit length, mass and stiffness; a rotary inertia."""
 
@@ -44,7 +46,6 @@ def test_a_mass_alone_is_that_of_a_slender_rod() -> None:
     assert lowest(cantilever(both)) == pytest.approx(pi / 2, rel=1e-6)
 
 
-@pytest.mark.alone
 def test_without_any_inertia_nothing_moves() -> None:
     pushed = {"ends": (clamped(), free(follower=lambda c: (0.0, 0.0, -c.P)))}
     with pytest.raises(SceneError, match="give it an inertia"):

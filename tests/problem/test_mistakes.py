@@ -42,6 +42,8 @@ from rodfem import (
 from rodfem.diagram import solver
 from rodfem.errors import InputError
 
+pytestmark = pytest.mark.alone
+
 NAN, INF, HUGE, TINY = math.nan, math.inf, 1e308, 1e-320
 TIP = free(force=lambda c: (0, 0, -c.P))
 

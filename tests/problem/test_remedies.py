@@ -24,7 +24,7 @@ COMMAND_LINE = ("app/cli.py", "app/options.py", "app/console.py", "app/commands/
 PROGRAMS = (*COMMAND_LINE, "output/plot_modes.py", "output/plot_diagram.py", "output/render.py")
 """Modules that are run themselves, and may know their own options."""
 
-pytestmark = pytest.mark.short
+pytestmark = [pytest.mark.alone, pytest.mark.versions]
 
 
 def parser() -> Parser:

@@ -20,6 +20,8 @@ from rodfem.output.glyphs import STEEL
 from rodfem.output.render import _read
 from rodfem.problem.end import End
 
+pytestmark = pytest.mark.alone
+
 E2 = (0.0, 1.0, 0.0)
 TAN = 4.493409457909064**2
 """Load of a clamped and hinged column, with tan x = x: times EI / l^2."""
@@ -49,7 +51,6 @@ def top(c: Any) -> tuple[float, float, float]:
     return (0.0, 0.0, 1.0)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 @pytest.mark.parametrize("planar", [None, "e2"])
 @pytest.mark.parametrize(("left", "expected"), [(clamped(), TAN), (hinged(E2), pi**2)], ids=["clamped", "hinged"])
@@ -99,6 +100,7 @@ def shot(P: float, bent: float, guess: np.ndarray) -> np.ndarray:
     return end(fsolve(miss, guess, xtol=1e-12))[2:]
 
 
+@pytest.mark.short
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_bent_rod_on_an_inclined_guide(formulation: str) -> None:
     """Curved in its undeformed state, so that it bends from the start: against shooting."""

@@ -86,6 +86,7 @@ def pushed(length: float, stiffness: float, mass: float) -> Scene:
     )
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("units", [DNA, PIPELINE], ids=["DNA", "pipeline"])
 def test_flutter(units: tuple[float, float, float]) -> None:
     """Beck's load 20.0509536 EI / L^2 and the frequencies of a cantilever: roots of 1 + cos x cosh x, to the fourth."""
@@ -98,6 +99,7 @@ def test_flutter(units: tuple[float, float, float]) -> None:
     assert [p.negative for p in diagram["straight"].points if p.load < flutter.point.load][-1] == 0
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("method", ["shift-invert", "cayley", "slicing", "dense", "reduction"])
 def test_methods(method: str) -> None:
     """Eigenvalues of a flexible rod by each method, in the kinetic metric of unit rotary inertia."""
@@ -123,6 +125,7 @@ def test_mumps_counts_in_any_units(name: str, units: tuple[float, float]) -> Non
     assert not diagram.warnings
 
 
+@pytest.mark.alone
 def test_numbers_in_words() -> None:
     """A load of 1e-11 is written with its digits, by the terminal and in tables."""
     assert digits.number(7.89568359e-11, 8e-19) == "7.89568359e-11 (8e-19)"

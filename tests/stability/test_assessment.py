@@ -148,6 +148,7 @@ def reference() -> tuple[Assessor, PETSc.Vec]:
     return Assessor(solver.system), x
 
 
+@pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize("method", SOLVERS)
 def test_reference_values(method: str) -> None:
@@ -401,6 +402,7 @@ def test_quotients_decide_within_a_wide_band() -> None:
 # --- rank of the constraints -------------------------------------------------------------------------------------
 
 
+@pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_smallest_singular_value(formulation: str) -> None:

@@ -62,6 +62,7 @@ def eigenvalues(S: np.ndarray, M: np.ndarray, f: BranchSolver) -> np.ndarray:
     return scipy.linalg.eigh(condensed, np.diag(size[~massless]), eigvals_only=True)
 
 
+@pytest.mark.versions
 @pytest.mark.short
 @FORMULATIONS
 @STATES
@@ -74,6 +75,7 @@ def test_index_is_that_of_dense_matrices(formulation: str, branch: int, load: fl
     assert found.zero == p.zero == (abs(mu) < f.inertia.tolerance).sum() == (0 if branch == 0 else 1)
 
 
+@pytest.mark.alone
 @FORMULATIONS
 @STATES
 def test_eigenvalues_nearest_zero(formulation: str, branch: int, load: float) -> None:
@@ -89,6 +91,7 @@ def test_eigenvalues_nearest_zero(formulation: str, branch: int, load: float) ->
     assert [f.system.norm(v) for v in vectors] == pytest.approx([1, 1, 1], abs=1e-10)
 
 
+@pytest.mark.alone
 def test_close_eigenvalues_nearest_zero() -> None:
     """Three within 1 %, of which the block holds two: iterations of the block alone gain 1 % each."""
     f = follower("reduced", *SMALL)
@@ -115,6 +118,7 @@ def test_counts_below_any_value(formulation: str, branch: int, load: float) -> N
         assert factored.below(sigma) == (mu < sigma).sum()
 
 
+@pytest.mark.alone
 def test_counts_below_large_values() -> None:
     f, p = follower("reduced", *SMALL), state("reduced", 1, 0.5)
     f.system.set_phase(p.x)
@@ -124,6 +128,7 @@ def test_counts_below_large_values() -> None:
         assert factored.below(sigma) == (mu < sigma).sum() - 1  # without the symmetry's
 
 
+@pytest.mark.versions
 @FORMULATIONS
 @STATES
 def test_spectrum_is_that_of_dense_matrices(formulation: str, branch: int, load: float) -> None:
@@ -138,6 +143,7 @@ def test_spectrum_is_that_of_dense_matrices(formulation: str, branch: int, load:
     assert modes.negative(f.inertia.tolerance) == p.negative
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("load", [0.05, 0.25, 0.7])
 def test_spectrum_of_the_straight_rod(load: float) -> None:
     f = follower("reduced", 12, 6)

@@ -307,6 +307,7 @@ def reference_pencil(coordinates: str) -> Pencil:
     return Blocks(solver.system, coordinates).assemble(x)
 
 
+@pytest.mark.versions
 @pytest.mark.short
 @pytest.mark.parametrize("inverse", INVERSES)
 @pytest.mark.parametrize("coordinates", ["full", "tangent"])

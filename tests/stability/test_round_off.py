@@ -10,6 +10,8 @@ from mpi4py import MPI
 from rodfem.linalg.matrices import petsc_matrix
 from rodfem.stability.round_off import quotient_error, rounding
 
+pytestmark = pytest.mark.alone
+
 EPS = np.finfo(float).eps
 
 

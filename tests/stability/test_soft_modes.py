@@ -24,6 +24,8 @@ from rodfem.output.typical import typical_state
 from rodfem.stability.sliding import AMPLE
 from rodfem.stability.soft_mode import SoftMode, index_range, is_stable
 
+pytestmark = pytest.mark.alone
+
 SLIDING = "sliding along the rod"
 
 
@@ -68,7 +70,6 @@ def test_an_end_too_free_to_tell() -> None:
         assert "undecided, index 0 to 2" in stream.getvalue() and "sign undecided" in stream.getvalue()
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("imperfection", [1e-9, -1e-9, 1e-6])
 def test_sections_that_are_nearly_round(imperfection: float) -> None:
     """A circle turns its sections inside out at the cost of (B1 - B2)/2 sin^2 in the curvature 1, over 2 pi."""
@@ -101,7 +102,6 @@ def decay(diagram: Diagram, point: Point) -> float:
     return sqrt(point.load - (0.789 / 1.345 * twist) ** 2 / 4)
 
 
-@pytest.mark.alone
 def test_sliding_costs_what_the_tails_of_a_buckle_tell() -> None:
     """Its tails decay like exp(-delta s), and meet the clamps half a length away: mu ~ delta^2 exp(-delta)."""
     diagram = buckle(40)
@@ -119,7 +119,6 @@ def test_sliding_costs_what_the_tails_of_a_buckle_tell() -> None:
     assert "sliding along the rod, mu = 2.8e-06 +- " in str(asked.point.soft[0])
 
 
-@pytest.mark.alone
 def test_a_mesh_that_pins_a_buckle_is_found_out(folder: Path) -> None:
     """With 27 elements it is in the middle of one, unstable on this mesh: a second direction that no rod has."""
     diagram = buckle(27)
@@ -142,7 +141,6 @@ def test_a_mesh_that_pins_a_buckle_is_found_out(folder: Path) -> None:
     assert [p.soft for p in again[1].points] == [p.soft for p in branch.points]
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("elements", [23, 27, 33])
 def test_a_mesh_that_pins_a_buckle_is_found_out_without_error_bars(elements: int) -> None:
     """The derivative along the rod solves the linearised equations of the rod, not of this mesh: by how much tells.

@@ -14,6 +14,7 @@ from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricSolver
 
 pytestmark = [
     pytest.mark.short,
+    pytest.mark.versions,
     pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one"),
 ]
 
