@@ -61,7 +61,7 @@ def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> l
     ranges: dict[str, Patch] = {}
     for branch in branches:
         ranges |= _shade(axes, branch)
-        for curve in curves(branch["columns"]):
+        for curve in curves(branch["columns"], branch["special"]):
             motions.setdefault(curve.motion, curve.colour)
             shown |= _draw_curve(axes, curve, motions[curve.motion])
         for special in branch["special"]:
