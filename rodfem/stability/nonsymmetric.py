@@ -389,16 +389,6 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             number //= 2
         raise ConvergenceError(f"SLEPc found no eigenvalue near {target:.6g}: use a richer discretisation.")
 
-    def basis(self, number: int, target: float) -> np.ndarray:
-        """Real basis (n, p) of the invariant subspace of about ``number`` eigenvalues nearest to ``target``, by SLEPc.
-
-        It is that for unknowns in units of their natural sizes, on one rank.  Raises :class:`ConvergenceError` as
-        :meth:`near` does.
-        """
-        with self.system.clock("stability"):
-            found = self._shifted(number, target / self.system.scene.units.omega2, *self.in_units())
-        return _real_basis(found)
-
     def eliminated(self, target: float) -> Elimination | None:
         """Factors of ``S - target M`` in units of natural sizes that solve for arrays; None where there are none."""
         if self.system.comm.size > 1 or compat.COMPLEX:
@@ -451,19 +441,6 @@ def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.
     """
     parts, turn = np.linalg.eigh(product(comm, vectors, weighed))
     return np.asarray(vectors @ (turn / np.sqrt(np.maximum(parts, EPS * parts[-1]))))
-
-
-def _real_basis(found: list[_Pair]) -> np.ndarray:
-    """Real basis (n, p) of the span of the vectors of some pairs and of their conjugates, in the order of the pairs."""
-    columns: list[np.ndarray] = []
-    seen: list[complex] = []
-    for pair in found:
-        if abs(pair.value.imag) < REAL * abs(pair.value):
-            columns.append(pair.parts[0])
-        elif not any(abs(pair.value - v.conjugate()) < ALIKE * abs(v) for v in seen):
-            columns += pair.parts
-            seen.append(pair.value)
-    return np.stack(columns, axis=1)
 
 
 def groups(values: np.ndarray, tolerance: float = MULTIPLE) -> list[list[int]]:
