@@ -121,11 +121,16 @@ class StaticSolver:
         """Special point at a load that is given."""
         return SpecialPoint.given(kind, point, self.units.load)
 
-    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, NewtonResult]:
-        """Equilibrium at exactly ``load`` by Newton's method from ``guess``."""
+    def at_load(
+        self, guess: PETSc.Vec, load: float, reach: float = 1e3, *, nearby: bool = False
+    ) -> tuple[PETSc.Vec, NewtonResult]:
+        """Equilibrium at exactly ``load`` by Newton's method from ``guess``, with corrections of ``reach`` at most.
+
+        Where the one computed last was ``nearby``, its factors serve first.
+        """
         x = guess.copy()
         self.system.set_load(x, load)
-        outcome = correct(self.system, x, self.axis, reach=reach)
+        outcome = correct(self.system, x, self.axis, reach=reach, nearby=nearby)
         self.system.set_load(x, load)  # steps at fixed load may have moved it by round-off
         return x, outcome
 
@@ -260,12 +265,14 @@ class BranchSolver(StaticSolver):
         found = self.inertia.at(x)
         return found.count().zero > found.drifts
 
-    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, NewtonResult]:
+    def at_load(
+        self, guess: PETSc.Vec, load: float, reach: float = 1e3, *, nearby: bool = False
+    ) -> tuple[PETSc.Vec, NewtonResult]:
         """As for any equilibrium, with the symmetric factors unless they are too near singular."""
         x = guess.copy()
         self.system.set_load(x, load)
         outcome = self.corrector.correct(x, self.axis, reach=reach)
-        return (x, outcome) if outcome is not None else super().at_load(guess, load, reach)
+        return (x, outcome) if outcome is not None else super().at_load(guess, load, reach, nearby=nearby)
 
     def point(
         self,

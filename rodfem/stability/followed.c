@@ -67,8 +67,9 @@ static void product(const Spaces *f, const double *a, const double *b, double *o
     }
 }
 
-/* Rows of a block, those given or (NULL) the first ones, times the p x p matrix t.  */
-static void turned(const Spaces *f, const int *rows, int count, const double *block, const double *t, double *out)
+/* Rows of a block, those given or (NULL) the first ones, times the p x columns matrix t.  */
+static void turned(const Spaces *f, const int *rows, int count, const double *block, const double *t, int columns,
+                   double *out)
 {
     for (int first = 0; first < count; first += LANES) {
         int here = count - first < LANES ? count - first : LANES, at[LANES];
@@ -76,7 +77,7 @@ static void turned(const Spaces *f, const int *rows, int count, const double *bl
             int row = first + (r < here ? r : 0);
             at[r] = rows ? rows[row] : row;
         }
-        for (int q = 0; q < f->p; q += LANES) {
+        for (int q = 0; q < columns; q += LANES) {
             lanes sum[LANES] = {{0}};
             for (int k = 0; k < f->p; k++) {
                 lanes row = WIDE(t, k, q);
@@ -150,8 +151,8 @@ static void probe(Spaces *f, const double *t)
 static void go_on(Spaces *f, int side, const double *t)
 {
     double *change = f->block, *image = f->mapped;
-    turned(f, NULL, f->n, f->block, t, f->solved);
-    turned(f, f->heavy, f->heavies, f->mapped, t, f->columns);
+    turned(f, NULL, f->n, f->block, t, f->p, f->solved);
+    turned(f, f->heavy, f->heavies, f->mapped, t, f->p, f->columns);
     for (int h = 0; h < f->heavies; h++) {
         int i = f->heavy[h];
         for (int j = 0; j < f->p; j++) {
@@ -196,4 +197,24 @@ int improve(Spaces *f, int side)
     if (side == RIGHT) probe(f, t);
     go_on(f, side, t);
     return 0;
+}
+
+/* Basis of a side: the sum of `known` ones (n x p each) with weights.  */
+void predict(Spaces *f, int side, int known, const double *weights, const double *past)
+{
+    size_t size = (size_t)f->n * f->p;
+    for (int i = 0; i < f->n; i++) for (int j = 0; j < f->p; j++) AT(f->basis[side], i, j) = 0;
+    for (int s = 0; s < known; s++)
+        for (int i = 0; i < f->n; i++) {
+            const double *row = past + s * size + (size_t)i * f->p;
+            for (int j = 0; j < f->p; j++) AT(f->basis[side], i, j) += weights[s] * row[j];
+        }
+}
+
+/* Combinations of the right basis with `count` columns of coefficients (p x width, at most as many), and M times them, in
+   `block` and in `mapped`; after a step.  */
+void combine(Spaces *f, int count, const double *w)
+{
+    turned(f, NULL, f->n, f->basis[RIGHT], w, count, f->block);
+    times_mass(f, f->block, f->mapped);
 }

@@ -113,14 +113,14 @@ class _Past:
         self._next = 0
         self.keep(load, basis)
 
-    def predict(self, load: float, out: np.ndarray) -> None:
-        """Write the basis (n, p) at a load."""
+    def weights(self, load: float) -> np.ndarray:
+        """Weights of the bases, one after the other, in the prediction at a load."""
         distances = np.array(self.loads) - load
-        distances /= abs(distances).max()
-        powers = np.vander(distances, min(DEGREE + 1, len(distances)), increasing=True)
-        weights = powers @ np.linalg.inv(powers.T @ powers)[0]
-        self.reach = abs(float(weights @ (np.array(self.loads) - load) ** (DEGREE + 1)))
-        out[:] = (weights @ self.bases[: len(weights)]).reshape(out.shape)
+        scaled = distances / abs(distances).max()
+        powers = np.vander(scaled, min(DEGREE + 1, len(scaled)), increasing=True)
+        weights = np.ascontiguousarray(powers @ np.linalg.inv(powers.T @ powers)[0])
+        self.reach = abs(float(weights @ distances ** (DEGREE + 1)))
+        return weights
 
     def keep(self, load: float, basis: np.ndarray) -> None:
         """Keep the basis (n, p) at a load, improved there after it was predicted, instead of the oldest one."""
@@ -219,8 +219,8 @@ class FollowedPairs:
             spaces = self._taken(pencil)
             if spaces is None:
                 return None
-            for past, basis in zip(self._past, spaces.bases, strict=True):
-                past.predict(load, basis)
+            for side, past in enumerate(self._past):
+                spaces.predict(side, past.weights(load), past.bases)
             improved = set[int]()
             for step in range(STEPS):
                 side, other = self._turn, LEFT if self._turn == RIGHT else RIGHT
@@ -239,10 +239,13 @@ class FollowedPairs:
         return None
 
     def _frequencies(self, pencil: NonsymmetricPencil, found: _Ritz, chosen: np.ndarray) -> Frequencies:
+        """Frequencies of the ``chosen`` pairs, whose motions have no names yet."""
         assert self._spaces is not None
-        values = self.shift / pencil.system.scene.units.omega2 + 1.0 / found.nu[chosen]
-        vectors = self._spaces.bases[RIGHT] @ found.w[:, chosen]
-        return pencil.frequencies(values.astype(complex), found.errors[chosen], vectors.astype(complex))
+        chosen = chosen[np.argsort((1.0 / found.nu[chosen]).real, kind="stable")]
+        units = pencil.system.scene.units
+        values = self.shift / units.omega2 + (1.0 / found.nu[chosen]).astype(complex)
+        vectors, weighed = self._spaces.combined(found.w[:, chosen])
+        return pencil.unnamed(values, found.errors[chosen], vectors, weighed)
 
 
 def _ritz(spaces: Subspaces) -> _Ritz:

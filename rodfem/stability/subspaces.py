@@ -21,12 +21,17 @@ FRESH = 0.1
 LANES = 8
 """The width of a row of vectors is a multiple of this."""
 SINGULAR, NO_ROOM = 1, 2
+FUNCTIONS = """
+int improve(Spaces *f, int side);
+void predict(Spaces *f, int side, int known, const double *weights, const double *past);
+void combine(Spaces *f, int count, const double *w);
+"""
 
 
 def declarations() -> str:
     """The structure and the function of the code, for cffi."""
     code = Path(__file__).with_name("followed.c").read_text()
-    return code[code.index("typedef struct {") : code.index("#define AT(")] + "int improve(Spaces *f, int side);"
+    return code[code.index("typedef struct {") : code.index("#define AT(")] + FUNCTIONS
 
 
 class Subspaces:
@@ -60,7 +65,9 @@ class Subspaces:
         random /= np.sqrt((random * (mass @ random)).sum(axis=0))
         sides[RIGHT][:, p : p + PROBES] = self._named("fresh", n, PROBES)[:] = random
         self.overlap, self.matrix = (self._named(name, width, width)[:p, :p] for name in ("overlap", "matrix"))
-        for name in ("columns", "solved", "block", "mapped"):
+        self._combined = [self._named(name, n, width) for name in ("block", "mapped")]
+        self._coefficients = np.zeros((p, width))
+        for name in ("columns", "solved"):
             self._named(name, n, width)
         self._named("small", 3, width, width)
         f.heavy = self._pointer(np.zeros(n, dtype=np.int32), "int")
@@ -88,6 +95,25 @@ class Subspaces:
         if factors is not self._factors:
             f.solve[RIGHT], f.solve[LEFT] = factors.address("solve"), factors.address("solve_transposed")
             f.factors, self._factors = factors.pointer, factors
+
+    def predict(self, side: int, weights: np.ndarray, past: np.ndarray) -> None:
+        """Let the basis of a side be a sum of some of the ``past``, (any, n p), the first ones, with ``weights``."""
+        given = (self.ffi.cast("double *", x.ctypes.data) for x in (weights, past))
+        self.lib.predict(self._spaces, side, len(weights), *given)
+
+    def combined(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Combinations (n, k) of the right basis with coefficients ``w`` (p, k), and ``M`` times them; k is p at most.
+
+        They are real where ``w`` is.
+        """
+        if np.iscomplexobj(w):
+            real, imaginary = self.combined(w.real), self.combined(w.imag)
+            return real[0] + 1j * imaginary[0], real[1] + 1j * imaginary[1]
+        count = w.shape[1]
+        self._coefficients[:, :count] = w
+        self.lib.combine(self._spaces, count, self.ffi.cast("double *", self._coefficients.ctypes.data))
+        vectors, images = (block[:, :count].copy() for block in self._combined)
+        return vectors, images
 
     def improve(self, side: int) -> None:
         """Make a step of inverse iteration on one side, and of the probes where it is the right one.

@@ -107,7 +107,7 @@ def test_the_probes_see_an_eigenvalue_that_is_missing(missing: int) -> None:
     chosen = [i for i in range(P + 1) if i != missing]
     spaces = made(given, (right[:, chosen].real, left[:, chosen].real))
     seen = []
-    for _ in range(30):
+    for _ in range(5):  # round-off does not bring the missing one into the bases meanwhile
         spaces.improve(RIGHT)
         seen.append(spaces.outside)
     assert max(seen) == pytest.approx(abs(nu[missing]), rel=0.1)
