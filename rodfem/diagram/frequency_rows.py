@@ -141,7 +141,7 @@ class FrequencyRows:
     def _name(self, rows: list[Row]) -> None:
         """Name the motions of rows, all at once."""
         if rows:
-            found = named(self.eigensolver.system, [(row.found, row.turned) for row in rows])
+            found = named(self.eigensolver.system, [(row.found, row.turned) for row in rows], self.number)
             for row, frequencies in zip(rows, found, strict=True):
                 row.found = frequencies
 

@@ -199,16 +199,44 @@ int improve(Spaces *f, int side)
     return 0;
 }
 
-/* Basis of a side: the sum of `known` ones (n x p each) with weights.  */
-void predict(Spaces *f, int side, int known, const double *weights, const double *past)
+#define SUPPORT 8 /* bases that a prediction is fitted to, at most */
+
+/* Weights of the values at `known` distances in the value at zero of the polynomial of a degree that is fitted to them, by
+   polynomials that are orthogonal there (Forsythe, J. SIAM 5 (1957) 74).  */
+static void fit(int known, int degree, const double *distances, double *weights)
+{
+    double values[SUPPORT][SUPPORT], at[SUPPORT], most = 0;
+    for (int s = 0; s < known; s++) { most = fmax(most, fabs(distances[s])); weights[s] = 0; }
+    for (int k = 0; k <= degree && k < known; k++) {
+        double *mine = values[k], square = 0;
+        for (int s = 0; s < known; s++) mine[s] = k ? values[k - 1][s] * distances[s] / most : 1;
+        at[k] = k ? 0 : 1;
+        for (int j = 0; j < k; j++) {
+            double share = 0, size = 0;
+            for (int s = 0; s < known; s++) { share += mine[s] * values[j][s]; size += values[j][s] * values[j][s]; }
+            for (int s = 0; s < known; s++) mine[s] -= share / size * values[j][s];
+            at[k] -= share / size * at[j];
+        }
+        for (int s = 0; s < known; s++) square += mine[s] * mine[s];
+        for (int s = 0; s < known; s++) weights[s] += at[k] * mine[s] / square;
+    }
+}
+
+/* Basis of a side at distance zero by the polynomial of a degree that is fitted to `known` ones (n x p each); what it
+   misses of the next power of the distance.  */
+double predict(Spaces *f, int side, int known, int degree, const double *distances, const double *past)
 {
     size_t size = (size_t)f->n * f->p;
+    double weights[SUPPORT], missed = 0;
+    fit(known, degree, distances, weights);
+    for (int s = 0; s < known; s++) missed += weights[s] * pow(distances[s], degree + 1);
     for (int i = 0; i < f->n; i++) for (int j = 0; j < f->p; j++) AT(f->basis[side], i, j) = 0;
     for (int s = 0; s < known; s++)
         for (int i = 0; i < f->n; i++) {
             const double *row = past + s * size + (size_t)i * f->p;
             for (int j = 0; j < f->p; j++) AT(f->basis[side], i, j) += weights[s] * row[j];
         }
+    return fabs(missed);
 }
 
 /* Combinations of the right basis with `count` columns of coefficients (p x width, at most as many), and M times them, in

@@ -53,7 +53,7 @@ from rodfem.stability.subspaces import LEFT, RIGHT, Subspaces
 GUARDS = 2
 """Number of eigenvalues that are followed beyond those that are wanted."""
 DEGREE, SUPPORT = 2, 6
-"""Degree of the polynomial of the prediction, and number of loads that it is fitted to."""
+"""Degree of the polynomial of the prediction, and number of loads that it is fitted to, at most eight."""
 BEGINNING, AT_ONCE = 20, 3
 """At the first load, how often the bases are made orthonormal, at most, and steps on either side after each time."""
 STEPS = 10
@@ -108,24 +108,19 @@ class _Past:
 
     def __init__(self, load: float, basis: np.ndarray) -> None:
         """Begin with a basis (n, p) at a load."""
-        self.bases, self.loads = np.zeros((SUPPORT, basis.size)), list[float]()
+        self.bases, self.loads = np.zeros((SUPPORT, *basis.shape)), list[float]()
         self.reach = self.reached = 0.0
         self._next = 0
         self.keep(load, basis)
 
-    def weights(self, load: float) -> np.ndarray:
-        """Weights of the bases, one after the other, in the prediction at a load."""
-        distances = np.array(self.loads) - load
-        scaled = distances / abs(distances).max()
-        powers = np.vander(scaled, min(DEGREE + 1, len(scaled)), increasing=True)
-        weights = np.ascontiguousarray(powers @ np.linalg.inv(powers.T @ powers)[0])
-        self.reach = abs(float(weights @ distances ** (DEGREE + 1)))
-        return weights
+    def predict(self, spaces: Subspaces, side: int, load: float) -> None:
+        """Predict the basis of a side at a load."""
+        self.reach = spaces.predict(side, DEGREE, np.array(self.loads) - load, self.bases)
 
     def keep(self, load: float, basis: np.ndarray) -> None:
         """Keep the basis (n, p) at a load, improved there after it was predicted, instead of the oldest one."""
         self.reached = self.reach if len(self.loads) == SUPPORT else 0.0
-        self.bases[self._next].reshape(basis.shape)[:] = basis
+        self.bases[self._next] = basis
         self.loads[self._next : self._next + 1] = [load]
         self._next = (self._next + 1) % SUPPORT
 
@@ -220,7 +215,7 @@ class FollowedPairs:
             if spaces is None:
                 return None
             for side, past in enumerate(self._past):
-                spaces.predict(side, past.weights(load), past.bases)
+                past.predict(spaces, side, load)
             improved = set[int]()
             for step in range(STEPS):
                 side, other = self._turn, LEFT if self._turn == RIGHT else RIGHT

@@ -433,24 +433,28 @@ def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.
     return np.asarray(vectors @ (turn / np.sqrt(np.maximum(parts, EPS * parts[-1]))))
 
 
-def named(system: System, rows: Sequence[tuple[Frequencies, np.ndarray]]) -> list[Frequencies]:
+def named(
+    system: System, rows: Sequence[tuple[Frequencies, np.ndarray]], number: int | None = None
+) -> list[Frequencies]:
     """Frequencies of some states, each given with the rotation field there, with the names of their motions.
 
-    A multiple eigenvalue has one name, that of its invariant subspace: its vectors are any in it, bending about d1 in
-    one state and about d2 in the next.
+    Only the first ``number`` are named, where that is given.  A multiple eigenvalue has one name, that of its invariant
+    subspace: its vectors are any in it, bending about d1 in one state and about d2 in the next.
     """
     blocks: list[np.ndarray] = []
     owners: list[np.ndarray] = []
     fields: list[np.ndarray] = []
-    together = [groups(found.values, ALIKE) for found, _ in rows]
+    together = [[g for g in groups(found.values, ALIKE) if number is None or g[0] < number] for found, _ in rows]
     count = 0
     for (found, turned), of_row in zip(rows, together, strict=True):
-        vectors, owner = found.vectors, np.empty(len(found.values), dtype=int)
-        for number, group in enumerate(of_row, count):
-            owner[group] = number
+        order = [j for group in of_row for j in group]
+        vectors, owner = found.vectors[:, order], np.empty(len(order), dtype=int)
+        first = 0
+        for place, group in enumerate(of_row, count):
+            here = slice(first, first := first + len(group))
+            owner[here] = place
             if len(group) > 1:
-                vectors = vectors.copy() if vectors is found.vectors else vectors
-                vectors[:, group] = orthonormal(system.comm, vectors[:, group], found.weighed[:, group])
+                vectors[:, here] = orthonormal(system.comm, vectors[:, here], found.weighed[:, group])
         parts = [vectors.real, vectors.imag] if np.iscomplexobj(vectors) else [vectors]
         blocks += parts
         owners += [owner] * len(parts)

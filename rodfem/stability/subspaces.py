@@ -23,7 +23,7 @@ LANES = 8
 SINGULAR, NO_ROOM = 1, 2
 FUNCTIONS = """
 int improve(Spaces *f, int side);
-void predict(Spaces *f, int side, int known, const double *weights, const double *past);
+double predict(Spaces *f, int side, int known, int degree, const double *distances, const double *past);
 void combine(Spaces *f, int count, const double *w);
 """
 
@@ -96,10 +96,14 @@ class Subspaces:
             f.solve[RIGHT], f.solve[LEFT] = factors.address("solve"), factors.address("solve_transposed")
             f.factors, self._factors = factors.pointer, factors
 
-    def predict(self, side: int, weights: np.ndarray, past: np.ndarray) -> None:
-        """Let the basis of a side be a sum of some of the ``past``, (any, n p), the first ones, with ``weights``."""
-        given = (self.ffi.cast("double *", x.ctypes.data) for x in (weights, past))
-        self.lib.predict(self._spaces, side, len(weights), *given)
+    def predict(self, side: int, degree: int, distances: np.ndarray, past: np.ndarray) -> float:
+        """Let the basis of a side be what a polynomial fitted to some others has at distance zero.
+
+        They are the first ones of the ``past`` (any, n, p), at ``distances`` (k,), at most eight, and the polynomial is
+        of that ``degree`` at most.  Returns what it misses of the next power of the distance.
+        """
+        given = (self.ffi.cast("double *", x.ctypes.data) for x in (distances, past))
+        return float(self.lib.predict(self._spaces, side, len(distances), degree, *given))
 
     def combined(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Combinations (n, k) of the right basis with coefficients ``w`` (p, k), and ``M`` times them; k is p at most.
