@@ -102,12 +102,14 @@ class BranchSolver(StaticSolver):
         found = self.inertia.at(x)
         return found.count().zero > found.drifts
 
-    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, NewtonResult]:
+    def at_load(
+        self, guess: PETSc.Vec, load: float, reach: float = 1e3, *, nearby: bool = False
+    ) -> tuple[PETSc.Vec, NewtonResult]:
         """As for any equilibrium, with the symmetric factors unless they are too near singular."""
         x = guess.copy()
         self.system.set_load(x, load)
         outcome = self.corrector.correct(x, self.axis, reach=reach)
-        return (x, outcome) if outcome is not None else super().at_load(guess, load, reach)
+        return (x, outcome) if outcome is not None else super().at_load(guess, load, reach, nearby=nearby)
 
     def point(
         self,

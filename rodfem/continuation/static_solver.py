@@ -65,11 +65,16 @@ class StaticSolver:
         """Special point at a load that is given."""
         return SpecialPoint.given(kind, point, self.units.load)
 
-    def at_load(self, guess: PETSc.Vec, load: float, reach: float = 1e3) -> tuple[PETSc.Vec, NewtonResult]:
-        """Equilibrium at exactly ``load`` by Newton's method from ``guess``."""
+    def at_load(
+        self, guess: PETSc.Vec, load: float, reach: float = 1e3, *, nearby: bool = False
+    ) -> tuple[PETSc.Vec, NewtonResult]:
+        """Equilibrium at exactly ``load`` by Newton's method from ``guess``, with corrections of ``reach`` at most.
+
+        Where the one computed last was ``nearby``, its factors serve first.
+        """
         x = guess.copy()
         self.system.set_load(x, load)
-        outcome = correct(self.system, x, self.axis, reach=reach)
+        outcome = correct(self.system, x, self.axis, reach=reach, nearby=nearby)
         self.system.set_load(x, load)  # steps at fixed load may have moved it by round-off
         return x, outcome
 

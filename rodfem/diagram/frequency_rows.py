@@ -24,6 +24,7 @@ from rodfem.stability.nonsymmetric import (
     Frequencies,
     NonsymmetricPencil,
     NonsymmetricSolver,
+    named,
 )
 from rodfem.tolerances import unit
 
@@ -63,10 +64,11 @@ NONE = Frequencies(np.zeros(0, dtype=complex), np.zeros(0))
 
 @dataclass
 class Row:
-    """A point of a sweep and what was found there; ``anew``: by SLEPc."""
+    """A ``point`` of a sweep and what was ``found`` there, ``anew`` by SLEPc, and the rotation field, ``turned``."""
 
     point: Point
     found: Frequencies
+    turned: np.ndarray
     anew: bool
 
 
@@ -80,20 +82,22 @@ class FrequencyRows:
         self.followed = FollowedPairs(sought(number), SHIFT * units.omega2)
         self._open: list[Row] = []
         self._certified = self._before = NONE
+        self._numbers = _numbers(NONE)
         self._kept = self._pause = self._resting = 0
 
     def add(self, point: Point) -> list[Row]:
         """Find the eigenvalues at the next point; rows that are certified by now, in their order."""
         pencil = self.eigensolver.at(point.x)
         found = self._followed(pencil, point)
-        changed = found is None or _numbers(found) != _numbers(self._before)
+        numbers = None if found is None else _numbers(found)
+        changed = numbers != self._numbers
         if (
             found is not None
             and not changed
             and len(self._open) < EVERY - 1
             and not near(found.values[: self.number + 1])
         ):
-            self._open.append(Row(point, found, anew=False))
+            self._open.append(Row(point, found, pencil.turned, anew=False))
             self._before, self._kept = found, self._kept + 1
             return []
         done = self.finish() if changed else []
@@ -101,12 +105,13 @@ class FrequencyRows:
             pencil = self.eigensolver.at(point.x)
         anew = leftmost(pencil, self.number, self._before)
         if found is not None and agree(found, anew):
-            self._open.append(Row(point, found if len(found.values) == len(anew.values) else anew, anew=True))
+            kept = found if len(found.values) == len(anew.values) else anew
+            self._open.append(Row(point, kept, pencil.turned, anew=True))
             self._pause = 0
         else:
             self._begin(pencil, point)
             self._solve_anew()
-            self._open.append(Row(point, anew, anew=True))
+            self._open.append(Row(point, anew, pencil.turned, anew=True))
         return done + self._close()
 
     def _followed(self, pencil: NonsymmetricPencil, point: Point) -> Frequencies | None:
@@ -128,8 +133,17 @@ class FrequencyRows:
     def _close(self) -> list[Row]:
         done, self._open = self._open, []
         if done:
+            self._name([row for row in done if not row.found.kinds])
             self._certified = self._before = done[-1].found
+            self._numbers = _numbers(self._before)
         return done
+
+    def _name(self, rows: list[Row]) -> None:
+        """Name the motions of rows, all at once."""
+        if rows:
+            found = named(self.eigensolver.system, [(row.found, row.turned) for row in rows], self.number)
+            for row, frequencies in zip(rows, found, strict=True):
+                row.found = frequencies
 
     def _solve_anew(self) -> None:
         """Solve anew for all rows that are open."""
@@ -216,10 +230,12 @@ def in_order(found: Frequencies) -> Frequencies:
     """Frequencies by their real parts, without imaginary parts that are round-off."""
     values = np.where(abs(found.values.imag) < REAL * abs(found.values), found.values.real, found.values)
     order = np.lexsort((values.imag, np.round(values.real / found.one, 6)))
+    if (np.diff(order) == 1).all():
+        return replace(found, values=values)
     return Frequencies(
         values[order],
         found.errors[order],
-        tuple(found.kinds[i] for i in order),
+        tuple(found.kinds[i] for i in order) if found.kinds else (),
         found.vectors[:, order],
         found.weighed[:, order],
         found.one,

@@ -31,6 +31,7 @@ from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
 from rodfem.problem.arguments import Check, a, checked, count, each, number, path, text
 from rodfem.problem.scene import Scene
+from rodfem.stability import subspaces
 from rodfem.stability.assessment import Verdict, assess
 from rodfem.timing import Clock
 
@@ -116,6 +117,8 @@ class Solver:
             compile_ahead("newton", compiled_newton.declarations(), Path(compiled_newton.__file__).parent)
             compile_ahead("shape", compiled_shape.DECLARATIONS, Path(compiled_shape.__file__).parent)
             compile_ahead("step", compiled_step.declarations(), Path(compiled_step.__file__).parent)
+            if not scene.conservative:
+                compile_ahead("followed", subspaces.declarations(), Path(subspaces.__file__).parent)
         system = System(scene, discretization or Discretization(), comm, clock)
         self.equilibria = BranchSolver(system, spectrum) if scene.conservative else StaticSolver(system)
 

@@ -26,6 +26,7 @@ from rodfem.continuation.interpolant import real_root, zero_uncertainty
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER, Kind
 from rodfem.continuation.locate import SHARP
 from rodfem.continuation.observer import Observer
+from rodfem.continuation.prediction import ROWS, predict_at_load
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.first_name import name_of_first
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, SHIFT, FrequencyRows, Row, differ, leftmost
@@ -84,6 +85,7 @@ class Sweep:
         self.rows = FrequencyRows(self.eigensolver, self.number)
         self.curves = Curves(solver.system.comm)
         self.last: Row | None = None
+        self.latest: list[Point] = []
         self.branches: list[Branch] = []
         self._load = solver.system.scene.load
 
@@ -136,13 +138,23 @@ class Sweep:
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         try:
-            for load in loads:
-                x = at_load(self.solver, x, float(load))
+            for load in loads.tolist():
+                self.latest = [*self.latest[1 - ROWS :], self._point(self._next(load, x))]
                 for notice in self.solver.notices():
                     self.observer.warn(notice)
-                self._take(branch, self.rows.add(self._point(x)))
+                self._take(branch, self.rows.add(self.latest[-1]))
         finally:  # also where there is no equilibrium, or at an interrupt: nothing that has been computed is lost
             self._take(branch, self.rows.finish())
+
+    def _next(self, load: float, first: PETSc.Vec) -> PETSc.Vec:
+        """Equilibrium at the next load, predicted by the last ones; the ``first`` guess where there is none."""
+        if not self.latest:
+            return at_load(self.solver, first, load)
+        x, outcome = self.solver.at_load(predict_at_load(self.solver.system, self.latest, load), load, nearby=True)
+        if not outcome.converged:
+            return at_load(self.solver, self.latest[-1].x, load)
+        require_held(self.solver, x)
+        return x
 
     def _take(self, branch: Branch, rows: list[Row]) -> None:
         """Take rows of the grid into a branch, and the special points before each."""
@@ -401,17 +413,22 @@ def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
 
     Raises :class:`SceneError` where a load drives a motion that nothing holds.
     """
-    system, name = solver.system, solver.system.scene.load
     x, outcome = solver.at_load(guess, load)
     if not outcome.converged:
-        raise ConvergenceError(f"No equilibrium at {name} = {load:g}: use a smaller range.")
+        raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
+    require_held(solver, x)
+    return x
+
+
+def require_held(solver: StaticSolver, x: PETSc.Vec) -> None:
+    """Raise :class:`SceneError` where the loads of a state ``x`` drive a motion that nothing holds."""
+    system = solver.system
     if system.drift(x) > DRIVEN * system.stiffness_scale:
         raise SceneError(
-            f"There is no equilibrium at {name} = {load:g}: nothing holds the rod against the "
-            f"{' or the '.join(system.free_motions(guess))}, and the loads drive it; hold that motion at one end, or "
+            f"There is no equilibrium at {system.scene.load} = {system.scalar(x):g}: nothing holds the rod against the "
+            f"{' or the '.join(system.free_motions(x))}, and the loads drive it; hold that motion at one end, or "
             "balance the loads."
         )
-    return x
 
 
 def _zero_between(measured: AtLoad, cluster: Cluster, load: float, one: float) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
 from petsc4py import PETSc
@@ -44,17 +44,20 @@ def correct(
     row: PETSc.Vec,
     most: int = 12,
     reach: float = 1e3,
+    *,
+    nearby: bool = False,
 ) -> NewtonResult:
     """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place, with LU factors.
 
     As :func:`iterate`, with the phase conditions of the guess ``x``; fails at a singular matrix, too.  ``system`` has
     the equations, ``row`` (n,) is the last row of the bordered matrix; ``most`` and ``reach`` are those of
-    :func:`iterate`.
+    :func:`iterate`.  Where the last call ended ``nearby``, with the same ``row``, its factors serve first.
     """
     system.set_phase(x)
     if system.compiled is not None and not system.damping:
         with system.clock("solve"):
-            ended = system.compiled.correct(x, row, limits(system, most, reach))
+            held = nearby and system.lu.regular and not system.compiled.factors.resorted
+            ended = system.compiled.correct(x, row, replace(limits(system, most, reach), held=held))
         if ended.status != BROKEN:
             return result(ended)
     step = system.new_vector()
@@ -74,7 +77,7 @@ def limits(system: System, most: int, reach: float, tolerance: float = 0.0) -> L
     earlier.
     """
     still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
-    return Limits(most, reach, tolerance, still, TOLERANCE, KEPT, SHRUNK)
+    return Limits(most, False, reach, tolerance, still, TOLERANCE, KEPT, SHRUNK)
 
 
 def result(ended: Ended) -> NewtonResult:

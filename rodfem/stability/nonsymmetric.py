@@ -20,7 +20,8 @@ A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -81,8 +82,8 @@ class Frequencies:
 
     Errors are backward errors; of eigenvalues that were followed (:mod:`rodfem.stability.followed_pairs`) relative ones
     of ``1 / (mu - shift)``.  ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors``
-    (n, k) are complex, with the n unknowns of this rank, ``weighed`` (n, k) are their products with the mass, and
-    ``one`` is the natural size of the eigenvalues.
+    (n, k) are complex, or real where all eigenvalues are, with the n unknowns of this rank, ``weighed`` (n, k) are
+    their products with the mass, and ``one`` is the natural size of the eigenvalues.
     """
 
     values: np.ndarray
@@ -128,7 +129,6 @@ class NonsymmetricSolver(PencilMatrices):
         super().__init__(system)
         self.inverted: tuple[PETSc.Mat, Factors] | None = None
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
-        self.floats = floats(system.scene)
         self._rows: sp.csr_matrix | None = None
 
     @property
@@ -164,8 +164,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def __init__(self, shared: NonsymmetricSolver) -> None:
         """Be the state that the matrices were just filled for."""
         super().__init__(shared)
-        self._turned, self._free, self._own = shared.turned, shared.free, slice(None)
-        self._floats = shared.floats
+        self.turned, self._free, self._own = shared.turned, shared.free, slice(None)
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
@@ -233,40 +232,31 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
 
     def frequencies(self, values: np.ndarray, errors: np.ndarray, vectors: np.ndarray) -> Frequencies:
         """Frequencies from eigenvalues (k,) and vectors (n, k), complex, of the pencil in units of natural sizes."""
+        return named(self.system, [(self.unnamed(values, errors, vectors), self.turned)])[0]
+
+    def unnamed(
+        self, values: np.ndarray, errors: np.ndarray, vectors: np.ndarray, weighed: np.ndarray | None = None
+    ) -> Frequencies:
+        """Frequencies of ``values`` with their ``errors`` and ``vectors`` before their motions are named.
+
+        The ``weighed`` vectors are the products with the mass, in the same units, where they are known.
+        """
         units = self.system.scene.units
         if not units.ordinary:
-            values, vectors = values * units.omega2, vectors * self.sizes.array_r.real[:, None]
-        self._complete(values, vectors)
-        kinds = self._kinds(values, vectors)
+            values, vectors, weighed = values * units.omega2, vectors * self.sizes.array_r.real[:, None], None
+        if self._free:
+            vectors, weighed = vectors.astype(complex), None
+            self._complete(values, vectors)
         order = np.lexsort((values.imag, np.round(values.real / units.omega2, 9)))
-        vectors = vectors[:, order]
-        named = tuple(kinds[i] for i in order)
-        return Frequencies(values[order], errors[order], named, vectors, self.weighed(vectors), units.omega2)
-
-    def _kinds(self, values: np.ndarray, vectors: np.ndarray) -> list[str]:
-        """Names of the motions; a multiple eigenvalue has one for its invariant subspace.
-
-        Its vectors are any in its invariant subspace: bending about d1 in one state and about d2 in the next.
-        """
-        together, columns, owners = groups(values, ALIKE), [], []
-        for number, group in enumerate(together):
-            basis = vectors[:, group] if len(group) == 1 else self.orthonormal(vectors[:, group])
-            parts = [basis.real, basis.imag] if self.system.comm.size > 1 or basis.imag.any() else [basis.real]
-            columns += parts
-            owners += [number] * (len(parts) * len(group))
-        squares = mode_type.squares(self.system, self._turned, np.concatenate(columns, axis=1))
-        sums = np.zeros((len(together), squares.shape[1]))
-        np.add.at(sums, owners, squares)
-        kinds = [""] * len(values)
-        for group, square in zip(together, sums, strict=True):
-            rigid = self._floats and abs(values[group]).max() < STILL * abs(values).max()
-            for j in group:
-                kinds[j] = mode_type.RIGID if rigid else mode_type.name(square / max(square.sum(), TINY))
-        return kinds
+        if (np.diff(order) != 1).any():
+            values, errors, vectors = values[order], errors[order], vectors[:, order]
+            weighed = None if weighed is None else weighed[:, order]
+        weighed = self.weighed(vectors) if weighed is None else weighed
+        return Frequencies(values, errors, (), vectors, weighed, units.omega2)
 
     def motion(self, basis: np.ndarray) -> str:
         """Type of the motion spanned by a ``basis`` (n, k)."""
-        return mode_type.name(mode_type.shares(self.system, self._turned, [*basis.real.T, *basis.imag.T]))
+        return mode_type.name(mode_type.shares(self.system, self.turned, [*basis.real.T, *basis.imag.T]))
 
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
         """``M X`` for real or complex vectors (n, k), with any PETSc."""
@@ -389,16 +379,6 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             number //= 2
         raise ConvergenceError(f"SLEPc found no eigenvalue near {target:.6g}: use a richer discretisation.")
 
-    def basis(self, number: int, target: float) -> np.ndarray:
-        """Real basis (n, p) of the invariant subspace of about ``number`` eigenvalues nearest to ``target``, by SLEPc.
-
-        It is that for unknowns in units of their natural sizes, on one rank.  Raises :class:`ConvergenceError` as
-        :meth:`near` does.
-        """
-        with self.system.clock("stability"):
-            found = self._shifted(number, target / self.system.scene.units.omega2, *self.in_units())
-        return _real_basis(found)
-
     def eliminated(self, target: float) -> Elimination | None:
         """Factors of ``S - target M`` in units of natural sizes that solve for arrays; None where there are none."""
         if self.system.comm.size > 1 or compat.COMPLEX:
@@ -453,17 +433,46 @@ def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.
     return np.asarray(vectors @ (turn / np.sqrt(np.maximum(parts, EPS * parts[-1]))))
 
 
-def _real_basis(found: list[_Pair]) -> np.ndarray:
-    """Real basis (n, p) of the span of the vectors of some pairs and of their conjugates, in the order of the pairs."""
-    columns: list[np.ndarray] = []
-    seen: list[complex] = []
-    for pair in found:
-        if abs(pair.value.imag) < REAL * abs(pair.value):
-            columns.append(pair.parts[0])
-        elif not any(abs(pair.value - v.conjugate()) < ALIKE * abs(v) for v in seen):
-            columns += pair.parts
-            seen.append(pair.value)
-    return np.stack(columns, axis=1)
+def named(
+    system: System, rows: Sequence[tuple[Frequencies, np.ndarray]], number: int | None = None
+) -> list[Frequencies]:
+    """Frequencies of some states, each given with the rotation field there, with the names of their motions.
+
+    Only the first ``number`` are named, where that is given.  A multiple eigenvalue has one name, that of its invariant
+    subspace: its vectors are any in it, bending about d1 in one state and about d2 in the next.
+    """
+    blocks: list[np.ndarray] = []
+    owners: list[np.ndarray] = []
+    fields: list[np.ndarray] = []
+    together = [[g for g in groups(found.values, ALIKE) if number is None or g[0] < number] for found, _ in rows]
+    count = 0
+    for (found, turned), of_row in zip(rows, together, strict=True):
+        order = [j for group in of_row for j in group]
+        vectors, owner = found.vectors[:, order], np.empty(len(order), dtype=int)
+        first = 0
+        for place, group in enumerate(of_row, count):
+            here = slice(first, first := first + len(group))
+            owner[here] = place
+            if len(group) > 1:
+                vectors[:, here] = orthonormal(system.comm, vectors[:, here], found.weighed[:, group])
+        parts = [vectors.real, vectors.imag] if np.iscomplexobj(vectors) else [vectors]
+        blocks += parts
+        owners += [owner] * len(parts)
+        fields += [turned] * (len(parts) * len(owner))
+        count += len(of_row)
+    squares = np.zeros((count, 3))
+    columns = np.concatenate(blocks, axis=1)
+    np.add.at(squares, np.concatenate(owners), mode_type.squares(system, np.stack(fields), columns))
+    names = iter(mode_type.names(squares / np.maximum(squares.sum(axis=1), TINY)[:, None]))
+    out = []
+    for (found, _), of_row in zip(rows, together, strict=True):
+        kinds = [""] * len(found.values)
+        least = STILL * abs(found.values).max() if floats(system.scene) else 0.0
+        for group, name in zip(of_row, names, strict=False):
+            for j in group:
+                kinds[j] = mode_type.RIGID if abs(found.values[group]).max() < least else name
+        out.append(replace(found, kinds=tuple(kinds)))
+    return out
 
 
 def groups(values: np.ndarray, tolerance: float = MULTIPLE) -> list[list[int]]:

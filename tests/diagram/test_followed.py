@@ -63,18 +63,21 @@ def difference(p: Point, q: Point, one: float) -> float:
 
 
 def same(followed: Branch, anew: Branch, one: float) -> None:
-    """Assert that two sweeps have the same rows and special points."""
-    assert [p.negative for p in followed.points] == [p.negative for p in anew.points]
+    """Assert that two sweeps have the same rows and special points.
+
+    Two eigenvalues that are one, at a special point, have the root of the accuracy, and round-off makes them a pair.
+    """
+    special = {s.row for s in anew.special if s.kind in ("flutter", "divergence")}
+    rows = [(p, q) for i, (p, q) in enumerate(zip(followed.points, anew.points, strict=True)) if i not in special]
+    assert [p.negative for p, _ in rows] == [q.negative for _, q in rows]
     assert [p.zero for p in followed.points] == [p.zero for p in anew.points]
     assert [p.motion for p in followed.points] == [p.motion for p in anew.points]
     assert [(s.kind, s.negative_before, s.negative_after) for s in followed.special] == [
         (s.kind, s.negative_before, s.negative_after) for s in anew.special
     ]
     assert [s.point.load for s in followed.special] == pytest.approx([s.point.load for s in anew.special], rel=1e-9)
-    special = {s.row for s in anew.special if s.kind in ("flutter", "divergence")}
-    for i, (p, q) in enumerate(zip(followed.points, anew.points, strict=True)):
-        if i not in special:  # two that are one there have the root of the accuracy
-            assert difference(p, q, one) < CLAIMED, p.load
+    for p, q in rows:
+        assert difference(p, q, one) < CLAIMED, p.load
 
 
 @pytest.mark.parametrize("name", SCENES)
