@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hard.fuzz import comparison, worker
 from hard.fuzz.comparison import compared, of_a_sentence
-from hard.fuzz.oracle import scaling
+from hard.fuzz.oracle import Oracle, scaling
 from hard.fuzz.scenes import scene
 from hard.fuzz.summary import in_words
 
@@ -46,6 +46,17 @@ def test_dependent_constraints_have_no_index() -> None:
     solver = Solver(scene(1, 98), Discretization("pointwise", 7, 5, factors="petsc"))
     with pytest.raises((ConvergenceError, SceneError), match="depend on"):
         solver.equilibrium(0.0)
+
+
+def test_the_way_down_leaves_a_saddle() -> None:
+    """A ring with nearly round sections: a mode of mu = -2e-4 is passed slowly, and one mesh in two stayed there."""
+    found = []
+    for elements, degree in ((10, 6), (14, 5)):
+        solver = Solver(scene(6, 78), Discretization("pointwise", elements, degree))
+        found.append(solver.equilibrium(0.2))
+        assert Oracle(solver.equilibria.system).eigenvalues(found[-1].x).min() > -1e-9
+    assert found[0].energy == pytest.approx(found[1].energy, abs=1e-10)
+    assert [point.negative for point in found] == [0, 0]
 
 
 def test_a_difference_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
