@@ -147,8 +147,8 @@ def relax(
     while the steps are small, and Newton's method takes over near the end (Kelley & Keyes, SIAM J. Numer. Anal. 35
     (1998) 508-523).
 
-    Implicit steps longer than ``1/|mu|`` go uphill along a mode of a negative eigenvalue ``mu``, to the saddle: from one
-    the way down needs steps not ``longest``, and it goes on where ``accepts`` denies an equilibrium that Newton's method
+    Implicit steps longer than ``1/|mu|`` go uphill along a mode of a negative eigenvalue ``mu``, to a saddle.  Steps at
+    most as long as ``longest`` lead away from one, and the way goes on while ``accepts`` denies what Newton's method
     finds.
 
     ``system`` has the equations, ``row`` (n,) is the last row of the bordered matrix, and at most ``most`` steps are
