@@ -13,7 +13,7 @@ from hard.fuzz.oracle import Oracle, scaling
 from hard.fuzz.scenes import scene
 from hard.fuzz.summary import in_words
 
-from rodfem import Discretization, Solver
+from rodfem import Discretization, Plan, Solver, StepControl, trace
 from rodfem.errors import ConvergenceError, SceneError
 
 pytestmark = pytest.mark.alone
@@ -57,6 +57,18 @@ def test_the_way_down_leaves_a_saddle() -> None:
         assert Oracle(solver.equilibria.system).eigenvalues(found[-1].x).min() > -1e-9
     assert found[0].energy == pytest.approx(found[1].energy, abs=1e-10)
     assert [point.negative for point in found] == [0, 0]
+
+
+def test_forces_of_a_taut_rod_are_not_determined() -> None:
+    """Its ends are as far apart as it is long: by round-off some meshes converge to a force of 1e9, others refuse."""
+    taut, plan = scene(11, 221), Plan(depth=0, steps=StepControl(most=3), error_bars=False)
+    try:
+        said = trace(taut, Discretization("auto", 5, 6), plan).warnings
+    except SceneError as refusal:
+        said = [str(refusal)]
+    assert any("forces in the first state" in words or "depend on" in words for words in said)
+    slack = taut.varying("P", (0.01, 0.02))
+    assert not any("forces" in words for words in trace(slack, Discretization("auto", 5, 6), plan).warnings)
 
 
 def test_a_difference_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
