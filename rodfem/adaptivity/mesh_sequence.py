@@ -24,7 +24,7 @@ from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import TINY, unit
 
-FINEST, COARSEST = 1e-10, 1e-1
+FINEST, COARSEST = 1e-11, 1e-1
 """Least and greatest accuracy that can be asked for; the former is near round-off."""
 OF_A_RING = 1e-8
 """Accuracy with which a uniform ring is computed at least."""
