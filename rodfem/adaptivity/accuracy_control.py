@@ -115,10 +115,11 @@ class AccuracyControl:
         if self.meshes.accuracy is None:
             return
         special.point.estimate = error = self._error_of(special)
-        if error > self.accuracy and not special.note:
+        if error > self.accuracy:
             located = special.located_to / unit(special.point.load, one=self.units.load) > self.accuracy
             why = f"located to {special.located_to:.0e} only" if located else "finer meshes did not lower the error"
-            special.note = f"accuracy {self.accuracy:g} not reached: {why}"
+            missed = f"accuracy {self.accuracy:g} not reached: {why}"
+            special.note = f"{special.note}; {missed}" if special.note else missed
 
     def summary(self, branch: Branch, observer: Observer) -> None:
         """Say on which meshes a branch was traced, and the largest error of its points."""

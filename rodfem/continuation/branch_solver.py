@@ -24,6 +24,8 @@ from rodfem.stability.out_of_plane import InSpace
 from rodfem.stability.round_off import decide
 from rodfem.stability.symmetric import SymmetricSolver
 
+ASIDE = 0.1
+"""How far beside a saddle the way down goes on, in the metric."""
 VERTICAL = 1e-8
 """Slope of the load (in spans per unit of arclength) below which it counts as constant along a branch."""
 
@@ -96,6 +98,18 @@ class BranchSolver(StaticSolver):
     def is_stable(self, x: PETSc.Vec) -> bool:
         """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
         return self.inertia.at(x).count().negative == 0
+
+    def off(self, x: PETSc.Vec, start: PETSc.Vec) -> tuple[PETSc.Vec, float]:
+        """State beside the saddle ``x``, along its most unstable mode on the side of ``start``.
+
+        Also the longest time step by which that mode grows: half of its time.
+        """
+        modes = SymmetricSolver(self.inertia).at(x).leftmost(1)
+        beside, mode = x.copy(), modes.vectors[0]
+        size = ASIDE / self.system.norm(mode)
+        beside.axpy(size if self.row(mode).dot(start - x) >= 0 else -size, mode)
+        self.system.set_load(beside, self.system.scalar(x))
+        return beside, 0.5 / abs(float(modes.values[0]))
 
     def may_move(self, x: PETSc.Vec) -> bool:
         """Whether an equilibrium has more zero eigenvalues than symmetries that it breaks."""

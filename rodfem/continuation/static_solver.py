@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
+from math import inf
 
 import numpy as np
 from petsc4py import PETSc
@@ -111,21 +113,37 @@ class StaticSolver:
     def downhill(self, load: float) -> tuple[PETSc.Vec, NewtonResult]:
         """Equilibrium at ``load`` by going downhill from the scene's start, and from there bent a little.
 
-        From a symmetrical start the way down may end on a saddle: a stable state is preferred.
+        A stable state is preferred.  From a symmetrical start the way down may end on a saddle, and where it passes one
+        slowly it depends on the mesh whether it stays there: from a saddle it goes on, along its most unstable mode.
         """
         first: tuple[PETSc.Vec, NewtonResult] | None = None
         for bent in (0.0, 0.4, 0.8):
-            x = self.start(load, bent)
-            outcome = relax(self.system, x, self.axis)
-            for _ in range(3):  # phase conditions taken far away may hold a state off the equilibrium
-                if outcome.converged and self.system.drift(x) > HELD * self.system.stiffness_scale:
-                    x, outcome = self.at_load(x, load)
+            x, outcome = self._relaxed(self.start(load, bent))
             if outcome.converged and self.is_stable(x):
                 return x, outcome
             if first is None or (outcome.converged and not first[1].converged):
                 first = x, outcome
         assert first is not None
-        return first
+        if not first[1].converged:
+            return first
+        beside, longest = self.off(first[0], self.start(load))
+        found = self._relaxed(beside, longest, self.is_stable)
+        return found if found[1].converged else first
+
+    def _relaxed(
+        self, x: PETSc.Vec, longest: float = inf, accepts: Callable[[PETSc.Vec], bool] = lambda x: True
+    ) -> tuple[PETSc.Vec, NewtonResult]:
+        """Equilibrium downhill from the state ``x``, which moves there, at its load; see :func:`relax`."""
+        load = self.system.scalar(x)
+        outcome = relax(self.system, x, self.axis, longest=longest, accepts=accepts)
+        for _ in range(3):  # phase conditions taken far away may hold a state off the equilibrium
+            if outcome.converged and self.system.drift(x) > HELD * self.system.stiffness_scale:
+                x, outcome = self.at_load(x, load)
+        return x, outcome
+
+    def off(self, x: PETSc.Vec, start: PETSc.Vec) -> tuple[PETSc.Vec, float]:
+        """State beside the saddle ``x``, and the longest time step of the way down; here nothing is a saddle."""
+        return x.copy(), inf
 
     def factors(self) -> list[Factors]:
         """All factors that this solver makes."""

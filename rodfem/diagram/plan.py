@@ -25,7 +25,7 @@ COUNTS = {
 }
 """Arguments that are not negative, in words."""
 GIVE_LOADS = Remedy("give them in {}", Argument("Plan", "at"))
-FINEST, COARSEST = 1e-10, 1e-1
+FINEST, COARSEST = 1e-11, 1e-1
 """Least and greatest accuracy that can be asked for; the former is near round-off."""
 ACCURACY = 1e-8
 """One that an error suggests."""

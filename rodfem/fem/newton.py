@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import inf, isfinite
 
 from petsc4py import PETSc
 
@@ -135,13 +135,24 @@ def iterate(
     return NewtonResult(False, iteration, size, float("inf"))
 
 
-def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> NewtonResult:
+def relax(
+    system: System,
+    x: PETSc.Vec,
+    row: PETSc.Vec,
+    most: int = 300,
+    longest: float = inf,
+    accepts: Callable[[PETSc.Vec], bool] = lambda x: True,
+) -> NewtonResult:
     """Solve from a guess that is too far for Newton's method, in place, by pseudo-transient continuation.
 
     The overdamped motion ``M x' = -F(x)`` on the constraints is integrated by implicit Euler steps, ``(S + M/tau) dx =
     -F``, with ``M`` the metric: it goes downhill, to a state that is stable if one can be reached.  The time step grows
     while the steps are small, and Newton's method takes over near the end (Kelley & Keyes, SIAM J. Numer. Anal. 35
     (1998) 508-523).
+
+    Implicit steps longer than ``1/|mu|`` go uphill along a mode of a negative eigenvalue ``mu``, to a saddle.  Steps at
+    most as long as ``longest`` lead away from one, and the way goes on while ``accepts`` denies what Newton's method
+    finds.
 
     ``system`` has the equations, ``row`` (n,) is the last row of the bordered matrix, and at most ``most`` steps are
     taken.
@@ -160,11 +171,11 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Newt
             break
         x.axpy(-(1.0 if size < LARGEST else LARGEST / size), step)  # constraints are mended in one step, however long
         # switched evolution: longer time steps while the motion is slow, shorter where it is fast
-        tau *= 2.0 if size < 0.2 else 0.5 if size > LARGEST else 1.0
+        tau = min(tau * (2.0 if size < 0.2 else 0.5 if size > LARGEST else 1.0), longest)
         if (iteration % 5 == 4 and size < 0.1) or size < CLOSE:  # not earlier: it might jump to a state uphill
             x.copy(trial)
             outcome = correct(system, trial, row, reach=0.3)
-            if outcome.converged:
+            if outcome.converged and accepts(trial):
                 trial.copy(x)
                 return outcome
     return NewtonResult(False, most, float("inf"), float("inf"))

@@ -307,6 +307,7 @@ class Factored:
             v.axpy(FRESH, own.seed(i))  # the old vectors may span an invariant space that misses the nearest one
         with own.system.clock("stability"):
             for iteration in range(most):
+                own.system.tidy()
                 if iteration and iteration % EXPANDED == 0:
                     vectors = self._in_krylov_space(vectors)
                 solved = self._inverse(vectors)
