@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import signal
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from types import ModuleType
 
 import rodfem
@@ -29,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command that ``arguments``, by default those of the shell, name; bad input ends with one sentence."""
     name, *words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     if name in ("-h", "--help", "help"):
-        print(HELP.format(commands="\n".join(f"  {each:<10}{_words(_module(each))}" for each in COMMANDS)), end="")
+        print(HELP.format(commands="\n".join(f"  {each:<10}{_words(each)}" for each in COMMANDS)), end="")
     elif name == "--version":
         print(_versions())
     elif name not in COMMANDS:
@@ -57,6 +60,9 @@ def _module(name: str) -> ModuleType:
     return import_module(f"{HOME}.{name}")
 
 
-def _words(module: ModuleType) -> str:
-    """First line of a module's docstring."""
-    return (module.__doc__ or "").partition("\n")[0]
+def _words(name: str) -> str:
+    """First line of the docstring of a command's module, which is not imported: that takes long."""
+    spec = find_spec(f"{HOME}.{name}")
+    assert spec is not None
+    assert spec.origin is not None
+    return (ast.get_docstring(ast.parse(Path(spec.origin).read_text())) or "").partition("\n")[0]
