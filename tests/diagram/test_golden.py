@@ -32,7 +32,7 @@ def marked(name: str) -> Any:
     return pytest.param(name, marks=[*marks, pytest.mark.versions] if name.removeprefix("demo ") in DEMOS else marks)
 
 
-@pytest.mark.parametrize("name", map(marked, NUMBERS))
+@pytest.mark.parametrize("name", [marked(name) for name in NUMBERS])
 def test_nothing_has_changed(name: str) -> None:
     found, recorded = record(cases()[name]()), NUMBERS[name]
     for key in ("name", "ended", "indices"):
