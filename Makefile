@@ -7,6 +7,8 @@ MPIRUN := /usr/bin/mpirun.openmpi --oversubscribe
 LIMIT := 1800
 # Whether `make docs` executes the lessons: force, or off where the tests have done so.
 LESSONS := force
+# Whether `make test` runs the tests marked long, too: yes.
+ALL :=
 # More options for pytest, as in: make test ARGS="-k hemitropic"
 ARGS :=
 
@@ -38,7 +40,7 @@ demo: setup ## follow a hemitropic rod past its bifurcations and draw it
 	@echo "The pictures:"; ls results/hemitropic/diagram.png results/hemitropic/shape.png
 
 test: setup ## run the tests: serially, on two ranks, and the short ones on three
-	@tools/test.sh "$(PYTHON)" "$(MPIRUN)" "$(LIMIT)" $(ARGS)
+	@all=$(ALL) tools/test.sh "$(PYTHON)" "$(MPIRUN)" "$(LIMIT)" $(ARGS)
 
 lint: setup ## check style and types
 	@tools/setup.sh dev

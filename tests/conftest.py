@@ -20,6 +20,7 @@ def collect_garbage() -> Iterator[None]:
     yield
     gc.collect()
     compat.destroy_garbage(MPI.COMM_WORLD)
+    gc.freeze()  # what is left, in caches, is not looked through again after each of a hundred modules
 
 
 @pytest.fixture

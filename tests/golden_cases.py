@@ -9,6 +9,7 @@ from typing import Any
 import classics
 import demo_cases as demos
 import hemitropic_cases
+import pytest
 from literature import test_classics
 from problem import test_docs
 
@@ -50,7 +51,7 @@ def cases() -> dict[str, Callable[[], Scene]]:
     return found | {f"docs {name}": (lambda s=scene: s) for name, scene in test_docs.scenes().items()}
 
 
-ON_RANKS = (
+VARIED = (
     "demo hemitropic",
     "demo cord",
     "demo ruler",
@@ -64,10 +65,10 @@ ON_RANKS = (
     "classic no mean deflection",
     "classic in a plane",
     "docs hinge",
-    "docs sprung",
-    "docs midway",
+    "classic tip spring",
+    "classic point load",
 )
-"""Cases with all that a mesh may have where ranks cut it: closed and planar rods, joints, constraints of all kinds."""
+"""Cases that have all that a rod may have: closed, planar, curved ones, joints, springs, constraints of all kinds."""
 
 
 REPEATED = (
@@ -91,11 +92,12 @@ def distinct() -> list[str]:
     return [name for name in cases() if name.removeprefix("docs ") not in REPEATED]
 
 
-def single_branches() -> list[str]:
-    """Names of the conservative ones of these without families, whose scenes are not stated for that."""
-    return [
+def single_branches() -> list[Any]:
+    """Names of the conservative ones of these without families, for tests; those beside ``VARIED`` are long."""
+    names = [
         name for name in distinct() if name not in NOT_CONSERVATIVE and name.removeprefix("classic ") not in FAMILIES
     ]
+    return [pytest.param(name, marks=[] if name in VARIED else [pytest.mark.long]) for name in names]
 
 
 def trace(scene: Scene, *, error_bars: bool = True) -> rodfem.Diagram:

@@ -328,7 +328,7 @@ def caught_by(fault: Fault) -> str:
 
 def first_failure(tree: Path, tests: list[str]) -> str:
     """Name of the first test that fails in a copy of the tree; empty where all pass."""
-    options = ["-x", "-q", "--no-header", "-p", "no:cacheprovider"]
+    options = ["-x", "-q", "--no-header", "-p", "no:cacheprovider", "-m", "not long"]
     done = subprocess.run(
         [sys.executable, "-m", "pytest", *options, *tests],
         cwd=tree,

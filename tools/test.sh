@@ -4,11 +4,13 @@
 #
 #     tools/test.sh PYTHON MPIRUN SECONDS [options for pytest]        (as `make test` does)
 #
-# Two ranks do without the tests marked `alone` that are not `short`.  With quick=yes in the environment there are only
-# the tests marked `versions`: serially, and of them on two ranks what two ranks run.
+# Serially, those marked `long` run with all=yes in the environment only.  Two ranks do without the tests marked `alone`
+# that are not `short`.  With quick=yes there are only the tests marked `versions`: serially, and of them on two ranks what
+# two ranks run.
 set -eu
 cd "$(dirname "$0")/.."
-marks="not alone or short" serial=
+marks="not alone or short" serial="not long"
+[ "${all-}" != yes ] || serial=
 [ "${quick-}" != yes ] || marks="versions and ($marks)" serial=versions
 python=$1 mpirun=$2 limit=$3
 shift 3

@@ -146,7 +146,6 @@ def coarse(accuracy: float | None) -> Diagram:
     return trace(hemitropic_cases.scene(), mesh, Plan((0.0, 0.55), (0.5,), 1, accuracy=accuracy))
 
 
-@pytest.mark.alone
 def test_a_mesh_that_does_not_resolve_a_state_says_so() -> None:
     """At 0.5 two meshes agree by accident in the ordinate, not in the strains: its bar is a tenth of its error."""
     diagram = coarse(None)

@@ -189,7 +189,6 @@ def test_known_state_at_another_load() -> None:
         Deflation(ruler().follower, 6.5, hemitropic_cases.user_points(ruler()["plane"], 6.0))
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_mirrors_are_those_of_the_equations(formulation: str) -> None:
     expected = {"cord": {(1, -1, 1), (1, 1, -1), (1, -1, -1)}, "ruler": {(1, -1, 1)}}

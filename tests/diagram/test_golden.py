@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from every_row import disagreements
-from golden_cases import DEMOS, FAMILIES, NOT_CONSERVATIVE, ON_RANKS, REPEATED, cases, distinct, record, single_branches
+from golden_cases import DEMOS, FAMILIES, NOT_CONSERVATIVE, REPEATED, VARIED, cases, distinct, record, single_branches
 
 NUMBERS: dict[str, Any] = json.loads((Path(__file__).parents[1] / "golden" / "numbers.json").read_text())
 
@@ -22,17 +22,17 @@ def test_all_cases_are_recorded() -> None:
     scenes = {name: scene() for name, scene in cases().items()}
     assert {name for name, scene in scenes.items() if not scene.conservative} == set(NOT_CONSERVATIVE)
     families = {name for name, scene in scenes.items() if scene.name in FAMILIES}
-    assert set(single_branches()) == set(distinct()) - families - set(NOT_CONSERVATIVE)
+    assert {case.values[0] for case in single_branches()} == set(distinct()) - families - set(NOT_CONSERVATIVE)
     assert len(distinct()) == len(scenes) - len(REPEATED)
 
 
 def marked(name: str) -> Any:
     """A case with the runs that have it besides the serial one."""
-    marks = [] if name in ON_RANKS else [pytest.mark.alone]
+    marks = [] if name in VARIED else [pytest.mark.alone]
     return pytest.param(name, marks=[*marks, pytest.mark.versions] if name.removeprefix("demo ") in DEMOS else marks)
 
 
-@pytest.mark.parametrize("name", map(marked, NUMBERS))
+@pytest.mark.parametrize("name", [marked(name) for name in NUMBERS])
 def test_nothing_has_changed(name: str) -> None:
     found, recorded = record(cases()[name]()), NUMBERS[name]
     for key in ("name", "ended", "indices"):
@@ -47,7 +47,10 @@ def test_nothing_has_changed(name: str) -> None:
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("name", ["demo hemitropic", "demo cord", "demo ruler", "demo ring"])
+@pytest.mark.parametrize(
+    "name",
+    ["demo hemitropic", "demo ring", *(pytest.param(f"demo {x}", marks=pytest.mark.long) for x in ("cord", "ruler"))],
+)
 def test_index_of_every_row(name: str) -> None:
     """By three other methods; ``python -m tests.every_row`` does the same for all conservative scenes."""
     rows, wrong = disagreements(name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from golden_cases import ON_RANKS, cases
+from golden_cases import VARIED, cases
 from mpi4py import MPI
 from petsc4py import PETSc
 from random_chains import chain_of_cells, petsc, random_chain
@@ -197,7 +197,7 @@ def test_all_ranks_hear_of_trouble() -> None:
 
 
 @pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="nothing is cut on one rank")
-@pytest.mark.parametrize("name", ON_RANKS)
+@pytest.mark.parametrize("name", VARIED)
 def test_pieces_of_every_scene(name: str) -> None:
     """Rings, joints, planar rods, integral constraints: wherever the ranks cut them."""
     scene = cases()[name]()

@@ -131,7 +131,12 @@ def test_values_in_the_literature() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "formulation"), [(name, f) for name, expected in CRITICAL.items() for f in expected[1]]
+    ("name", "formulation"),
+    [
+        pytest.param(name, f, marks=[pytest.mark.short] if name == "pressed ring" else [])
+        for name, expected in CRITICAL.items()
+        for f in expected[1]
+    ],
 )
 def test_critical_loads(name: str, formulation: str) -> None:
     scene, _, modes, expected = CRITICAL[name]
@@ -281,6 +286,7 @@ def test_clamped_loop(formulation: str) -> None:
 # --- planar rods ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.short
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_lateral_buckling_of_a_planar_rod(formulation: str) -> None:
     """In its plane it is stable under every load; in space it is not."""
@@ -335,6 +341,7 @@ def test_hanging_cable(planar: str | None) -> None:
 # --- a material that loses its convexity ----------------------------------------------------------------------------
 
 
+@pytest.mark.short
 def test_loss_of_convexity() -> None:
     """``W = k^2/2 - k^4/4`` is convex to ``k^2 = 1/3``, which the clamped end reaches first: by quadrature.
 

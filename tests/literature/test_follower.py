@@ -135,6 +135,7 @@ def test_mass_and_inertia() -> None:
     assert abs(vibration(10.0, rotary_inertia=(0.0, 0.0, 1e-3)).near(2, 2400.0).values - twist).min() < 1e-9 * twist
 
 
+@pytest.mark.short
 def test_motions_have_names() -> None:
     """Bending about d1 is the weak plane, about d2 the strong one, and torsion has a closed form."""
     found = vibration(10.0, rotary_inertia=(1e-3, 1e-3, 2e-3)).near(5, 1.0)

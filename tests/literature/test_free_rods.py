@@ -42,6 +42,7 @@ def floating(ends: tuple, span: tuple[float, float], **loads) -> Scene:
 PRESSED = (free(lambda c: (0.0, 0.0, c.P)), free(lambda c: (0.0, 0.0, -c.P)))
 
 
+@pytest.mark.short
 def test_frequencies_and_rigid_motions() -> None:
     """Six zero eigenvalues, of three translations and three rotations, and pairs of frequencies in two planes."""
     solver = Solver(floating(PRESSED, (0.0, 45.0)), MESH)

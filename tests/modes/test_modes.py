@@ -51,6 +51,7 @@ def modes_of(solver: StaticSolver, x: PETSc.Vec, number: int, method: str = "aut
 # --- closed forms ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.short
 def test_euler_column() -> None:
     """Clamped-free, EI = 1 and 2: rotation sqrt(2) sin w s, displacement its integral, mu = EI w^2 - P."""
     P, given = 10.0, classics.euler("clamped-free")
