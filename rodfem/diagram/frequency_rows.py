@@ -103,6 +103,9 @@ class FrequencyRows:
         done = self.finish() if changed else []
         if done:
             pencil = self.eigensolver.at(point.x)
+        if found is not None and not near(found.values[: self.number + 1]) and self._proved(pencil, point, found):
+            self._open.append(Row(point, found, pencil.turned, anew=False))
+            return done + self._close()
         anew = leftmost(pencil, self.number, self._before)
         if found is not None and agree(found, anew):
             kept = found if len(found.values) == len(anew.values) else anew
@@ -121,11 +124,19 @@ class FrequencyRows:
             return None
         return in_order(replace(found, values=_without_round_off(found.values, SHIFT * found.one)))
 
+    def _proved(self, pencil: NonsymmetricPencil, point: Point, found: Frequencies) -> bool:
+        """Whether what was followed to a point is proved to be all that is as near to the shift."""
+        certified = self.followed.certified(pencil, point.load)
+        return certified is not None and agree(found, certified) and not _beyond(self._certified, found)
+
     def finish(self) -> list[Row]:
         """Certify the last point: all rows that are left."""
-        if self._open and not self._open[-1].anew:
+        if self._open:
             row, before = self._open[-1], self._open[-2].found if len(self._open) > 1 else self._certified
-            if not agree(row.found, leftmost(self.eigensolver.at(row.point.x), self.number, before)):
+            pencil = self.eigensolver.at(row.point.x)
+            if not (
+                self._proved(pencil, row.point, row.found) or agree(row.found, leftmost(pencil, self.number, before))
+            ):
                 self.followed.end()
                 self._solve_anew()
         return self._close()
@@ -184,11 +195,17 @@ def leftmost(pencil: NonsymmetricPencil, number: int, before: Frequencies = NONE
     """
     one = pencil.system.scene.units.omega2
     found = pencil.near(sought(number), SHIFT * one)
-    reach = SEEN * abs(found.values).max()
+    pairs = _beyond(before, found)
     found = replace(found, values=_without_round_off(found.values, SHIFT * one))
-    for pair in (v for v in before.values if v.imag > 0 and abs(v) > reach):
+    for pair in pairs:
         found = _joined(found, pencil.near(2, pair * (1 + BESIDE)))
     return in_order(found)
+
+
+def _beyond(before: Frequencies, found: Frequencies) -> list[complex]:
+    """Pairs of the load ``before`` that may be farther from the origin than all that was found from the real shift."""
+    reach = SEEN * abs(found.values).max()
+    return [v for v in before.values.tolist() if v.imag > 0 and abs(v) > reach]
 
 
 def differ(pencil: NonsymmetricPencil, number: int) -> str:
