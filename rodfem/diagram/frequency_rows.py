@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.stability.followed_pairs import FollowedPairs
@@ -81,9 +82,15 @@ class FrequencyRows:
         units = eigensolver.system.scene.units
         self.followed = FollowedPairs(sought(number), SHIFT * units.omega2)
         self._open: list[Row] = []
+        self._first: Frequencies | None = None
         self._certified = self._before = NONE
         self._numbers = _numbers(NONE)
         self._kept = self._pause = self._resting = 0
+
+    def first(self, x: PETSc.Vec) -> str:
+        """Find the eigenvalues of ``x``, the state of the first point; in words, if any, what other shifts find."""
+        self._first = leftmost(self.eigensolver.at(x), self.number)
+        return differ(self.eigensolver.at(x), self.number, self._first)
 
     def add(self, point: Point) -> list[Row]:
         """Find the eigenvalues at the next point; rows that are certified by now, in their order."""
@@ -106,7 +113,7 @@ class FrequencyRows:
         if found is not None and not near(found.values[: self.number + 1]) and self._proved(pencil, point, found):
             self._open.append(Row(point, found, pencil.turned, anew=False))
             return done + self._close()
-        anew = leftmost(pencil, self.number, self._before)
+        anew, self._first = self._first or leftmost(pencil, self.number, self._before), None
         if found is not None and agree(found, anew):
             kept = found if len(found.values) == len(anew.values) else anew
             self._open.append(Row(point, kept, pencil.turned, anew=True))
@@ -208,14 +215,13 @@ def _beyond(before: Frequencies, found: Frequencies) -> list[complex]:
     return [v for v in before.values.tolist() if v.imag > 0 and abs(v) > reach]
 
 
-def differ(pencil: NonsymmetricPencil, number: int) -> str:
-    """The eigenvalues, in words, that two shifts do not find alike; empty where they do.
+def differ(pencil: NonsymmetricPencil, number: int, found: Frequencies) -> str:
+    """Eigenvalues, in words, that were ``found`` and that another shift does not find alike; empty where it does.
 
-    Eigenvalues of a singular pencil, ``S x = M x = 0`` for some ``x``, are any numbers, with residuals of round-off; so
+    Of the ``pencil`` ``number`` or more are sought.  Eigenvalues of a singular pencil, ``S x = M x = 0`` for some ``x``, are any numbers, with residuals of round-off; so
     are those that round-off makes of the infinite ones of a pencil that is badly scaled.  Both change with the shift.
     """
-    one = pencil.system.scene.units.omega2
-    found, other = (in_order(pencil.near(sought(number), shift * one)) for shift in (SHIFT, OTHER * SHIFT))
+    other = in_order(pencil.near(sought(number), OTHER * SHIFT * found.one))
     if agree(found, other):
         return ""
     first, second = (

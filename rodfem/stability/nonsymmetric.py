@@ -33,8 +33,8 @@ from rodfem import compat
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain, Elimination
-from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, is_spread
-from rodfem.linalg.matrices import gathered, local_rows, petsc_matrix, shared
+from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, GaveUpError, is_spread
+from rodfem.linalg.matrices import Shared, gathered, local_rows, petsc_matrix, places_in, shared
 from rodfem.linalg.selection import factors_of
 from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
@@ -128,6 +128,7 @@ class NonsymmetricSolver(PencilMatrices):
         """Allocate the matrices of the pencil once."""
         super().__init__(system)
         self.inverted: tuple[PETSc.Mat, Factors] | None = None
+        self.places: np.ndarray | None = None
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
         self._rows: sp.csr_matrix | None = None
 
@@ -172,21 +173,15 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         transposed = matrix.copy()
         transposed.transpose()
         transposed.axpy(-1.0, matrix, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        begin, end = transposed.getOwnershipRange()
-        rows = [(i, *transposed.getRow(i)) for i in range(begin, end)]
         size = matrix.norm(PETSc.NormType.INFINITY)
-        mine = [
-            (i, j, v)
-            for i, columns, values in rows
-            for j, v in zip(columns, values, strict=True)
-            if abs(v) > NEGLIGIBLE * size
-        ]
-        entries = [e for part in self.system.comm.allgather(mine) for e in part]
-        used = sorted({i for i, _, _ in entries})
+        mine = local_rows(transposed).tocoo()
+        counted = abs(mine.data) > NEGLIGIBLE * size
+        part = mine.row[counted] + transposed.getOwnershipRange()[0], mine.col[counted], mine.data[counted].real
+        rows, columns, values = map(np.concatenate, zip(*self.system.comm.allgather(part), strict=True))
+        used = np.unique(rows)
         small = np.zeros((len(used), len(used)))
-        for i, j, v in entries:
-            small[used.index(i), used.index(j)] = v
-        return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if used else (0, 0.0)
+        small[np.searchsorted(used, rows), np.searchsorted(used, columns)] = values
+        return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if len(used) else (0, 0.0)
 
     def near(self, number: int, target: complex) -> Frequencies:
         """Return eigenvalues nearest to ``target``: ``number``, or more where they come.
@@ -383,9 +378,27 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         """Factors of ``S - target M`` in units of natural sizes that solve for arrays; None where there are none."""
         if self.system.comm.size > 1 or compat.COMPLEX:
             return None
+        own, mass, kept = shared(self.matrix), shared(self.mass), self._shared.inverted
+        if own and mass and kept and isinstance(kept[1], Chain) and self.system.scene.units.ordinary:
+            return self._refactored(kept[1], own, mass, target)
         inverse = self._inverse(*self.in_units(), target / self.system.scene.units.omega2)
         factors = None if inverse is None else inverse.factors
         return factors.elimination if isinstance(factors, Chain) and not factors.resorted else None
+
+    def _refactored(self, factors: Chain, own: Shared, mass: Shared, target: float) -> Elimination | None:
+        """The same by factors that know the pattern, of values that need no matrix of PETSc's."""
+        if self._shared.places is None:
+            self._shared.places = places_in(own.pattern, mass.pattern)
+        values = own.values.copy()
+        values[self._shared.places] -= target * mass.values
+        try:
+            factors.elimination.factor(values)
+        except GaveUpError:
+            return None
+        factors.adopt(regular=factors.elimination.regular)
+        if not factors.regular:
+            raise ConvergenceError(_singular(target))
+        return factors.elimination
 
     def _inverse(self, matrix: PETSc.Mat, mass: PETSc.Mat, target: complex) -> Inverse | None:
         """Inverse of ``matrix - target mass`` along the rod, piece by piece on several ranks; None: SLEPc's own.
@@ -443,34 +456,33 @@ def named(
     """
     blocks: list[np.ndarray] = []
     owners: list[np.ndarray] = []
-    fields: list[np.ndarray] = []
+    counts: list[int] = []
     together = [[g for g in groups(found.values, ALIKE) if number is None or g[0] < number] for found, _ in rows]
     count = 0
-    for (found, turned), of_row in zip(rows, together, strict=True):
-        order = [j for group in of_row for j in group]
-        vectors, owner = found.vectors[:, order], np.empty(len(order), dtype=int)
+    for (found, _), of_row in zip(rows, together, strict=True):
+        sizes = [len(group) for group in of_row]
+        vectors = found.vectors[:, [j for group in of_row for j in group]]
+        owner = np.repeat(np.arange(count, count + len(of_row)), sizes)
         first = 0
-        for place, group in enumerate(of_row, count):
+        for group in of_row if max(sizes) > 1 else ():
             here = slice(first, first := first + len(group))
-            owner[here] = place
-            if len(group) > 1:
-                vectors[:, here] = orthonormal(system.comm, vectors[:, here], found.weighed[:, group])
+            vectors[:, here] = orthonormal(system.comm, vectors[:, here], found.weighed[:, group])
         parts = [vectors.real, vectors.imag] if np.iscomplexobj(vectors) else [vectors]
         blocks += parts
         owners += [owner] * len(parts)
-        fields += [turned] * (len(parts) * len(owner))
+        counts.append(len(parts) * len(owner))
         count += len(of_row)
     squares = np.zeros((count, 3))
-    columns = np.concatenate(blocks, axis=1)
-    np.add.at(squares, np.concatenate(owners), mode_type.squares(system, np.stack(fields), columns))
+    turned = np.repeat(np.stack([field for _, field in rows]), counts, axis=0)
+    np.add.at(squares, np.concatenate(owners), mode_type.squares(system, turned, np.concatenate(blocks, axis=1)))
     names = iter(mode_type.names(squares / np.maximum(squares.sum(axis=1), TINY)[:, None]))
-    out = []
+    out, floating = [], floats(system.scene)
     for (found, _), of_row in zip(rows, together, strict=True):
         kinds = [""] * len(found.values)
-        least = STILL * abs(found.values).max() if floats(system.scene) else 0.0
         for group, name in zip(of_row, names, strict=False):
+            rigid = floating and abs(found.values[group]).max() < STILL * abs(found.values).max()
             for j in group:
-                kinds[j] = mode_type.RIGID if abs(found.values[group]).max() < least else name
+                kinds[j] = mode_type.RIGID if rigid else name
         out.append(replace(found, kinds=tuple(kinds)))
     return out
 
