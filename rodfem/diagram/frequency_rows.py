@@ -1,11 +1,12 @@
-"""Left-most eigenvalues at the loads of a sweep: followed from load to load, and certified by solving for them anew.
+"""Left-most eigenvalues at the loads of a sweep: followed from load to load, and certified.
 
-To solve anew is to find, from nothing and by SLEPc, the eigenvalues nearest to a shift below zero, and by a complex
-shift the pairs that are farther.  That is done at the first load and at the last one, at every :data:`EVERY`-th, and
-where eigenvalues come near one another; on both sides of every change of the numbers of complex and of negative
-eigenvalues; and where they were not followed to the accuracy that SLEPc is asked for.  In between they are followed
-(:mod:`rodfem.stability.followed_pairs`).  Rows are open until the next certificate: what is found anew has to be what
-was followed.  Where it is not, all open rows are solved for anew.
+They are followed from the first load on (:mod:`rodfem.stability.followed_pairs`).  A certificate is due at the last
+load, at every :data:`EVERY`-th, and on both sides of every change of the numbers of complex and of negative
+eigenvalues.  It is a proof that none is missing (:mod:`rodfem.stability.outside`).  Where that fails, at the first
+load, where eigenvalues come near one another, and where they were not followed to the accuracy that SLEPc is asked for,
+they are solved for anew: from nothing and by SLEPc those nearest to a shift below zero, and by a complex shift the
+pairs that may be farther.  Rows are open until the next certificate: what is found anew has to be what was followed.
+Where it is not, all open rows are solved for anew.
 """
 
 from __future__ import annotations
@@ -218,7 +219,9 @@ def _beyond(before: Frequencies, found: Frequencies) -> list[complex]:
 def differ(pencil: NonsymmetricPencil, number: int, found: Frequencies) -> str:
     """Eigenvalues, in words, that were ``found`` and that another shift does not find alike; empty where it does.
 
-    Of the ``pencil`` ``number`` or more are sought.  Eigenvalues of a singular pencil, ``S x = M x = 0`` for some ``x``, are any numbers, with residuals of round-off; so
+    Of the ``pencil`` ``number`` or more are sought.
+
+    Eigenvalues of a singular pencil, ``S x = M x = 0`` for some ``x``, are any numbers, with residuals of round-off; so
     are those that round-off makes of the infinite ones of a pencil that is badly scaled.  Both change with the shift.
     """
     other = in_order(pencil.near(sought(number), OTHER * SHIFT * found.one))
