@@ -18,16 +18,8 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.stability.followed_pairs import FollowedPairs
-from rodfem.stability.nonsymmetric import (
-    ALIKE,
-    EPS,
-    NEAR_ZERO,
-    REAL,
-    Frequencies,
-    NonsymmetricPencil,
-    NonsymmetricSolver,
-    named,
-)
+from rodfem.stability.frequencies import ALIKE, EPS, NEAR_ZERO, REAL, Frequencies, named
+from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 from rodfem.tolerances import unit
 
 FREQUENCIES = 6

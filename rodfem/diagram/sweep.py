@@ -35,7 +35,8 @@ from rodfem.faults import as_failure, without
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
-from rodfem.stability.nonsymmetric import MULTIPLE, REAL, Frequencies, NonsymmetricSolver
+from rodfem.stability.frequencies import MULTIPLE, REAL, Frequencies
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.stability.rank import require_independent_constraints
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 

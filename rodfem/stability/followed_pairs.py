@@ -48,7 +48,8 @@ from math import nan
 import numpy as np
 
 from rodfem.errors import ConvergenceError
-from rodfem.stability.nonsymmetric import ALIKE, EPS, SPARE, Frequencies, NonsymmetricPencil, orthonormal
+from rodfem.stability.frequencies import ALIKE, EPS, Frequencies, orthonormal
+from rodfem.stability.nonsymmetric import SPARE, NonsymmetricPencil
 from rodfem.stability.outside import enclosed
 from rodfem.stability.subspaces import LEFT, RIGHT, Subspaces
 

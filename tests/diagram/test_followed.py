@@ -22,7 +22,8 @@ from rodfem.diagram.frequency_rows import SHIFT, FrequencyRows, Row
 from rodfem.diagram.solver import Solver
 from rodfem.diagram.sweep import at_load
 from rodfem.stability.followed_pairs import GUARDS, FollowedPairs
-from rodfem.stability.nonsymmetric import SPARE, Frequencies, NonsymmetricPencil, NonsymmetricSolver
+from rodfem.stability.frequencies import Frequencies
+from rodfem.stability.nonsymmetric import SPARE, NonsymmetricPencil, NonsymmetricSolver
 from rodfem.stability.subspaces import Subspaces
 
 pytestmark = pytest.mark.alone
