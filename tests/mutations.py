@@ -209,6 +209,18 @@ FAULTS = {
         "found is not None",
         "tests/diagram/test_followed.py",
     ),
+    "frequencies-proved-by-nothing": Fault(
+        f"{STABILITY}outside.py",
+        "return gap > 0.0 and self.doubt < (MARGIN * gap) ** 2",
+        "return gap > -1e9",
+        "tests/stability/test_outside.py",
+    ),
+    "probes-that-see-nothing": Fault(
+        f"{STABILITY}followed.c",
+        "f->outside = fmax(f->outside, size / sqrt(fmax(before, 1e-300)));",
+        "f->outside = 0 * size * before;",
+        "tests/stability/test_subspaces.py",
+    ),
     "transposed-factors-are-not": Fault(
         "rodfem/linalg/chain.c",
         "down(c, WIDTH, 1, y, z);",

@@ -13,7 +13,7 @@ from rodfem.continuation.interpolant import real_root, zero_uncertainty
 from rodfem.continuation.locate import SHARP
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured
-from rodfem.stability.nonsymmetric import MULTIPLE, Frequencies, groups
+from rodfem.stability.frequencies import MULTIPLE, Frequencies, groups
 from rodfem.tolerances import ROUND_OFF
 
 MOVED = 0.3

@@ -29,14 +29,15 @@ from rodfem.continuation.observer import Observer
 from rodfem.continuation.prediction import ROWS, predict_at_load
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.first_name import name_of_first
-from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, SHIFT, FrequencyRows, Row, differ, leftmost
+from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, SHIFT, FrequencyRows, Row, leftmost
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.faults import as_failure, without
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
-from rodfem.stability.nonsymmetric import MULTIPLE, REAL, Frequencies, NonsymmetricSolver
+from rodfem.stability.frequencies import MULTIPLE, REAL, Frequencies
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.stability.rank import require_independent_constraints
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 
@@ -130,7 +131,8 @@ class Sweep:
         self.observer.branch(branch)
         if self.solver.system.scene.constraints:  # others are independent
             require_independent_constraints(self.solver.system, x)
-        if words := differ(self.eigensolver.at(x), self.number):
+        x = at_load(self.solver, x, float(loads[0]))
+        if words := self.rows.first(x):
             self.observer.warn(
                 f"The eigenvalues omega^2 of the first state are not well defined ({words}): do not trust any of this "
                 "sweep. Constraints may follow from others, or sizes of the rod's numbers may be too far apart."
@@ -147,9 +149,9 @@ class Sweep:
             self._take(branch, self.rows.finish())
 
     def _next(self, load: float, first: PETSc.Vec) -> PETSc.Vec:
-        """Equilibrium at the next load, predicted by the last ones; the ``first`` guess where there is none."""
+        """Equilibrium at the next ``load``, predicted by the last ones; the ``first`` one where there are none."""
         if not self.latest:
-            return at_load(self.solver, first, load)
+            return first
         x, outcome = self.solver.at_load(predict_at_load(self.solver.system, self.latest, load), load, nearby=True)
         if not outcome.converged:
             return at_load(self.solver, self.latest[-1].x, load)

@@ -84,16 +84,13 @@ def shared(matrix: PETSc.Mat) -> Shared | None:
     return found
 
 
-def places_in(pattern: sp.csr_matrix, part: sp.csr_matrix) -> np.ndarray:
-    """Places of the entries of a ``part`` among those of a ``pattern`` that has all of them, (entries,).
-
-    The indices of both are sorted.
-    """
-    rows, columns = pattern.shape
-    every, wanted = (
-        np.repeat(np.arange(rows), np.diff(matrix.indptr)) * columns + matrix.indices for matrix in (pattern, part)
-    )
-    return np.searchsorted(every, wanted)
+def places_in(pattern: sp.csr_matrix, other: sp.csr_matrix) -> np.ndarray:
+    """Places among the entries of a ``pattern`` of those of an ``other``, all of which it has; indices are sorted."""
+    numbers = [
+        np.repeat(np.arange(x.shape[0]), np.diff(x.indptr)) * x.shape[1] + x.indices.astype(np.int64)
+        for x in (pattern, other)
+    ]
+    return np.asarray(np.searchsorted(*numbers))
 
 
 STORED = """

@@ -43,11 +43,14 @@ keep it from forgetting the others.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
 from rodfem.errors import ConvergenceError
-from rodfem.stability.nonsymmetric import ALIKE, EPS, SPARE, Frequencies, NonsymmetricPencil, orthonormal
+from rodfem.stability.frequencies import ALIKE, EPS, Frequencies, orthonormal
+from rodfem.stability.nonsymmetric import SPARE, NonsymmetricPencil
+from rodfem.stability.outside import enclosed
 from rodfem.stability.subspaces import LEFT, RIGHT, Subspaces
 
 GUARDS = 2
@@ -56,6 +59,8 @@ DEGREE, SUPPORT = 2, 6
 """Degree of the polynomial of the prediction, and number of loads that it is fitted to, at most eight."""
 BEGINNING, AT_ONCE = 20, 3
 """At the first load, how often the bases are made orthonormal, at most, and steps on either side after each time."""
+AGAIN = 4
+"""Steps on either side that bring the bases of one load to the one before."""
 STEPS = 10
 """Steps of inverse iteration at one load, at most."""
 ERROR = 1e-13
@@ -144,7 +149,7 @@ class FollowedPairs:
         self.number, self.shift = number, shift
         self._spaces: Subspaces | None = None
         self._past: list[_Past] = []
-        self._turn = RIGHT
+        self._turn, self._load = RIGHT, nan
 
     @property
     def lost(self) -> bool:
@@ -208,10 +213,41 @@ class FollowedPairs:
         ):  # the shift is an eigenvalue, or a projection singular
             return None
 
+    def certified(self, pencil: NonsymmetricPencil, load: float) -> Frequencies | None:
+        """The eigenvalues that the bases have at a load, where these are proved to be all, solved for anew, else None.
+
+        They have neither vectors nor order.  Bases of another load are improved for this one, and kept as they were.
+        """
+        if self.lost:
+            return None
+        try:
+            with pencil.system.clock("stability"):
+                return self._certified(pencil, load)
+        except (ConvergenceError, np.linalg.LinAlgError):  # a projection is singular
+            return None
+
+    def _certified(self, pencil: NonsymmetricPencil, load: float) -> Frequencies | None:
+        factors, spaces = pencil.eliminated(self.shift), self._taken(pencil)
+        if factors is None or spaces is None:
+            return None
+        kept = [basis.copy() for basis in spaces.bases]
+        for _ in range(0 if load == self._load else AGAIN):
+            spaces.improve(RIGHT)
+            spaces.improve(LEFT)
+        found = enclosed(spaces.bases[RIGHT], spaces.bases[LEFT], pencil.mass_in_units(), factors)
+        for basis, before in zip(spaces.bases, kept, strict=True):
+            basis[:] = before
+        number = self.number + SPARE
+        if found is None or not found.proves(number):
+            return None
+        one = pencil.system.scene.units.omega2
+        nu = found.nu[np.argsort(-abs(found.nu), kind="stable")[:number]]
+        return Frequencies(self.shift + one / nu, np.zeros(number), one=one)
+
     def _followed(self, pencil: NonsymmetricPencil, load: float) -> Frequencies | None:
         """The same; raises :class:`numpy.linalg.LinAlgError` where a projection is singular."""
         with pencil.system.clock("stability"):
-            spaces = self._taken(pencil)
+            spaces, self._load = self._taken(pencil), load
             if spaces is None:
                 return None
             for side, past in enumerate(self._past):

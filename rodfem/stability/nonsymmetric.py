@@ -20,8 +20,7 @@ A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -33,12 +32,12 @@ from rodfem import compat
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain, Elimination
-from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, is_spread
-from rodfem.linalg.matrices import gathered, local_rows, petsc_matrix, shared
+from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, GaveUpError, is_spread
+from rodfem.linalg.matrices import Shared, gathered, local_rows, petsc_matrix, places_in, shared
 from rodfem.linalg.selection import factors_of
-from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
 from rodfem.stability.dense import finite_eigenpairs
+from rodfem.stability.frequencies import EPS, Frequencies, named, orthonormal, product, squares
 from rodfem.stability.pencil import (
     FACTORS,
     Inverse,
@@ -51,7 +50,7 @@ from rodfem.stability.pencil import (
     weighed_modes,
     with_factors,
 )
-from rodfem.tolerances import NEGLIGIBLE, TINY
+from rodfem.tolerances import NEGLIGIBLE
 
 FAR = 1e5
 """How many times farther from the shift than the third nearest an eigenvalue may be.
@@ -61,50 +60,8 @@ which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than t
 """
 DENSE = 3
 """A pencil smaller than this many Krylov spaces is solved by dense reductions: it may have few finite eigenvalues."""
-REAL = 1e-7
-"""An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
-MULTIPLE = 1e-8
-"""Eigenvalues that differ by less than this, relative, are one that is multiple."""
-ALIKE = 1e-6
-"""Eigenvalues that differ by less than this, relative, have one name: where another is near the shift, digits go."""
-STILL = 1e-10
-"""Share of the farthest eigenvalue below which that of a rod that nothing holds is zero."""
-NEAR_ZERO = 1e-2
-"""Share of the farthest eigenvalue below which differences of others are relative to this share."""
-EPS = float(np.finfo(float).eps)
 SPARE = 2
 """Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
-
-
-@dataclass(frozen=True)
-class Frequencies:
-    """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and their ``errors`` (k,).
-
-    Errors are backward errors; of eigenvalues that were followed (:mod:`rodfem.stability.followed_pairs`) relative ones
-    of ``1 / (mu - shift)``.  ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors``
-    (n, k) are complex, or real where all eigenvalues are, with the n unknowns of this rank, ``weighed`` (n, k) are
-    their products with the mass, and ``one`` is the natural size of the eigenvalues.
-    """
-
-    values: np.ndarray
-    errors: np.ndarray
-    kinds: tuple[str, ...] = ()
-    vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
-    weighed: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
-    one: float = 1.0
-
-    @property
-    def noise(self) -> float:
-        """Magnitude below which an eigenvalue counts as zero."""
-        return REAL * max(self.one, float(abs(self.values).min(initial=np.inf)))
-
-    def diverged(self) -> int:
-        """Number of negative real eigenvalues."""
-        return int(((self.values.imag == 0) & (self.values.real < -self.noise)).sum())
-
-    def unstable(self, tolerance: float) -> int:
-        """Number of eigenvalues with a negative real part or a non-zero imaginary part."""
-        return int(((self.values.real < -tolerance) | (abs(self.values.imag) > tolerance)).sum())
 
 
 @dataclass(frozen=True)
@@ -128,6 +85,7 @@ class NonsymmetricSolver(PencilMatrices):
         """Allocate the matrices of the pencil once."""
         super().__init__(system)
         self.inverted: tuple[PETSc.Mat, Factors] | None = None
+        self.places: np.ndarray | None = None
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
         self._rows: sp.csr_matrix | None = None
 
@@ -172,21 +130,15 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         transposed = matrix.copy()
         transposed.transpose()
         transposed.axpy(-1.0, matrix, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        begin, end = transposed.getOwnershipRange()
-        rows = [(i, *transposed.getRow(i)) for i in range(begin, end)]
         size = matrix.norm(PETSc.NormType.INFINITY)
-        mine = [
-            (i, j, v)
-            for i, columns, values in rows
-            for j, v in zip(columns, values, strict=True)
-            if abs(v) > NEGLIGIBLE * size
-        ]
-        entries = [e for part in self.system.comm.allgather(mine) for e in part]
-        used = sorted({i for i, _, _ in entries})
+        mine = local_rows(transposed).tocoo()
+        counted = abs(mine.data) > NEGLIGIBLE * size
+        part = mine.row[counted] + transposed.getOwnershipRange()[0], mine.col[counted], mine.data[counted].real
+        rows, columns, values = map(np.concatenate, zip(*self.system.comm.allgather(part), strict=True))
+        used = np.unique(rows)
         small = np.zeros((len(used), len(used)))
-        for i, j, v in entries:
-            small[used.index(i), used.index(j)] = v
-        return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if used else (0, 0.0)
+        small[np.searchsorted(used, rows), np.searchsorted(used, columns)] = values
+        return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if len(used) else (0, 0.0)
 
     def near(self, number: int, target: complex) -> Frequencies:
         """Return eigenvalues nearest to ``target``: ``number``, or more where they come.
@@ -383,9 +335,27 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         """Factors of ``S - target M`` in units of natural sizes that solve for arrays; None where there are none."""
         if self.system.comm.size > 1 or compat.COMPLEX:
             return None
+        own, mass, kept = shared(self.matrix), shared(self.mass), self._shared.inverted
+        if own and mass and kept and isinstance(kept[1], Chain) and self.system.scene.units.ordinary:
+            return self._refactored(kept[1], own, mass, target)
         inverse = self._inverse(*self.in_units(), target / self.system.scene.units.omega2)
         factors = None if inverse is None else inverse.factors
         return factors.elimination if isinstance(factors, Chain) and not factors.resorted else None
+
+    def _refactored(self, factors: Chain, own: Shared, mass: Shared, target: float) -> Elimination | None:
+        """The same by factors that know the pattern, of values that need no matrix of PETSc's."""
+        if self._shared.places is None:
+            self._shared.places = places_in(own.pattern, mass.pattern)
+        values = own.values.copy()
+        values[self._shared.places] -= target * mass.values
+        try:
+            factors.elimination.factor(values)
+        except GaveUpError:
+            return None
+        factors.adopt(regular=factors.elimination.regular)
+        if not factors.regular:
+            raise ConvergenceError(_singular(target))
+        return factors.elimination
 
     def _inverse(self, matrix: PETSc.Mat, mass: PETSc.Mat, target: complex) -> Inverse | None:
         """Inverse of ``matrix - target mass`` along the rod, piece by piece on several ranks; None: SLEPc's own.
@@ -410,86 +380,6 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         if not factors.regular:
             raise ConvergenceError(_singular(target))
         return Inverse(factors)
-
-
-def product(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """``a^* b`` of the rows of all ranks of ``comm``: (k, m) for (n, k) and (n, m)."""
-    mine = a.conj().T @ b
-    return np.asarray(mine if comm.size == 1 else comm.allreduce(mine))
-
-
-def squares(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Products (k,) of each column of ``a`` (n, k) with the same of ``b``, real parts, of all ranks of ``comm``."""
-    mine = np.sum(a.conj() * b, axis=0).real
-    return np.asarray(mine if comm.size == 1 else comm.allreduce(mine))
-
-
-def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.ndarray:
-    """Basis of the span of complex vectors (n, k), orthonormal in the mass; ``weighed`` are their products with it.
-
-    The ranks of ``comm`` share the rows.
-    """
-    parts, turn = np.linalg.eigh(product(comm, vectors, weighed))
-    return np.asarray(vectors @ (turn / np.sqrt(np.maximum(parts, EPS * parts[-1]))))
-
-
-def named(
-    system: System, rows: Sequence[tuple[Frequencies, np.ndarray]], number: int | None = None
-) -> list[Frequencies]:
-    """Frequencies of some states, each given with the rotation field there, with the names of their motions.
-
-    Only the first ``number`` are named, where that is given.  A multiple eigenvalue has one name, that of its invariant
-    subspace: its vectors are any in it, bending about d1 in one state and about d2 in the next.
-    """
-    blocks: list[np.ndarray] = []
-    owners: list[np.ndarray] = []
-    fields: list[np.ndarray] = []
-    together = [[g for g in groups(found.values, ALIKE) if number is None or g[0] < number] for found, _ in rows]
-    count = 0
-    for (found, turned), of_row in zip(rows, together, strict=True):
-        order = [j for group in of_row for j in group]
-        vectors, owner = found.vectors[:, order], np.empty(len(order), dtype=int)
-        first = 0
-        for place, group in enumerate(of_row, count):
-            here = slice(first, first := first + len(group))
-            owner[here] = place
-            if len(group) > 1:
-                vectors[:, here] = orthonormal(system.comm, vectors[:, here], found.weighed[:, group])
-        parts = [vectors.real, vectors.imag] if np.iscomplexobj(vectors) else [vectors]
-        blocks += parts
-        owners += [owner] * len(parts)
-        fields += [turned] * (len(parts) * len(owner))
-        count += len(of_row)
-    squares = np.zeros((count, 3))
-    columns = np.concatenate(blocks, axis=1)
-    np.add.at(squares, np.concatenate(owners), mode_type.squares(system, np.stack(fields), columns))
-    names = iter(mode_type.names(squares / np.maximum(squares.sum(axis=1), TINY)[:, None]))
-    out = []
-    for (found, _), of_row in zip(rows, together, strict=True):
-        kinds = [""] * len(found.values)
-        least = STILL * abs(found.values).max() if floats(system.scene) else 0.0
-        for group, name in zip(of_row, names, strict=False):
-            for j in group:
-                kinds[j] = mode_type.RIGID if abs(found.values[group]).max() < least else name
-        out.append(replace(found, kinds=tuple(kinds)))
-    return out
-
-
-def groups(values: np.ndarray, tolerance: float = MULTIPLE) -> list[list[int]]:
-    """Places of eigenvalues in groups of equal ones, in the order of the first of each."""
-    out: list[list[int]] = []
-    least = NEAR_ZERO * abs(values).max(initial=0.0)
-    sizes = tolerance * np.maximum(abs(values), least)
-    if (abs(values[:, None] - values) < sizes[:, None]).sum() <= len(values):  # no two of them
-        return [[i] for i in range(len(values))]
-    for i, value in enumerate(values):
-        for group in out:
-            if abs(value - values[group[0]]) < tolerance * max(abs(value), least):
-                group.append(i)
-                break
-        else:
-            out.append([i])
-    return out
 
 
 def _singular(target: complex) -> str:

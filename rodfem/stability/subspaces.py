@@ -97,7 +97,7 @@ class Subspaces:
             f.factors, self._factors = factors.pointer, factors
 
     def predict(self, side: int, degree: int, distances: np.ndarray, past: np.ndarray) -> float:
-        """Let the basis of a side be what a polynomial fitted to some others has at distance zero.
+        """Let the basis of a ``side`` be what a polynomial fitted to some others has at distance zero.
 
         They are the first ones of the ``past`` (any, n, p), at ``distances`` (k,), at most eight, and the polynomial is
         of that ``degree`` at most.  Returns what it misses of the next power of the distance.

@@ -87,6 +87,18 @@ def test_one_step_on_either_side() -> None:
         assert spaces.changes[side] == pytest.approx(change.T @ mass @ change, rel=1e-7, abs=1e-8)
 
 
+@pytest.mark.parametrize("known", range(1, 7))
+def test_prediction_is_a_polynomial_of_least_squares(known: int) -> None:
+    """At loads in any order; what it misses of the next power."""
+    spaces, rng = made(pencil()), np.random.default_rng(6)
+    past, distances = rng.normal(size=(6, N, P)), -rng.permutation(6)[:known] - rng.random(known)
+    missed = spaces.predict(LEFT, 2, distances, past)
+    degree = min(2, known - 1)
+    fitted = np.polyfit(distances, past[:known].reshape(known, -1), degree)[-1].reshape(N, P)
+    assert spaces.bases[LEFT] == pytest.approx(fitted, rel=1e-9, abs=1e-9)
+    assert missed == pytest.approx(abs(np.polyfit(distances, distances**3, degree)[-1]), rel=1e-9)
+
+
 def test_converges_to_dense_eigenvalues_and_the_probes_see_the_next() -> None:
     given = pencil()
     spaces, (nu, _, _) = made(given), given.spectrum
