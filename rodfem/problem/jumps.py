@@ -70,7 +70,8 @@ def unbroken(scene: Scene, inside: Callable[[float], bool]) -> str:
 
 def _along(scene: Scene, s: Any) -> Iterator[tuple[str, list[Any]]]:
     """Functions that hold along the rod, in words, as expressions of the arclength ``s`` at some states."""
-    c, places = scene.constants(s=s), [_place(scene, s, state) for state in STATES]
+    c = scene.constants(max(scene.span, key=abs), s)  # at no load, where nothing would jump
+    places = [_place(scene, s, state) for state in STATES]
     yield "stored energy", [ufl.as_ufl(scene.energy(x.v, x.k, c)) for x in places]
     for what, function, role in functions_of(scene):
         if role.along and role.call == "f(c)":

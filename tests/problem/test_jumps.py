@@ -56,7 +56,7 @@ def test_where_functions_jump() -> None:
     """Comparisons of the arclength, of a place's as of the constants', in any function; no kink is a jump."""
     half = lambda s: ufl.conditional(ufl.And(ufl.gt(s, 1 / 3), ufl.le(s**2, 0.25)), 2.0, 1.0)  # noqa: E731
     bent = lambda v, k, c: (1 + half(c.s)) * k[0] ** 2 + (1 + abs(c.s - 0.6)) * k[1] ** 2 + k[2] ** 2  # noqa: E731
-    push = lambda c: (0.0, 0.0, -1 - 0.5 * ufl.sign(c.s - 0.7))  # noqa: E731
+    push = lambda c: (0.0, 0.0, c.P * ufl.sign(c.s - 0.7))  # noqa: E731
     spring = lambda x, c: ufl.conditional(ufl.lt(x.s, sqrt(0.5)), 1.0, 2.0) * x.r[0] ** 2  # noqa: E731
     found = jumps(column("all", SUPPORTS["clamped-free"], (0.0, 1.0), energy=bent, distributed=push, potential=spring))
     assert found["stored energy"] == pytest.approx([1 / 3, 0.5], abs=1e-11)
