@@ -212,7 +212,10 @@ def check_chain(branch: Branch, out: Compared) -> None:
         else:
             if index == b.negative:
                 continue
-        if not branch.unexplained:
+        low, high = sorted((index, b.negative))
+        between = [p for p in branch.points if a.arclength < p.arclength < b.arclength]
+        open_there = any(p.negative <= low and high <= p.negative + p.undecided for p in between)
+        if not (branch.unexplained or open_there):
             out.wrong.append(f"{branch.name}: from {a.load:.8g} ({a.negative}) to {b.load:.8g} ({b.negative})")
 
 
