@@ -8,7 +8,7 @@ from golden_cases import cases, single_branches
 
 import rodfem.fem.system
 from rodfem import Discretization, Plan, trace
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
 from rodfem.fem.compiled_newton import CompiledNewton
