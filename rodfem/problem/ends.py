@@ -58,10 +58,11 @@ def pinned(
     moment: OfConstants | None = None,
     follower_moment: OfConstants | None = None,
 ) -> End:
-    """Return an end whose position is given (None: free in that direction) and whose directors turn freely.
+    """Return an end whose position is given and whose directors turn freely.
 
-    Moments are those of :class:`End`, without a potential in space: ``moment(c)`` (3,) about axes that stay,
-    ``follower_moment(c)`` (3,) along the directors.
+    ``position(c)`` (3,) is that of the end; components that are None are free, and ``force(c)`` (3,) is a dead force
+    there.  Moments have no potential in space: ``moment(c)`` (3,) is about axes that stay, ``follower_moment(c)`` (3,)
+    along the directors.
     """
     return End(position=position, force=force, moment=moment, follower_moment=follower_moment)
 
@@ -96,8 +97,8 @@ def free(
 ) -> End:
     """Return an end without support, loaded by forces, a potential energy, moments, or nothing.
 
-    ``force(c)`` (3,) is a dead force, ``follower(c)`` (3,) one along the directors, and moments are as for
-    :func:`pinned`.
+    ``force(c)`` (3,) is a dead force, ``follower(c)`` (3,) one along the directors, ``energy(x, c)`` a potential;
+    ``moment(c)`` and ``follower_moment(c)`` (3,) are as for :func:`pinned`.
     """
     return End(force=force, follower=follower, energy=energy, moment=moment, follower_moment=follower_moment)
 
