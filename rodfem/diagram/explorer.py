@@ -122,7 +122,7 @@ class Explorer(Tracer):
             require_independent_constraints(self.solver.system, self.solver.start(start))
             raise
         if self.scene.constraints:  # of those that follow from others a matrix tells nothing: its factors are round-off
-            require_independent_constraints(self.solver.system, point.x)
+            require_independent_constraints(self.solver.system, point.x, self.solver.start(start))
         if point.stretch < COLLAPSED:
             raise SceneError(
                 f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "

@@ -33,6 +33,7 @@ from rodfem.problem.arguments import Check, a, checked, count, each, number, pat
 from rodfem.problem.scene import Scene
 from rodfem.stability import subspaces
 from rodfem.stability.assessment import Verdict, assess
+from rodfem.stability.rank import require_independent_constraints
 from rodfem.timing import Clock
 
 
@@ -152,6 +153,9 @@ class Solver:
         assert isinstance(solver, BranchSolver)
         return SoftStates(solver, lambda: Enriched(solver))
 
+    _independent = False
+    """Whether the constraints of the scene are known to be so: of others a matrix tells nothing but round-off."""
+
     @cached_property
     def _sweep(self) -> Sweep:
         return Sweep(self.equilibria, Plan(self.scene.span), Observer(), lambda: None)
@@ -192,7 +196,8 @@ class Solver:
             scene's own start is taken, as for the first state of a diagram.
 
         Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, or whose index the mesh cannot
-        hold, and :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found.
+        hold, :class:`~rodfem.errors.SceneError` where constraints of the scene follow from others, and
+        :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found.
         """
         scene, found = self.scene, self.equilibria
         scene.parameters[scene.load].check(scene.load, load)
@@ -205,6 +210,9 @@ class Solver:
                 f"No equilibrium was found at {scene.load} = {load:g}: go there in steps of the load, each from the "
                 "state before."
             )
+        if scene.constraints and not self._independent:
+            require_independent_constraints(found.system, x, found.start(load))
+            self._independent = True
         point, mesh = self.point(x), self.equilibria.system.fields.discretization
         if isinstance(found, BranchSolver):
             check_index(scene, load, point.index, mesh.elements * mesh.degree)

@@ -21,6 +21,8 @@ from rodfem.problem.scene import Scene
 
 FEW = 4
 """Nodes for each half-wave below which the index is counted."""
+BENT = 1e-6
+"""Rotation of the first state away from the scene's start, in radian, above which it is not that start."""
 SAMPLES = 2001
 """Places along the rod at which the turning of its start is looked at."""
 SMALL = 1e-6
@@ -39,7 +41,7 @@ def check_waves(solver: StaticSolver, span: tuple[float, float], warn: Callable[
     scene, mesh = fields.scene, fields.discretization
     nodes, finer = mesh.elements * mesh.degree, None
     for load in span:
-        if FEW * half_waves(scene, load) <= nodes:
+        if FEW * half_waves(scene, load) <= nodes or (load != span[0] and _bends(solver, span[0])):
             continue
         index = _index(solver, load)
         if index is None:
@@ -52,6 +54,17 @@ def check_waves(solver: StaticSolver, span: tuple[float, float], warn: Callable[
                 f"At {scene.load} = {load:g} the index of the first state is {index} on {mesh.elements} elements and "
                 f"{there} on {2 * mesh.elements}: indices may be the mesh's; use more elements or a higher degree."
             )
+
+
+def _bends(solver: BranchSolver, load: float) -> bool:
+    """Whether the rod turns away from its start at a ``load``: elsewhere the start is then near no state of its branch.
+
+    A rod of natural curvature that is pushed together bends further, while its start, straight, has dozens of waves.
+    """
+    system, start = solver.system, solver.start(load)
+    x, outcome = solver.at_load(start, load)
+    turned = float(abs(system.at(x).turned - system.at(start).turned).max(initial=0.0))
+    return outcome.converged and max(system.comm.allgather(turned)) > BENT
 
 
 def _index(solver: StaticSolver, load: float) -> int | None:

@@ -1,12 +1,12 @@
 """Contents of ``diagram.json`` as its readers rely on them: the kind of each entry, declared once.
 
-Entries that are missing are the matter of each reader, which needs some and not others; those that are there are of
-their kind, columns have one length, and rows and meshes that are named exist.
+Rows and special points have what all readers need; other entries that are missing are the matter of each reader.  Those
+that are there are of their kind, columns have one length, and rows and meshes that are named exist.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from reprlib import Repr
@@ -19,6 +19,8 @@ from rodfem.file_format import DIAGRAM, STATES, read_json
 Test = Callable[[Any], bool]
 SHORT = Repr()
 SHORT.maxother = SHORT.maxstring = 60
+ROW, POINT = ("load", "ordinate"), ("kind", "load", "ordinate", "negative_before", "negative_after", "zero", "row")
+"""Entries of every row and of every special point."""
 
 
 def _is_number(x: Any) -> bool:
@@ -137,7 +139,10 @@ def check_diagram(data: Mapping[str, Any], where: Path | str) -> None:
         if "columns" not in branch:
             continue
         rows = _rows(branch["columns"], len(meshes), here)
+        if rows:
+            _require(branch["columns"], ROW, here)
         for i, special in enumerate(branch.get("special", [])):
+            _require(special, POINT, f"{here} special point {i},")
             _check(special, SPECIAL, f"{here} special point {i},")
             _check(special.get("law") or {}, LAW, f"{here} special point {i},")
             if special.get("row", 0) >= rows:
@@ -146,6 +151,11 @@ def check_diagram(data: Mapping[str, Any], where: Path | str) -> None:
             _check(change, {"row": COUNT}, here)
             if change.get("row", 0) + 1 >= rows:
                 raise InputError(f"{here} has an unexplained change in row {change['row']} of {rows}: run it again.")
+
+
+def _require(data: Mapping[str, Any], names: Sequence[str], where: str) -> None:
+    if missing := [name for name in names if name not in data]:
+        raise InputError(f"{where} has no {missing[0]}: run the scene again.")
 
 
 def _rows(columns: Mapping[str, list[Any]], meshes: int, where: str) -> int:

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 GRID = 200
 """Pieces of the rod in each of which one zero is looked for."""
+BESIDE = 1e-4
+"""Part of a piece by which the grid is moved: no simple fraction of the rod is a point of it."""
 JUMP = 1e-9
 """Least jump, relative to the greater of the two values."""
 
@@ -91,8 +93,8 @@ def _place(scene: Scene, s: Any, state: Any) -> Any:
 def _changes(expressions: list[Any], s: _Arclength, scene: Scene) -> Iterator[float]:
     """Arclengths inside the rod at which a comparison with the arclength changes."""
     a, b = scene.interval
-    grid = np.linspace(a, b, GRID + 1)[1:-1]  # of which no simple fraction of the rod is a point
-    grid = np.concatenate([[a], grid + 1e-4 * scene.length / GRID, [b]])
+    inner = np.linspace(a, b, GRID + 1)[1:-1] + BESIDE * scene.length / GRID
+    grid = np.concatenate([[a], inner, [b]])
     parts = {part for e in expressions for part in unique_pre_traversal(e) if isinstance(part, LT | GT | LE | GE)}
     for part in (part for part in parts if s in unique_pre_traversal(part)):
         left, right = part.ufl_operands

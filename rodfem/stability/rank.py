@@ -30,6 +30,8 @@ from rodfem.stability.projection import factored
 
 DEPENDENT = 1e-12
 """A singular value below this, relative to the greatest column of ``C``, is zero."""
+ROUND = 1e-9
+"""Distance from the scene's start, in the metric, below which a state is that start: Newton's tolerance."""
 DIRECTION = 1e-6
 """Relative tolerance of ARPACK for the vector of the least singular value."""
 PASSES = 8
@@ -120,7 +122,12 @@ def rank_of(pencil: Pencil, scalars: Sequence[str] = ()) -> float:
     )
 
 
-def require_independent_constraints(system: System, x: PETSc.Vec) -> None:
-    """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others."""
+def require_independent_constraints(system: System, x: PETSc.Vec, start: PETSc.Vec | None = None) -> None:
+    """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others.
+
+    Where ``x`` is the scene's ``start`` but for round-off they are taken there, where gradients that vanish are zero.
+    """
+    if start is not None and system.norm(start - x) < ROUND:
+        x = start
     scalars = [u for u in system.fields.unknown_scalars if u.multiplier]
     rank_of(Blocks(system, "full").assemble(x), [u.group.equation.format(u.component + 1) for u in scalars])

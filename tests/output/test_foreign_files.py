@@ -15,6 +15,7 @@ import pytest
 
 import rodfem
 from rodfem import Discretization, Plan
+from rodfem.app.commands import info
 from rodfem.errors import InputError
 from rodfem.output import plot_diagram, plot_modes, render
 
@@ -91,6 +92,8 @@ ENTRIES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (changed(*C, "mesh", 0, to=5), "row of mesh 5, of 1"),
     (changed(*C, "negative", 0, to=0.5), "a whole number"),
     (changed(*C, "energy"), "has no energy"),
+    (changed(*C, "load"), "has no load"),
+    (changed(*S, "ordinate"), "special point 0, has no ordinate"),
     (changed(*S, "row", to=99999), "in row 99999"),
     (changed(*S, "row", to=-7), "a whole number"),
     (changed(*S, "kind", to="foo"), "one of branch point"),
@@ -123,6 +126,16 @@ def test_entries(change: Callable[[dict[str, Any]], None], words: str, good: Pat
     sentence = refused(lambda: rodfem.load(bad, SCENE), capfd)
     assert words in sentence
     assert "\n" not in sentence
+
+
+@pytest.mark.parametrize("entry", [(*C, "ordinate"), (*S, "load"), (*S, "zero"), (*S, "negative_before")])
+def test_a_table_of_what_is_not_there(entry: tuple[str | int, ...], good: Path, bad: Path) -> None:
+    """``rodfem info`` ended with KeyError: 'load'."""
+    data = json.loads((good / "diagram.json").read_text())
+    changed(*entry)(data)
+    (bad / "diagram.json").write_text(json.dumps(data))
+    with pytest.raises(InputError, match=f"has no {entry[-1]}: run the scene again"):
+        info.main([str(bad)])
 
 
 def put(name: str, value: Any) -> Callable[[h5py.File], None]:
