@@ -1,8 +1,8 @@
 r"""Frequencies between the loads of a sweep where two of them collide, for pictures: a chord would show a corner there.
 
 The eigenvalues ``mu = s +- sqrt(D)`` have a square root at a flutter load; their mean ``s`` and
-``D = ((mu1 - mu2)/2)^2`` have none (:mod:`rodfem.stability.cluster`).  Both are cubic splines through the rows on either
-side and the flutter load itself, where ``D = 0``.
+``D = ((mu1 - mu2)/2)^2`` have none (:mod:`rodfem.stability.cluster`).  Both are cubic splines through the rows on
+either side and the flutter load itself, where ``D = 0``.
 """
 
 from __future__ import annotations

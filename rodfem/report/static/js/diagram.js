@@ -12,6 +12,9 @@ const plot = document.getElementById("diagram");
 const choice = document.getElementById("ordinate");
 const FREQUENCIES = { key: "frequencies", name: "frequencies" };
 const ordinates = [...(frequencies.ANY ? [FREQUENCIES] : []), ...data.ordinates];
+const NAMED = 12, MANY = 1500; // branches up to which each has its name in the plot; places that names keep clear of
+const NAME = [0.09, 0.03], LEAST = 0.7, SHARES = [0.5, 0.6, 0.4, 0.7, 0.3, 0.8, 0.2]; // halves of a name, in shares of the plot
+const SIDES = [[0, -1], [0, 1], [-1, 0], [1, 0]]; // of a row at which its branch's name may stand
 let ordinate = ordinates[0];
 let cursor = null;
 
@@ -74,12 +77,12 @@ function points(branch, number, rows, marker) {
   };
 }
 
-// The index beside the middle of each piece that is long enough for it.
+// The index beside the middle of each piece that is long enough for it, and the name of a branch where it covers least.
 function labels() {
   const all = data.branches.flatMap((b) => b.load.map((x, i) => [x, heights(b)[i]])).filter((p) => p[1] !== null);
   const range = (k) => Math.max(...all.map((p) => p[k])) - Math.min(...all.map((p) => p[k])) || 1;
-  const [width, height] = [range(0), range(1)];
-  const found = [];
+  const [width, height] = [range(0), range(1)], places = all.map(([x, y]) => [x / width, y / height]);
+  const found = [], names = [];
   for (const b of data.branches)
     for (const piece of b.pieces) {
       const [first, last] = piece.rows, y = heights(b), at = (i) => [b.load[i] / width, y[i] / height];
@@ -88,10 +91,26 @@ function labels() {
       const row = Math.round((first + last) / 2), [x, v] = at(row);
       if (length > 0.07 && y[row] !== null && !found.some((o) => Math.hypot(o.x - x, o.v - v) < 0.045)) found.push({ x, v, row, b, text: piece.index });
     }
-  return found.map(({ b, row, text }) => ({
-    x: b.load[row], y: heights(b)[row], text: `<b>${escaped(text)}</b>`, showarrow: false, yshift: 11, xshift: 7,
-    font: { color: b.colour, size: 14 }, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0, captureevents: false,
-  }));
+  const taken = [...places.filter((_, i) => i % Math.ceil(places.length / MANY) === 0), ...found.map(({ x, v }) => [x + 0.01, v + 0.035])];
+  for (const b of data.branches.length > NAMED ? [] : data.branches) {
+    const free = ([x, v]) => taken.reduce((least, [p, q]) => Math.min(least, Math.max(Math.abs(p - x) / NAME[0], Math.abs(q - v) / NAME[1])), 1);
+    const places = SHARES.flatMap((share) => SIDES.map(([right, up]) => {
+      const row = Math.round(share * (b.load.length - 1)), middle = [b.load[row] / width + (NAME[0] + 0.02) * right, heights(b)[row] / height + 0.04 * up];
+      return { row, right, up, middle, room: heights(b)[row] === null ? 0 : free(middle) };
+    }));
+    const best = places.reduce((one, other) => (other.room > one.room ? other : one));
+    if (best.room < LEAST) continue;
+    taken.push(...[-0.8, 0, 0.8].map((share) => [best.middle[0] + share * NAME[0], best.middle[1]]));
+    names.push({ ...best, b });
+  }
+  const label = (b, row, text, yshift, xshift, size, xanchor = "center") => ({
+    x: b.load[row], y: heights(b)[row], text, showarrow: false, yshift, xshift, xanchor,
+    font: { color: b.colour, size }, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0, captureevents: false,
+  });
+  return [
+    ...found.map(({ b, row, text }) => label(b, row, `<b>${escaped(text)}</b>`, 11, 7, 14)),
+    ...names.map(({ b, row, right, up }) => label(b, row, escaped(b.name), 14 * up, 8 * right, 12, ["right", "center", "left"][right + 1])),
+  ];
 }
 
 function traces() {

@@ -26,13 +26,18 @@ function words(mode) {
 
 function redraw() {
   const b = branch(), here = b.modes[state.row] ?? [];
-  const key = [state.branch, here.length ? state.row : -1, here.indexOf(state.mode)].join();
+  const rows = Object.keys(b.modes).map(Number), none = !rows.length && (b.spectrum || b.omega2) && document.createElement("span");
+  const key = [state.branch, here.length || none ? state.row : -1, here.indexOf(state.mode)].join();
   if (key === shown) return;
   shown = key;
   const buttons = here.map((mode) => button(words(mode), mode === state.mode, () => showMode(mode === state.mode ? null : mode), mode.kind));
-  const rows = Object.keys(b.modes).map(Number);
+  if (none) {
+    none.className = "quiet";
+    none.title = "The command of this report, with these options besides: see About";
+    none.textContent = `Modes that move: run with --at ${digits(b.load[state.row], 4)} --modes 3`;
+  }
   const others = here.length ? [] : rows.map((row) => button(`modes at ${data.symbol} = ${digits(b.load[row])}`, null, () => select(state.branch, row)));
-  box.replaceChildren(...buttons, ...others);
+  box.replaceChildren(...buttons, ...others, ...(none ? [none] : []));
 }
 
 export function start() {
