@@ -88,7 +88,9 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
         figure = Figure(figsize=(columns * PANEL[0], rows * PANEL[1] + 0.5), dpi=2 * DPI // 3 if moving else DPI)
         FigureCanvasAgg(figure)
         figure.subplots_adjust(0.01, 0.01, 0.99, 1 - (TITLES + 0.4) / (rows * PANEL[1] + 0.5), 0.04, 0.36)
-        figure.suptitle(f"{heading(path)}{branch}, load {modes.load:.6g}", fontsize=14, y=1 - 0.1 / figure.get_figheight(), va="top")
+        figure.suptitle(
+            f"{heading(path)}{branch}, load {modes.load:.6g}", fontsize=14, y=1 - 0.1 / figure.get_figheight(), va="top"
+        )
         places = [figure.add_subplot(rows, columns, i + 1) for i in range(len(numbers))]
         panels = [_Panel(axes, modes, setting, n, moving) for axes, n in zip(places, numbers, strict=True)]
         if not moving:
