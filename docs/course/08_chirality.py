@@ -19,8 +19,8 @@
 # %% [markdown]
 # ## Picture
 #
-# A cord of $k_0 = 3\pi$ under a tension 40, seen from two sides. Its right half (orange) is the mirror image of its left
-# half: the two loops have opposite hands.
+# A cord of $k_0 = 3\pi$ under a tension 40, seen from two sides. Its right half (orange) is the mirror image of its
+# left half: the two loops have opposite hands.
 
 # %%
 from math import hypot, inf, pi

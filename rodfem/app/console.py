@@ -27,8 +27,6 @@ rodfem COMMAND --help lists the arguments of a command.
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command that ``arguments``, by default those of the shell, name; bad input ends with one sentence."""
-    if arguments is None:  # a reader, as head, may leave
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     name, *words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     if name in ("-h", "--help", "help"):
         print(HELP.format(commands="\n".join(f"  {each:<10}{_words(_module(each))}" for each in COMMANDS)), end="")
@@ -38,8 +36,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         near = get_close_matches(name, COMMANDS, n=1) or [" or ".join(COMMANDS)]
         Parser(prog="rodfem").error(f"unknown command {name!r}: choose {near[0]}")
     else:
+        command = _module(name)
+        if arguments is None:  # a reader, as head, may leave; PETSc, which a command may load, would complain
+            signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         try:
-            _module(name).main(words)
+            command.main(words)
         except InputError as trouble:
             complain(str(trouble))
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from textwrap import fill
 
 from rodfem.app.cli import Parser
-from rodfem.output.glossary import ENTRIES, explanation, title
+from rodfem.output.glossary import ENTRIES, explanation, is_entry, title
 
 WIDTH = 110
 """Columns of a paragraph."""
@@ -15,9 +15,10 @@ WIDTH = 110
 def main(words: Sequence[str]) -> None:
     """Explain it, or list all; raises :class:`~rodfem.errors.InputError` for a word that no entry has."""
     parser = Parser(prog="rodfem explain", description=__doc__)
-    parser.add_argument("word", nargs="*", help="as index, BP, 'branch point'; none lists all")
-    word = " ".join(parser.parse_args(words).word)
-    if not word:
+    parser.add_argument("word", nargs="*", help="as index, BP LP, branch point; none lists all")
+    given = parser.parse_args(words).word
+    if not given:
         print("\n".join(sorted(map(title, ENTRIES), key=str.lower)))
-    for name, text in explanation(word) if word else ():
+    each = given if len(given) > 1 and all(map(is_entry, given)) else [" ".join(given)] if given else []
+    for name, text in (entry for word in each for entry in explanation(word)):
         print(fill(f"{name}: {text}", WIDTH, subsequent_indent="  "))

@@ -16,12 +16,11 @@ function button(text, pressed, action, kind = "") {
   return made;
 }
 
-const WORDS = { grows: "grows", swings: "swings", zero: "zero" };
-
+// Its value and what it does; what moves only where it does, or the buttons would not stand side by side.
 function words(mode) {
   const [x, y] = mode.value;
   const value = mode.words || `${rough(x, 5)}${y ? ` ${y > 0 ? "+" : "−"} ${digits(Math.abs(y), 5)} i` : ""}`;
-  return `${mode.kind === "grows" ? "◌" : "●"} μ = ${value}: ${mode.motion}, ${WORDS[mode.kind]}`;
+  return `${mode.kind === "grows" ? "◌" : "●"} ${value} ${mode.kind}${mode === state.mode ? `: ${mode.motion}` : ""}`;
 }
 
 function redraw() {
@@ -36,6 +35,7 @@ function redraw() {
     none.title = "The command of this report, with these options besides: see About";
     none.textContent = `Modes that move: run with --at ${digits(b.load[state.row], 4)} --modes 3`;
   }
+  buttons.forEach((one, i) => (one.title = `Mode ${i + 1}: ${here[i].motion}`));
   const others = here.length ? [] : rows.map((row) => button(`modes at ${data.symbol} = ${digits(b.load[row])}`, null, () => select(state.branch, row)));
   box.replaceChildren(...buttons, ...others, ...(none ? [none] : []));
 }
