@@ -19,6 +19,7 @@ def main(words: Sequence[str]) -> None:
     given = parser.parse_args(words).word
     if not given:
         print("\n".join(sorted(map(title, ENTRIES), key=str.lower)))
-    each = given if len(given) > 1 and all(map(is_entry, given)) else [" ".join(given)] if given else []
+    together = [" ".join(given)] if given else []
+    each = together if any(map(is_entry, together)) or not all(map(is_entry, given)) else given
     for name, text in (entry for word in each for entry in explanation(word)):
         print(fill(f"{name}: {text}", WIDTH, subsequent_indent="  "))
