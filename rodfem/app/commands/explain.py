@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
+from shutil import get_terminal_size
 from textwrap import fill
 
 from rodfem.app.cli import Parser
@@ -22,4 +24,5 @@ def main(words: Sequence[str]) -> None:
     together = [" ".join(given)] if given else []
     each = together if any(map(is_entry, together)) or not all(map(is_entry, given)) else given
     for name, text in (entry for word in each for entry in explanation(word)):
-        print(fill(f"{name}: {text}", WIDTH, subsequent_indent="  "))
+        width = min(WIDTH, get_terminal_size().columns) if sys.stdout.isatty() else WIDTH
+        print(fill(f"{name}: {text}", width, subsequent_indent="  "))
