@@ -14,6 +14,7 @@ const FREQUENCIES = { key: "frequencies", name: "frequencies" };
 const ordinates = [...(frequencies.ANY ? [FREQUENCIES] : []), ...data.ordinates];
 const NAMED = 12, MANY = 1500; // branches up to which each has its name in the plot; places that labels keep clear of
 const LETTER = 0.0095, TALL = 0.03, AWAY = 0.012; // half the size of a label, for each letter, and its distance: shares of the plot
+const LINE = 0.03; // half the height that a label keeps clear of others
 const SHORTEST = 0.07, LEAST = 0.7; // pieces without a label; room for a name, of what it takes
 const SHARES = [0.5, 0.6, 0.4, 0.7, 0.3, 0.8, 0.2]; // of a piece at which a label may stand
 const SIDES = [[0, 1], [0, -1], [1, 0], [-1, 0]]; // of a row at which it may
@@ -95,7 +96,7 @@ function labels() {
     }));
     const best = places.reduce((one, other) => (one && one.room >= other.room ? one : other), null);
     if (!best || best.room < wanted) return [];
-    taken.push(...[-0.8, 0, 0.8].map((share) => [best.middle[0] + share * wide, best.middle[1]]));
+    taken.push(...[-0.8, 0, 0.8].flatMap((share) => [-1, 0, 1].map((side) => [best.middle[0] + share * wide, best.middle[1] + side * LINE])));
     const { row, right, up } = best, xanchor = ["right", "center", "left"][right + 1];
     return [{ x: b.load[row], y: heights(b)[row], text, showarrow: false, yshift: 13 * up, xshift: 7 * right, xanchor, font: { color: b.colour, ...style }, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0, captureevents: false }];
   };
