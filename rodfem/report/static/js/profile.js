@@ -77,7 +77,7 @@ function redraw() {
   const how = layout("arclength s", `${tab} ${symbol}`, { margin: { l: 46, r: 10, t: 6, b: 34 }, uirevision: tab });
   how.yaxis.range = range(b, first);
   const jump = b.jumps[symbol][state.row], size = Math.max(...how.yaxis.range.map(Math.abs));
-  error.textContent = jump > ROUND_OFF * size ? `error ≈ ${jump.toExponential(0)}` : "error unknown";
+  error.textContent = jump > ROUND_OFF * size ? `error ≈ ${jump.toExponential(0)}` : "error: ~";
   return draw(plot, traces, how);
 }
 
