@@ -28,7 +28,10 @@ SHORT.maxother = SHORT.maxstring = 60
 
 
 def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Decorator of a function whose arguments are checked, and converted, before anything else is done."""
+    """Decorator of a function whose arguments are checked, and converted, before anything else is done.
+
+    The function raises :class:`TypeError`, with the names of its arguments, where one is missing or is none of them.
+    """
 
     def decorate(function: Callable[P, T]) -> Callable[P, T]:
         signature = inspect.signature(function)
