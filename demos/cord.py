@@ -49,7 +49,10 @@ def cord(turns: float = 1.5) -> Scene:
         interval=(0.0, 1.0),
         rod="unshearable and inextensible",
         energy=lambda v, k, c: bending_and_twist((k[0], k[1] - c.k0, k[2]), (1.0, 1.0, 1.0)),
-        parameters={"lam": Parameter(60.0, r"\lambda", words="tension"), "k0": Parameter(2 * pi * turns)},
+        parameters={
+            "lam": Parameter(60.0, r"\lambda", words="tension"),
+            "k0": Parameter(2 * pi * turns, words="natural curvature"),
+        },
         load="lam",
         ends=(clamped(), sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, c.lam))),
         ordinate=Ordinate("shortening 1 - r3(1)", s=1.0, of=lambda r, q: 1 - r[2], label="shortening $1 - r_3(1)$"),

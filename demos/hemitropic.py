@@ -59,9 +59,9 @@ def hemitropic_rod(
         parameters={
             "lam": Parameter(0.0, r"\lambda", admissible=(-inf, 1.0), words="end shortening"),
             "A": Parameter(coupling, words="coupling"),
-            "B": Parameter(twisting),
-            "C": Parameter(bending),
-            "l": Parameter(half_length),
+            "B": Parameter(twisting, words="twisting stiffness"),
+            "C": Parameter(bending, words="bending stiffness"),
+            "l": Parameter(half_length, words="half length"),
         },
         load="lam",
         ends=(

@@ -71,9 +71,10 @@ def draw(couplings: np.ndarray, loads: np.ndarray, results: list[dict], path: Pa
     from matplotlib.figure import Figure
 
     stable = np.array([[np.nan if x is None else x for x in r["stable"]] for r in results]).T
-    figure = Figure(figsize=(7.5, 5.0), dpi=200, layout="constrained")
+    figure = Figure(figsize=(8.0, 5.0), dpi=200, layout="constrained")
     axes = figure.subplots()
-    picture = axes.pcolormesh(couplings, loads, stable, shading="nearest", cmap="viridis")
+    shading = "gouraud" if np.isfinite(stable).all() else "nearest"
+    picture = axes.pcolormesh(couplings, loads, stable, shading=shading, cmap="viridis")
     for pair in sorted({(a, b) for r in results for a, b, _ in r["changes"]}):
         places = [[load for a, b, load in r["changes"] if (a, b) == pair] for r in results]
         line = np.array([found[0] if found else np.nan for found in places])
@@ -85,7 +86,7 @@ def draw(couplings: np.ndarray, loads: np.ndarray, results: list[dict], path: Pa
     axes.set(
         xlabel="coupling $A$",
         ylabel=r"end shortening $\lambda$",
-        title="Compressed hemitropic rod; lines: index of the straight one",
+        title="Compressed hemitropic rod; lines: where the straight rod's index changes",
     )
     with draft_of(path) as draft:
         figure.savefig(draft)

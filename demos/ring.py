@@ -59,7 +59,7 @@ def ring(twisting: float = 1.5) -> Scene:
         energy=lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t0), (1.0, 1.0, c.C)),
         parameters={
             "t0": Parameter(0.0, "t_0", words="natural twist"),
-            "C": Parameter(twisting, admissible=(0.0, inf)),
+            "C": Parameter(twisting, admissible=(0.0, inf), words="twisting stiffness"),
         },
         load="t0",
         ends=Ring(),

@@ -72,12 +72,12 @@ def diagram(name: str) -> dict[str, Any]:
 
 def both_signs(found: dict[str, Any], label: str, path: Path) -> None:
     """Draw a diagram with both signs of its ordinate, which is ``label``."""
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE | {"font.size": 13.0}):
         figure = Figure(figsize=(9.0, 5.0), dpi=DPI, layout="constrained")
         axes = figure.subplots()
         draw(axes, found, signs=(1, -1))
         axes.set(ylabel=label, title=found["title"])
-        axes.legend(handles=legend_of(found), loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9)
+        axes.legend(handles=legend_of(found), loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=11)
         path.parent.mkdir(exist_ok=True)
         figure.savefig(path)
 

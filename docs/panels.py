@@ -17,6 +17,7 @@ from rodfem.output.plot_diagram import END_MARKER, ENDS
 from rodfem.output.plot_frequencies import draw_into
 from rodfem.output.plot_pieces import PLANAR, STABLE, UNSTABLE
 from rodfem.output.sheet import HALO, PALETTE, axis_label
+from rodfem.output.smooth import between
 
 MARKERS: dict[str, dict[str, Any]] = {
     "branch point": {"marker": "o", "mfc": "white"},
@@ -44,10 +45,11 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
         load, ordinate = (np.array(branch["columns"][x]) for x in ("load", "ordinate"))
         for rows, index, in_space in pieces(branch):
             style = ":" if index else "--" if in_space else "-"
+            curve = smooth(np.column_stack([load, ordinate]), rows, between(branch, "ordinate"))
             for sign in signs if np.ptp(ordinate) else (1,):
-                axes.plot(load[rows], sign * ordinate[rows], style, color=colour, linewidth=width)
+                axes.plot(curve[:, 0], sign * curve[:, 1], style, color=colour, linewidth=width)
             text = f"{index} ({in_space})" if in_space != index else f"{index}"
-            labels.append((text, colour, np.column_stack([load, ordinate])[rows]))
+            labels.append((text, colour, curve))
         for row, _ in endings(branch):
             for sign in signs if ordinate[row] else (1,):
                 style = {"ls": "none", "zorder": 5} | END_MARKER | {"ms": 2.7 * width}
@@ -66,6 +68,12 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
     for text, colour, places in labels:
         _write(axes, text, colour, places, 6 * width, written)
     axes.set_xlabel(axis_label(found))
+
+
+def smooth(places: np.ndarray, rows: slice, more: Mapping[int, np.ndarray]) -> np.ndarray:
+    """Places (n, 2) of the ``rows`` of a branch with the points in between, ``more``, by the row before."""
+    return np.vstack([part for i in range(rows.start, rows.stop) for part in
+                      (places[i : i + 1], *([more[i]] if i in more and i + 1 < rows.stop else []))])  # fmt: skip
 
 
 def legend_of(found: Mapping[str, Any]) -> list[Artist]:

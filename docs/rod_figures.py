@@ -15,19 +15,24 @@ import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from panels import draw, legend_of
 
 from rodfem import Branch, Diagram, Discretization, Plan, Ring, Scene, trace
+from rodfem.output.glyphs import glyphs_of
 from rodfem.output.sheet import STYLE, symbol_of, tex
 from rodfem.output.view import sign_of, view_of
+from rodfem.problem.quaternions import directors
+from rodfem.problem.setting import Setting
+from rodfem.problem.supports import distributed_on, foundation_of, supports_of, ties_of
 
 DOCS = Path(__file__).parent
 COLUMNS, DPI, MOST_ENTRIES = 2, 110, 4
-WIDTHS = [2.6, 1.0]
+WIDTHS = [2.2, 1.25]
 """Of a diagram, and of the shape beside it."""
-FIRST_STEP = (0.25, 0.5, 0.75)
-"""Places of more rows on the first step of a branch, in parts of its ordinate; it is a parabola, nearly."""
+FONT, SLENDER = 11.0, 45.0
+"""Points of the text; the rod's length over the radius to which supports and loads are drawn."""
 STILL = 1e-3
 """Ordinate below which a state has not moved."""
 MOST_BRANCHES = 6
@@ -66,8 +71,8 @@ def first_switches(data: Mapping[str, Any]) -> Mapping[str, Any]:
 def sheet(scenes: Mapping[str, Scene], path: Path) -> None:
     """Draw the diagrams of ``scenes`` beside each other, each with the shape of a stable state."""
     rows = ceil(len(scenes) / COLUMNS)
-    with matplotlib.rc_context(STYLE | {"font.size": 9.0}):
-        figure = Figure(figsize=(10.0, 2.9 * rows + 0.6), dpi=DPI, layout="constrained")
+    with matplotlib.rc_context(STYLE | {"font.size": FONT}):
+        figure = Figure(figsize=(10.5, 3.3 * rows + 0.7), dpi=DPI, layout="constrained")
         handles: list[Artist] = []
         grid = figure.add_gridspec(rows, 2 * COLUMNS, width_ratios=COLUMNS * WIDTHS)
         for number, (name, scene) in enumerate(scenes.items()):
@@ -77,7 +82,7 @@ def sheet(scenes: Mapping[str, Scene], path: Path) -> None:
             state = shown(diagram)
             last = 2 * column + (1 if state else 2)
             axes = figure.add_subplot(grid[row, 2 * column : last])
-            draw(axes, found, width=1.6)
+            draw(axes, found, width=2.0)
             handles += legend_of(found)
             axes.set_title(name, family="monospace")
             if scene.conservative:
@@ -86,7 +91,7 @@ def sheet(scenes: Mapping[str, Scene], path: Path) -> None:
                 shape(figure.add_subplot(grid[row, last]), diagram, *state)
         entries = {handle.get_label(): handle for handle in handles}
         columns = min(len(entries), MOST_ENTRIES)
-        room = 0.25 * (ceil(len(entries) / columns) + 0.4) / figure.get_size_inches()[1]
+        room = 0.29 * (ceil(len(entries) / columns) + 0.4) / figure.get_size_inches()[1]
         figure.get_layout_engine().set(rect=(0, room, 1, 1 - room))
         figure.legend(handles=list(entries.values()), loc="lower center", ncols=columns, frameon=False)
         path.parent.mkdir(exist_ok=True)
@@ -94,11 +99,8 @@ def sheet(scenes: Mapping[str, Scene], path: Path) -> None:
 
 
 def traced(scene: Scene) -> Diagram:
-    """Diagram of a scene, with rows of their own on the first step of each branch, which would be drawn as a chord."""
-    found = trace(scene, Discretization("auto", 8, 6), Plan(error_bars=False))
-    starts = [b.points[:2] for b in found if b.parent and len(b.points) > 1]
-    loads = {p.load + (q.load - p.load) * t**2 for p, q in starts for t in FIRST_STEP}
-    return found.again(at=tuple(sorted(loads))) if loads else found
+    """Diagram of a scene."""
+    return trace(scene, Discretization("auto", 8, 6), Plan(error_bars=False))
 
 
 def shown(diagram: Diagram) -> tuple[Branch, int] | None:
@@ -119,27 +121,43 @@ def shown(diagram: Diagram) -> tuple[Branch, int] | None:
 
 
 def shape(axes: Axes, diagram: Diagram, branch: Branch, row: int) -> None:
-    """Draw the centreline of a state, and of the first one in grey, as :mod:`rodfem.output.view` looks at it.
+    """Draw a state with its supports and loads, and the first one in grey, as :mod:`rodfem.output.view` looks at it.
 
     Gravity is along -e3.
     """
-    first, point = diagram[0].points[0], branch.points[row]
-    lines = [diagram.solvers[p.mesh].shape.sample(p.x)["r"] for p in (first, point)]
-    if isinstance(diagram.scene.ends, Ring):  # it may be anywhere
+    scene, first, point = diagram.scene, diagram[0].points[0], branch.points[row]
+    samples = [diagram.solvers[p.mesh].shape.sample(p.x) for p in (first, point)]
+    lines = [sample["r"] for sample in samples]
+    if isinstance(scene.ends, Ring):  # it may be anywhere
         lines = [r - r.mean(axis=0) for r in lines]
-    moved, down = lines[1] - lines[0], None if diagram.scene.distributed is None else np.array([0.0, 0.0, -1.0])
+    moved, down = lines[1] - lines[0], None if scene.distributed is None else np.array([0.0, 0.0, -1.0])
     right, up, _ = view_of(lines[0], moved, down=down)
     up = up * sign_of(moved[np.argmax(abs(moved @ up))] @ up) if down is None else up  # of two images the upper one
-    for r, style in zip(lines, ({"color": "0.75", "lw": 2.0}, {"color": "#7ea6cf", "lw": 3.0}), strict=True):
-        axes.plot(r @ right, r @ up, solid_capstyle="round", **style)
-        axes.plot(r[0] @ right, r[0] @ up, "s", color="0.45", ms=4)
+    view = np.array([right, up, np.cross(right, up)])
+    for r, style in zip(lines, ({"color": "0.75", "lw": 2.5}, {"color": "#5b8fc4", "lw": 4.0}), strict=True):
+        axes.plot(r @ right, r @ up, solid_capstyle="round", zorder=2, **style)
+    setting = Setting(
+        supports=tuple(supports_of(scene, samples[1]).values()),
+        distributed=distributed_on(scene, point.load) if scene.distributed is not None else None,
+        foundation=foundation_of(scene, samples[1]) if scene.potential is not None else None,
+        ties=tuple(kept[0] for kept in ties_of(scene, samples[1:])),
+    )
+    s = samples[1]["s"]
+    solids = glyphs_of(setting, s, lines[1], directors(samples[1]["q"]), float(np.ptp(s)) / SLENDER, view)
+    for solid in solids:
+        corners = solid.points[solid.triangles] @ view.T
+        shade = PolyCollection(
+            list(corners[:, :, :2]), facecolors=solid.color, edgecolors=solid.color, lw=0.3, zorder=3
+        )
+        axes.add_collection(shade)
+    axes.autoscale_view()
     axes.set_aspect("equal")
     axes.margins(0.12)
     axes.set_axis_off()
-    scene = diagram.scene
     symbol = tex(symbol_of(scene.parameters[scene.load].label or scene.load), always=True)
-    index = f"index {point.negative}"
-    axes.set_title(f"{symbol} = {point.load:.3g}, {index}", fontsize=8.5, color="0.3")
+    index = f"{point.negative} ({point.negative_in_space})" if point.negative_in_space else f"{point.negative}"
+    words = "stable" if index == "0" else f"index {index}"
+    axes.set_title(f"{symbol} = {point.load:.3g}, {words}", fontsize=FONT - 1, color="0.3")
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ Continuous symmetries (a rod free to turn about its axis, a ring that may go any
 that breaks one has a zero eigenvalue for it, which is counted as zero.
 
 Data flows one way: ``problem.scene`` -> ``fem.system`` (the bordered saddle point) -> ``fem.newton`` ->
-``stability.inertia`` -> ``continuation.solvers``, ``continuation.special_points`` -> ``diagram.explorer`` ->
+``stability.inertia`` -> ``continuation.follow``, ``continuation.special_points`` -> ``diagram.explorer`` ->
 ``output.files``, and imports go the other way.  Pictures are drawn from saved files alone.  The mathematics is in
 ``forms``.
 

@@ -7,7 +7,9 @@ behind what the header promises.
 from __future__ import annotations
 
 import os
+import platform
 import struct
+from functools import cache
 from pathlib import Path
 
 ELF = b"\x7fELF"
@@ -24,6 +26,16 @@ def folder() -> Path:
     """Folder in which FFCx keeps its kernels; raises :class:`RuntimeError` where there is no home folder to have it."""
     given = os.environ.get("XDG_CACHE_HOME")
     return (Path(given) if given else Path.home() / ".cache") / "fenics"
+
+
+@cache
+def processor() -> str:
+    """Name and abilities of the processor, on which code compiled with -march=native depends."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().split("\n\n")[0].splitlines()
+        return "".join(line for line in lines if line.startswith(("model name", "flags", "Features")))
+    except OSError:
+        return platform.processor()
 
 
 def refused(error: OSError) -> str:

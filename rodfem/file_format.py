@@ -136,6 +136,9 @@ def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, 
     try:
         text = Path(path).read_text(encoding="utf-8")
         data: dict[str, Any] = json.loads(text, parse_constant=_no_number)
+    except FileNotFoundError as trouble:
+        also = ", or the folder of one: rodfem list names those below a folder" if form is DIAGRAM else ""
+        raise InputError(f"There is no {path}: give {form.file}{also}.") from trouble
     except (OSError, ValueError, RecursionError) as trouble:
         raise InputError(f"{path} is no {form.name} ({trouble}): give {form.file}.") from trouble
     form.check(data, path, needs)

@@ -13,8 +13,8 @@ from types import ModuleType
 from rows import verify
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import Plan

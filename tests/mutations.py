@@ -72,13 +72,13 @@ FAULTS = {
     # location
     "location-is-blunt": Fault(f"{CONTINUATION}locate.py", "SHARP = 1e-11", "SHARP = 1e-4", LOCATE),
     "location-at-another-zero": Fault(
-        f"{CONTINUATION}locate.py", "np.argmin(abs(real - guess))", "np.argmax(abs(real - guess))", LOCATE
+        f"{CONTINUATION}interpolant.py", "np.argmin(abs(real - guess))", "np.argmax(abs(real - guess))", LOCATE
     ),
     "location-without-its-tail": Fault(
-        f"{CONTINUATION}locate.py", "max(tail - floor, 0.0) + arithmetic", "0.0", f"{FOLLOW} {HEMITROPIC} {ERRORS}"
+        f"{CONTINUATION}interpolant.py", "max(tail - floor, 0.0) + arithmetic", "0.0", f"{FOLLOW} {HEMITROPIC} {ERRORS}"
     ),
     "state-beside-the-point": Fault(
-        f"{CONTINUATION}locate.py",
+        f"{CONTINUATION}interpolant.py",
         "x, tangent = combine(states, weights)",
         "x, tangent = states[0]",
         f"{CORD} {GOLDEN}",
@@ -113,7 +113,7 @@ FAULTS = {
         CHAIN,
     ),
     "stability-is-not-exchanged": Fault(
-        f"{CONTINUATION}special_points.py",
+        f"{CONTINUATION}switching.py",
         "return low if there == high else low + 1",
         "return low",
         f"{CHAIN} {GOLDEN}",
@@ -125,7 +125,7 @@ FAULTS = {
         f"{ERRORS}",
     ),
     "no-fold-next-to-a-branch-point": Fault(
-        f"{CONTINUATION}special_points.py",
+        f"{CONTINUATION}switching.py",
         "if odd * even >= 0 or abs(odd) >= 2 * abs(even):",
         "if True:",
         "tests/literature/test_postbuckling.py",
@@ -208,6 +208,18 @@ FAULTS = {
         "found is not None and agree(found, anew)",
         "found is not None",
         "tests/diagram/test_followed.py",
+    ),
+    "frequencies-proved-by-nothing": Fault(
+        f"{STABILITY}outside.py",
+        "return gap > 0.0 and self.doubt < (MARGIN * gap) ** 2",
+        "return gap > -1e9",
+        "tests/stability/test_outside.py",
+    ),
+    "probes-that-see-nothing": Fault(
+        f"{STABILITY}followed.c",
+        "f->outside = fmax(f->outside, size / sqrt(fmax(before, 1e-300)));",
+        "f->outside = 0 * size * before;",
+        "tests/stability/test_subspaces.py",
     ),
     "transposed-factors-are-not": Fault(
         "rodfem/linalg/chain.c",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rodfem.continuation.branch import Branch
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.stability.assessment import assess
 
 

@@ -10,7 +10,7 @@ import hemitropic_cases
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System

@@ -24,7 +24,9 @@ of the branch (and whose finer ones of the same degree are, too). The ratio is h
 GOALS = """
 Time per accepted point over AUTO's, full rod against full rod, on one core: of following alone (rodfem with its index,
 AUTO has none), and with special points and all else included; and over AUTO's half rod, of which it makes use of the
-symmetry, against the full rod here. The reason is where rodfem's time goes.
+symmetry, against the full rod here. `compiled alone` is the same ratio for what compiled code takes of it (kernels of
+the forms, factors, solutions, counts): where that exceeds the goal, nothing that Python saves would meet it. The reason
+is where rodfem's time goes.
 """
 AUTO = """
 For each error the fastest discretisation of either: AUTO's NTST x NCOL found by a sweep (`benchmarks/auto`), rodfem's

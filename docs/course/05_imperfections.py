@@ -147,4 +147,4 @@ print(f"curvature {answer:.9f} (1/8); fold at {snap.point.load:.10f}, by Koiter 
 # ## Where it breaks
 #
 # The law is local: at $\varepsilon = 0.02$ it is off by 0.06 %, later by more. Two modes at nearly one load make the
-# reduced energy one of two amplitudes, with worse imperfections. Symmetric rods do that always (lesson 7).
+# reduced energy one of two amplitudes, more sensitive to imperfections. Symmetric rods do that always (lesson 7).

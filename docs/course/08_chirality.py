@@ -19,8 +19,8 @@
 # %% [markdown]
 # ## Picture
 #
-# A cord of $k_0 = 3\pi$ under a tension 40, seen from two sides. Its right half is the mirror image of its left half:
-# the two loops have opposite hands.
+# A cord of $k_0 = 3\pi$ under a tension 40, seen from two sides. Its right half (orange) is the mirror image of its
+# left half: the two loops have opposite hands.
 
 # %%
 from math import hypot, inf, pi
@@ -30,7 +30,7 @@ import numpy as np
 import rodfem
 from forms.energy import bending_and_twist, hemitropic
 from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, clamped, sliding
-from rodfem.course.pictures import axes, show
+from rodfem.course.pictures import panels, show
 
 cord = Scene(
     name="cord",
@@ -46,10 +46,11 @@ cord = Scene(
 slack = rodfem.trace(cord, Discretization(elements=18), Plan(depth=1))
 (perversion,) = [point for point in slack.at(40.0) if point.stable]
 r = slack.solvers[perversion.mesh].shape.sample(perversion.x)["r"]
-ax = axes("along the axis, $r_3$", "across it, $r_1$ and $r_2$", equal=True)
-ax.plot(r[:, 2], r[:, :2], lw=2, label=["$r_1$", "$r_2$"])
-ax.legend(frameon=False)
-show(ax.figure, "08_cord")
+drawn = panels(2, "along the axis, $r_3$", "across: $r_1$ (left), $r_2$ (right)", equal=True)
+for column, ax in enumerate(drawn):
+    for half in (r[: len(r) // 2 + 1], r[len(r) // 2 :]):
+        ax.plot(half[:, 2], half[:, column], lw=2.5)
+show(drawn[0].figure, "08_cord")
 
 # %% [markdown]
 # ## Form

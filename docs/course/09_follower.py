@@ -36,7 +36,7 @@ loads = np.linspace(0, 3.5, 400)
 mu = np.array([ziegler(P) for P in loads])
 ax = axes("thrust $P$", r"$\mu = \omega^2$")
 ax.plot(np.r_[loads, loads[::-1]], np.r_[mu.real[:, 1], mu.real[::-1, 0]], lw=2, label="real part")
-ax.plot(loads, abs(mu.imag[:, 0]), "--", lw=2, label="imaginary part, with both signs")
+ax.plot(loads, abs(mu.imag[:, 0]), "--", lw=2, label="imaginary part, of one of the pair")
 ax.legend(frameon=False)
 show(ax.figure, "09_ziegler")
 

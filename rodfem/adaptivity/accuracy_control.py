@@ -16,8 +16,8 @@ import numpy as np
 from rodfem.adaptivity.error_estimate import Again, Enriched
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.stability.inertia import ROUGH
@@ -115,10 +115,11 @@ class AccuracyControl:
         if self.meshes.accuracy is None:
             return
         special.point.estimate = error = self._error_of(special)
-        if error > self.accuracy and not special.note:
+        if error > self.accuracy:
             located = special.located_to / unit(special.point.load, one=self.units.load) > self.accuracy
             why = f"located to {special.located_to:.0e} only" if located else "finer meshes did not lower the error"
-            special.note = f"accuracy {self.accuracy:g} not reached: {why}"
+            missed = f"accuracy {self.accuracy:g} not reached: {why}"
+            special.note = f"{special.note}; {missed}" if special.note else missed
 
     def summary(self, branch: Branch, observer: Observer) -> None:
         """Say on which meshes a branch was traced, and the largest error of its points."""

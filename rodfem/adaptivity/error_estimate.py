@@ -28,10 +28,12 @@ from petsc4py import PETSc
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
 from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.event_location import locate_event
 from rodfem.continuation.kinds import FOLD
-from rodfem.continuation.locate import NEAREST, WINDOW, Curve, locate_event, refine
+from rodfem.continuation.locate import NEAREST, WINDOW, refine
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
-from rodfem.continuation.solvers import BranchSolver
+from rodfem.continuation.states_between import Curve
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.transfer import Transfer, richer_system

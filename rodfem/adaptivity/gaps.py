@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf
+from typing import TYPE_CHECKING
 
-from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Point, SpecialPoint
-from rodfem.continuation.solvers import BranchSolver, distance
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.unfolding import Unfolded, unfold
 from rodfem.fem.newton import correct
+
+if TYPE_CHECKING:
+    from rodfem.adaptivity.mesh_sequence import Meshes
 
 SHARE = 0.25
 """Largest step near a gap, relative to the distance from where the branches would cross."""
@@ -71,14 +74,14 @@ class Gaps:
     def open(self, gap: Gap, solver: BranchSolver) -> bool:
         """Add a gap; False where it is known already, so that smaller steps have not resolved it."""
         for known in self.known:
-            if distance(solver.system, gap.point.x, self.meshes.here(known.point, solver).x) < LEAST:
+            if solver.system.distance(gap.point.x, self.meshes.here(known.point, solver).x) < LEAST:
                 return False
         self.known.append(gap)
         return True
 
     def reach(self, solver: BranchSolver, point: Point) -> float:
         """Largest step from a point: in proportion to the distance from the nearest gap."""
-        apart = (distance(solver.system, point.x, self.meshes.here(gap.point, solver).x) for gap in self.known)
+        apart = (solver.system.distance(point.x, self.meshes.here(gap.point, solver).x) for gap in self.known)
         return max(SHARE * min(apart, default=inf), LEAST)
 
 

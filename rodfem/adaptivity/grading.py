@@ -19,7 +19,7 @@ from numpy.polynomial import legendre
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.fem.fields import Discretization, Fields, turning_of
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY, same_place

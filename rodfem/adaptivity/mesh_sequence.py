@@ -15,8 +15,8 @@ from petsc4py import PETSc
 from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.adaptivity.grading import SmoothnessIndicator, cheapest, cost, first_mesh, weights_of
 from rodfem.continuation.branch import Point, SpecialPoint
-from rodfem.continuation.solvers import BranchSolver
-from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.newton import correct
 from rodfem.fem.symmetries import may_slide
@@ -24,8 +24,6 @@ from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import TINY, unit
 
-FINEST, COARSEST = 1e-10, 1e-1
-"""Least and greatest accuracy that can be asked for; the former is near round-off."""
 OF_A_RING = 1e-8
 """Accuracy with which a uniform ring is computed at least."""
 MARGIN = 100.0
@@ -36,15 +34,6 @@ FURTHER = 10.0
 OWN_MESH = Remedy(
     "use {} and {} instead of an accuracy", *(Argument("Discretization", name) for name in ("elements", "degree"))
 )
-
-
-def check_accuracy(accuracy: float) -> None:
-    """Raise :class:`InputError` for an accuracy outside :data:`FINEST` to :data:`COARSEST`."""
-    if not FINEST <= accuracy <= COARSEST:
-        raise InputError(
-            f"An accuracy of {accuracy:g} is not attainable: ask for one between {FINEST:g} (round-off) and "
-            f"{COARSEST:g}."
-        )
 
 
 def internal_accuracy(scene: Scene, accuracy: float) -> float:

@@ -16,9 +16,9 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import STEADY, Enriched
 from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.corrector import NEAR
 from rodfem.continuation.locate import across
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.inertia import NULL

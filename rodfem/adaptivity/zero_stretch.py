@@ -9,8 +9,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import END
-from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import HIGHEST
 from rodfem.fem.system import System

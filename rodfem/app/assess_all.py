@@ -11,7 +11,7 @@ from pathlib import Path
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import USER
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.system import System

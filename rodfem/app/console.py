@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import signal
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from types import ModuleType
 
 import rodfem
@@ -27,19 +30,20 @@ rodfem COMMAND --help lists the arguments of a command.
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command that ``arguments``, by default those of the shell, name; bad input ends with one sentence."""
-    if arguments is None:  # a reader, as head, may leave
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     name, *words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     if name in ("-h", "--help", "help"):
-        print(HELP.format(commands="\n".join(f"  {each:<10}{_words(_module(each))}" for each in COMMANDS)), end="")
+        print(HELP.format(commands="\n".join(f"  {each:<10}{_words(each)}" for each in COMMANDS)), end="")
     elif name == "--version":
         print(_versions())
     elif name not in COMMANDS:
         near = get_close_matches(name, COMMANDS, n=1) or [" or ".join(COMMANDS)]
         Parser(prog="rodfem").error(f"unknown command {name!r}: choose {near[0]}")
     else:
+        command = _module(name)
+        if arguments is None:  # a reader, as head, may leave; PETSc, which a command may load, would complain
+            signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         try:
-            _module(name).main(words)
+            command.main(words)
         except InputError as trouble:
             complain(str(trouble))
 
@@ -56,6 +60,9 @@ def _module(name: str) -> ModuleType:
     return import_module(f"{HOME}.{name}")
 
 
-def _words(module: ModuleType) -> str:
-    """First line of a module's docstring."""
-    return (module.__doc__ or "").partition("\n")[0]
+def _words(name: str) -> str:
+    """First line of the docstring of a command's module, which is not imported: that takes long."""
+    spec = find_spec(f"{HOME}.{name}")
+    assert spec is not None
+    assert spec.origin is not None
+    return (ast.get_docstring(ast.parse(Path(spec.origin).read_text())) or "").partition("\n")[0]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, SpecialPoint
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.ranks import on_first

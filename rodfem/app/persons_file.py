@@ -32,7 +32,8 @@ def load(file: Path, name: str | None = None) -> ModuleType:
     except Exception as trouble:  # whatever the file does
         line = getattr(trouble, "lineno", None) if isinstance(trouble, SyntaxError) else _last_line(path, trouble)
         where = f"{file}, line {line}" if line else f"{file}"
-        raise InputError(f"{where}: {type(trouble).__name__}: {trouble}; run python {file} to see more.") from trouble
+        words = f"{where}: {type(trouble).__name__}: {trouble}{_there_are(trouble)}"
+        raise InputError(f"{words}; run {_python()} {file} to see more.") from trouble
     finally:
         if before is not None:
             sys.modules[spec.name] = before
@@ -42,3 +43,21 @@ def load(file: Path, name: str | None = None) -> ModuleType:
 def _last_line(path: Path, trouble: Exception) -> int | None:
     """Last line of a file that ran before it failed."""
     return next((f.lineno for f in reversed(extract_tb(trouble.__traceback__)) if f.filename == str(path)), None)
+
+
+def _there_are(trouble: Exception) -> str:
+    """Public functions and classes of a module of rodfem in which a name was looked for in vain."""
+    module = getattr(trouble, "obj", None)
+    if not isinstance(trouble, AttributeError) or not isinstance(module, ModuleType):
+        return ""
+    here = module.__name__
+    if not here.startswith(("rodfem", "forms")):
+        return ""
+    names = [n for n, x in vars(module).items() if not n.startswith("_") and getattr(x, "__module__", "") == here]
+    return f": there are {', '.join(sorted(names))}" if names else ""
+
+
+def _python() -> str:
+    """Path of the interpreter, relative to the folder in which it is typed if it is below that."""
+    path = Path(sys.executable)
+    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)

@@ -7,6 +7,7 @@ import gc
 import os
 from collections.abc import Callable
 from pathlib import Path
+from shlex import quote
 
 from mpi4py import MPI
 
@@ -119,7 +120,7 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     terminal.spectra(branches, scene)
     terminal.frequencies(branches, scene.load)
     terminal.timing(clock, sum(len(b.points) for b in branches))
-    terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5 (rodfem view {output} shows them)")
+    terminal.say(f"Results in {output}{os.sep}: diagram.json, states.h5 (rodfem view {quote(str(output))} shows them)")
     if plan.method or plan.modes:
         from rodfem.app.assess_all import assess_all
 

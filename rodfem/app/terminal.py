@@ -6,7 +6,8 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from shutil import get_terminal_size
-from textwrap import fill
+from textwrap import fill, wrap
+from time import monotonic
 from typing import Any, TextIO
 
 import numpy as np
@@ -31,8 +32,8 @@ from rodfem.timing import WORK, Clock
 
 INDEX, UNSTABLE = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
-WIDTH = 110
-"""Columns of a paragraph."""
+WIDTH, PAUSE = 110, 30.0
+"""Columns of a paragraph; seconds between two lines of progress that stay."""
 STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
 
 
@@ -70,6 +71,14 @@ def _roots(point: Point, one: float) -> dict[str, str]:
     return {kind: "  ".join(texts[:4]) + (" ..." if len(texts) > 4 else "") for kind, texts in words.items()}
 
 
+def broken(line: str, columns: int) -> list[str]:
+    """A line in parts of at most so many ``columns``; those after the first are indented deeper."""
+    if len(line) <= columns:
+        return [line]
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
+    return wrap(line, columns, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+
+
 class Report(Observer):
     """Prints on rank 0."""
 
@@ -83,6 +92,12 @@ class Report(Observer):
         self.live = self.on and self.stream.isatty() and comm.size == 1
         self.paint = painted if self.on and wanted(self.stream) else str
         self.known: list[Branch] = []
+        self.load, self.told = "load", monotonic()
+
+    @property
+    def width(self) -> int:
+        """Columns that a paragraph may take: no more than a terminal has."""
+        return min(WIDTH, get_terminal_size().columns) if self.live else WIDTH
 
     def say(self, line: str = "", end: str = "\n") -> None:
         """Print one line."""
@@ -90,6 +105,10 @@ class Report(Observer):
             if self.live:
                 self.stream.write("\r\033[K")
             lines = self.words(line).split("\n")
+            if self.live and not end:
+                lines = [lines[0][: get_terminal_size().columns - 1]]
+            elif self.live:
+                lines = [part for one in lines for part in broken(one, get_terminal_size().columns)]
             self.stream.write("\n".join(map(self.paint, lines)) + end)
             self.stream.flush()
 
@@ -112,7 +131,7 @@ class Report(Observer):
         if accuracy is not None and scene.conservative:
             self.say(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
         self.say(f"  unknowns: {f.describe()}, load {scene.load}")
-        self.units = scene.units
+        self.units, self.load = scene.units, scene.load
         self.count = INDEX if scene.conservative else UNSTABLE
         self.wide = len("0->1 (in space 2)") if scene.planar and scene.conservative else max(6, len(self.count))
         if not scene.conservative:
@@ -163,14 +182,15 @@ class Report(Observer):
         self.say(f"       load           ordinate       int W ds  {self.count:>{self.wide}}  zero  located to")
 
     def progress(self, branch: Branch, point: Point) -> None:
-        """Keep one line up to date while a branch is traced (on a terminal only)."""
-        if self.live:
-            line = (
-                f"  ... {branch.name}: {len(branch.points)} points, {self.count} {point.negative}, "
-                f"load {in_decimals(point.load, 5, self.units.load)}; {len(self.known)} branches known, "
-                f"{not_followed(self.known)} branch points waiting"
+        """Keep one line up to date while a branch is traced; elsewhere than on a terminal print it now and then."""
+        if self.live or monotonic() - self.told > PAUSE:
+            self.told = monotonic()
+            self.say(
+                f"  ... {branch.name}: {self.load} = {in_decimals(point.load, 5, self.units.load)}, {self.count} "
+                f"{point.negative}, {len(branch.points)} points; {len(self.known)} known, "
+                f"{not_followed(self.known)} waiting",
+                end="" if self.live else "\n",
             )
-            self.say(line[: get_terminal_size().columns - 1], end="")
 
     def special(self, branch: Branch, special: SpecialPoint) -> None:
         """Print a special point as it is found, as AUTO does."""
@@ -246,7 +266,7 @@ class Report(Observer):
         """Print a diagram, the contents of ``diagram.json``, in sentences."""
         self.say("\nIn words (rodfem explain WORD has more)")
         for sentence in in_sentences(data):
-            self.say(fill(sentence, WIDTH, initial_indent="  ", subsequent_indent="    "))
+            self.say(fill(sentence, self.width, initial_indent="  ", subsequent_indent="    "))
 
     def spectra(self, branches: Sequence[Branch], scene: Scene) -> None:
         """Print the left-most eigenvalues of the special points, if they were asked for."""

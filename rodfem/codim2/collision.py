@@ -10,11 +10,14 @@ given line of the plane by the secant method for ``D``, its tangent from central
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.codim2.others import UNSTABLE, beside_cluster
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, measure
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
@@ -30,6 +33,8 @@ DIFFERENCE = 1e-3
 
 class Collision:
     """Corrects points of the plane to where two eigenvalues near ``omega2`` collide."""
+
+    others = UNSTABLE
 
     def __init__(self, solver: StaticSolver, plane: Plane) -> None:
         """Allocate the pencil."""
@@ -71,7 +76,9 @@ class Collision:
         located = np.maximum(last * abs(across) * width, ROUND_OFF * np.maximum(self.plane.sizes, abs(p)))
         ordinate = self.solver.shape.ordinate(x)
         still, modes = system.new_vector(), as_vectors(system, clearest.cluster.basis)
-        return LocusPoint(p, x, dq * width, still, located, ordinate=ordinate, omega2=omega2, modes=modes)
+        rest, lower = beside_cluster(self.eigensolver.at(x), clearest.cluster.basis), int(np.sign(gradient[0]))
+        node = LocusPoint(p, x, dq * width, still, located, ordinate=ordinate, omega2=omega2, modes=modes)
+        return replace(node, rest=rest + (here.cluster.size if omega2 < 0 else 0), lower=lower)
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> tuple[float, float, Measured, PETSc.Vec]:
         """Zero of ``D`` on the system's line of parameters, by secants: t, its last change, the cluster, state.

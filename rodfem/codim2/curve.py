@@ -23,12 +23,19 @@ REACH = 1e-6
 """Distance, in the metric, that a point on a bound may move by, however short the step."""
 BESIDE = 1e-3
 """Share of the plane's width by which the last point may miss the two nodes that it is between."""
+CERTAIN = 10.0
+"""Uncertainties of a parameter by which it changes towards a turning point: less is the round-off of a constant."""
 CLOSED = 1e-9
 """Difference of ordinates that a closed curve may end with, where they do not change along it: absolute."""
 
 
 class Criterion(Protocol):
-    """Defining equations of a locus: a corrector onto it."""
+    """Defining equations of a locus: a corrector onto it.
+
+    ``others`` says of a row that the number of unstable eigenvalues but for those of the locus has changed.
+    """
+
+    others: str
 
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Size of a step."""
@@ -150,12 +157,13 @@ class Tracer:
             found = self._located(a, b, lambda n: n.curvature, "cusp")
         else:
             for i in np.flatnonzero(a.dp * b.dp < 0):
-                found += self._located(a, b, lambda n, i=i: float(n.dp[i]), f"turns in {names[i]}")  # type: ignore[misc]
+                turn = self._located(a, b, lambda n, i=i: float(n.dp[i]), f"turns in {names[i]}")  # type: ignore[misc]
+                found += [(n, kind) for n, kind in turn if _moves(n, a, b, i)]
         for node, kind in sorted(found, key=lambda item: item[0].s):
             half.marks[len(half.nodes)] = kind
             half.nodes.append(node)
         if a.rest != b.rest:
-            half.marks[len(half.nodes)] = "another eigenvalue has vanished since the row before, seen from the start"
+            half.marks[len(half.nodes)] = self.criterion.others
         return ""
 
     def _located(
@@ -200,3 +208,9 @@ class Tracer:
             return False
         aside = abs(part[0] * whole[1] - part[1] * whole[0]) / size
         return aside < 0.05 * size and abs(start.ordinate - a.ordinate) <= 2 * abs(b.ordinate - a.ordinate) + CLOSED
+
+
+def _moves(turn: LocusPoint, a: LocusPoint, b: LocusPoint, which: int) -> bool:
+    """Whether a parameter at its extremum differs from that at the neighbours by more than its uncertainty."""
+    moved = max(abs(turn.p[which] - a.p[which]), abs(turn.p[which] - b.p[which]))
+    return bool(moved > CERTAIN * turn.located_to[which])

@@ -23,11 +23,13 @@ from petsc4py import PETSc
 
 from rodfem.codim2.collision import Collision
 from rodfem.codim2.curve import Criterion, Half, Tracer
+from rodfem.codim2.others import unstable
 from rodfem.codim2.parameter_plane import Interval, LocusPoint, Plane
 from rodfem.codim2.singular import Singular, null_vectors
 from rodfem.continuation.branch import SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, KINDS
-from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.transfer import Transfer, richer_system
@@ -36,11 +38,14 @@ from rodfem.output.digits import number
 from rodfem.output.files import mesh_of, save_json
 from rodfem.stability.cluster import as_vectors
 from rodfem.stability.inertia import Inertia
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-5, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
 SAME = 1e-6
 """Loads of special points that differ by less than this, relative, may be one and the same point of a curve."""
+BESIDE = 1e-3
+"""Distance of a load beside a divergence load at which the unstable eigenvalues are counted, over the bounds."""
 CUSP = 1e-3
 """Part of the tangent in the plane, as a share of the bounds, below which a node is at a cusp."""
 
@@ -76,10 +81,10 @@ class Locus:
         The scene's ordinate, (n,).
     index
         Index of the equilibria on the two sides of the curve, (n, 2): the eigenvalues that vanish on it positive, and
-        negative.  -1 for flutter and divergence.
+        negative.  Under loads without a potential the number of unstable eigenvalues, of those nearest to zero.
     lower
-        Side of the load on which the index is the lower one at the start of a locus of branch points: -1 below, 1
-        above, 0 where it is not known.
+        Side of the load on which the index is the lower one at the start: -1 below, 1 above, 0 where it is not known,
+        as for a fold.
     omega2
         The double eigenvalue of flutter, (n,), nan for others.
     located_to
@@ -231,8 +236,8 @@ def locus(
     Parameters
     ----------
     solver
-        The :class:`~rodfem.continuation.solvers.BranchSolver` that found the special point, or for flutter and
-        divergence the :class:`~rodfem.continuation.solvers.StaticSolver` of the sweep.  It is left as it was found.
+        The :class:`~rodfem.continuation.branch_solver.BranchSolver` that found the special point, or for flutter and
+        divergence the :class:`~rodfem.continuation.static_solver.StaticSolver` of the sweep.  It is left as it was.
     special
         A fold, a branch point, a flutter load or a divergence load.
     parameter
@@ -267,7 +272,8 @@ def locus(
         found = _both_sides(tracer, first)
         crossings = _crossings(tracer, found, first, float(p[1]))
         error = _errors(solver, special.kind, plane, found, error_bars)
-    return _locus(solver, special, (plane.names, bounds), found, crossings, error)
+        lower = _lower_side(solver, plane, special, first)
+    return _locus(solver, special, (plane.names, bounds), found, crossings, error, lower)
 
 
 def _locus(
@@ -277,10 +283,11 @@ def _locus(
     found: Curve,
     crossings: list[tuple[float, float]],
     error: np.ndarray,
+    lower: int,
 ) -> Locus:
     """The curve that was found in a ``plane``, its names and bounds, with what a file of it says about the scene."""
     scene, nodes, (names, bounds) = solver.system.scene, found.nodes, plane
-    rest, k = np.array([n.rest for n in nodes]), special.multiplicity
+    rest, k = np.array([n.rest for n in nodes]), _changing(special, nodes[found.start])
     load, other = (scene.parameters[name] for name in names)
     return Locus(
         scene=scene.name,
@@ -293,7 +300,7 @@ def _locus(
         values=np.array([n.p for n in nodes]),
         ordinate=np.array([n.ordinate for n in nodes]),
         index=np.stack([rest, np.where(rest >= 0, rest + k, -1)], axis=1),
-        lower=_lower_side(special),
+        lower=lower,
         omega2=np.array([n.omega2 for n in nodes]),
         located_to=np.array([n.located_to for n in nodes]),
         error=error,
@@ -368,8 +375,23 @@ def _criterion(solver: StaticSolver, plane: Plane, kind: str, near: LocusPoint) 
     return Singular(solver, plane, near.modes, kind == FOLD, near.left)
 
 
-def _lower_side(special: SpecialPoint) -> int:
-    """Side of the load, -1 or 1, on which the index of a branch is the lower one beside a branch point; 0: unknown."""
+def _changing(special: SpecialPoint, node: LocusPoint) -> int:
+    """By how much the index changes across a locus at a node."""
+    if special.kind == FLUTTER:  # two that have diverged are as unstable as a complex pair
+        return 0 if node.omega2 < 0 else len(node.modes)
+    return len(node.modes) if special.kind == DIVERGENCE else special.multiplicity
+
+
+def _lower_side(solver: StaticSolver, plane: Plane, special: SpecialPoint, node: LocusPoint) -> int:
+    """Side of the load, -1 or 1, on which the index is the lower one beside a special point; 0: unknown."""
+    if special.kind == FLUTTER:
+        return node.lower
+    if special.kind == DIVERGENCE:
+        solver.system.line = plane.along(node.p, 0)
+        loads = node.p[0] + BESIDE * plane.width[0] * np.array([-1.0, 1.0])
+        states = (solver.at_load(node.x, float(load))[0] for load in loads)
+        below, above = (unstable(NonsymmetricSolver(solver.system).at(x)) for x in states)
+        return int(np.sign(below - above))
     change = special.negative_after - special.negative_before
     if special.kind != BRANCH_POINT or special.test_function != "mu":
         return 0

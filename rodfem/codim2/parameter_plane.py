@@ -25,11 +25,12 @@ Tangent = tuple[np.ndarray, PETSc.Vec | None]
 class LocusPoint:
     """A point of a locus: parameters ``p`` (2,), state ``x``, and its unit tangent ``dp``, ``dx`` at arclength ``s``.
 
-    ``rest`` counts the negative eigenvalues other than those that vanish here (-1: not counted).  At folds ``coupling``
-    (2,) is the derivative of the equations in the two parameters along the null vector, in units of the bounds, and
-    ``curvature`` the second one along it.  ``omega2`` is a double eigenvalue.  ``modes`` are the null vectors, or a
-    basis of the double eigenvalue's invariant subspace; ``left`` the left null vectors where they are others.
-    ``located_to`` (2,) are the uncertainties of the parameters, and ``ordinate`` is the scene's.
+    ``rest`` counts the negative eigenvalues, or the unstable ones under loads without a potential, other than those
+    that vanish or collide here (-1: not counted); those that collide are real on the side ``lower`` of the load.  At
+    folds ``coupling`` (2,) is the derivative of the equations in the two parameters along the null vector, in units of
+    the bounds, and ``curvature`` the second one along it.  ``omega2`` is a double eigenvalue.  ``modes`` are the null
+    vectors, or a basis of the double eigenvalue's invariant subspace; ``left`` the left null vectors where they are
+    others.  ``located_to`` (2,) are the uncertainties of the parameters, and ``ordinate`` is the scene's.
     """
 
     p: np.ndarray
@@ -40,6 +41,7 @@ class LocusPoint:
     s: float = 0.0
     ordinate: float = float("nan")
     rest: int = -1
+    lower: int = 0
     omega2: float = float("nan")
     curvature: float = 0.0
     coupling: np.ndarray = field(default_factory=lambda: np.zeros(2))

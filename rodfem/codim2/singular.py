@@ -42,13 +42,16 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.codim2.others import UNSTABLE, VANISHED, beside_zero
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent
-from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import KEPT, SHRUNK, STALLED, TOLERANCE
 from rodfem.linalg.orthogonal import combine, orthonormalize, project_out
 from rodfem.stability.bordered import Bordered
 from rodfem.stability.inertia import Factored, Inertia
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, TINY
 
 DIFFERENCE = 1e-4
@@ -104,9 +107,11 @@ class Singular:
         constraints = None if left else self.saddle.constraints
         self.bordered = Bordered(self.system, matrix, len(vectors), constraints)
         self.turned: Bordered | None = None
+        self.others = UNSTABLE if left else VANISHED
         if left:
             self._transposed = matrix.transpose(PETSc.Mat())
             self.turned = Bordered(self.system, self._transposed, len(vectors), None)
+            self.frequencies = NonsymmetricSolver(self.system)
 
     def _adopt(self, vectors: list[PETSc.Vec], left: list[PETSc.Vec]) -> None:
         """Border with these vectors from now on, made orthonormal in the metric."""
@@ -286,12 +291,18 @@ class Singular:
             dx,
             located,
             ordinate=self.solver.shape.ordinate(x),
-            rest=at.rest,
+            rest=at.rest if self.turned is None else self._others(p, x),
             curvature=float(curvature) if self.fold else 0.0,
             coupling=coupling if self.fold else np.zeros(2),
             modes=at.v,
             left=[] if self.turned is None else at.w,
         )
+
+    def _others(self, p: np.ndarray, x: PETSc.Vec) -> int:
+        """Unstable eigenvalues at a divergence load but for those that vanish."""
+        self.system.line = self.plane.along(p, 0)
+        self.system.set_load(x, float(p[0]))
+        return beside_zero(self.frequencies.at(x), len(self.phi))
 
 
 def null_vectors(saddle: Inertia, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:

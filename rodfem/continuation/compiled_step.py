@@ -1,8 +1,8 @@
 """A step of continuation in one call of compiled code (``step.c``): prediction, correction, tangent, index, checks.
 
 Between the calls of a step Python and PETSc's vectors take longer than the arithmetic.  Where the compiled step gives
-up, as near a singular state, or where a condition below is not met, :func:`~rodfem.continuation.solvers.follow` makes
-it step by step: a test compares both at every row of every scene.
+up, as near a singular state, or where a condition below is not met, ``BranchSolver.step`` makes it step by step: a
+test compares both at every row of every scene.
 """
 
 from __future__ import annotations

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rodfem.continuation.locate import SHARP, real_root, zero_uncertainty
+from rodfem.continuation.eigenvalue_curves import assignment
+from rodfem.continuation.interpolant import real_root, zero_uncertainty
+from rodfem.continuation.locate import SHARP
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured
-from rodfem.stability.nonsymmetric import MULTIPLE, Frequencies, groups
+from rodfem.stability.frequencies import MULTIPLE, Frequencies, groups
 from rodfem.tolerances import ROUND_OFF
 
 MOVED = 0.3
@@ -38,14 +40,12 @@ def unmatched(found: Frequencies, others: np.ndarray) -> list[list[int]]:
 
     Equal ones are together.
     """
-    from scipy.optimize import linear_sum_assignment  # slow to load
-
-    upper = [i for i, v in enumerate(found.values) if v.imag > 0]
+    upper = np.flatnonzero(found.values.imag > 0).tolist()
     if not upper:
         return []
     mine, there = found.values[upper][:, None], others[others.imag > 0]
     distance = abs(mine - there[None, :]) / abs(mine)
-    rows, columns = linear_sum_assignment(distance)
+    rows, columns = assignment(distance)
     matched = {upper[i] for i, j in zip(rows, columns, strict=True) if distance[i, j] < MOVED}
     new = [i for i in upper if i not in matched]
     values = found.values

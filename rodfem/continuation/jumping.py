@@ -20,9 +20,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.locate import solve_at
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.prediction import hermite, lagrange, predict
-from rodfem.continuation.solvers import BranchSolver, distance
+from rodfem.continuation.states_between import solve_at
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
@@ -118,7 +118,7 @@ def _across(system: System, x: PETSc.Vec, chord: PETSc.Vec) -> float:
 
 def _between(solver: BranchSolver, a: Point, b: Point) -> Point | None:
     """Equilibrium on a plane across the piece, with its tangent; None where there is none between the rows."""
-    whole = distance(solver.system, a.x, b.x)
+    whole = solver.system.distance(a.x, b.x)
     for place in PLACES:
         s = a.arclength + place * (b.arclength - a.arclength)
         try:
@@ -126,6 +126,6 @@ def _between(solver: BranchSolver, a: Point, b: Point) -> Point | None:
             tangent = solver.tangent(solver.row(hermite(a, b, s)[1]), at=x)
         except ConvergenceError:
             continue
-        if max(distance(solver.system, a.x, x), distance(solver.system, x, b.x)) <= whole:
+        if max(solver.system.distance(a.x, x), solver.system.distance(x, b.x)) <= whole:
             return replace(a, x=x, tangent=tangent, arclength=s)
     return None

@@ -21,7 +21,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import DISTANCE, ORDINATE, NormalForm, SpecialPoint
-from rodfem.continuation.solvers import VERTICAL, BranchSolver
+from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.fem.newton import correct
 from rodfem.tolerances import round_off
 

@@ -54,6 +54,16 @@ def predict(points: Sequence[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
     return combine(vectors, value), combine(vectors, slope)
 
 
+def predict_at_load(system: System, points: Sequence[Point], load: float) -> PETSc.Vec:
+    """Extrapolate equilibria at loads, the last of some ``points``, to another ``load``.
+
+    Of a scene with symmetries it is the line through two: a polynomial of higher degree would magnify, from load to
+    load, where these are on their orbits.
+    """
+    recent = points[-2 if system.drifts else -ROWS :]
+    return combine([p.x for p in recent], lagrange(np.array([p.load for p in recent]), load)[0])
+
+
 def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
     """Cubic through two points with their tangents at arclength ``s`` between them: state and direction.
 

@@ -1,5 +1,5 @@
-/* One step of pseudo-arclength continuation in one call: rodfem/continuation/solvers.py has the same in Python, step by
-   step, for several ranks, PETSc's factors, and wherever this one gives up.
+/* One step of pseudo-arclength continuation in one call: rodfem/continuation/branch_solver.py has the same in Python, step
+   by step, for several ranks, PETSc's factors, and wherever this one gives up.
 
    Prediction across the orbit of the last state, phase conditions at the prediction, Newton's method (newton.c), phase
    conditions, factors, tangent and index at the state found, and what is checked there: the equations, the norms of the

@@ -21,8 +21,8 @@ from collections.abc import Sequence
 from math import exp, inf, isfinite
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.solvers import BranchSolver
-from rodfem.continuation.special_points import midpoint, point_between
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.states_between import midpoint, point_between
 
 LOWER = 0.5
 """A vertex above this share of the lowest value known is no pair's, once the vertex is believed."""

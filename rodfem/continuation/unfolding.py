@@ -29,7 +29,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import SpecialPoint
-from rodfem.continuation.solvers import BranchSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 FOLDER = Path("results") / "course"
 """Where a script's pictures are."""
-SIZES = {1: (6.5, 4.0), 2: (8.5, 4.0), 3: (9.5, 3.6)}
+SIZES = {1: (6.5, 4.0), 2: (7.2, 3.8), 3: (8.2, 3.4)}
 """Width and height in inches of figures with so many axes."""
 
 
@@ -52,6 +52,8 @@ def panels(number: int, x: str, y: str, equal: bool = False) -> list[Axes]:
             one.spines[["top", "right"]].set_visible(False)
             if equal:
                 one.set_aspect("equal")
+            if number > 1:
+                one.locator_params(nbins=5)
     return list(drawn)
 
 

@@ -27,7 +27,7 @@ from math import isfinite
 
 from petsc4py import PETSc
 
-from rodfem.continuation.solvers import BranchSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.fem.newton import LARGEST
 from rodfem.tolerances import TINY

@@ -21,10 +21,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, Point
-from rodfem.continuation.locate import solve_at_load
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.prediction import hermite
-from rodfem.continuation.solvers import BranchSolver
+from rodfem.continuation.states_between import solve_at_load
 from rodfem.deflation.deflated_newton import FLOW, MOST, DeflatedNewton
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
 from rodfem.deflation.guesses import turned_over, turned_state
@@ -71,7 +71,7 @@ class SearchLog:
 
 
 class Deflation(DeflatedNewton):
-    """Search for equilibria of a :class:`~rodfem.continuation.solvers.BranchSolver`'s scene at one load.
+    """Search for equilibria of a :class:`~rodfem.continuation.branch_solver.BranchSolver`'s scene at one load.
 
     Attributes
     ----------

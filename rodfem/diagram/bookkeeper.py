@@ -10,18 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.adaptivity.gaps import Gap, Gaps
-from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Branch
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer, Recorder
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.diagram.journal import Journal, discretization_of
 from rodfem.diagram.record import Reader, Record, Writer
 from rodfem.fem.natural_order import NaturalOrder
 from rodfem.problem.events import Event
+
+if TYPE_CHECKING:
+    from rodfem.adaptivity.mesh_sequence import Meshes
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.zero_stretch import LOCATED, zero_stretch
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.kinds import END
-from rodfem.continuation.locate import solve_at
 from rodfem.continuation.prediction import hermite
-from rodfem.continuation.solvers import VERTICAL, BranchSolver, distance
+from rodfem.continuation.states_between import solve_at
 from rodfem.diagram.equivalence import near
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
@@ -82,7 +82,7 @@ def singular_end(
     x, outcome = solver.at_load(last.x, beyond, reach=1.0)
     if not outcome.converged:
         raise ConvergenceError(f"there is no equilibrium at {scene.load} = {beyond:g}")
-    s = last.arclength + distance(system, last.x, x)
+    s = last.arclength + system.distance(last.x, x)
     point = solver.point(x, s, solver.load_tangent(x, beyond > load), outcome)
     found = [s for s in search(previous, point) if s.kind.branches]
     return next((s for s in found if abs(s.point.load - load) < SAME_END * abs(span[1] - span[0])), None)
@@ -100,7 +100,7 @@ def closing(
     if len(branch.points) < LEAST:
         return None
     if max(abs(a.slope), abs(b.slope)) < VERTICAL * width:  # equal loads: compare the states
-        passed = distance(solver.system, b.x, here(branch.points[0]).x) < b.arclength - a.arclength
+        passed = solver.system.distance(b.x, here(branch.points[0]).x) < b.arclength - a.arclength
         return b if passed else None
     first = branch.points[0 if branch.parent is None else 1]
     if (
@@ -114,7 +114,7 @@ def closing(
     x, outcome = solver.at_load(hermite(a, b, s)[0], first.load, reach=1.0)
     if not outcome.converged:  # beside a fold, say: not there
         return None
-    s = a.arclength + distance(solver.system, a.x, x)
+    s = a.arclength + solver.system.distance(a.x, x)
     point = solver.point(x, s, solver.load_tangent(x, b.load > a.load), outcome)
     return point if alike(point, first, SAME_STATE) else None
 

@@ -6,10 +6,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.event_location import event_at, locate_event
 from rodfem.continuation.kinds import EVENT
-from rodfem.continuation.locate import event_at, locate_event
 from rodfem.continuation.prediction import hermite
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.diagram.step import Step
 from rodfem.problem.events import Event
 from rodfem.tolerances import INSIDE, round_off

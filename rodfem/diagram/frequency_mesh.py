@@ -15,7 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rodfem.adaptivity.mesh_sequence import start_mesh
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.frequency_rows import SHIFT
 from rodfem.diagram.sweep import at_load
 from rodfem.errors import Argument, ConvergenceError, Remedy

@@ -1,11 +1,12 @@
-"""Left-most eigenvalues at the loads of a sweep: followed from load to load, and certified by solving for them anew.
+"""Left-most eigenvalues at the loads of a sweep: followed from load to load, and certified.
 
-To solve anew is to find, from nothing and by SLEPc, the eigenvalues nearest to a shift below zero, and by a complex
-shift the pairs that are farther.  That is done at the first load and at the last one, at every :data:`EVERY`-th, and
-where eigenvalues come near one another; on both sides of every change of the numbers of complex and of negative
-eigenvalues; and where they were not followed to the accuracy that SLEPc is asked for.  In between they are followed
-(:mod:`rodfem.stability.followed_pairs`).  Rows are open until the next certificate: what is found anew has to be what
-was followed.  Where it is not, all open rows are solved for anew.
+They are followed from the first load on (:mod:`rodfem.stability.followed_pairs`).  A certificate is due at the last
+load, at every :data:`EVERY`-th, and on both sides of every change of the numbers of complex and of negative
+eigenvalues.  It is a proof that none is missing (:mod:`rodfem.stability.outside`).  Where that fails, at the first
+load, where eigenvalues come near one another, and where they were not followed to the accuracy that SLEPc is asked for,
+they are solved for anew: from nothing and by SLEPc those nearest to a shift below zero, and by a complex shift the
+pairs that may be farther.  Rows are open until the next certificate: what is found anew has to be what was followed.
+Where it is not, all open rows are solved for anew.
 """
 
 from __future__ import annotations
@@ -13,18 +14,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.stability.followed_pairs import FollowedPairs
-from rodfem.stability.nonsymmetric import (
-    ALIKE,
-    EPS,
-    NEAR_ZERO,
-    REAL,
-    Frequencies,
-    NonsymmetricPencil,
-    NonsymmetricSolver,
-)
+from rodfem.stability.frequencies import ALIKE, EPS, NEAR_ZERO, REAL, Frequencies, named
+from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 from rodfem.tolerances import unit
 
 FREQUENCIES = 6
@@ -63,10 +58,11 @@ NONE = Frequencies(np.zeros(0, dtype=complex), np.zeros(0))
 
 @dataclass
 class Row:
-    """A point of a sweep and what was found there; ``anew``: by SLEPc."""
+    """A ``point`` of a sweep and what was ``found`` there, ``anew`` by SLEPc, and the rotation field, ``turned``."""
 
     point: Point
     found: Frequencies
+    turned: np.ndarray
     anew: bool
 
 
@@ -79,34 +75,46 @@ class FrequencyRows:
         units = eigensolver.system.scene.units
         self.followed = FollowedPairs(sought(number), SHIFT * units.omega2)
         self._open: list[Row] = []
+        self._first: Frequencies | None = None
         self._certified = self._before = NONE
+        self._numbers = _numbers(NONE)
         self._kept = self._pause = self._resting = 0
+
+    def first(self, x: PETSc.Vec) -> str:
+        """Find the eigenvalues of ``x``, the state of the first point; in words, if any, what other shifts find."""
+        self._first = leftmost(self.eigensolver.at(x), self.number)
+        return differ(self.eigensolver.at(x), self.number, self._first)
 
     def add(self, point: Point) -> list[Row]:
         """Find the eigenvalues at the next point; rows that are certified by now, in their order."""
         pencil = self.eigensolver.at(point.x)
         found = self._followed(pencil, point)
-        changed = found is None or _numbers(found) != _numbers(self._before)
+        numbers = None if found is None else _numbers(found)
+        changed = numbers != self._numbers
         if (
             found is not None
             and not changed
             and len(self._open) < EVERY - 1
             and not near(found.values[: self.number + 1])
         ):
-            self._open.append(Row(point, found, anew=False))
+            self._open.append(Row(point, found, pencil.turned, anew=False))
             self._before, self._kept = found, self._kept + 1
             return []
         done = self.finish() if changed else []
         if done:
             pencil = self.eigensolver.at(point.x)
-        anew = leftmost(pencil, self.number, self._before)
+        if found is not None and not near(found.values[: self.number + 1]) and self._proved(pencil, point, found):
+            self._open.append(Row(point, found, pencil.turned, anew=False))
+            return done + self._close()
+        anew, self._first = self._first or leftmost(pencil, self.number, self._before), None
         if found is not None and agree(found, anew):
-            self._open.append(Row(point, found if len(found.values) == len(anew.values) else anew, anew=True))
+            kept = found if len(found.values) == len(anew.values) else anew
+            self._open.append(Row(point, kept, pencil.turned, anew=True))
             self._pause = 0
         else:
             self._begin(pencil, point)
             self._solve_anew()
-            self._open.append(Row(point, anew, anew=True))
+            self._open.append(Row(point, anew, pencil.turned, anew=True))
         return done + self._close()
 
     def _followed(self, pencil: NonsymmetricPencil, point: Point) -> Frequencies | None:
@@ -116,11 +124,19 @@ class FrequencyRows:
             return None
         return in_order(replace(found, values=_without_round_off(found.values, SHIFT * found.one)))
 
+    def _proved(self, pencil: NonsymmetricPencil, point: Point, found: Frequencies) -> bool:
+        """Whether what was followed to a point is proved to be all that is as near to the shift."""
+        certified = self.followed.certified(pencil, point.load)
+        return certified is not None and agree(found, certified) and not _beyond(self._certified, found)
+
     def finish(self) -> list[Row]:
         """Certify the last point: all rows that are left."""
-        if self._open and not self._open[-1].anew:
+        if self._open:
             row, before = self._open[-1], self._open[-2].found if len(self._open) > 1 else self._certified
-            if not agree(row.found, leftmost(self.eigensolver.at(row.point.x), self.number, before)):
+            pencil = self.eigensolver.at(row.point.x)
+            if not (
+                self._proved(pencil, row.point, row.found) or agree(row.found, leftmost(pencil, self.number, before))
+            ):
                 self.followed.end()
                 self._solve_anew()
         return self._close()
@@ -128,8 +144,17 @@ class FrequencyRows:
     def _close(self) -> list[Row]:
         done, self._open = self._open, []
         if done:
+            self._name([row for row in done if not row.found.kinds])
             self._certified = self._before = done[-1].found
+            self._numbers = _numbers(self._before)
         return done
+
+    def _name(self, rows: list[Row]) -> None:
+        """Name the motions of rows, all at once."""
+        if rows:
+            found = named(self.eigensolver.system, [(row.found, row.turned) for row in rows], self.number)
+            for row, frequencies in zip(rows, found, strict=True):
+                row.found = frequencies
 
     def _solve_anew(self) -> None:
         """Solve anew for all rows that are open."""
@@ -170,21 +195,28 @@ def leftmost(pencil: NonsymmetricPencil, number: int, before: Frequencies = NONE
     """
     one = pencil.system.scene.units.omega2
     found = pencil.near(sought(number), SHIFT * one)
-    reach = SEEN * abs(found.values).max()
+    pairs = _beyond(before, found)
     found = replace(found, values=_without_round_off(found.values, SHIFT * one))
-    for pair in (v for v in before.values if v.imag > 0 and abs(v) > reach):
+    for pair in pairs:
         found = _joined(found, pencil.near(2, pair * (1 + BESIDE)))
     return in_order(found)
 
 
-def differ(pencil: NonsymmetricPencil, number: int) -> str:
-    """The eigenvalues, in words, that two shifts do not find alike; empty where they do.
+def _beyond(before: Frequencies, found: Frequencies) -> list[complex]:
+    """Pairs of the load ``before`` that may be farther from the origin than all that was found from the real shift."""
+    reach = SEEN * abs(found.values).max()
+    return [v for v in before.values.tolist() if v.imag > 0 and abs(v) > reach]
+
+
+def differ(pencil: NonsymmetricPencil, number: int, found: Frequencies) -> str:
+    """Eigenvalues, in words, that were ``found`` and that another shift does not find alike; empty where it does.
+
+    Of the ``pencil`` ``number`` or more are sought.
 
     Eigenvalues of a singular pencil, ``S x = M x = 0`` for some ``x``, are any numbers, with residuals of round-off; so
     are those that round-off makes of the infinite ones of a pencil that is badly scaled.  Both change with the shift.
     """
-    one = pencil.system.scene.units.omega2
-    found, other = (in_order(pencil.near(sought(number), shift * one)) for shift in (SHIFT, OTHER * SHIFT))
+    other = in_order(pencil.near(sought(number), OTHER * SHIFT * found.one))
     if agree(found, other):
         return ""
     first, second = (
@@ -216,10 +248,12 @@ def in_order(found: Frequencies) -> Frequencies:
     """Frequencies by their real parts, without imaginary parts that are round-off."""
     values = np.where(abs(found.values.imag) < REAL * abs(found.values), found.values.real, found.values)
     order = np.lexsort((values.imag, np.round(values.real / found.one, 6)))
+    if (np.diff(order) == 1).all():
+        return replace(found, values=values)
     return Frequencies(
         values[order],
         found.errors[order],
-        tuple(found.kinds[i] for i in order),
+        tuple(found.kinds[i] for i in order) if found.kinds else (),
         found.vectors[:, order],
         found.weighed[:, order],
         found.one,

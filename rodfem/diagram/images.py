@@ -7,7 +7,7 @@ the same energies and indices, at the same loads.  A diagram shows that image wh
 from __future__ import annotations
 
 from rodfem.continuation.branch import Branch
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.deflation.discrete_symmetries import candidates, mirrors
 from rodfem.tolerances import NEGLIGIBLE
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rodfem.continuation.branch import Point
+from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import VERTICAL, BranchSolver
 from rodfem.stability.round_off import resolve
 
 ROWS = 4

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from rodfem.adaptivity.mesh_sequence import check_accuracy
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import Argument, InputError, Remedy
 from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
@@ -26,6 +25,8 @@ COUNTS = {
 }
 """Arguments that are not negative, in words."""
 GIVE_LOADS = Remedy("give them in {}", Argument("Plan", "at"))
+FINEST, COARSEST = 1e-11, 1e-1
+"""Least and greatest accuracy that can be asked for; the former is near round-off."""
 ACCURACY = 1e-8
 """One that an error suggests."""
 
@@ -120,7 +121,7 @@ class Plan:
         for event in self.events:
             event.check(scene.length)
         if self.accuracy is not None:
-            check_accuracy(self.accuracy)
+            self._check_accuracy(self.accuracy)
         low, high = sorted(span)
         for load in self.at:
             if not low <= load <= high:
@@ -155,6 +156,14 @@ class Plan:
             raise InputError(f"{'Modes' if self.modes else 'A method'} needs loads to judge at", GIVE_LOADS)
         if self.modes and self.method in methods.METHODS and not methods.find(self.method).finds_modes:
             raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))
+
+    @staticmethod
+    def _check_accuracy(accuracy: float) -> None:
+        if not FINEST <= accuracy <= COARSEST:
+            raise InputError(
+                f"An accuracy of {accuracy:g} is not attainable: ask for one between {FINEST:g} (round-off) and "
+                f"{COARSEST:g}."
+            )
 
     def _check_mesh(self, scene: Scene, discretization: Discretization) -> None:
         if self.accuracy is not None and discretization.vertices is None:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import USER
-from rodfem.continuation.locate import solve_at_load
 from rodfem.continuation.prediction import hermite
+from rodfem.continuation.states_between import solve_at_load
 from rodfem.diagram.step import Step
 
 if TYPE_CHECKING:

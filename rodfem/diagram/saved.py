@@ -11,8 +11,9 @@ from typing import Any
 from mpi4py import MPI
 
 from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import KINDS
-from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.asked import EQUATIONS
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan

@@ -14,8 +14,9 @@ from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.continuation import compiled_step
 from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.deflation.search import find_equilibria
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
@@ -30,6 +31,7 @@ from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
 from rodfem.problem.arguments import Check, a, checked, count, each, number, path, text
 from rodfem.problem.scene import Scene
+from rodfem.stability import subspaces
 from rodfem.stability.assessment import Verdict, assess
 from rodfem.timing import Clock
 
@@ -75,8 +77,8 @@ class Solver:
     Attributes
     ----------
     equilibria
-        What the numerics work with: a :class:`~rodfem.continuation.solvers.BranchSolver`, or an
-        :class:`~rodfem.continuation.solvers.StaticSolver` where a load has no potential.
+        What the numerics work with: a :class:`~rodfem.continuation.branch_solver.BranchSolver`, or an
+        :class:`~rodfem.continuation.static_solver.StaticSolver` where a load has no potential.
     """
 
     @checked(scene=SCENE, discretization=MESH, comm=RANKS, spectrum=count(4), clock=a(Clock, "a Clock"))
@@ -115,6 +117,8 @@ class Solver:
             compile_ahead("newton", compiled_newton.declarations(), Path(compiled_newton.__file__).parent)
             compile_ahead("shape", compiled_shape.DECLARATIONS, Path(compiled_shape.__file__).parent)
             compile_ahead("step", compiled_step.declarations(), Path(compiled_step.__file__).parent)
+            if not scene.conservative:
+                compile_ahead("followed", subspaces.declarations(), Path(subspaces.__file__).parent)
         system = System(scene, discretization or Discretization(), comm, clock)
         self.equilibria = BranchSolver(system, spectrum) if scene.conservative else StaticSolver(system)
 

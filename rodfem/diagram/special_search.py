@@ -15,7 +15,8 @@ from rodfem.continuation.index_chain import Row, chained
 from rodfem.continuation.jumping import joined, suspected
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.special_points import COUPLED, find_special, midpoint, same_point
+from rodfem.continuation.special_points import COUPLED, find_special, same_point
+from rodfem.continuation.states_between import midpoint
 from rodfem.continuation.touching import Touching
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.stability.round_off import resolve

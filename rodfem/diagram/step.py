@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rodfem.continuation.branch import Point, SpecialPoint
 
 if TYPE_CHECKING:
-    from rodfem.continuation.solvers import BranchSolver
+    from rodfem.continuation.branch_solver import BranchSolver
 
 
 class Step(NamedTuple):

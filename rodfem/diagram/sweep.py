@@ -22,19 +22,22 @@ from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
+from rodfem.continuation.interpolant import real_root, zero_uncertainty
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER, Kind
-from rodfem.continuation.locate import SHARP, real_root, zero_uncertainty
+from rodfem.continuation.locate import SHARP
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.prediction import ROWS, predict_at_load
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.first_name import name_of_first
-from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, SHIFT, FrequencyRows, Row, differ, leftmost
+from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, SHIFT, FrequencyRows, Row, leftmost
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.faults import as_failure, without
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
-from rodfem.stability.nonsymmetric import MULTIPLE, REAL, Frequencies, NonsymmetricSolver
+from rodfem.stability.frequencies import MULTIPLE, REAL, Frequencies
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.stability.rank import require_independent_constraints
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 
@@ -83,6 +86,7 @@ class Sweep:
         self.rows = FrequencyRows(self.eigensolver, self.number)
         self.curves = Curves(solver.system.comm)
         self.last: Row | None = None
+        self.latest: list[Point] = []
         self.branches: list[Branch] = []
         self._load = solver.system.scene.load
 
@@ -127,7 +131,8 @@ class Sweep:
         self.observer.branch(branch)
         if self.solver.system.scene.constraints:  # others are independent
             require_independent_constraints(self.solver.system, x)
-        if words := differ(self.eigensolver.at(x), self.number):
+        x = at_load(self.solver, x, float(loads[0]))
+        if words := self.rows.first(x):
             self.observer.warn(
                 f"The eigenvalues omega^2 of the first state are not well defined ({words}): do not trust any of this "
                 "sweep. Constraints may follow from others, or sizes of the rod's numbers may be too far apart."
@@ -135,13 +140,23 @@ class Sweep:
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         try:
-            for load in loads:
-                x = at_load(self.solver, x, float(load))
+            for load in loads.tolist():
+                self.latest = [*self.latest[1 - ROWS :], self._point(self._next(load, x))]
                 for notice in self.solver.notices():
                     self.observer.warn(notice)
-                self._take(branch, self.rows.add(self._point(x)))
+                self._take(branch, self.rows.add(self.latest[-1]))
         finally:  # also where there is no equilibrium, or at an interrupt: nothing that has been computed is lost
             self._take(branch, self.rows.finish())
+
+    def _next(self, load: float, first: PETSc.Vec) -> PETSc.Vec:
+        """Equilibrium at the next ``load``, predicted by the last ones; the ``first`` one where there are none."""
+        if not self.latest:
+            return first
+        x, outcome = self.solver.at_load(predict_at_load(self.solver.system, self.latest, load), load, nearby=True)
+        if not outcome.converged:
+            return at_load(self.solver, self.latest[-1].x, load)
+        require_held(self.solver, x)
+        return x
 
     def _take(self, branch: Branch, rows: list[Row]) -> None:
         """Take rows of the grid into a branch, and the special points before each."""
@@ -400,17 +415,22 @@ def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
 
     Raises :class:`SceneError` where a load drives a motion that nothing holds.
     """
-    system, name = solver.system, solver.system.scene.load
     x, outcome = solver.at_load(guess, load)
     if not outcome.converged:
-        raise ConvergenceError(f"No equilibrium at {name} = {load:g}: use a smaller range.")
+        raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
+    require_held(solver, x)
+    return x
+
+
+def require_held(solver: StaticSolver, x: PETSc.Vec) -> None:
+    """Raise :class:`SceneError` where the loads of a state ``x`` drive a motion that nothing holds."""
+    system = solver.system
     if system.drift(x) > DRIVEN * system.stiffness_scale:
         raise SceneError(
-            f"There is no equilibrium at {name} = {load:g}: nothing holds the rod against the "
-            f"{' or the '.join(system.free_motions(guess))}, and the loads drive it; hold that motion at one end, or "
+            f"There is no equilibrium at {system.scene.load} = {system.scalar(x):g}: nothing holds the rod against the "
+            f"{' or the '.join(system.free_motions(x))}, and the loads drive it; hold that motion at one end, or "
             "balance the loads."
         )
-    return x
 
 
 def _zero_between(measured: AtLoad, cluster: Cluster, load: float, one: float) -> tuple[float, float]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
+import numpy as np
 from mpi4py import MPI
 
 from rodfem import compat
 from rodfem.adaptivity.mesh_sequence import start_mesh
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer, Recorder
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.diagram.asked import as_asked
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
@@ -23,12 +25,15 @@ from rodfem.diagram.waves import check_waves
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
 from rodfem.fem.fingerprint import fingerprint
+from rodfem.fem.system import System
 from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
+from rodfem.problem.jumps import unbroken
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import round_off_of_strains
 from rodfem.ranks import end_together
 from rodfem.timing import Clock
+from rodfem.tolerances import SAME_PLACE, same_place
 
 PLAN = a(Plan, "a Plan, as in Plan(at=(1.0,), depth=1)")
 
@@ -116,6 +121,8 @@ def traced(
         recorder.system(found.system, plan.accuracy)
         if doubt := round_off_of_strains(scene):
             recorder.warn(doubt)
+        if doubt := unbroken(scene, partial(_inside, scene, found.system, plan.accuracy is not None)):
+            recorder.warn(doubt)
         if compiled and plan.error_bars and form_compiler.ALONE:
             compile_richer(found.system)
 
@@ -155,3 +162,12 @@ def _mesh(
     mesh, change = frequency_mesh(scene, discretization.formulation, plan.accuracy, plan.over(scene), number, comm)
     observer.frequency_mesh(mesh, number, change, plan.accuracy)
     return replace(mesh, factors=discretization.factors)
+
+
+def _inside(scene: Scene, system: System, adaptive: bool, s: float) -> bool:
+    """Whether an arclength of a ``scene`` is inside of an element; of ``adaptive`` meshes only joints are vertices."""
+    if adaptive:
+        return not any(same_place(joint, s, scene.length) for joint in scene.joints)
+    ends, close = np.sort(system.fields.vertices.reshape(-1, 2), axis=1), SAME_PLACE * scene.length
+    mine = bool(((ends[:, 0] + close < s) & (s < ends[:, 1] - close)).any())
+    return any(system.comm.allgather(mine))

@@ -11,12 +11,13 @@ from rodfem.adaptivity.gaps import Gap, Gaps
 from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
 from rodfem.adaptivity.soft_rows import SoftRows
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.follow import follow
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer, Recorder
-from rodfem.continuation.solvers import BranchSolver, follow
-from rodfem.continuation.special_points import FIRST
+from rodfem.continuation.switching import FIRST
 from rodfem.diagram.bookkeeper import Bookkeeper, Recalled
 from rodfem.diagram.branch_ends import closing, end_at_zero_stretch, last_admissible, meeting, singular_end
 from rodfem.diagram.equivalence import equivalent

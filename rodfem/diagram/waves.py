@@ -13,7 +13,8 @@ from math import pi
 
 import numpy as np
 
-from rodfem.continuation.solvers import BranchSolver, StaticSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.solver import Solver, check_index
 from rodfem.problem.roles import functions_of
 from rodfem.problem.scene import Scene

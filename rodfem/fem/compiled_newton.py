@@ -42,12 +42,14 @@ def declarations() -> str:
 class Limits:
     """Constants of Newton's method, for one call.
 
-    At most ``most`` iterations are made; ``reach`` bounds a correction, ``tolerance`` is an error that is small enough,
+    At most ``most`` iterations are made, the first one with the factors of the last call where ``held`` says that its
+    state was nearby; ``reach`` bounds a correction, ``tolerance`` is an error that is small enough,
     ``still`` the size below which a correction that no longer shrinks is round-off.  ``converged``, ``kept`` and
     ``shrunk`` are TOLERANCE, KEPT and SHRUNK of :mod:`rodfem.fem.newton`.
     """
 
     most: int
+    held: bool
     reach: float
     tolerance: float
     still: float

@@ -51,6 +51,7 @@ typedef struct {
 
 typedef struct {
     int most;
+    int held;                   /* whether there are LU factors of a state nearby, which serve first */
     double reach, tolerance;    /* bound of a correction; error that is small enough */
     double converged, still, kept, shrunk; /* constants of rodfem/fem/newton.py */
     int iterations, singular;   /* singular: the Jacobian was, exactly */
@@ -209,7 +210,7 @@ int factor_at(const Rod *rod, Block *b, const double *x)
    factors are those of S, without (NULL) LU factors of the Jacobian; newton->step is the correction.  */
 int correct(const Rod *rod, Block *b, Newton *newton, double *x, const double *row)
 {
-    int n = rod->n, fresh = 1;
+    int n = rod->n, fresh = b || !newton->held;
     double previous = INFINITY, size = INFINITY;
     newton->status = 1;
     newton->singular = newton->factorisations = 0;
@@ -245,9 +246,14 @@ int correct(const Rod *rod, Block *b, Newton *newton, double *x, const double *r
         }
         double distance = size_of(rod, step);
         size = fmax(distance, sqrt(length) / (1 + sqrt(state)));
+        if (!fresh && isinf(previous) && !(size < newton->kept)) { /* no state nearby: begin with new factors */
+            memcpy(x, newton->origin, n * sizeof(double));
+            fresh = 1;
+            continue;
+        }
         if (!isfinite(distance) || !isfinite(length) || distance > newton->reach) break;
         /* chord steps converge linearly: their rate, doubled for safety, says what the next correction would be */
-        double left = fresh ? size : fmin(2 * size / previous, 1) * size;
+        double left = fresh || isinf(previous) ? size : fmin(2 * size / previous, 1) * size;
         if (size < newton->converged || left < newton->tolerance || (fresh && newton->still > size && size > 0.5 * previous)) {
             newton->error = left;
             for (int i = 0; i < n; i++) newton->origin[i] -= x[i];

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from math import isfinite
+from dataclasses import dataclass, replace
+from math import inf, isfinite
 
 from petsc4py import PETSc
 
@@ -44,17 +44,20 @@ def correct(
     row: PETSc.Vec,
     most: int = 12,
     reach: float = 1e3,
+    *,
+    nearby: bool = False,
 ) -> NewtonResult:
     """Solve the equations on the plane through ``x`` orthogonal to ``row``, in place, with LU factors.
 
     As :func:`iterate`, with the phase conditions of the guess ``x``; fails at a singular matrix, too.  ``system`` has
     the equations, ``row`` (n,) is the last row of the bordered matrix; ``most`` and ``reach`` are those of
-    :func:`iterate`.
+    :func:`iterate`.  Where the last call ended ``nearby``, with the same ``row``, its factors serve first.
     """
     system.set_phase(x)
     if system.compiled is not None and not system.damping:
         with system.clock("solve"):
-            ended = system.compiled.correct(x, row, limits(system, most, reach))
+            held = nearby and system.lu.regular and not system.compiled.factors.resorted
+            ended = system.compiled.correct(x, row, replace(limits(system, most, reach), held=held))
         if ended.status != BROKEN:
             return result(ended)
     step = system.new_vector()
@@ -74,7 +77,7 @@ def limits(system: System, most: int, reach: float, tolerance: float = 0.0) -> L
     earlier.
     """
     still = max(STALLED, TOLERANCE * system.stiffness_scale / system.damping) if system.damping else STALLED
-    return Limits(most, reach, tolerance, still, TOLERANCE, KEPT, SHRUNK)
+    return Limits(most, False, reach, tolerance, still, TOLERANCE, KEPT, SHRUNK)
 
 
 def result(ended: Ended) -> NewtonResult:
@@ -132,13 +135,24 @@ def iterate(
     return NewtonResult(False, iteration, size, float("inf"))
 
 
-def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> NewtonResult:
+def relax(
+    system: System,
+    x: PETSc.Vec,
+    row: PETSc.Vec,
+    most: int = 300,
+    longest: float = inf,
+    accepts: Callable[[PETSc.Vec], bool] = lambda x: True,
+) -> NewtonResult:
     """Solve from a guess that is too far for Newton's method, in place, by pseudo-transient continuation.
 
     The overdamped motion ``M x' = -F(x)`` on the constraints is integrated by implicit Euler steps, ``(S + M/tau) dx =
     -F``, with ``M`` the metric: it goes downhill, to a state that is stable if one can be reached.  The time step grows
     while the steps are small, and Newton's method takes over near the end (Kelley & Keyes, SIAM J. Numer. Anal. 35
     (1998) 508-523).
+
+    Implicit steps longer than ``1/|mu|`` go uphill along a mode of a negative eigenvalue ``mu``, to a saddle.  Steps at
+    most as long as ``longest`` lead away from one, and the way goes on while ``accepts`` denies what Newton's method
+    finds.
 
     ``system`` has the equations, ``row`` (n,) is the last row of the bordered matrix, and at most ``most`` steps are
     taken.
@@ -157,11 +171,11 @@ def relax(system: System, x: PETSc.Vec, row: PETSc.Vec, most: int = 300) -> Newt
             break
         x.axpy(-(1.0 if size < LARGEST else LARGEST / size), step)  # constraints are mended in one step, however long
         # switched evolution: longer time steps while the motion is slow, shorter where it is fast
-        tau *= 2.0 if size < 0.2 else 0.5 if size > LARGEST else 1.0
+        tau = min(tau * (2.0 if size < 0.2 else 0.5 if size > LARGEST else 1.0), longest)
         if (iteration % 5 == 4 and size < 0.1) or size < CLOSE:  # not earlier: it might jump to a state uphill
             x.copy(trial)
             outcome = correct(system, trial, row, reach=0.3)
-            if outcome.converged:
+            if outcome.converged and accepts(trial):
                 trial.copy(x)
                 return outcome
     return NewtonResult(False, most, float("inf"), float("inf"))

@@ -21,6 +21,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from rodfem import compat
 from rodfem.fem.assembly import Places, matrix_places, vector_places
 from rodfem.fem.compiled_newton import CompiledNewton
 from rodfem.fem.equations import Equations
@@ -198,6 +199,10 @@ class System:
         self.metric.mult(d, self.workspace)
         return float(max(self.workspace.dot(d).real, 0.0)) ** 0.5
 
+    def distance(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
+        """Distance of two states in the metric."""
+        return self.norm(a - b)
+
     def at(self, x: PETSc.Vec, line: Line | None = None) -> State:
         """State of the values ``x`` has now, with the parameters of a ``line``, :attr:`line` unless given.
 
@@ -211,10 +216,19 @@ class System:
                 return state
         gathered, local = self.gathered(x), self.fields.clamps.copy()
         local[self._numbered] = gathered[: len(self._numbered)]
+        self.tidy()
         state = State(self, local, gathered[len(self._numbered) :], line)
         if values:
             self._recent = [(values, state), *self._recent[: self._kept - 1]]
         return state
+
+    def tidy(self) -> None:
+        """Destroy the vectors that Python has collected, if they are long; collective.
+
+        A hundred of them, as one location of a special point leaves, are as much memory as all matrices.
+        """
+        if self.fields.unknowns > FEW:
+            compat.destroy_garbage(self.comm)
 
     def change(self, d: PETSc.Vec) -> NodalValues:
         """Nodal values of a change of state: zero where a state is clamped."""

@@ -511,22 +511,27 @@ int chain_factor(chain *c, const double *values)
 
 /* --- solutions ---------------------------------------------------------------------------------------------------- */
 
-#define WIDTH 4 /* columns solved for at once: the factors are read once for all of them */
+#define WIDTH 8 /* columns solved for at once, at most: the factors are read once for all of them */
 #define ALL(q) for (int q = 0; q < w; q++)
+
+/* Number of columns that are solved for next: those for which there is code.  */
+static int strip(int left) { return left >= WIDTH ? WIDTH : left >= 4 ? 4 : left; }
 
 /* L z = y for w columns, interleaved: those of one unknown are next to each other.  Of the transposed matrix that is
    U^t z = y: U has its pivots on its diagonal, and its right-hand sides belong to columns.  */
-static inline void down(const chain *c, const int w, const int transposed, double *y, double *z)
+static inline void down(const chain *c, const int w, const int transposed, double *restrict y, double *restrict z)
 {
     for (int index = 0; index < c->fronts; index++) {
         const Front *f = &c->front[index];
         const int *rows = (const int *)c->order.data + (transposed ? f->columns : f->rows);
         int m = f->size;
-        const double *l = (const double *)c->panel.data + f->values + (transposed ? (size_t)m * f->pivots : 0);
+        const double *restrict l = (const double *)c->panel.data + f->values + (transposed ? (size_t)m * f->pivots : 0);
         for (int i = 0; i < m; i++) ALL(q) z[i * w + q] = y[(size_t)rows[i] * w + q];
-        for (int j = 0; j < f->pivots; j++) {
-            if (transposed) ALL(q) z[j * w + q] /= l[(size_t)j * m + j];
-            for (int i = j + 1; i < m; i++) ALL(q) z[i * w + q] -= l[(size_t)j * m + i] * z[j * w + q];
+        for (int j = 0; j < f->pivots; j++, l += m) {
+            double t[WIDTH];
+            if (transposed) ALL(q) z[j * w + q] /= l[j];
+            ALL(q) t[q] = z[j * w + q];
+            for (int i = j + 1; i < m; i++) ALL(q) z[i * w + q] -= l[i] * t[q];
         }
         for (int i = 0; i < m; i++) ALL(q) y[(size_t)rows[i] * w + q] = z[i * w + q];
         if (!c->symmetric) continue;
@@ -548,14 +553,14 @@ static inline void down(const chain *c, const int w, const int transposed, doubl
 
 /* L^t x = y or U x = y.  Solutions belong to columns, right-hand sides to rows: x may be y if they are the same.  Of a
    transposed matrix without symmetry it is L^t x = y, and solutions belong to rows.  */
-static inline void up(const chain *c, const int w, const int transposed, const double *y, double *x, double *z)
+static inline void up(const chain *c, const int w, const int transposed, const double *y, double *x, double *restrict z)
 {
     const int unit = c->symmetric || transposed; /* the diagonal of L is one */
     for (int index = c->fronts - 1; index >= 0; index--) {
         const Front *f = &c->front[index];
         const int *order = (const int *)c->order.data, m = f->size;
         const int *rows = order + (transposed ? f->columns : f->rows), *columns = order + (transposed ? f->rows : f->columns);
-        const double *u = (const double *)c->panel.data + f->values + (unit ? 0 : (size_t)m * f->pivots);
+        const double *restrict u = (const double *)c->panel.data + f->values + (unit ? 0 : (size_t)m * f->pivots);
         for (int i = f->pivots; i < m; i++) ALL(q) z[i * w + q] = x[(size_t)columns[i] * w + q];
         for (int j = f->pivots - 1; j >= 0; j--) {
             double t[WIDTH];
@@ -574,6 +579,7 @@ static void down_by(const chain *c, int w, double *y, double *z)
     case 1: down(c, 1, 0, y, z); break;
     case 2: down(c, 2, 0, y, z); break;
     case 3: down(c, 3, 0, y, z); break;
+    case 4: down(c, 4, 0, y, z); break;
     default: down(c, WIDTH, 0, y, z);
     }
 }
@@ -584,6 +590,7 @@ static void up_by(const chain *c, int w, const double *y, double *x, double *z)
     case 1: up(c, 1, 0, y, x, z); break;
     case 2: up(c, 2, 0, y, x, z); break;
     case 3: up(c, 3, 0, y, x, z); break;
+    case 4: up(c, 4, 0, y, x, z); break;
     default: up(c, WIDTH, 0, y, x, z);
     }
 }
@@ -613,8 +620,8 @@ static int room_for_columns(chain *c, int k)
 int chain_forward(chain *c, int k, const double *b, double *rest)
 {
     if (!room_for_columns(c, k)) return 2;
-    for (int column = 0; column < k; column += WIDTH) {
-        int w = k - column < WIDTH ? k - column : WIDTH;
+    for (int column = 0, w; column < k; column += w) {
+        w = strip(k - column);
         double *y = c->forward + (size_t)column * c->n;
         const double *right = b + (size_t)column * c->n;
         for (int i = 0; i < c->n; i++) ALL(q) y[(size_t)i * w + q] = right[(size_t)q * c->n + i] * c->scale[i];
@@ -628,8 +635,8 @@ int chain_forward(chain *c, int k, const double *b, double *rest)
 /* Substitute back in those columns, into x: `rest` are the solutions of what an open chain left.  */
 void chain_back(chain *c, int k, const double *rest, double *x)
 {
-    for (int column = 0; column < k; column += WIDTH) {
-        int w = k - column < WIDTH ? k - column : WIDTH;
+    for (int column = 0, w; column < k; column += w) {
+        w = strip(k - column);
         double *y = c->forward + (size_t)column * c->n, *z = c->back + (size_t)c->n * WIDTH;
         double *solved = c->symmetric ? y : c->back, *out = x + (size_t)column * c->n;
         for (int i = 0; i < c->rest; i++)
@@ -648,20 +655,20 @@ int chain_solve(chain *c, int k, const double *b, double *x)
 }
 
 /* Solutions x of a closed chain without symmetry, transposed, for k columns of b.  Columns that are missing in the last
-   strip are zero.  2: out of memory.  */
+   strip, of four or of WIDTH, are zero.  2: out of memory.  */
 int chain_solve_transposed(chain *c, int k, const double *b, double *x)
 {
-    const int w = WIDTH;
-    if (!room_for_columns(c, w)) return 2;
-    double *y = c->forward, *solved = c->back, *z = c->back + (size_t)c->n * w;
-    for (int column = 0; column < k; column += w) {
+    if (!room_for_columns(c, WIDTH)) return 2;
+    double *y = c->forward, *solved = c->back, *z = c->back + (size_t)c->n * WIDTH;
+    for (int column = 0, w; column < k; column += w) {
         const double *right = b + (size_t)column * c->n;
         double *out = x + (size_t)column * c->n;
+        w = k - column > 4 ? WIDTH : 4;
         int here = k - column < w ? k - column : w;
         for (int i = 0; i < c->n; i++)
             ALL(q) y[(size_t)i * w + q] = q < here ? right[(size_t)q * c->n + i] * c->scale[i] : 0.0;
-        down(c, WIDTH, 1, y, z);
-        up(c, WIDTH, 1, y, solved, z);
+        if (w == WIDTH) { down(c, WIDTH, 1, y, z); up(c, WIDTH, 1, y, solved, z); }
+        else { down(c, 4, 1, y, z); up(c, 4, 1, y, solved, z); }
         for (int i = 0; i < c->n; i++)
             for (int q = 0; q < here; q++) out[(size_t)q * c->n + i] = solved[(size_t)i * w + q] * c->scale[i];
     }

@@ -139,8 +139,11 @@ class Elimination:
     @property
     def functions(self) -> list[int]:
         """Addresses of the functions that factor, solve, and count negative pivots and those that are zero."""
-        names = ("factor", "solve", "negative", "zero")
-        return [int(self.ffi.cast("uintptr_t", self.ffi.addressof(self.lib, f"chain_{name}"))) for name in names]
+        return [self.address(name) for name in ("factor", "solve", "negative", "zero")]
+
+    def address(self, name: str) -> int:
+        """Address of the function ``chain_name``."""
+        return int(self.ffi.cast("uintptr_t", self.ffi.addressof(self.lib, f"chain_{name}")))
 
     def factor(self, values: np.ndarray) -> None:
         """Eliminate; raises :class:`GaveUpError` where the matrix is no chain.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import platform
 import sys
 import tempfile
 from functools import cache
@@ -18,17 +17,6 @@ from rodfem.errors import SetupError
 
 FLAGS = ["-O3", "-march=native"]
 """Of the compiler: fast loops, and no -ffast-math, which would hide what is no number."""
-
-
-def _processor() -> str:
-    """Name and abilities of the processor, which code compiled for it depends on."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().split("\n\n")[0].splitlines()
-        return "".join(line for line in lines if line.startswith(("model name", "flags", "Features")))
-    except OSError:
-        return platform.processor()
-
-
 _HERE = Path(__file__).parent
 _JOBS: dict[str, Job] = {}
 """What is compiled beside this process, by name."""
@@ -62,7 +50,8 @@ def module(name: str, declarations: str, beside: Path = _HERE) -> Any:
 def _named(name: str, declarations: str, beside: Path) -> tuple[str, str]:
     """Name in the cache, which tells all that the compiled code depends on, and the code of ``name.c``."""
     code = (beside / f"{name}.c").read_text()
-    key = hashlib.sha1("\n".join([code, declarations, *FLAGS, sys.version, _processor()]).encode()).hexdigest()[:16]
+    depends = [code, declarations, *FLAGS, sys.version, code_cache.processor()]
+    key = hashlib.sha1("\n".join(depends).encode()).hexdigest()[:16]
     return f"rodfem_{name}_{key}", code
 
 

@@ -84,6 +84,15 @@ def shared(matrix: PETSc.Mat) -> Shared | None:
     return found
 
 
+def places_in(pattern: sp.csr_matrix, other: sp.csr_matrix) -> np.ndarray:
+    """Places among the entries of a ``pattern`` of those of an ``other``, all of which it has; indices are sorted."""
+    numbers = [
+        np.repeat(np.arange(x.shape[0]), np.diff(x.indptr)) * x.shape[1] + x.indices.astype(np.int64)
+        for x in (pattern, other)
+    ]
+    return np.asarray(np.searchsorted(*numbers))
+
+
 STORED = """
 int MatMPIAIJGetSeqAIJ(void *matrix, void **block, void **rest, void *columns);
 int MatSeqAIJGetArrayRead(void *matrix, void **values);

@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import bound, halved
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import InputError
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.linalg.orthogonal import combine, orthonormalize

@@ -40,8 +40,9 @@ def change_in_words(one: Interval, after: Interval, branches: Branches) -> tuple
         return where, "changes its index without a special point that says why"
     if UNDECIDED in (one.kind, after.kind):
         return where, "has an eigenvalue that is not told from zero on one side"
-    verb = "loses" if one.kind == STABLE else "changes"
-    return where, f"{verb} its stability against motions out of the plane"
+    if one.kind == STABLE:
+        return where, "loses its stability against motions out of the plane (without planar it is located)"
+    return where, "changes its stability against motions out of the plane"
 
 
 def _event(special: Mapping[str, Any], branch: Mapping[str, Any], branches: Branches) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Branch, SpecialPoint, not_followed
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Fields
 from rodfem.fem.system import System

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
+from rodfem.output.collisions import between_rows
 from rodfem.output.intervals import intervals_of
 from rodfem.output.plot_pieces import STABLE
 from rodfem.output.sheet import PALETTE
@@ -70,14 +71,22 @@ class Range(NamedTuple):
     shade: str
 
 
-def curves(columns: Mapping[str, Any]) -> list[FrequencyCurve]:
-    """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve."""
+def curves(columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = ()) -> list[FrequencyCurve]:
+    """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve.
+
+    With its ``special`` points curves have points between rows where two frequencies collide.
+    """
     found: dict[int, list[tuple[float, int, complex, str]]] = {}
     for row, (load, pairs, motions, numbers) in enumerate(
         zip(columns["load"], columns["omega2"], columns["motion"], columns["curve"], strict=True)
     ):
         for pair, motion, number in zip(pairs, motions, numbers, strict=True):
             found.setdefault(number, []).append((load, row, complex(*pair) ** 0.5, motion))
+    for number, extra in between_rows(columns, special).items():
+        motion = found[number][-1][3]
+        same = {point.row for point in extra if point.load == columns["load"][point.row]}
+        found[number] = [member for member in found[number] if member[1] not in same]
+        found[number] += [(point.load, point.row, point.mu**0.5, motion) for point in extra]
     out = []
     for members in found.values():
         members.sort(key=lambda member: member[0])

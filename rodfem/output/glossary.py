@@ -221,12 +221,21 @@ def explanation(word: str) -> list[tuple[str, str]]:
 
     Raises :class:`~rodfem.errors.InputError` for a word that no entry has.
     """
-    found = [name for name, kind in KINDS.items() if kind.code == word.upper()]
-    if not found:
-        found = [name for name in NAMES if name.lower() == " ".join(word.lower().split())]
+    found = _found(word)
     if not found:
         inside = [name for name in NAMES if word.lower() in name.lower().replace(",", "").split()]
         near = inside[:NEAR] or get_close_matches(word.lower(), NAMES, n=NEAR)
         best = f"{' or '.join(near)}, or rodfem explain" if near else "rodfem explain"
         raise InputError(f"There is no entry {word!r}: try {best}, which lists all.")
     return [(title(NAMES[name]), ENTRIES[NAMES[name]]) for name in dict.fromkeys(found)]
+
+
+def is_entry(word: str) -> bool:
+    """Whether a word has an entry."""
+    return bool(_found(word))
+
+
+def _found(word: str) -> list[str]:
+    """Names of the entries of a word: those of a code, or its own."""
+    found = [name for name, kind in KINDS.items() if kind.code == word.upper()]
+    return found or [name for name in NAMES if name.lower() == " ".join(word.lower().split())]

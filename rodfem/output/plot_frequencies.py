@@ -19,6 +19,8 @@ from rodfem.file_format import DIAGRAM
 from rodfem.output.frequency_curves import DIVERGED, GROWTH, PAIR, FrequencyCurve, curves, ranges_of, top
 from rodfem.output.sheet import DPI, HALO, SIZE, STYLE, at_most, axis_label, mesh_in_words, save
 
+BESIDE, TEXT, SHARES = ((8.0, -16.0), (8.0, 6.0), (8.0, -34.0)), np.array([4.0, 1.0]), np.linspace(0.0, 1.0, 9)
+"""Where the load stands beside its mark, in points; size of its text, over that of letters; places along lines."""
 SPECIAL = {name: kind.marker for name, kind in KINDS.items() if kind.test == FREQUENCY}
 """Markers of the special points of a sweep."""
 WIDTH, EVERY = 1.8, 0.03
@@ -59,16 +61,15 @@ def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> l
     motions: dict[str, str] = {}
     shown: set[str] = set()
     ranges: dict[str, Patch] = {}
+    axes.set_ylim(0, 1.15 * max(top(b["columns"], most) for b in branches))
     for branch in branches:
         ranges |= _shade(axes, branch)
-        for curve in curves(branch["columns"]):
+        for curve in curves(branch["columns"], branch["special"]):
             motions.setdefault(curve.motion, curve.colour)
             shown |= _draw_curve(axes, curve, motions[curve.motion])
-        for special in branch["special"]:
-            if special["kind"] in SPECIAL:
-                _mark(axes, special)
-                shown.add(special["kind"])
-    axes.set_ylim(0, 1.15 * max(top(b["columns"], most) for b in branches))
+    for special in (s for branch in branches for s in branch["special"] if s["kind"] in SPECIAL):
+        _mark(axes, special)
+        shown.add(special["kind"])
     axes.set_ylabel(r"frequency $\omega$")
     handles: list[Artist] = [Line2D([], [], color=color, lw=WIDTH, label=motion) for motion, color in motions.items()]
     handles += [
@@ -108,9 +109,26 @@ def _mark(axes: Axes, special: Mapping[str, Any]) -> None:
     """Mark a flutter or divergence load, and write it beside: of divergence above the axis, where its frequency is."""
     omega = abs(complex(special["omega2"])) ** 0.5
     axes.plot(special["load"], omega, ls="none", zorder=5, clip_on=False, **SPECIAL[special["kind"]])
-    place = (8, -16) if special["kind"] == FLUTTER and omega else (0, 14)
-    text = axes.annotate(f"{special['load']:.6g}", (special["load"], omega), place, textcoords="offset points")
+    here = float(special["load"]), float(omega)
+    place = _clear(axes, here) if special["kind"] == FLUTTER and omega else (0.0, 14.0)
+    text = axes.annotate(f"{special['load']:.6g}", here, place, textcoords="offset points")
     text.set(path_effects=HALO, ha="left" if place[0] else "center", zorder=6)
+
+
+def _clear(axes: Axes, here: tuple[float, float]) -> tuple[float, float]:
+    """Where of :data:`BESIDE` the text of a mark covers least of the curves: its left lower corner, in points."""
+    points, counts = 72 / axes.figure.dpi, []
+    axes.figure.draw_without_rendering()
+    origin = axes.transData.transform(here)
+    size = TEXT * axes.xaxis.label.get_size()
+    for x, y in BESIDE:
+        count = 0
+        for line in axes.get_lines():
+            on_paper = (axes.transData.transform(line.get_xydata()) - origin) * points
+            between = np.concatenate([on_paper[:-1] + share * np.diff(on_paper, axis=0) for share in SHARES])
+            count += int(((between >= (x, y - 1)) & (between <= (x + size[0], y + 1 + size[1]))).all(axis=1).sum())
+        counts.append(count)
+    return BESIDE[int(np.argmin(counts))]
 
 
 def _footer(diagram: Mapping[str, Any], branches: list[Mapping[str, Any]]) -> str:

@@ -10,6 +10,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from rodfem.continuation.kinds import BRANCH_POINT, KINDS, USER
 from rodfem.file_format import LOCUS
@@ -30,8 +31,6 @@ POINTS: dict[str, dict[str, Any]] = {
 STABLE_SIDE, BAND, STEEP = "#CDE9DF", 60.0, 0.05
 """Colour and width, in pixels, of the shade on the stable side of a curve; vertical component of the unit normal at the
 start below which that has no side of the load."""
-STABLE_REGION = "#EBF6F1"
-"""Colour of what lies between the stable side of a curve and the next one, or the bound of the load."""
 AFTER, ASIDE = 0.3, 30.0
 """Share of its rows after which the indices of a curve stand, and their distance from it, in pixels."""
 LEGEND, BELOW = 3, (0.5, -0.14)
@@ -44,8 +43,9 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
     """Draw loci of one scene in the plane of its two parameters, one over the other.
 
     The first parameter, the load, is upwards.  Beside each curve stand the indices of the equilibria on its two sides
-    where they were counted, as ``0|1``; the stable side of a curve of branch points is shaded next to it, and paler as
-    far as the next curve: there stability is known as far as these curves tell, as no other one was looked for.
+    where they were counted, as ``0|1``.  The stable side of a curve is shaded as far as the next curve, or the bound of
+    the load: there stability is known as far as these curves tell, as no other one was looked for.  Where a curve turns
+    back it is shaded next to it.
 
     Parameters
     ----------
@@ -73,14 +73,16 @@ def draw_locus(loci: Sequence[Mapping[str, Any]], path: Path) -> Path:
         axes.set_axisbelow(True)
         axes.margins(y=ROOM)
         _draw_curves(axes, loci)
-        _fill_stable_regions(axes, loci)
+        filled = _fill_stable_regions(axes, loci)
         _name(figure, axes, loci)
         figure.draw_without_rendering()
         for one in loci:
-            _shade_stable_side(axes, one)
+            if one not in filled:
+                _shade_stable_side(axes, one)
         handles = {handle.get_label(): handle for handle in (*axes.get_lines(), *axes.patches, *axes.collections)}
         place = {"ncols": LEGEND, "loc": "upper center", "bbox_to_anchor": BELOW}
-        axes.legend(handles=list(handles.values()), fontsize=8.5, **place)
+        entries = [*handles.values(), *_indices(loci)]
+        axes.legend(handles=entries, fontsize=9.5, **place)
         figure.draw_without_rendering()  # the legend has taken its room: pixels are final
         for one in loci:
             _write_indices(axes, one)
@@ -110,11 +112,21 @@ def _draw_curves(axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:
                 axes.plot(x[row], y[row], linestyle="none", zorder=5, path_effects=HALO, **style)
 
 
-def _fill_stable_regions(axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:
-    """Fill the regions that :func:`~rodfem.output.stable_region.stable_region` finds."""
+def _fill_stable_regions(axes: Axes, loci: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Fill the regions that :func:`~rodfem.output.stable_region.stable_region` finds; returns the loci with one."""
+    filled = []
     for one in loci:
         if region := stable_region(one, loci):
-            axes.fill_between(*region, color=STABLE_REGION, lw=0, zorder=-1, label=WORDS)
+            axes.fill_between(*region, color=STABLE_SIDE, lw=0, zorder=-1, label=WORDS)
+            filled.append(one)
+    return filled
+
+
+def _indices(loci: Sequence[Mapping[str, Any]]) -> list[Line2D]:
+    """Entry of the legend for the indices beside the curves, if there are any."""
+    pairs = [pair for one in loci for pair in one["columns"]["index"] if pair[0] >= 0]
+    style = {"ls": "none", "marker": r"$\mathbf{i|j}$", "ms": 13, "mfc": "0.3", "mec": "none"}
+    return [Line2D([], [], label="index on the two sides", **style)] if pairs else []
 
 
 def _name(figure: Figure, axes: Axes, loci: Sequence[Mapping[str, Any]]) -> None:

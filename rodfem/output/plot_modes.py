@@ -34,7 +34,7 @@ from rodfem.whole_files import draft_of
 __all__ = ["draw_modes", "main"]
 
 Floats = NDArray[np.float64]
-PANEL, COLUMNS = (3.6, 2.3), 3  # inches
+PANEL, COLUMNS, TITLES = (4.0, 2.75), 3, 0.8  # inches; those that titles take above a panel
 LARGEST = 0.14, 0.9
 """Drawn displacement over the rod's size, and rotation in radian, of which the one that is reached first holds."""
 POINTS, SIDES, SLENDER = (240, 100), (14, 10), 65.0
@@ -85,10 +85,12 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
     moving = output.suffix.lower() == ".gif"
     output.parent.mkdir(parents=True, exist_ok=True)
     with rc_context(STYLE | {"axes.grid": False}), draft_of(output) as draft:
-        figure = Figure(figsize=(columns * PANEL[0], rows * PANEL[1] + 0.4), dpi=2 * DPI // 3 if moving else DPI)
+        figure = Figure(figsize=(columns * PANEL[0], rows * PANEL[1] + 0.5), dpi=2 * DPI // 3 if moving else DPI)
         FigureCanvasAgg(figure)
-        figure.subplots_adjust(0.01, 0.01, 0.99, 1 - 0.75 / (rows * PANEL[1] + 0.4), 0.04, 0.28)
-        figure.suptitle(f"{heading(path)}{branch}, load {modes.load:.6g}", fontsize=11)
+        figure.subplots_adjust(0.01, 0.01, 0.99, 1 - (TITLES + 0.4) / (rows * PANEL[1] + 0.5), 0.04, 0.36)
+        figure.suptitle(
+            f"{heading(path)}{branch}, load {modes.load:.6g}", fontsize=14, y=1 - 0.1 / figure.get_figheight(), va="top"
+        )
         places = [figure.add_subplot(rows, columns, i + 1) for i in range(len(numbers))]
         panels = [_Panel(axes, modes, setting, n, moving) for axes, n in zip(places, numbers, strict=True)]
         if not moving:
@@ -156,7 +158,7 @@ class _Panel:
         doubt = f" ({error:.0e})" if np.isfinite(error) else ""
         value = f"{mu.real:.6g}" if mu.imag == 0 else f"{mu.real:.5g} {'+' if mu.imag > 0 else '-'} {abs(mu.imag):.5g}i"
         what = {FREE: "zero", STABLE: "stable", UNSTABLE: "unstable" if mu.imag == 0 else "flutter"}[self.color]
-        self.axes.set_title(f"{number + 1}: $\\mu$ = {value}{doubt}\n{what}: {kind}", fontsize=9, color=self.color)
+        self.axes.set_title(f"{number + 1}: $\\mu$ = {value}{doubt}\n{what}: {kind}", fontsize=12.5, color=self.color)
 
     def _look(self, span: float) -> None:
         """Choose the axes (see :func:`rodfem.output.view.view_of`), the limits, and the sign of the mode.
@@ -185,7 +187,7 @@ class _Panel:
         low[0] -= 0.15 * (high - low)[0]  # room for the triad
         middle, half = (low + high) / 2, (high - low) / 2
         half = np.maximum(
-            half, half[::-1] * np.array([PANEL[0], PANEL[1] - 0.6]) / np.array([PANEL[1] - 0.6, PANEL[0]])
+            half, half[::-1] * np.array([PANEL[0], PANEL[1] - TITLES]) / np.array([PANEL[1] - TITLES, PANEL[0]])
         )
         self.limits = np.stack([middle - half, middle + half], axis=1)
 
@@ -256,14 +258,14 @@ class _Panel:
         corner = self.limits[:, 0] + 1.6 * size
         labels: list[tuple[Floats, list[str]]] = []
         for i, axis in enumerate(self.view[:2].T):
-            self.axes.plot(*np.stack([corner, corner + size * axis], axis=1), color="0.45", lw=0.9, zorder=3)
+            self.axes.plot(*np.stack([corner, corner + size * axis], axis=1), color="0.45", lw=1.2, zorder=3)
             if np.linalg.norm(axis) > 0.5:
                 place = next((names for at, names in labels if np.linalg.norm(at - axis) < 0.5), None)
                 if place is None:
                     labels.append((axis, place := []))
                 place.append(f"e{i + 1}")
         for axis, names in labels:
-            self.axes.text(*(corner + 1.35 * size * axis), ", ".join(names), fontsize=6.5, color="0.35", ha="center",
+            self.axes.text(*(corner + 1.5 * size * axis), ", ".join(names), fontsize=10, color="0.35", ha="center",
                            va="center", zorder=3)  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rodfem.continuation.branch import Branch, Point
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.output.files import save_states
 from rodfem.output.folder import picture_at
 from rodfem.problem.arguments import checked

@@ -28,7 +28,10 @@ SHORT.maxother = SHORT.maxstring = 60
 
 
 def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Decorator of a function whose arguments are checked, and converted, before anything else is done."""
+    """Decorator of a function whose arguments are checked, and converted, before anything else is done.
+
+    The function raises :class:`TypeError`, with the names of its arguments, where one is missing or is none of them.
+    """
 
     def decorate(function: Callable[P, T]) -> Callable[P, T]:
         signature = inspect.signature(function)
@@ -36,7 +39,11 @@ def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
 
         @wraps(function)
         def call(*arguments: P.args, **named: P.kwargs) -> T:
-            given = signature.bind(*arguments, **named)
+            try:
+                given = signature.bind(*arguments, **named)
+            except TypeError as trouble:  # Python's own words lack the function and what it takes
+                words = f"{function.__name__}() {trouble}: its arguments are {', '.join(signature.parameters)}"
+                raise TypeError(words) from None
             for name, check in checks.items():
                 if name in given.arguments and given.arguments[name] is not defaults[name]:
                     given.arguments[name] = check(name, given.arguments[name])

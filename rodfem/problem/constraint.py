@@ -49,7 +49,9 @@ class Constraint(Contribution):
 class Integral(Constraint):
     """An integral over the rod that ``equals(c)``, which is spread over the rod."""
 
-    equals: Callable[[Constants], Any] = role_field(Role("value of an integral constraint", "f(c)", 0), lambda c: 0.0)
+    equals: Callable[[Constants], Any] = role_field(
+        Role("value of an integral constraint", "f(c)", 0, placed=False), lambda c: 0.0
+    )
     words = "integral constraint"
     whole = True
 

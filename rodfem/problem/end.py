@@ -55,14 +55,18 @@ class End(Contribution):
         Conservative.
     """
 
-    position: OfConstants | None = role_field(Role("position of the {} end", "f(c)", 3, gaps=True))
-    rotation: Quaternion | OfConstants | None = role_field(Role("rotation of the {} end", "f(c)", 4, or_value=True))
-    force: OfConstants | None = role_field(Role("force on the {} end", "f(c)", 3, load=DEAD_AT_END))
-    follower: OfConstants | None = role_field(Role("follower force on the {} end", "f(c)", 3, load=FOLLOWER))
+    position: OfConstants | None = role_field(Role("position of the {} end", "f(c)", 3, gaps=True, placed=False))
+    rotation: Quaternion | OfConstants | None = role_field(
+        Role("rotation of the {} end", "f(c)", 4, or_value=True, placed=False)
+    )
+    force: OfConstants | None = role_field(Role("force on the {} end", "f(c)", 3, load=DEAD_AT_END, placed=False))
+    follower: OfConstants | None = role_field(
+        Role("follower force on the {} end", "f(c)", 3, load=FOLLOWER, placed=False)
+    )
     hinge: tuple[float, float, float] | None = None
-    moment: OfConstants | None = role_field(Role("moment on the {} end", "f(c)", 3, load=MOMENT))
+    moment: OfConstants | None = role_field(Role("moment on the {} end", "f(c)", 3, load=MOMENT, placed=False))
     follower_moment: OfConstants | None = role_field(
-        Role("follower moment on the {} end", "f(c)", 3, load=FOLLOWER_MOMENT)
+        Role("follower moment on the {} end", "f(c)", 3, load=FOLLOWER_MOMENT, placed=False)
     )
     energy: OfPlace | None = role_field(Role("energy of the {} end", "f(x, c)", 0, load=POTENTIAL))
 

@@ -52,9 +52,19 @@ def clamped(position: OfConstants = lambda c: (0.0, 0.0, 0.0), rotation: Quatern
     return End(position=position, rotation=rotation)
 
 
-def pinned(position: OfConstants = lambda c: (0.0, 0.0, 0.0), force: OfConstants | None = None) -> End:
-    """Return an end whose position is given (None: free in that direction) and whose directors turn freely."""
-    return End(position=position, force=force)
+def pinned(
+    position: OfConstants = lambda c: (0.0, 0.0, 0.0),
+    force: OfConstants | None = None,
+    moment: OfConstants | None = None,
+    follower_moment: OfConstants | None = None,
+) -> End:
+    """Return an end whose position is given and whose directors turn freely.
+
+    ``position(c)`` (3,) is that of the end; components that are None are free, and ``force(c)`` (3,) is a dead force
+    there.  Moments have no potential in space: ``moment(c)`` (3,) is about axes that stay, ``follower_moment(c)`` (3,)
+    along the directors.
+    """
+    return End(position=position, force=force, moment=moment, follower_moment=follower_moment)
 
 
 def sliding(
@@ -78,9 +88,19 @@ def hinged(
     return End(position=position, rotation=rotation, hinge=axis, force=force)
 
 
-def free(force: OfConstants | None = None, follower: OfConstants | None = None, energy: OfPlace | None = None) -> End:
-    """Return an end without support, loaded by a dead force, a follower force, a potential energy, or none."""
-    return End(force=force, follower=follower, energy=energy)
+def free(
+    force: OfConstants | None = None,
+    follower: OfConstants | None = None,
+    energy: OfPlace | None = None,
+    moment: OfConstants | None = None,
+    follower_moment: OfConstants | None = None,
+) -> End:
+    """Return an end without support, loaded by forces, a potential energy, moments, or nothing.
+
+    ``force(c)`` (3,) is a dead force, ``follower(c)`` (3,) one along the directors, ``energy(x, c)`` a potential;
+    ``moment(c)`` and ``follower_moment(c)`` (3,) are as for :func:`pinned`.
+    """
+    return End(force=force, follower=follower, energy=energy, moment=moment, follower_moment=follower_moment)
 
 
 def elastic(

@@ -62,6 +62,8 @@ class Role:
         How it is to be written, for where it fails; what converts the value that it returns.
     gaps
         Whether a component may be None.
+    placed
+        Whether the constants that it is given have the arclength; those of an end, or of all of the rod, have none.
     """
 
     words: str
@@ -73,6 +75,7 @@ class Role:
     hint: str = UFL
     returns: Conversion | None = None
     gaps: bool = False
+    placed: bool = True
 
     @property
     def arguments(self) -> int:
@@ -91,6 +94,28 @@ def role_field(role: Role | Callable[[Any], Role], default: Any = None) -> Any:
     return field(default=default, metadata={"role": role})
 
 
+class Placeless:
+    """Constants without the arclength.
+
+    What acts at an end is a number: as a function of ``c.s`` it would be one along the rod wherever the equations of a
+    formulation have it under an integral.
+    """
+
+    def __init__(self, c: Any) -> None:
+        """Be the constants ``c`` otherwise."""
+        self._constants = c
+
+    def __getattr__(self, name: str) -> Any:
+        """Constant of a ``name``; raises :class:`NoSuchNameError` for the arclength."""
+        if name == "s":
+            raise NoSuchNameError("asks for the arclength c.s, but does not vary along the rod: write the number.")
+        return getattr(self._constants, name)
+
+    def __getitem__(self, name: object) -> Any:
+        """Say how a constant is written."""
+        return self._constants[name]
+
+
 Visit = Callable[[str, Any, Role], Any]
 
 
@@ -102,7 +127,7 @@ def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[...
     @wraps(function)
     def call(*arguments: Any) -> Any:
         try:
-            value = function(*arguments)
+            value = function(*arguments) if role.placed else function(*map(Placeless, arguments))
             return value if role.returns is None else role.returns(value)
         except NoSuchNameError as trouble:
             raise SceneError(f"The {what} {trouble}") from None

@@ -61,7 +61,8 @@ def check_kinds(scene: Scene) -> None:
     for name, parameter in scene.parameters.items():
         check_parameter(name, parameter)
     if not (is_object(scene.inertia) and hasattr(scene.inertia, "rho_A") and hasattr(scene.inertia, "rho_I")):
-        raise SceneError(f"The inertia is {scene.inertia!r}: give one, as in Inertia(rho_A=lambda c: 1.0).")
+        call = ", or call it if it is a method" if callable(scene.inertia) else ""
+        raise SceneError(f"The inertia is {scene.inertia!r}: give one, as in Inertia(rho_A=lambda c: 1.0){call}.")
     if not (is_object(scene.ordinate) and hasattr(scene.ordinate, "places")):
         raise SceneError(f"The ordinate is {scene.ordinate!r}: give an Ordinate(name, s, of).")
     for what, words in (

@@ -27,7 +27,7 @@ def frequencies_of(branch: Mapping[str, Any]) -> dict[str, Any] | None:
                 "rows": curve.rows.tolist(),
                 "parts": {"frequency": plain(curve.real)} | {name: plain(part) for name, part in curve.parts.items()},
             }
-            for curve in curves(columns)
+            for curve in curves(columns, branch["special"])
         ],
         "ranges": [found._asdict() for found in ranges_of(branch)],
         "marks": [

@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from rodfem.errors import InputError
 from rodfem.problem.quaternions import directors
+from rodfem.problem.setting import FOUNDATION, SUPPORTS, TIES
 
 Floats = NDArray[np.float64]
 
@@ -52,14 +53,17 @@ class Shapes:
 def shapes_of(group: Any, count: int) -> Shapes:
     """Read the states below the group of a branch at ``count`` stations, by splines through the nodes.
 
-    Raises :class:`InputError` where one is not finite, or no curve.
+    The centre of a rod that nothing holds, which may be anywhere, is the origin.  Raises :class:`InputError` where a
+    state is not finite, or no curve.
     """
     s, r, q = (np.asarray(group[name]) for name in ("s", "r", "q"))
     rows = []
     for row, at in enumerate(np.isfinite(s)):  # the rows of a mesh with fewer nodes end in nan
         rows.append(_state((s[row, at], r[row, at], q[row, at]), count, group))
-    at, *fields = (np.array(part) for part in zip(*rows, strict=True))
-    return Shapes(at[0], *fields)
+    at, positions, quaternions = (np.array(part) for part in zip(*rows, strict=True))
+    if SUPPORTS in group and not any(group.get(name) for name in (SUPPORTS, FOUNDATION, TIES)):
+        positions = positions - positions.mean(axis=1, keepdims=True)
+    return Shapes(at[0], positions, quaternions)
 
 
 def _state(nodes: tuple[Floats, Floats, Floats], count: int, group: Any) -> tuple[Floats, ...]:

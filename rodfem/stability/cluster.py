@@ -19,7 +19,8 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.stability.nonsymmetric import REAL, Frequencies, NonsymmetricPencil
+from rodfem.stability.frequencies import REAL, Frequencies
+from rodfem.stability.nonsymmetric import NonsymmetricPencil
 from rodfem.tolerances import TINY
 
 BESIDE = 1e-3

@@ -24,7 +24,7 @@ from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Factors, Sizes
-from rodfem.linalg.matrices import local_rows
+from rodfem.linalg.matrices import local_rows, places_in, shared
 from rodfem.linalg.orthogonal import Basis, combine, generic, orthonormalize
 from rodfem.linalg.selection import factors_of
 from rodfem.tolerances import TINY
@@ -97,6 +97,9 @@ class Inertia:
             self.metric.setValue(system.load_index, system.load_index, 0.0)
         self.metric.assemble()
         self._weights = local_rows(self.metric) if system.comm.size == 1 else None
+        self._shared, self._on_metric = shared(self.matrix), np.zeros(0, dtype=int)
+        if self._shared is not None and self._weights is not None:
+            self._on_metric = places_in(self._shared.pattern, self._weights)
         self.factors = inertia_factors(system.comm, system.fields.along, system.fields.dense_rows, system.natural_sizes)
         self.constraints = system.fields.constraints()
         self.scale = system.stiffness_scale
@@ -162,6 +165,15 @@ class Inertia:
         if system.has_scalars:
             self.matrix.setValue(system.load_index, system.load_index, 1.0)
         self.matrix.assemble()
+
+    def move(self, sigma: float) -> None:
+        """Let the matrix be ``S - sigma M``, whatever its shift was."""
+        by, self.shift = self.shift - sigma, sigma
+        if by and self._shared is not None and self._weights is not None:
+            self._shared.values[self._on_metric] += by * self._weights.data
+        elif by:
+            self.matrix.axpy(by, self.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        self.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
 
     def _settle_band(self) -> None:
         system = self.system
@@ -249,10 +261,7 @@ class Factored:
         """
         own = self._own()
         with own.system.clock("stability"):
-            if sigma != own.shift:
-                own.matrix.axpy(own.shift - sigma, own.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            own.matrix.stateIncrease()  # a parallel axpy does not count as a change of the matrix by itself
-            own.shift = sigma
+            own.move(sigma)
             own.factors(own.matrix)
             own.factored = self._filled
         return self.counted()
@@ -298,6 +307,7 @@ class Factored:
             v.axpy(FRESH, own.seed(i))  # the old vectors may span an invariant space that misses the nearest one
         with own.system.clock("stability"):
             for iteration in range(most):
+                own.system.tidy()
                 if iteration and iteration % EXPANDED == 0:
                     vectors = self._in_krylov_space(vectors)
                 solved = self._inverse(vectors)

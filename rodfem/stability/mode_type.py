@@ -27,14 +27,16 @@ def shares(system: System, turned: np.ndarray, parts: list[np.ndarray]) -> np.nd
 def squares(system: System, turned: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Integrals of the squared rotations about the three directors in each of some perturbations, (k, 3); collective.
 
-    ``turned`` (cells, nodes, components) is the rotation field of the state, ``columns`` (n, k) are the perturbations
-    as values of this rank's unknowns.  The rotation is the spin ``w = 2 vec(conj(q) dq)`` at the nodes.
+    ``turned`` (cells, nodes, components) is the rotation field of the state, or, with k in front, those of one state
+    for each perturbation; ``columns`` (n, k) are the perturbations as values of this rank's unknowns.  The rotation is
+    the spin ``w = 2 vec(conj(q) dq)`` at the nodes.
     """
     f = system.fields
     cells = slice(0, f.owned_cells)
     size = (f.vertices[cells, 1] - f.vertices[cells, 0])[:, None, None]
     change = system.changes(columns)[:, f.dofs[f.turning.name][cells]]
-    q, dq = f.turning.quaternion(turned[cells]), f.turning.change(turned[cells], change)
+    turned = turned[..., cells, :, :]
+    q, dq = f.turning.quaternion(turned), f.turning.change(turned, change)
     scalar, v, dv = q[..., :1], q[..., 1:], dq[..., 1:]
     across = v[..., [1, 2, 0]] * dv[..., [2, 0, 1]] - v[..., [2, 0, 1]] * dv[..., [1, 2, 0]]  # v x dv
     w = scalar * dv - dq[..., :1] * v - across
@@ -44,10 +46,14 @@ def squares(system: System, turned: np.ndarray, columns: np.ndarray) -> np.ndarr
 
 def name(share: np.ndarray) -> str:
     """Name of a motion by its shares: one of :data:`KINDS`, ``bending`` (about both), or ``mixed``."""
-    for kind, part in zip(KINDS, share, strict=True):
-        if part > PURE:
-            return kind
-    return "bending" if share[0] + share[1] > PURE else "mixed"
+    return names(share[None, :])[0]
+
+
+def names(shares: np.ndarray) -> list[str]:
+    """The same of several motions, (k, 3)."""
+    kinds = (*KINDS, "bending", "mixed")
+    mixed = np.where(shares[:, 0] + shares[:, 1] > PURE, len(KINDS), len(KINDS) + 1)
+    return [kinds[i] for i in np.where(shares.max(axis=1) > PURE, shares.argmax(axis=1), mixed).tolist()]
 
 
 def halves(vector: PETSc.Vec) -> list[np.ndarray]:

@@ -20,7 +20,7 @@ A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -32,12 +32,12 @@ from rodfem import compat
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain, Elimination
-from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, is_spread
-from rodfem.linalg.matrices import gathered, local_rows, petsc_matrix, shared
+from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, GaveUpError, is_spread
+from rodfem.linalg.matrices import Shared, gathered, local_rows, petsc_matrix, places_in, shared
 from rodfem.linalg.selection import factors_of
-from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
 from rodfem.stability.dense import finite_eigenpairs
+from rodfem.stability.frequencies import EPS, Frequencies, named, orthonormal, product, squares
 from rodfem.stability.pencil import (
     FACTORS,
     Inverse,
@@ -50,7 +50,7 @@ from rodfem.stability.pencil import (
     weighed_modes,
     with_factors,
 )
-from rodfem.tolerances import NEGLIGIBLE, TINY
+from rodfem.tolerances import NEGLIGIBLE
 
 FAR = 1e5
 """How many times farther from the shift than the third nearest an eigenvalue may be.
@@ -60,50 +60,8 @@ which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than t
 """
 DENSE = 3
 """A pencil smaller than this many Krylov spaces is solved by dense reductions: it may have few finite eigenvalues."""
-REAL = 1e-7
-"""An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
-MULTIPLE = 1e-8
-"""Eigenvalues that differ by less than this, relative, are one that is multiple."""
-ALIKE = 1e-6
-"""Eigenvalues that differ by less than this, relative, have one name: where another is near the shift, digits go."""
-STILL = 1e-10
-"""Share of the farthest eigenvalue below which that of a rod that nothing holds is zero."""
-NEAR_ZERO = 1e-2
-"""Share of the farthest eigenvalue below which differences of others are relative to this share."""
-EPS = float(np.finfo(float).eps)
 SPARE = 2
 """Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
-
-
-@dataclass(frozen=True)
-class Frequencies:
-    """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and their ``errors`` (k,).
-
-    Errors are backward errors; of eigenvalues that were followed (:mod:`rodfem.stability.followed_pairs`) relative ones
-    of ``1 / (mu - shift)``.  ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors``
-    (n, k) are complex, with the n unknowns of this rank, ``weighed`` (n, k) are their products with the mass, and
-    ``one`` is the natural size of the eigenvalues.
-    """
-
-    values: np.ndarray
-    errors: np.ndarray
-    kinds: tuple[str, ...] = ()
-    vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
-    weighed: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
-    one: float = 1.0
-
-    @property
-    def noise(self) -> float:
-        """Magnitude below which an eigenvalue counts as zero."""
-        return REAL * max(self.one, float(abs(self.values).min(initial=np.inf)))
-
-    def diverged(self) -> int:
-        """Number of negative real eigenvalues."""
-        return int(((self.values.imag == 0) & (self.values.real < -self.noise)).sum())
-
-    def unstable(self, tolerance: float) -> int:
-        """Number of eigenvalues with a negative real part or a non-zero imaginary part."""
-        return int(((self.values.real < -tolerance) | (abs(self.values.imag) > tolerance)).sum())
 
 
 @dataclass(frozen=True)
@@ -127,8 +85,8 @@ class NonsymmetricSolver(PencilMatrices):
         """Allocate the matrices of the pencil once."""
         super().__init__(system)
         self.inverted: tuple[PETSc.Mat, Factors] | None = None
+        self.places: np.ndarray | None = None
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
-        self.floats = floats(system.scene)
         self._rows: sp.csr_matrix | None = None
 
     @property
@@ -164,8 +122,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
     def __init__(self, shared: NonsymmetricSolver) -> None:
         """Be the state that the matrices were just filled for."""
         super().__init__(shared)
-        self._turned, self._free, self._own = shared.turned, shared.free, slice(None)
-        self._floats = shared.floats
+        self.turned, self._free, self._own = shared.turned, shared.free, slice(None)
 
     def asymmetry(self) -> tuple[int, float]:
         """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
@@ -173,21 +130,15 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         transposed = matrix.copy()
         transposed.transpose()
         transposed.axpy(-1.0, matrix, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        begin, end = transposed.getOwnershipRange()
-        rows = [(i, *transposed.getRow(i)) for i in range(begin, end)]
         size = matrix.norm(PETSc.NormType.INFINITY)
-        mine = [
-            (i, j, v)
-            for i, columns, values in rows
-            for j, v in zip(columns, values, strict=True)
-            if abs(v) > NEGLIGIBLE * size
-        ]
-        entries = [e for part in self.system.comm.allgather(mine) for e in part]
-        used = sorted({i for i, _, _ in entries})
+        mine = local_rows(transposed).tocoo()
+        counted = abs(mine.data) > NEGLIGIBLE * size
+        part = mine.row[counted] + transposed.getOwnershipRange()[0], mine.col[counted], mine.data[counted].real
+        rows, columns, values = map(np.concatenate, zip(*self.system.comm.allgather(part), strict=True))
+        used = np.unique(rows)
         small = np.zeros((len(used), len(used)))
-        for i, j, v in entries:
-            small[used.index(i), used.index(j)] = v
-        return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if used else (0, 0.0)
+        small[np.searchsorted(used, rows), np.searchsorted(used, columns)] = values
+        return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if len(used) else (0, 0.0)
 
     def near(self, number: int, target: complex) -> Frequencies:
         """Return eigenvalues nearest to ``target``: ``number``, or more where they come.
@@ -233,40 +184,31 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
 
     def frequencies(self, values: np.ndarray, errors: np.ndarray, vectors: np.ndarray) -> Frequencies:
         """Frequencies from eigenvalues (k,) and vectors (n, k), complex, of the pencil in units of natural sizes."""
+        return named(self.system, [(self.unnamed(values, errors, vectors), self.turned)])[0]
+
+    def unnamed(
+        self, values: np.ndarray, errors: np.ndarray, vectors: np.ndarray, weighed: np.ndarray | None = None
+    ) -> Frequencies:
+        """Frequencies of ``values`` with their ``errors`` and ``vectors`` before their motions are named.
+
+        The ``weighed`` vectors are the products with the mass, in the same units, where they are known.
+        """
         units = self.system.scene.units
         if not units.ordinary:
-            values, vectors = values * units.omega2, vectors * self.sizes.array_r.real[:, None]
-        self._complete(values, vectors)
-        kinds = self._kinds(values, vectors)
+            values, vectors, weighed = values * units.omega2, vectors * self.sizes.array_r.real[:, None], None
+        if self._free:
+            vectors, weighed = vectors.astype(complex), None
+            self._complete(values, vectors)
         order = np.lexsort((values.imag, np.round(values.real / units.omega2, 9)))
-        vectors = vectors[:, order]
-        named = tuple(kinds[i] for i in order)
-        return Frequencies(values[order], errors[order], named, vectors, self.weighed(vectors), units.omega2)
-
-    def _kinds(self, values: np.ndarray, vectors: np.ndarray) -> list[str]:
-        """Names of the motions; a multiple eigenvalue has one for its invariant subspace.
-
-        Its vectors are any in its invariant subspace: bending about d1 in one state and about d2 in the next.
-        """
-        together, columns, owners = groups(values, ALIKE), [], []
-        for number, group in enumerate(together):
-            basis = vectors[:, group] if len(group) == 1 else self.orthonormal(vectors[:, group])
-            parts = [basis.real, basis.imag] if self.system.comm.size > 1 or basis.imag.any() else [basis.real]
-            columns += parts
-            owners += [number] * (len(parts) * len(group))
-        squares = mode_type.squares(self.system, self._turned, np.concatenate(columns, axis=1))
-        sums = np.zeros((len(together), squares.shape[1]))
-        np.add.at(sums, owners, squares)
-        kinds = [""] * len(values)
-        for group, square in zip(together, sums, strict=True):
-            rigid = self._floats and abs(values[group]).max() < STILL * abs(values).max()
-            for j in group:
-                kinds[j] = mode_type.RIGID if rigid else mode_type.name(square / max(square.sum(), TINY))
-        return kinds
+        if (np.diff(order) != 1).any():
+            values, errors, vectors = values[order], errors[order], vectors[:, order]
+            weighed = None if weighed is None else weighed[:, order]
+        weighed = self.weighed(vectors) if weighed is None else weighed
+        return Frequencies(values, errors, (), vectors, weighed, units.omega2)
 
     def motion(self, basis: np.ndarray) -> str:
         """Type of the motion spanned by a ``basis`` (n, k)."""
-        return mode_type.name(mode_type.shares(self.system, self._turned, [*basis.real.T, *basis.imag.T]))
+        return mode_type.name(mode_type.shares(self.system, self.turned, [*basis.real.T, *basis.imag.T]))
 
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
         """``M X`` for real or complex vectors (n, k), with any PETSc."""
@@ -389,23 +331,31 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             number //= 2
         raise ConvergenceError(f"SLEPc found no eigenvalue near {target:.6g}: use a richer discretisation.")
 
-    def basis(self, number: int, target: float) -> np.ndarray:
-        """Real basis (n, p) of the invariant subspace of about ``number`` eigenvalues nearest to ``target``, by SLEPc.
-
-        It is that for unknowns in units of their natural sizes, on one rank.  Raises :class:`ConvergenceError` as
-        :meth:`near` does.
-        """
-        with self.system.clock("stability"):
-            found = self._shifted(number, target / self.system.scene.units.omega2, *self.in_units())
-        return _real_basis(found)
-
     def eliminated(self, target: float) -> Elimination | None:
         """Factors of ``S - target M`` in units of natural sizes that solve for arrays; None where there are none."""
         if self.system.comm.size > 1 or compat.COMPLEX:
             return None
+        own, mass, kept = shared(self.matrix), shared(self.mass), self._shared.inverted
+        if own and mass and kept and isinstance(kept[1], Chain) and self.system.scene.units.ordinary:
+            return self._refactored(kept[1], own, mass, target)
         inverse = self._inverse(*self.in_units(), target / self.system.scene.units.omega2)
         factors = None if inverse is None else inverse.factors
         return factors.elimination if isinstance(factors, Chain) and not factors.resorted else None
+
+    def _refactored(self, factors: Chain, own: Shared, mass: Shared, target: float) -> Elimination | None:
+        """The same by factors that know the pattern, of values that need no matrix of PETSc's."""
+        if self._shared.places is None:
+            self._shared.places = places_in(own.pattern, mass.pattern)
+        values = own.values.copy()
+        values[self._shared.places] -= target * mass.values
+        try:
+            factors.elimination.factor(values)
+        except GaveUpError:
+            return None
+        factors.adopt(regular=factors.elimination.regular)
+        if not factors.regular:
+            raise ConvergenceError(_singular(target))
+        return factors.elimination
 
     def _inverse(self, matrix: PETSc.Mat, mass: PETSc.Mat, target: complex) -> Inverse | None:
         """Inverse of ``matrix - target mass`` along the rod, piece by piece on several ranks; None: SLEPc's own.
@@ -430,57 +380,6 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         if not factors.regular:
             raise ConvergenceError(_singular(target))
         return Inverse(factors)
-
-
-def product(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """``a^* b`` of the rows of all ranks of ``comm``: (k, m) for (n, k) and (n, m)."""
-    mine = a.conj().T @ b
-    return np.asarray(mine if comm.size == 1 else comm.allreduce(mine))
-
-
-def squares(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Products (k,) of each column of ``a`` (n, k) with the same of ``b``, real parts, of all ranks of ``comm``."""
-    mine = np.sum(a.conj() * b, axis=0).real
-    return np.asarray(mine if comm.size == 1 else comm.allreduce(mine))
-
-
-def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.ndarray:
-    """Basis of the span of complex vectors (n, k), orthonormal in the mass; ``weighed`` are their products with it.
-
-    The ranks of ``comm`` share the rows.
-    """
-    parts, turn = np.linalg.eigh(product(comm, vectors, weighed))
-    return np.asarray(vectors @ (turn / np.sqrt(np.maximum(parts, EPS * parts[-1]))))
-
-
-def _real_basis(found: list[_Pair]) -> np.ndarray:
-    """Real basis (n, p) of the span of the vectors of some pairs and of their conjugates, in the order of the pairs."""
-    columns: list[np.ndarray] = []
-    seen: list[complex] = []
-    for pair in found:
-        if abs(pair.value.imag) < REAL * abs(pair.value):
-            columns.append(pair.parts[0])
-        elif not any(abs(pair.value - v.conjugate()) < ALIKE * abs(v) for v in seen):
-            columns += pair.parts
-            seen.append(pair.value)
-    return np.stack(columns, axis=1)
-
-
-def groups(values: np.ndarray, tolerance: float = MULTIPLE) -> list[list[int]]:
-    """Places of eigenvalues in groups of equal ones, in the order of the first of each."""
-    out: list[list[int]] = []
-    least = NEAR_ZERO * abs(values).max(initial=0.0)
-    sizes = tolerance * np.maximum(abs(values), least)
-    if (abs(values[:, None] - values) < sizes[:, None]).sum() <= len(values):  # no two of them
-        return [[i] for i in range(len(values))]
-    for i, value in enumerate(values):
-        for group in out:
-            if abs(value - values[group[0]]) < tolerance * max(abs(value), least):
-                group.append(i)
-                break
-        else:
-            out.append([i])
-    return out
 
 
 def _singular(target: complex) -> str:

@@ -160,7 +160,7 @@ def test_what_was_used_where(folder: Path) -> None:
 @pytest.mark.parametrize("accuracy", [0.0, -1e-6, 1e-20, 1.0, float("nan"), float("inf")])
 def test_bad_accuracy(accuracy: float) -> None:
     scene = hemitropic_cases.scene()
-    with pytest.raises(InputError, match=r"is not attainable: ask for one between 1e-10 .round-off. and 0.1"):
+    with pytest.raises(InputError, match=r"is not attainable: ask for one between 1e-11 .round-off. and 0.1"):
         Plan(scene.span, accuracy=accuracy).check(scene)
 
 

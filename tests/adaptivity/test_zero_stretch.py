@@ -11,7 +11,7 @@ from classics import SUPPORTS, WIDE, column
 
 from forms.energy import bending_and_twist
 from rodfem import Discretization, Plan, trace
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 
 pytestmark = pytest.mark.alone
 

@@ -55,17 +55,29 @@ def test_colours(line: str, seen: str) -> None:
 
 def test_the_live_line_says_what_is_known_and_what_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setenv("COLUMNS", "160")
     scene, plan = hemitropic_cases.scene(span=(0.0, 0.2)), Plan(depth=1, error_bars=False)
     seen, plain = Terminal(), io.StringIO()
     for stream in (seen, plain):
         trace(scene, MESH, plan, Report(stream=stream))
     lines = re.findall(r"  \.\.\. [^\r]*", seen.getvalue())
-    assert lines and all(len(line) < 100 for line in lines)
-    assert "1 branches known, 1 branch points waiting" in lines[-1] or "2 branches known, 0 branch" in lines[-1]
-    assert re.match(r"  \.\.\. straight: \d+ points, index 0, load 0\.\d+; 1 branches known, 0 branch", lines[0])
+    assert lines and all(len(line) < 80 for line in lines)
+    assert "; 1 known, 1 waiting" in lines[-1] or "; 2 known, 0 waiting" in lines[-1]
+    assert re.match(r"  \.\.\. straight: lam = 0\.\d+, index 0, \d+ points; 1 known, 0 waiting", lines[0])
     assert "..." not in plain.getvalue().replace("+ ...", "") and "\033" not in plain.getvalue()
     assert re.sub(r"\r?(  \.\.\. [^\r]*)?\r\x1b\[K|\r\x1b\[K", "", seen.getvalue()) == plain.getvalue()
+    monkeypatch.setattr("rodfem.app.terminal.PAUSE", -1.0)  # a log of a long run has lines of progress that stay
+    log = io.StringIO()
+    trace(scene, MESH, plan, Report(stream=log))
+    assert [
+        line for line in log.getvalue().splitlines() if not line.startswith("  ... ")
+    ] == plain.getvalue().splitlines()
+    assert log.getvalue().count("\n  ... straight: lam = ") > 2
+    monkeypatch.setenv("COLUMNS", "60")  # a narrow window breaks lines between words
+    narrow = Terminal()
+    trace(scene, MESH, plan, Report(stream=narrow))
+    lines = re.sub(r"\r\x1b\[K", "", re.sub(r"  \.\.\. [^\r]*\r\x1b\[K", "", narrow.getvalue())).splitlines()
+    assert max(map(len, lines)) <= 60 and "".join(lines).split() == "".join(plain.getvalue().splitlines()).split()
 
 
 def test_most_branches() -> None:

@@ -125,7 +125,7 @@ def test_options_of_petsc_that_are_read() -> None:
     [
         (plot_diagram.main, "", "required"),
         (plot_diagram.main, "a b", "Unrecognized"),
-        (plot_diagram.main, "/nonexistent", "is no rodfem diagram"),
+        (plot_diagram.main, "/nonexistent", "There is no /nonexistent: give the diagram.json"),
         (plot_diagram.main, "/tmp", "is no rodfem diagram"),
         (plot_modes.main, "/nonexistent", "required"),
         (plot_modes.main, "/nonexistent --branch a --row x", "invalid int"),

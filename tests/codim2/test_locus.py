@@ -25,7 +25,7 @@ from shooting_solver import Problem, Rod
 from forms.energy import bending_and_twist
 from rodfem.codim2.locus import Locus, locus
 from rodfem.continuation.branch import Branch, SpecialPoint
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
@@ -33,6 +33,7 @@ from rodfem.diagram.trace import trace
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.output.plot_locus import _footer, draw_locus
+from rodfem.output.stable_region import stable_region
 from rodfem.problem.ends import clamped, free
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 
@@ -179,7 +180,19 @@ def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None
     assert found.ended == ("J1 = 0, its bound", "J1 = 0.004, its bound")
     for (P, J), mu in zip(found.values, found.omega2, strict=True):
         assert [P, mu] == pytest.approx(double(P, mu, J).tolist(), rel=3e-11)
+    assert found.lower == -1 and (found.index == [0, 2]).all() and not found.marks
+    region = stable_region(found.data(), [found.data()])
+    assert region and (region.end == 18.0).all() and region.edge[[0, -1]] == pytest.approx(found.values[[0, -1], 0])
     assert abs(found.values[-1, 0] - double(20.0, 120.0, 0.004)[0]) <= 10 * found.error[-1].max() <= 1e-9
+
+
+def test_a_load_that_does_not_change_has_no_turning_points() -> None:
+    """Beck's load is that of the weak plane, whatever the stiffness of the strong one; where both are one, of both."""
+    solver, branch = swept(demo_scene("follower", span=(15.0, 22.0)))
+    (flutter,) = specials(branch, "flutter")
+    found = locus(solver, flutter, "B2", ((0.0, 25.0), (1.0, 12.0)))
+    assert found.values[:, 0] == pytest.approx(double(20.0, 120.0, 0.0)[0], rel=1e-11)
+    assert not found.marks and (found.index == [0, 2]).all()
 
 
 def swept(scene: Scene) -> tuple[StaticSolver, Branch]:
@@ -216,9 +229,12 @@ def test_divergence(strong: float, which: int, monkeypatch: pytest.MonkeyPatch) 
     P, share = found.values.T
     assert abs(np.cos(np.sqrt(P)) * (share - 1) - share).max() < 1e-9
     assert set(found.ended) == {"P = 25, its bound", "share = -0.5, its bound"}
-    (turn,) = found.marks
-    assert turn.kind == "turns in share"
+    (turn,) = (mark for mark in found.marks if mark.kind == "turns in share")
     assert found.values[turn.row] == pytest.approx([pi**2, 0.5], abs=1e-6)
+    # another one is negative beyond the flutter load of a double zero, and one of the other plane beyond its own load
+    others = (P > 17.06957).astype(int) * (1 + which)
+    others += (strong > 1) & (P / strong > np.arccos(np.maximum(share / (share - 1), -1.0)) ** 2)
+    assert found.lower == -1 and found.index.tolist() == np.stack([others, others + 1 + which], axis=1).tolist()
     assert np.nanmax(found.error) < 1e-9
 
 

@@ -8,6 +8,7 @@ from golden_cases import cases, single_branches
 
 import rodfem.fem.system
 from rodfem import Discretization, Plan, trace
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
 from rodfem.fem.compiled_newton import CompiledNewton
@@ -42,6 +43,22 @@ def test_every_row_of_every_scene(name: str) -> None:
         a, b = (np.array([p.determinant for p in x.points]) for x in (branch, other))
         known = np.isfinite(a) & np.isfinite(b)
         assert np.median(abs(a - b)[known]) < SAME * max(1.0, abs(b[known]).max())
+
+
+@pytest.mark.parametrize(("load", "nearby"), [(3.601, True), (8.0, False)])
+def test_factors_of_a_state_nearby_serve_first(load: float, nearby: bool) -> None:
+    """The same equilibrium as by new factors; where the state is not nearby after all there are new ones at once."""
+    solver = StaticSolver(Solver(cases()["demo ruler"](), Discretization("auto", 4, 6)).equilibria.system)
+    compiled = solver.system.compiled
+    assert compiled is not None
+    x, _ = solver.first(3.6)
+    expected, by_new = solver.at_load(x, load)
+    made = compiled.newton.factorisations
+    solver.at_load(x, 3.6)
+    found, outcome = solver.at_load(x, load, nearby=True)
+    assert by_new.converged and outcome.converged
+    assert solver.system.norm(found - expected) < 1e-9
+    assert (compiled.newton.factorisations < made) == nearby
 
 
 def test_the_reference_uses_nothing_compiled(monkeypatch: pytest.MonkeyPatch) -> None:

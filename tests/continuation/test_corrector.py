@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rodfem.continuation.branch import Branch
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.corrector import NEAR
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.fem.newton import TOLERANCE, correct
 
 BENT = {"hemitropic": ("branch 1", 0.5), "cord": ("branch 2", 30.0), "ruler": ("branch 1", 8.0)}

@@ -38,10 +38,10 @@ from rodfem import (
 )
 from rodfem.app.terminal import Report
 from rodfem.codim2.locus import locus
+from rodfem.continuation.follow import _to_load
 from rodfem.continuation.index_chain import Row, breaks, chained, explain
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
-from rodfem.continuation.solvers import _to_load
-from rodfem.continuation.special_points import directions, leave
+from rodfem.continuation.switching import directions, leave
 from rodfem.diagram.equivalence import equivalent
 from rodfem.diagram.explorer import Explorer
 from rodfem.output.files import _branch_data

@@ -11,8 +11,8 @@ from numpy.polynomial import chebyshev
 from numpy.polynomial.polynomial import polyfromroots
 
 from rodfem.continuation.flutter import locate_flutter
+from rodfem.continuation.interpolant import NODES, left_out, real_root
 from rodfem.continuation.kinds import FOLD
-from rodfem.continuation.locate import NODES, left_out, real_root
 from rodfem.stability.cluster import Cluster, Measured
 
 pytestmark = pytest.mark.alone

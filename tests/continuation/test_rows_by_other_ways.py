@@ -10,10 +10,10 @@ import small_states
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.continuation import corrector, solvers
+from rodfem.continuation import branch_solver, corrector
 from rodfem.continuation.branch import Point
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.compiled_step import CompiledStep
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.trace import trace
@@ -108,7 +108,7 @@ def test_factors_of_an_exact_prediction_are_those_of_the_row(
         monkeypatch.setattr(CompiledStep, "__call__", lambda *arguments: None)
     ours, few = traced(name, "reduced"), made[0]
     monkeypatch.setattr(corrector, "SAME", -1.0)
-    monkeypatch.setattr(solvers, "SAME", -1.0)
+    monkeypatch.setattr(branch_solver, "SAME", -1.0)
     theirs = traced(name, "reduced")
     assert compiled or made[0] - few > few + 15
     for a, b in zip(ours.branches, theirs.branches, strict=True):

@@ -15,8 +15,8 @@ from shooting_solver import Problem, Rod
 
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, Point
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import BranchSolver, distance
 from rodfem.deflation.discrete_symmetries import mirrors
 from rodfem.deflation.group_orbit import Orbit
 from rodfem.deflation.guesses import turned_state
@@ -140,7 +140,7 @@ def test_ruler() -> None:
     assert (buckled.negative, buckled.zero, plane.negative) == (0, 0, 1)
     (mirror,) = search.mirrors
     image = mirror(found.follower.system, buckled.x)
-    assert distance(found.follower.system, image, buckled.x) > 0.5
+    assert found.follower.system.distance(image, buckled.x) > 0.5
     assert force(found.follower, image) < 1e-9
     assert search.nearest_known(image) < SAME
 
@@ -199,7 +199,7 @@ def test_mirrors_are_those_of_the_equations(formulation: str) -> None:
         x = turned_state(follower.system, follower.start(5.0), 1.0, [1, 2])
         for mirror in found:
             image = mirror(follower.system, x)
-            assert distance(follower.system, mirror(follower.system, image), x) < 1e-12
+            assert follower.system.distance(mirror(follower.system, image), x) < 1e-12
             if formulation == "reduced" or not mirror.reversal:  # a reversal may move the reaction to the other end
                 assert force(follower, image) == pytest.approx(force(follower, x), rel=1e-12)
 

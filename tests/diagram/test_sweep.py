@@ -83,6 +83,23 @@ def test_curves_go_on_where_they_cross(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(line.loads) >= len(branch.points) - 1
 
 
+def test_curves_meet_as_square_roots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between the rows beside a flutter load curves of pictures are those of Beck's column, not chords."""
+    branch, data, _ = swept(classics.partly_following(1.0, (0.0, 25.0)), monkeypatch)
+    (flutter,) = (s.point.load for s in specials(branch, "flutter"))
+    rows = {p.load for p in branch.points}
+    found = data["branches"][0]
+    between = [
+        (load, mu)
+        for curve in curves(found["columns"], found["special"])
+        for load, mu in zip(curve.loads, curve.roots**2, strict=True)
+        if load not in rows and abs(load - flutter) > 1e-6
+    ]
+    assert len(between) > 20
+    for load, mu in between:
+        assert abs(column(mu, load) - mu) < 5e-3 * abs(mu)
+
+
 @pytest.mark.alone
 def test_double_frequencies_have_one_name(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the rod bends alike in all planes the vectors of a frequency are any in a plane, its name is not."""

@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from small_states import scene
 
 from rodfem import Discretization, compat
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.solver import Solver
 
 EXACT = 1e-14

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rodfem import Discretization, End, Plan, Scene, SceneError, Solver, trace
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram import sweep
 from rodfem.stability.assessment import assess
 

@@ -12,7 +12,7 @@ import pytest
 from small_states import plain
 
 from forms.energy import bending_and_twist
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.fem.fields import Discretization
 from rodfem.fem.parameters import line
 from rodfem.fem.state import State

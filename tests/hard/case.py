@@ -88,7 +88,8 @@ def said(diagram: Diagram) -> tuple[str, ...]:
     unexplained = [str(u) for b in diagram for u in b.unexplained]
     ended = [b.ended for b in diagram if b.ended.startswith("no convergence")]
     notes = [note for note in diagram.notes if "eigenvalue" in note]
-    return (*diagram.warnings, *unexplained, *ended, *notes)
+    missed = [s.note for b in diagram for s in b.special if "not reached" in s.note]
+    return (*diagram.warnings, *unexplained, *ended, *notes, *missed)
 
 
 def singular(branch: Branch) -> list[SpecialPoint]:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hard.fuzz import comparison, worker
 from hard.fuzz.comparison import compared, of_a_sentence
-from hard.fuzz.oracle import scaling
+from hard.fuzz.oracle import Oracle, scaling
 from hard.fuzz.scenes import scene
 from hard.fuzz.summary import in_words
 
-from rodfem import Discretization, Solver
+from rodfem import Discretization, Plan, Solver, StepControl, trace
 from rodfem.errors import ConvergenceError, SceneError
 
 pytestmark = pytest.mark.alone
@@ -46,6 +46,29 @@ def test_dependent_constraints_have_no_index() -> None:
     solver = Solver(scene(1, 98), Discretization("pointwise", 7, 5, factors="petsc"))
     with pytest.raises((ConvergenceError, SceneError), match="depend on"):
         solver.equilibrium(0.0)
+
+
+def test_the_way_down_leaves_a_saddle() -> None:
+    """A ring with nearly round sections: a mode of mu = -2e-4 is passed slowly, and one mesh in two stayed there."""
+    found = []
+    for elements, degree in ((10, 6), (14, 5)):
+        solver = Solver(scene(6, 78), Discretization("pointwise", elements, degree))
+        found.append(solver.equilibrium(0.2))
+        assert Oracle(solver.equilibria.system).eigenvalues(found[-1].x).min() > -1e-9
+    assert found[0].energy == pytest.approx(found[1].energy, abs=1e-10)
+    assert [point.negative for point in found] == [0, 0]
+
+
+def test_forces_of_a_taut_rod_are_not_determined() -> None:
+    """Its ends are as far apart as it is long: by round-off some meshes converge to a force of 1e9, others refuse."""
+    taut, plan = scene(11, 221), Plan(depth=0, steps=StepControl(most=3), error_bars=False)
+    try:
+        said = trace(taut, Discretization("auto", 5, 6), plan).warnings
+    except SceneError as refusal:
+        said = [str(refusal)]
+    assert any("forces in the first state" in words or "depend on" in words for words in said)
+    slack = taut.varying("P", (0.01, 0.02))
+    assert not any("forces" in words for words in trace(slack, Discretization("auto", 5, 6), plan).warnings)
 
 
 def test_a_difference_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,9 +17,9 @@ import rodfem
 from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.app.many import many
 from rodfem.app.run import run
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.compiled_step import CompiledStep
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.solvers import BranchSolver
 from rodfem.diagram.diagram import Diagram
 from rodfem.errors import ConvergenceError
 from rodfem.stability.nonsymmetric import NonsymmetricPencil

@@ -11,13 +11,14 @@ import classics
 import numpy as np
 import pytest
 from classics import FORMULATIONS, column, explore, sweep
+from numpy.polynomial import Legendre, Polynomial
 from scipy.integrate import quad
-from scipy.linalg import expm
+from scipy.linalg import eigvals, expm
 from scipy.optimize import brentq, fsolve
 from scipy.special import ellipe, ellipk, jv
 from shooting_solver import Rod
 
-from rodfem import Discretization, End, Scene, Solver, clamped
+from rodfem import Discretization, End, Scene, Solver, clamped, free
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 pytestmark = pytest.mark.alone
@@ -440,6 +441,31 @@ def test_torque_on_a_cantilever(kind: str) -> None:
             misses = [abs(frequency(m) / (frequency(m + h) - frequency(m - h)) * 2 * h) for m in (mu, mu.conjugate())]
             assert min(misses) < 1e-7 * abs(mu)
         assert abs(values.imag).min() > 1e-3
+
+
+def nicolai(T: float) -> float:
+    """Discriminant of the two lowest frequencies under a tangential torque T, by Galerkin's method.
+
+    1.5 x'''' + T y''' = mu x and y'''' - T x''' = mu y, clamped, without moment and force at the free end.
+    """
+    s, weights = np.polynomial.legendre.leggauss(40)
+    s, weights = (s + 1) / 2, weights / 2
+    clamp = Polynomial([0.0, 0.0, 1.0])
+    basis = [clamp * Legendre.basis(i, domain=[0, 1]).convert(kind=Polynomial) for i in range(12)]
+    f = [np.array([g.deriv(d)(s) if d else g(s) for g in basis]) for d in range(4)]
+    stiffness, turning, mass = ((f[i] * weights) @ f[j].T for i, j in ((2, 2), (0, 3), (0, 0)))
+    A = np.block([[1.5 * stiffness, T * turning], [-T * turning, stiffness]])
+    mu = eigvals(A, np.kron(np.eye(2), mass))
+    first, second = mu[np.argsort(mu.real)][:2]
+    return float(((first - second) ** 2).real)
+
+
+def test_torque_on_an_oblong_cantilever(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nicolai: with two stiffnesses flutter begins at a torque of its own.  Twisting is 1e6 times as stiff."""
+    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
+    ends = clamped(), free(follower_moment=lambda c: (0.0, 0.0, c.P))
+    scene = column("oblong", ends, (0.5, 0.95), inertia=classics.BEAM, constants={"B2": 1.5, "C": 1e6})
+    assert sweep(scene).loads("flutter") == pytest.approx([root(nicolai, 0.5, 0.95)], rel=2e-7)
 
 
 def test_which_loads_have_a_potential() -> None:

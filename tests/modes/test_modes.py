@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from small_states import buckled, plain, scene
 from small_states import solver as solver_of
 
-from rodfem.continuation.solvers import StaticSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.solver import Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization

@@ -59,6 +59,8 @@ def test_a_code_of_several_kinds() -> None:
 def test_words_on_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     console.main(["explain", "branch", "point"])
     assert capsys.readouterr().out.startswith("branch point, BP: An equilibrium in which branches cross")
+    console.main(["explain", "LP", "index"])  # two entries
+    assert [line.split(",")[0] for line in capsys.readouterr().out.splitlines() if line[0] != " "] == ["fold", "index"]
     console.main(["explain"])
     listed = capsys.readouterr().out.splitlines()
     assert len(listed) == len(ENTRIES) and "fold, LP" in listed

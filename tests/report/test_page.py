@@ -141,7 +141,7 @@ def test_modules_stand_in_small_files() -> None:
 
 
 def test_unfit_folders_are_refused_in_a_sentence(results: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no rodfem diagram"):
+    with pytest.raises(InputError, match=r"There is no .*diagram.json: give .* the folder of one"):
         payload_of(tmp_path)
     (tmp_path / "diagram.json").write_bytes((results / "short" / "diagram.json").read_bytes())
     with pytest.raises(InputError, match=r"states\.h5"):

@@ -13,7 +13,7 @@ from hemitropic_cases import DEFAULT, explored, follower, user_points
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.solvers import BranchSolver
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.stability.symmetric import SymmetricSolver
 
 SMALL = (6, 3)

@@ -10,7 +10,8 @@ from mpi4py import MPI
 import rodfem.linalg.factorization
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
-from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricSolver
+from rodfem.stability.frequencies import Frequencies
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 pytestmark = [
     pytest.mark.short,

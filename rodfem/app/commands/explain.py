@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
+from shutil import get_terminal_size
 from textwrap import fill
 
 from rodfem.app.cli import Parser
-from rodfem.output.glossary import ENTRIES, explanation, title
+from rodfem.output.glossary import ENTRIES, explanation, is_entry, title
 
 WIDTH = 110
 """Columns of a paragraph."""
@@ -15,9 +17,12 @@ WIDTH = 110
 def main(words: Sequence[str]) -> None:
     """Explain it, or list all; raises :class:`~rodfem.errors.InputError` for a word that no entry has."""
     parser = Parser(prog="rodfem explain", description=__doc__)
-    parser.add_argument("word", nargs="*", help="as index, BP, 'branch point'; none lists all")
-    word = " ".join(parser.parse_args(words).word)
-    if not word:
+    parser.add_argument("word", nargs="*", help="as index, BP LP, branch point; none lists all")
+    given = parser.parse_args(words).word
+    if not given:
         print("\n".join(sorted(map(title, ENTRIES), key=str.lower)))
-    for name, text in explanation(word) if word else ():
-        print(fill(f"{name}: {text}", WIDTH, subsequent_indent="  "))
+    together = [" ".join(given)] if given else []
+    each = together if any(map(is_entry, together)) or not all(map(is_entry, given)) else given
+    for name, text in (entry for word in each for entry in explanation(word)):
+        width = min(WIDTH, get_terminal_size().columns) if sys.stdout.isatty() else WIDTH
+        print(fill(f"{name}: {text}", width, subsequent_indent="  "))

@@ -12,6 +12,12 @@ const plot = document.getElementById("diagram");
 const choice = document.getElementById("ordinate");
 const FREQUENCIES = { key: "frequencies", name: "frequencies" };
 const ordinates = [...(frequencies.ANY ? [FREQUENCIES] : []), ...data.ordinates];
+const NAMED = 12, MANY = 1500; // branches up to which each has its name in the plot; places that labels keep clear of
+const LETTER = 0.0095, TALL = 0.03, AWAY = 0.012; // half the size of a label, for each letter, and its distance: shares of the plot
+const LINE = 0.03; // half the height that a label keeps clear of others
+const SHORTEST = 0.07, LEAST = 0.7; // pieces without a label; room for a name, of what it takes
+const SHARES = [0.5, 0.6, 0.4, 0.7, 0.3, 0.8, 0.2]; // of a piece at which a label may stand
+const SIDES = [[0, 1], [0, -1], [1, 0], [-1, 0]]; // of a row at which it may
 let ordinate = ordinates[0];
 let cursor = null;
 
@@ -74,24 +80,34 @@ function points(branch, number, rows, marker) {
   };
 }
 
-// The index beside the middle of each piece that is long enough for it.
+// The index beside each piece that is long enough for it, and the name beside its branch, where they cover least.
 function labels() {
   const all = data.branches.flatMap((b) => b.load.map((x, i) => [x, heights(b)[i]])).filter((p) => p[1] !== null);
-  const range = (k) => Math.max(...all.map((p) => p[k])) - Math.min(...all.map((p) => p[k])) || 1;
-  const [width, height] = [range(0), range(1)];
-  const found = [];
-  for (const b of data.branches)
-    for (const piece of b.pieces) {
-      const [first, last] = piece.rows, y = heights(b), at = (i) => [b.load[i] / width, y[i] / height];
-      let length = 0;
-      for (let i = first; i < last; i++) length += Math.hypot(at(i + 1)[0] - at(i)[0], at(i + 1)[1] - at(i)[1]);
-      const row = Math.round((first + last) / 2), [x, v] = at(row);
-      if (length > 0.07 && y[row] !== null && !found.some((o) => Math.hypot(o.x - x, o.v - v) < 0.045)) found.push({ x, v, row, b, text: piece.index });
-    }
-  return found.map(({ b, row, text }) => ({
-    x: b.load[row], y: heights(b)[row], text: `<b>${escaped(text)}</b>`, showarrow: false, yshift: 11, xshift: 7,
-    font: { color: b.colour, size: 14 }, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0, captureevents: false,
+  const range = (k) => all.reduce((most, p) => Math.max(most, p[k]), -Infinity) - all.reduce((least, p) => Math.min(least, p[k]), Infinity) || 1;
+  const size = [range(0), range(1)], at = (b, row) => [b.load[row] / size[0], heights(b)[row] / size[1]];
+  const special = data.branches.flatMap((b) => b.special.filter((x) => x.drawn && heights(b)[x.row] !== null).map((x) => at(b, x.row)));
+  const taken = [...all.filter((_, i) => i % Math.ceil(all.length / MANY) === 0).map(([x, y]) => [x / size[0], y / size[1]]), ...special];
+  // Writes a text beside one of the rows of a branch, if there is as much room as is wanted.
+  const place = (b, rows, text, wide, wanted, style) => {
+    const room = ([x, v]) => taken.reduce((least, [p, q]) => Math.min(least, Math.max(Math.abs(p - x) / wide, Math.abs(q - v) / TALL)), 1);
+    const places = rows.filter((row) => heights(b)[row] !== null).flatMap((row) => SIDES.map(([right, up]) => {
+      const [x, v] = at(b, row), middle = [x + (wide + AWAY) * right, v + 0.04 * up];
+      return { row, right, up, middle, room: room(middle) };
+    }));
+    const best = places.reduce((one, other) => (one && one.room >= other.room ? one : other), null);
+    if (!best || best.room < wanted) return [];
+    taken.push(...[-0.8, 0, 0.8].flatMap((share) => [-1, 0, 1].map((side) => [best.middle[0] + share * wide, best.middle[1] + side * LINE])));
+    const { row, right, up } = best, xanchor = ["right", "center", "left"][right + 1];
+    return [{ x: b.load[row], y: heights(b)[row], text, showarrow: false, yshift: 13 * up, xshift: 7 * right, xanchor, font: { color: b.colour, ...style }, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0, captureevents: false }];
+  };
+  const rowsOf = (first, last) => SHARES.map((share) => Math.round(first + share * (last - first)));
+  const indices = data.branches.flatMap((b) => b.pieces.flatMap(({ rows: [first, last], index }) => {
+    let length = 0;
+    for (let i = first; i < last; i++) length += Math.hypot(...at(b, i + 1).map((x, k) => x - at(b, i)[k]));
+    return length > SHORTEST ? place(b, rowsOf(first, last), `<b>${escaped(index)}</b>`, LETTER * Math.max(index.length, 2), 0, { size: 14 }) : [];
   }));
+  const named = data.branches.length > NAMED ? [] : data.branches;
+  return [...indices, ...named.flatMap((b) => place(b, rowsOf(0, b.load.length - 1), escaped(b.name), LETTER * b.name.length, LEAST, { size: 12 }))];
 }
 
 function traces() {

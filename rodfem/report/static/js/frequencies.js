@@ -56,7 +56,7 @@ export function frame() {
   const wide = loads.reduce((a, b) => Math.max(a, b)) - loads.reduce((a, b) => Math.min(a, b)) || 1, all = each.flatMap((branch) => branch.ranges);
   const shapes = all.map(({ low, high, shade }) => ({ type: "rect", layer: "below", x0: low, x1: high, y0: 0, y1: 1, yref: "paper", line: { width: 0 }, fillcolor: shade }));
   const names = all.filter(({ low, high }) => high - low > ENOUGH * wide).map(({ low, high, words }) => ({ x: (low + high) / 2, y: 0.99, yref: "paper", yanchor: "top", text: `<b>${escaped(words.replace("range of ", ""))}</b>`, showarrow: false, font: { color: "#a34700" } }));
-  const loadsOf = each.flatMap(({ number, marks }) => marks.map(({ row, frequency }) => ({ x: data.branches[number].load[row], y: frequency, text: digits(data.branches[number].load[row], 6), showarrow: false, xanchor: "right", xshift: -10, bgcolor: "rgba(255,255,255,0.8)" })));
+  const loadsOf = each.flatMap(({ number, marks }) => marks.map(({ row, frequency }) => ({ x: data.branches[number].load[row], y: frequency, text: digits(data.branches[number].load[row], 6), showarrow: false, xanchor: "left", xshift: 8, yshift: -16 })));
   const how = layout(data.label, "frequency ω", { shapes, annotations: [...names, ...loadsOf], uirevision: "frequencies" });
   how.yaxis.range = [0, highest];
   return how;

@@ -103,7 +103,7 @@ function range() {
 export function drawPlane(plot) {
   const [first] = data.loci, here = { type: "line", x0: first.here, x1: first.here, y0: 0, y1: 1, yref: "paper", line: { color: "#8b95a1", width: 1.2, dash: "dot" } };
   const right = first.here > (Math.min(...first.x) + Math.max(...first.x)) / 2;
-  const note = { x: first.here, y: 1, yref: "paper", text: `this diagram: ${escaped(first.parameter)} = ${digits(first.here)}`, showarrow: false, xanchor: right ? "right" : "left", yanchor: "top", xshift: right ? -9 : 9, font: { color: "#66707c" } };
+  const note = { x: first.here, y: 0, yref: "paper", text: `this diagram: ${escaped(first.parameter)} = ${digits(first.here)}`, showarrow: false, xanchor: right ? "right" : "left", yanchor: "bottom", xshift: right ? -9 : 9, font: { color: "#66707c" } };
   const traces = [...data.loci.filter((locus) => locus.region).map(region), ...data.loci.map(curve), ...data.loci.filter((locus) => locus.marks.length).map(marks), ...line()];
   const how = layout(first.label, data.label, { shapes: [here], annotations: [...labels(range()), note], uirevision: "loci" });
   how.yaxis.range = range();

@@ -22,6 +22,7 @@ const LINES = [
 const LEAST = 1e-4; // difference of values up to which a quantity is drawn as constant
 const ROUND_OFF = 1e-13; // jumps, relative, below which a quantity is continuous by its discretisation
 const PAUSE = 120; // milliseconds
+const FINE = 8; // points of a curve for each interval between two that an element has
 let waiting = 0, last = 0;
 let tab = Object.keys(TABS)[0];
 
@@ -39,17 +40,35 @@ function range(b, first) {
   return b[key];
 }
 
+// Places in a row of `size` points that each element has, with the weights of the polynomial through them.
+function interpolation(size) {
+  const weights = Array.from({ length: size }, (_, i) => Array.from({ length: size }, (_, j) => (i === j ? 1 : 1 / (i - j))).reduce((a, b) => a * b));
+  return Array.from({ length: (size - 1) * FINE + 1 }, (_, n) => {
+    const at = n / FINE, parts = weights.map((weight, i) => weight / (at - i)), sum = parts.reduce((a, b) => a + b);
+    return n % FINE ? parts.map((part) => part / sum) : weights.map((_, i) => Number(i === at));
+  });
+}
+
+// Points of the curves of a state: those of its polynomials, element by element, or those that there are.
+function curves(all, size) {
+  let count = 0;
+  while (count * SIZE < all.length && !Number.isNaN(all[count * SIZE])) count++;
+  const at = (i, k) => all[i * SIZE + k];
+  if (size < 3) return (k) => Array.from({ length: count }, (_, i) => at(i, k));
+  const places = interpolation(size), starts = Array.from({ length: Math.floor(count / size) }, (_, e) => e * size);
+  return (k) => starts.flatMap((start) => places.map((parts) => parts.reduce((sum, part, i) => sum + part * at(start + i, k), 0)));
+}
+
 function redraw() {
   const b = branch(), { symbol, first, names } = TABS[tab];
   if (!b.profile) {
     error.textContent = "";
     return empty(plot, "The files of this run have no strains, forces and moments:\nrun the scene again.");
   }
-  const all = entry(b.profile, state.row), s = [];
-  for (let i = 0; i < all.length && !Number.isNaN(all[i]); i += SIZE) s.push(all[i]);
+  const column = curves(entry(b.profile, state.row), b.element[state.row]), s = column(0);
   const traces = names.map((name, i) => ({
     x: s,
-    y: s.map((_, n) => all[n * SIZE + first + i]),
+    y: column(first + i),
     name,
     mode: "lines",
     line: LINES[i],
@@ -58,7 +77,7 @@ function redraw() {
   const how = layout("arclength s", `${tab} ${symbol}`, { margin: { l: 46, r: 10, t: 6, b: 34 }, uirevision: tab });
   how.yaxis.range = range(b, first);
   const jump = b.jumps[symbol][state.row], size = Math.max(...how.yaxis.range.map(Math.abs));
-  error.textContent = jump > ROUND_OFF * size ? `error ≈ ${jump.toExponential(0)}` : "error not estimated";
+  error.textContent = jump > ROUND_OFF * size ? `error ≈ ${jump.toExponential(0)}` : "error: ~";
   return draw(plot, traces, how);
 }
 

@@ -5,7 +5,7 @@ import { data, digits, escaped, rough } from "report/data";
 import { branch, select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
 import { draw, layout } from "report/plotting";
-import { BLUE, VERMILION } from "report/styles";
+import { BLUE, DARK, DASHES, PLANAR, VERMILION } from "report/styles";
 
 const plot = document.getElementById("spectrum");
 let shown = null, cursor = null;
@@ -32,7 +32,7 @@ function range(b, all) {
 
 // The index of each piece against the load.
 function counts(b) {
-  const traces = b.pieces.map(({ rows: [first, last], index }) => {
+  const traces = b.pieces.map(({ rows: [first, last], index, kind }) => {
     const rows = Array.from({ length: last - first + 1 }, (_, i) => first + i), count = parseInt(index);
     return {
       x: rows.map((row) => b.load[row]),
@@ -41,7 +41,7 @@ function counts(b) {
       text: rows.map((row) => `row ${row}, ${escaped(data.symbol)} = ${digits(b.load[row])}<br>negative eigenvalues: ${escaped(index)}`),
       hovertemplate: "%{text}<extra></extra>",
       mode: "lines",
-      line: { color: count ? VERMILION : BLUE, width: 5 },
+      line: { color: count ? VERMILION : kind === PLANAR ? DARK : BLUE, width: 5, dash: kind === PLANAR ? DASHES[PLANAR] : "solid" },
     };
   });
   const how = layout(data.label, "index", { margin: { l: 60, r: 8, t: 4, b: 34 }, uirevision: b.name });

@@ -34,7 +34,9 @@ function values(b) {
   });
   const none = document.createElement("span");
   none.className = "quiet";
-  none.textContent = b.spectrum || b.omega2 || known.length ? "" : "Values of eigenvalues: run with --spectrum 4";
+  const options = ["--spectrum 4", `--at ${digits(b.load[state.row], 4)}`, "--modes 3"].map((option) => Object.assign(document.createElement("code"), { textContent: option }));
+  if (!(b.spectrum || b.omega2 || known.length)) none.append("Values: run with ", ...options.flatMap((option) => [option, " "]));
+  none.title = "The command of this report, with these options besides: see About";
   at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω²:" : "μ:", ...each] : [none]));
 }
 

@@ -1,0 +1,48 @@
+"""How many eigenvalues other than those that meet or vanish on a locus are unstable, under loads without a potential.
+
+The index of a symmetric tangent matrix comes with its factors (:mod:`rodfem.codim2.singular`).  Without symmetry
+stability is decided by the left-most eigenvalues ``omega^2``: those that are negative or complex count.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil
+
+NUMBER, SHIFT = 10, -10.0
+"""Eigenvalues that are sought besides those of the locus, and next to which one, over their natural size."""
+MET = 1e-4
+"""Imaginary part, relative to the eigenvalue, below which a pair has only just met: it has a square root there."""
+VANISHED = "another eigenvalue has vanished since the row before, seen from the start"
+UNSTABLE = "another frequency has become unstable, or stable, since the row before, seen from the start"
+"""What is said of a row where their number has changed, with a potential and without one."""
+
+
+def beside_cluster(pencil: NonsymmetricPencil, basis: np.ndarray) -> int:
+    """Unstable eigenvalues but for those of an invariant subspace: ``basis`` (n, size), orthonormal in the mass."""
+    found, size = _found(pencil, basis.shape[1]), basis.shape[1]
+    inside = (abs(pencil.product(basis, found.weighed)) ** 2).sum(axis=0)
+    return _unstable(found, np.argsort(inside / pencil.squares(found.vectors, found.weighed), kind="stable")[:-size])
+
+
+def beside_zero(pencil: NonsymmetricPencil, size: int) -> int:
+    """Unstable eigenvalues but for the ``size`` ones that are nearest to zero."""
+    found = _found(pencil, size)
+    return _unstable(found, np.argsort(abs(found.values), kind="stable")[size:])
+
+
+def unstable(pencil: NonsymmetricPencil) -> int:
+    """Unstable eigenvalues."""
+    found = _found(pencil, 0)
+    return _unstable(found, np.arange(len(found.values)))
+
+
+def _found(pencil: NonsymmetricPencil, size: int) -> Frequencies:
+    return pencil.near(NUMBER + size, SHIFT * pencil.system.scene.units.omega2)
+
+
+def _unstable(found: Frequencies, chosen: np.ndarray) -> int:
+    """Number of the ``chosen`` eigenvalues that are negative or complex."""
+    values, noise = found.values[chosen], found.noise
+    return int(((values.real < -noise) | (abs(values.imag) > np.maximum(noise, MET * abs(values)))).sum())

@@ -1,0 +1,105 @@
+"""Pseudo-arclength continuation: following a curve of equilibria with control of the step.
+
+The predictor extrapolates the last points of the branch by a polynomial in arclength (up to cubic); the corrector
+is Newton's method on the plane through the prediction orthogonal to the predicted direction (Keller 1977).  The
+step is chosen such that the corrector moves a prediction by a set distance: small where the curve bends, large
+where it does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from rodfem import compat
+from rodfem.continuation.branch import Point
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.prediction import predict
+from rodfem.continuation.step_control import StepControl
+
+ALIGNED = 0.9
+"""Least cosine between the direction of a prediction and the tangent at the corrected point."""
+PILE = 64
+"""Points of a branch after which the vectors that are not used any more are destroyed."""
+ON_BOUND = 1e-8
+"""Distance from a bound, in spans, below which a load counts as on it: branches of constant load may lie there."""
+
+
+def follow(
+    solver: BranchSolver,
+    points: list[Point],
+    steps: StepControl,
+    bounds: tuple[float, float],
+    reach: Callable[[Point], float] = lambda point: float("inf"),
+) -> Iterator[Point | str]:
+    """Continue a branch from its last point, yielding accepted points; a string at the end says why it ended.
+
+    ``bounds`` are the least and the greatest load; the branch ends exactly on them.  The caller appends (and may
+    insert) points in ``points``.  The direction is that of the last point's tangent.  ``reach`` bounds the step from a
+    point.  ``solver`` has the mesh, ``steps`` chooses the lengths of steps.
+    """
+    system, step = solver.system, steps.begin()
+    span = abs(system.scene.span[1] - system.scene.span[0])
+    low, high = (bound + sign * ON_BOUND * span for bound, sign in zip(bounds, (-1, 1), strict=True))
+    solver.corrector.restart()
+    while len(points) < steps.most:
+        last = points[-1]
+        if len(points) % PILE == 0:
+            compat.destroy_garbage(system.comm)
+        most = min(reach(last), steps.largest)
+        step = min(step, most)
+        known = points
+        if system.damping and last.tangent is not None:  # across a family, along which the path is not determined
+            known = [replace(last, tangent=solver.tangent(solver.row(last.tangent), at=last.x))]
+        made = solver.step(known, last.arclength + step, (low, high), 0.5 * step)
+        if not low <= made.load <= high or _on_bound(made.load, last, bounds, span):
+            bound = min(bounds, key=lambda bound: abs(bound - made.load))
+            point = _to_load(solver, points, made.load, bound, step, steps.smallest)
+            if point is not None:
+                yield point
+                yield "end of range"
+                return
+        elif made.outcome is not None and made.tangent is not None and made.aligned > ALIGNED:
+            place = last.arclength + made.length
+            point = solver.point(made.x, place, made.tangent, made.outcome, made.index, made.energy)
+            if steps.accepts(last, point):
+                yield point
+                order = 2 if system.damping else min(len(points) - 1, 3) + 1
+                step = steps.after(step, made.outcome.moved, order)
+                continue
+        step /= 2
+        if step < min(steps.smallest, 0.01 * most):
+            why = f"steps below {steps.smallest:g}"
+            if last.zero > (drifts := system.active_drifts(last.x)):
+                why += f"; {last.zero - drifts} eigenvalues vanish there to working accuracy"
+            yield f"no convergence at {system.scene.load} = {last.load:.6g} ({why})"
+            return
+    yield f"{steps.most} points reached"
+
+
+def _on_bound(load: float, last: Point, bounds: tuple[float, float], span: float) -> bool:
+    """Whether a step from ``last`` that changes the load ends on a bound of the range, but for round-off."""
+    near = min(abs(bound - load) for bound in bounds)
+    return near < ON_BOUND * span and abs(last.load - load) > 2 * ON_BOUND * span
+
+
+def _to_load(
+    solver: BranchSolver, points: list[Point], beyond: float, load: float, step: float, least: float
+) -> Point | None:
+    """Last point of a branch, exactly at ``load``; None where it is not accepted as any other point of the branch is.
+
+    ``beyond`` is the load that a whole step leads to.  The step to ``load`` is a part of it, of length ``least`` or
+    more, and Newton's method may go half as far from the prediction.
+    """
+    last, system = points[-1], solver.system
+    fraction = (load - last.load) / (beyond - last.load)
+    length = max(fraction * step, least)
+    x, direction = predict(points, last.arclength + fraction * step)
+    row = solver.row(direction)
+    x, outcome = solver.at_load(x, load, reach=0.5 * length)
+    if not outcome.converged:
+        return None
+    tangent = solver.load_tangent(x, beyond > last.load)
+    if not row.dot(tangent) > ALIGNED:
+        return None
+    return solver.point(x, last.arclength + system.distance(last.x, x), tangent, outcome)

@@ -1,0 +1,136 @@
+"""Eigenvalues ``mu = omega^2`` that were found at a state, the names of their motions, and groups of equal ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from mpi4py import MPI
+
+from rodfem.fem.system import System
+from rodfem.problem.local_state import floats
+from rodfem.stability import mode_type
+from rodfem.tolerances import TINY
+
+REAL = 1e-7
+"""An imaginary part smaller than this, relative to the eigenvalue, is round-off of a real one."""
+MULTIPLE = 1e-8
+"""Eigenvalues that differ by less than this, relative, are one that is multiple."""
+ALIKE = 1e-6
+"""Eigenvalues that differ by less than this, relative, have one name: where another is near the shift, digits go."""
+STILL = 1e-10
+"""Share of the farthest eigenvalue below which that of a rod that nothing holds is zero."""
+NEAR_ZERO = 1e-2
+"""Share of the farthest eigenvalue below which differences of others are relative to this share."""
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Frequencies:
+    """Eigenvalues ``values`` (k,), ``mu = omega^2``, in ascending order of real parts, and their ``errors`` (k,).
+
+    Errors are backward errors; of eigenvalues that were followed (:mod:`rodfem.stability.followed_pairs`) relative ones
+    of ``1 / (mu - shift)``.  ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors``
+    (n, k) are complex, or real where all eigenvalues are, with the n unknowns of this rank, ``weighed`` (n, k) are
+    their products with the mass, and ``one`` is the natural size of the eigenvalues.
+    """
+
+    values: np.ndarray
+    errors: np.ndarray
+    kinds: tuple[str, ...] = ()
+    vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    weighed: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    one: float = 1.0
+
+    @property
+    def noise(self) -> float:
+        """Magnitude below which an eigenvalue counts as zero."""
+        return REAL * max(self.one, float(abs(self.values).min(initial=np.inf)))
+
+    def diverged(self) -> int:
+        """Number of negative real eigenvalues."""
+        return int(((self.values.imag == 0) & (self.values.real < -self.noise)).sum())
+
+    def unstable(self, tolerance: float) -> int:
+        """Number of eigenvalues with a negative real part or a non-zero imaginary part."""
+        return int(((self.values.real < -tolerance) | (abs(self.values.imag) > tolerance)).sum())
+
+
+def named(
+    system: System, rows: Sequence[tuple[Frequencies, np.ndarray]], number: int | None = None
+) -> list[Frequencies]:
+    """Frequencies of some states, each given with the rotation field there, with the names of their motions.
+
+    Only the first ``number`` are named, where that is given.  A multiple eigenvalue has one name, that of its invariant
+    subspace: its vectors are any in it, bending about d1 in one state and about d2 in the next.
+    """
+    blocks: list[np.ndarray] = []
+    owners: list[np.ndarray] = []
+    counts: list[int] = []
+    together = [[g for g in groups(found.values, ALIKE) if number is None or g[0] < number] for found, _ in rows]
+    count = 0
+    for (found, _), of_row in zip(rows, together, strict=True):
+        sizes = [len(group) for group in of_row]
+        vectors = found.vectors[:, [j for group in of_row for j in group]]
+        owner = np.repeat(np.arange(count, count + len(of_row)), sizes)
+        first = 0
+        for group in of_row if max(sizes) > 1 else ():
+            here = slice(first, first := first + len(group))
+            vectors[:, here] = orthonormal(system.comm, vectors[:, here], found.weighed[:, group])
+        parts = [vectors.real, vectors.imag] if np.iscomplexobj(vectors) else [vectors]
+        blocks += parts
+        owners += [owner] * len(parts)
+        counts.append(len(parts) * len(owner))
+        count += len(of_row)
+    squares = np.zeros((count, 3))
+    turned = np.repeat(np.stack([field for _, field in rows]), counts, axis=0)
+    np.add.at(squares, np.concatenate(owners), mode_type.squares(system, turned, np.concatenate(blocks, axis=1)))
+    names = iter(mode_type.names(squares / np.maximum(squares.sum(axis=1), TINY)[:, None]))
+    out, floating = [], floats(system.scene)
+    for (found, _), of_row in zip(rows, together, strict=True):
+        kinds = [""] * len(found.values)
+        for group, name in zip(of_row, names, strict=False):
+            rigid = floating and abs(found.values[group]).max() < STILL * abs(found.values).max()
+            for j in group:
+                kinds[j] = mode_type.RIGID if rigid else name
+        out.append(replace(found, kinds=tuple(kinds)))
+    return out
+
+
+def groups(values: np.ndarray, tolerance: float = MULTIPLE) -> list[list[int]]:
+    """Places of eigenvalues in groups of equal ones, in the order of the first of each."""
+    out: list[list[int]] = []
+    least = NEAR_ZERO * abs(values).max(initial=0.0)
+    sizes = tolerance * np.maximum(abs(values), least)
+    if (abs(values[:, None] - values) < sizes[:, None]).sum() <= len(values):  # no two of them
+        return [[i] for i in range(len(values))]
+    for i, value in enumerate(values):
+        for group in out:
+            if abs(value - values[group[0]]) < tolerance * max(abs(value), least):
+                group.append(i)
+                break
+        else:
+            out.append([i])
+    return out
+
+
+def product(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """``a^* b`` of the rows of all ranks of ``comm``: (k, m) for (n, k) and (n, m)."""
+    mine = a.conj().T @ b
+    return np.asarray(mine if comm.size == 1 else comm.allreduce(mine))
+
+
+def squares(comm: MPI.Comm, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products (k,) of each column of ``a`` (n, k) with the same of ``b``, real parts, of all ranks of ``comm``."""
+    mine = np.sum(a.conj() * b, axis=0).real
+    return np.asarray(mine if comm.size == 1 else comm.allreduce(mine))
+
+
+def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.ndarray:
+    """Basis of the span of complex vectors (n, k), orthonormal in the mass; ``weighed`` are their products with it.
+
+    The ranks of ``comm`` share the rows.
+    """
+    parts, turn = np.linalg.eigh(product(comm, vectors, weighed))
+    return np.asarray(vectors @ (turn / np.sqrt(np.maximum(parts, EPS * parts[-1]))))

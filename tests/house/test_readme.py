@@ -1,0 +1,72 @@
+"""Every command of the README, as it stands and in its order: what a reader types, one after the other."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HOME = Path(__file__).parents[2]
+PROGRAMS = {".venv/bin/rodfem": [sys.executable, "-m", "rodfem"], "rodfem": [sys.executable, "-m", "rodfem"]}
+PROGRAMS |= {".venv/bin/python": [sys.executable], "mpirun": [shutil.which("mpirun.openmpi") or "mpirun"]}
+DEMO = "rodfem run demos/hemitropic.py"
+"""What ``make demo`` runs."""
+ELSEWHERE = ("make", "docker", "tools/image.py")
+"""What continuous integration runs, or a machine with containers."""
+PATIENCE = 300
+OURS = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_btl": "self,vader"}
+OURS |= {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg", "HWLOC_HIDE_ERRORS": "2", "OMPI_MCA_mpi_yield_when_idle": "1"}
+
+pytestmark = pytest.mark.alone
+
+
+def commands() -> list[str]:
+    """Lines of the README that are indented by four spaces and begin with a program, without their comments."""
+    text = re.sub(r"```.*?```", "", (HOME / "README.md").read_text(), flags=re.DOTALL)
+    lines = [line[4:].partition("  # ")[0].strip() for line in text.splitlines() if line.startswith("    ")]
+    return [DEMO, *(line for line in lines if line.partition(" ")[0] in PROGRAMS)]
+
+
+def own_rod() -> str:
+    """The rod of the README's first block."""
+    return re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), flags=re.DOTALL)[0]
+
+
+def test_all_commands_are_found() -> None:
+    text = re.sub(r"```.*?```", "", (HOME / "README.md").read_text(), flags=re.DOTALL)
+    lines = re.findall(r"^    ((?:\.venv/|rodfem|mpirun|make|docker|tools/).*)", text, flags=re.MULTILINE)
+    here = [line for line in lines if not line.startswith(ELSEWHERE)]
+    assert len(here) == len(commands()) - 1 > 20
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which a reader types them."""
+    folder = tmp_path_factory.mktemp("reader")
+    for name in ("demos", "docs"):
+        (folder / name).symlink_to(HOME / name)
+    return folder
+
+
+@pytest.mark.parametrize("command", commands())
+def test_a_command(command: str, place: Path) -> None:
+    """The last of those that go together need the results of the others before."""
+    words, answers = shlex.split(command), HOME / "docs" / "course" / "solutions" / "03_2.py"
+    (place / "mine.py").write_text(answers.read_text() if "check" in words else own_rod())
+    program = [part for word in words for part in PROGRAMS.get(word, [word])]
+    program += ["--no-figures"] if "run" in words and "--help" not in words else []
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("OMPI_", "PMIX"))}
+    before = {path for path in place.rglob("*") if path.is_file()}
+    done = subprocess.run(program, cwd=place, env=kept | OURS, capture_output=True, text=True, timeout=PATIENCE)
+    assert done.returncode == 0, done.stderr
+    written = {path.name for path in place.rglob("*") if path.is_file()} - {path.name for path in before}
+    if "--output" in words:
+        assert words[-1] in written
+    if "view" in words:
+        assert (place / words[-1] / "report.html").stat().st_size > 1e6

@@ -1,0 +1,65 @@
+"""Jumps along the rod that are inside of an element: found, and said, where no error bar holds."""
+
+from __future__ import annotations
+
+from math import cos, pi, sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from classics import SUPPORTS, column
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+from rodfem import Discretization, Plan, Scene, trace
+from rodfem.problem.jumps import jumps
+
+K, END = 500.0, 0.43
+
+
+def bed(x: Any, c: Any) -> Any:
+    """A foundation that ends."""
+    return 0.5 * K * ufl.conditional(ufl.lt(c.s, END), 1.0, 0.0) * (x.r[0] ** 2 + x.r[1] ** 2)
+
+
+def propagated(P: float, k: float, length: float) -> np.ndarray:
+    """Matrix that carries deflection, slope, moment and shear over a length, of a column of unit stiffness."""
+    A = np.array([[0, 1, 0, 0], [0, 0, 1, 0], [0, -P, 0, -1], [k, 0, 0, 0]])
+    return np.asarray(expm(A * length))
+
+
+def scene(**more: Any) -> Scene:
+    return column("bed", SUPPORTS["pinned-pinned"], (0.0, 40.0), potential=bed, constants={"B2": 9.0}, **more)
+
+
+def test_a_foundation_that_ends_inside_an_element() -> None:
+    """On 14 cubic elements, halved or not, all points of the quadrature are on the same side: 23.5588 +- 3e-7."""
+
+    def determinant(P: float) -> float:
+        T = propagated(P, 0.0, 1 - END) @ propagated(P, K, END)
+        return float(np.linalg.det(T[np.ix_([0, 2], [1, 3])]))
+
+    load = brentq(determinant, 23.0, 24.0, xtol=1e-10)
+    mesh, plan = Discretization(elements=14, degree=3), Plan(depth=0)
+    blind = trace(scene(), mesh, plan)
+    found = blind.special("branch point")[0]
+    assert abs(found.point.load - load) > 1e4 * found.error_estimate
+    assert any("potential along the rod jumps" in said and "breaks=(0.43,)" in said for said in blind.warnings)
+    seeing = trace(scene(breaks=(END,)), mesh, plan)
+    found = seeing.special("branch point")[0]
+    assert abs(found.point.load - load) < found.error_estimate + 1e-9 < 1e-4
+    assert seeing.warnings == []
+
+
+def test_where_functions_jump() -> None:
+    """Comparisons of the arclength, of a place's as of the constants', in any function; no kink is a jump."""
+    half = lambda s: ufl.conditional(ufl.And(ufl.gt(s, 1 / 3), ufl.le(s**2, 0.25)), 2.0, 1.0)  # noqa: E731
+    bent = lambda v, k, c: (1 + half(c.s)) * k[0] ** 2 + (1 + abs(c.s - 0.6)) * k[1] ** 2 + k[2] ** 2  # noqa: E731
+    push = lambda c: (0.0, 0.0, c.P * ufl.sign(c.s - 0.7))  # noqa: E731
+    spring = lambda x, c: ufl.conditional(ufl.lt(x.s, sqrt(0.5)), 1.0, 2.0) * x.r[0] ** 2  # noqa: E731
+    found = jumps(column("all", SUPPORTS["clamped-free"], (0.0, 1.0), energy=bent, distributed=push, potential=spring))
+    assert found["stored energy"] == pytest.approx([1 / 3, 0.5], abs=1e-11)
+    assert found["distributed force"] == pytest.approx([0.7], abs=1e-11)
+    assert found["potential along the rod"] == pytest.approx([cos(pi / 4)], abs=1e-11)
+    assert jumps(column("none", SUPPORTS["clamped-free"], (0.0, 1.0))) == {}

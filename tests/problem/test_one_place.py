@@ -1,0 +1,47 @@
+"""What acts at an end does not vary along the rod: ``c.s`` in it is refused, and still known elsewhere."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import ufl
+from classics import SUPPORTS, column
+
+from rodfem import Attachment, Discretization, End, Plan, clamped, free, integral, pinned, sliding, trace
+from rodfem.errors import SceneError
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        lambda: free(lambda c: (0.0, 0.0, -c.P * c.s)),
+        lambda: pinned(lambda c: (0.1 * c.s, 0.0, None)),
+        lambda: sliding(lambda c: (0.0, 0.0, None), lambda c: (ufl.cos(c.s), 0.0, 0.0, ufl.sin(c.s))),
+        lambda: End(moment=lambda c: (0.0, c.P * c.s, 0.0)),
+        lambda: End(follower_moment=lambda c: (0.0, c.P * c.s, 0.0)),
+        lambda: free(follower=lambda c: (0.0, 0.0, -c.P * c.s)),
+    ],
+)
+def test_an_end_has_no_arclength(end: Any) -> None:
+    """The reduced formulation took ``-c.P * c.s`` for a thrust that grows along the rod: 3.4766 for pi^2/4."""
+    with pytest.raises(SceneError, match=r"on the right end asks for the arclength|of the right end asks for the arc"):
+        column("end", (clamped(), end()), (0.0, 4.0))
+
+
+def test_an_integral_is_one_number() -> None:
+    with pytest.raises(SceneError, match="value of an integral constraint asks for the arclength"):
+        column(
+            "integral",
+            SUPPORTS["clamped-free"],
+            (0.0, 4.0),
+            constraints=(integral(lambda x, c: x.r[0], lambda c: c.s),),
+        )
+
+
+def test_an_attachment_knows_its_place() -> None:
+    """Twice ``c.s`` is one half-way along: Euler's load of half the length."""
+    half = Attachment(0.5, force=lambda c: (0.0, 0.0, -2 * c.P * c.s))
+    scene = column("half", (clamped(), free()), (0.0, 12.0), attachments=(half,))
+    found = trace(scene, Discretization(elements=4, degree=6), Plan(depth=0)).special("branch point")[0]
+    assert abs(found.point.load - 9.869604401089358) < found.error_estimate
