@@ -70,7 +70,7 @@ FAULTS = {
         "tests/output/test_smooth.py",
     ),
     # location
-    "location-is-blunt": Fault(f"{CONTINUATION}locate.py", "SHARP = 1e-11", "SHARP = 1e-4", f"{HEMITROPIC} {GOLDEN}"),
+    "location-is-blunt": Fault(f"{CONTINUATION}locate.py", "SHARP = 1e-11", "SHARP = 1e-4", LOCATE),
     "location-at-another-zero": Fault(
         f"{CONTINUATION}interpolant.py", "np.argmin(abs(real - guess))", "np.argmax(abs(real - guess))", LOCATE
     ),
