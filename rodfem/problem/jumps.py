@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
-from scipy.optimize import brentq
 from ufl.classes import GE, GT, LE, LT
 from ufl.corealg.traversal import unique_pre_traversal
 
 from forms.rotation import rotation
 from rodfem.problem.local_state import STATES, place
 from rodfem.problem.roles import functions_of
+from rodfem.roots import zero_between
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def _changes(expressions: list[Any], s: _Arclength, scene: Scene) -> Iterator[fl
         values = [difference(x) for x in grid]
         for (x, y), (f, g) in zip(pairwise(grid), pairwise(values), strict=True):
             if f * g < 0:
-                at = float(brentq(difference, x, y, xtol=NEGLIGIBLE * scene.length))
+                at = zero_between(difference, x, y, NEGLIGIBLE * scene.length)
                 if a + SAME_PLACE * scene.length < at < b - SAME_PLACE * scene.length:
                     yield round(at, 14 - int(np.ceil(np.log10(scene.length))))
 
