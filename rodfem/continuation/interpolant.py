@@ -17,6 +17,8 @@ NODES, FEWER = 6, 4
 """Number of nodes of an interpolant, and of one over a very short piece, unless it is even."""
 STEADILY = 4.0
 """Safety factor on the decay of the coefficients of an even series: it is told by one ratio, and changes."""
+DECAY, NOISY = 100.0, 5.0
+"""Ratio of a coefficient to the last but one after it above which a series decays; safety factor where it does not."""
 REAL = 1e-6
 """Imaginary part below which a zero of an interpolant, in half lengths of its interval, is real."""
 
@@ -88,7 +90,7 @@ def interpolate(
         return None
     load_at = float(chebyshev.chebval(root, load)) + loads[0]
     slope_at = float(chebyshev.chebval(root, slope))
-    left = zero_uncertainty(f, root)
+    left = zero_uncertainty(f, root, in_doubt(f) if test_function == "mu" else None)
     # the last coefficients bound what the series leaves out; a shift of the zero moves the load by its slope
     tail = left_out(load) + abs(slope_at) * left
     floor = round_off(load_at, one)
@@ -119,10 +121,20 @@ def real_root(series: np.ndarray, guess: float, low: float = -inf, high: float =
     return float(real[np.argmin(abs(real - guess))]) if len(real) else None
 
 
-def zero_uncertainty(series: np.ndarray, root: float) -> float:
-    """How far the last coefficient of a Chebyshev series can move its ``root``."""
+def zero_uncertainty(series: np.ndarray, root: float, doubt: float | None = None) -> float:
+    """How far a ``doubt`` about values of a Chebyshev series, by default its last coefficient, can move its root."""
     slope = float(chebyshev.chebval(root, chebyshev.chebder(series)))
-    return float(abs(series[-1] / slope)) if slope else float("inf")
+    return float((abs(series[-1]) if doubt is None else doubt) / abs(slope)) if slope else float("inf")
+
+
+def in_doubt(series: np.ndarray) -> float:
+    """Size of what a Chebyshev series leaves open of values that are measured: its last coefficient, or their noise.
+
+    Coefficients that do not decay are those of noise, of which the last one is small as often as not: an eigenvalue
+    near zero along a whole branch moves by much of itself with what Newton's method leaves of a state.
+    """
+    before, between, last = abs(series[-3:])
+    return float(last if DECAY * last < before else NOISY * max(before, between, last))
 
 
 def left_out(series: np.ndarray) -> float:

@@ -11,7 +11,7 @@ from numpy.polynomial import chebyshev
 from numpy.polynomial.polynomial import polyfromroots
 
 from rodfem.continuation.flutter import locate_flutter
-from rodfem.continuation.interpolant import NODES, left_out, real_root
+from rodfem.continuation.interpolant import NODES, in_doubt, left_out, real_root
 from rodfem.continuation.kinds import FOLD
 from rodfem.stability.cluster import Cluster, Measured
 
@@ -52,6 +52,23 @@ def test_what_a_series_leaves_out(f: Callable[[np.ndarray], np.ndarray], half: f
     series = chebyshev.chebfit(t, f(half * t) - f(half * t[:1]), NODES - 1)
     error = abs(chebyshev.chebval(fine, series) + f(half * t[:1]) - f(half * fine)).max()
     assert error <= left_out(series) + 1e-15 <= 1e3 * error + 1e-14
+
+
+@pytest.mark.parametrize("noise", [1e-6, 1e-3, 0.05])
+def test_noise_is_no_sharp_zero(noise: float) -> None:
+    """The last coefficient alone was less than the error in two cases of three, than a third of it in one of three."""
+    t, errors = chebyshev.chebpts1(NODES), np.random.default_rng(1).normal(size=(1000, NODES)) * noise
+    ratios = []
+    for values in (t - 0.1) * (1.0 + 0.2 * (t - 0.1)) + errors:
+        series = chebyshev.chebfit(t, values, NODES - 1)
+        root = real_root(series, 0.1)
+        assert root is not None
+        slope = abs(chebyshev.chebval(root, chebyshev.chebder(series)))
+        ratios.append(abs(root - 0.1) * slope / in_doubt(series))
+    assert np.mean(np.array(ratios) > 1.0) < 0.04
+    assert np.mean(np.array(ratios) > 3.0) < 0.02
+    smooth = chebyshev.chebfit(t, np.expm1(0.05 * (t - 0.1)), NODES - 1)
+    assert in_doubt(smooth) == abs(smooth[-1])
 
 
 def test_a_fold_is_located_to_round_off() -> None:
