@@ -70,7 +70,7 @@ FAULTS = {
         "tests/output/test_smooth.py",
     ),
     # location
-    "location-is-blunt": Fault(f"{CONTINUATION}locate.py", "SHARP = 1e-11", "SHARP = 1e-4", LOCATE),
+    "location-is-blunt": Fault(f"{CONTINUATION}interpolant.py", "SHARP = 1e-11", "SHARP = 1e-4", LOCATE),
     "location-at-another-zero": Fault(
         f"{CONTINUATION}interpolant.py", "np.argmin(abs(real - guess))", "np.argmax(abs(real - guess))", LOCATE
     ),
@@ -244,8 +244,8 @@ FAULTS = {
         ERRORS,
     ),
     "ordinate-of-a-load-that-is-exact": Fault(
-        "rodfem/diagram/sweep.py",
-        "s.ordinate_error += self._moved(richer, x, s)",
+        "rodfem/diagram/sweep_errors.py",
+        "s.ordinate_error += self._moved(x, s)",
         "pass",
         "tests/literature/test_follower.py",
     ),

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from rodfem.continuation.eigenvalue_curves import assignment
-from rodfem.continuation.interpolant import real_root, zero_uncertainty
-from rodfem.continuation.locate import SHARP
+from rodfem.continuation.interpolant import SHARP, in_doubt, real_root, zero_uncertainty
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured
 from rodfem.stability.frequencies import MULTIPLE, Frequencies, groups
@@ -82,7 +81,7 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
             continue
         load += half * root
         cluster = Cluster(cluster.basis, float(chebyshev.chebval(root, chebyshev.chebfit(t, mean, 5))))
-        uncertainty = max(half * zero_uncertainty(series, root), ROUND_OFF * abs(load))
+        uncertainty = max(half * zero_uncertainty(series, root, in_doubt(series)), ROUND_OFF * abs(load))
         if abs(root) < 1 and uncertainty < best.uncertainty:
             best = Located(load, uncertainty, cluster)
         elif best.uncertainty < ENOUGH * abs(load):

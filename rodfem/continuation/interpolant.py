@@ -15,6 +15,8 @@ from rodfem.tolerances import round_off
 
 NODES, FEWER = 6, 4
 """Number of nodes of an interpolant, and of one over a very short piece, unless it is even."""
+SHARP = 1e-11
+"""Uncertainty of a load on the given mesh below which the interpolation is not refined further."""
 STEADILY = 4.0
 """Safety factor on the decay of the coefficients of an even series: it is told by one ratio, and changes."""
 DECAY, NOISY = 100.0, 5.0

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.interpolant import FEWER, NODES, Located, Sample, interpolate
+from rodfem.continuation.interpolant import FEWER, NODES, SHARP, Located, Sample, interpolate
 from rodfem.continuation.prediction import hermite
 from rodfem.continuation.states_between import Curve, solve_at, solve_beside
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
@@ -30,8 +30,6 @@ WINDOW = 0.02
 """Half length, in the metric, of the interval of a branch on which a special point is interpolated."""
 NARROW = 0.25
 """Part of it that will do for an eigenvalue, whose zero is known to a tenth of it: a wider one is always narrowed."""
-SHARP = 1e-11
-"""Uncertainty of a load on the given mesh below which the interpolation is not refined further."""
 NEAREST = 1e-3
 """Distance of a fold from the branch point that its branch leaves, within which eigenvalues are zero to round-off."""
 PART = 0.02

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.frequency_rows import SHIFT
-from rodfem.diagram.sweep import at_load
+from rodfem.diagram.held import at_load
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System

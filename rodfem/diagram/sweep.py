@@ -1,73 +1,39 @@
 """Frequencies against the load for a rod under loads without a potential, and the loads at which they become unstable.
 
 At each load the equilibrium is solved for, and the left-most eigenvalues ``mu = omega^2`` of its pencil are found
-(:mod:`rodfem.diagram.frequency_rows`).  Where two real ones collide and become a complex pair, the square of half
-their difference ``D = ((mu1 - mu2)/2)^2`` passes through zero.  Unlike the eigenvalues, which have a square root
-there, ``D`` is a smooth function of the load: the discriminant of the pencil projected on the two of them.  Its zero
-is found by Chebyshev interpolation, at spectral accuracy and without ever solving at the double eigenvalue.  Where a
-single real one passes through zero the rod diverges: the eigenvalue itself is smooth there.
+(:mod:`rodfem.diagram.frequency_rows`).  Between them critical loads are located
+(:mod:`rodfem.diagram.critical_loads`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import bound, halved
-from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.eigenvalue_curves import Curves
-from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
-from rodfem.continuation.interpolant import real_root, zero_uncertainty
-from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER, Kind
-from rodfem.continuation.locate import SHARP
+from rodfem.continuation.kinds import END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.prediction import ROWS, predict_at_load
 from rodfem.continuation.static_solver import StaticSolver
+from rodfem.diagram.critical_loads import CriticalLoads
 from rodfem.diagram.first_name import name_of_first
-from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, SHIFT, FrequencyRows, Row, leftmost
+from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, FrequencyRows, Row, leftmost
+from rodfem.diagram.held import at_load, require_held
 from rodfem.diagram.plan import Plan
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.diagram.sweep_errors import SweepErrors
+from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without
-from rodfem.fem.transfer import Transfer, richer_system
-from rodfem.roots import zero_between
-from rodfem.stability.cluster import Cluster, Measured, as_vectors, cluster_of, measure
-from rodfem.stability.frequencies import MULTIPLE, REAL, Frequencies
+from rodfem.stability.cluster import Cluster
+from rodfem.stability.frequencies import REAL, Frequencies
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.stability.rank import require_independent_constraints
-from rodfem.tolerances import ROUND_OFF, round_off, unit
+from rodfem.tolerances import unit
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
-SAME = 1e-9
-"""Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
-DRIVEN = 1e-7
-"""Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
-MEAN = 10.0
-"""Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
-BESIDE = 1e-4
-"""Relative distance of the first two loads of a secant method."""
-AROUND = 1e-4
-"""Half width, relative to a divergence load, over which its eigenvalues are sampled."""
-TOGETHER = 1e-6
-"""Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
-
-
-@dataclass
-class _Event:
-    """A special point between two loads, before it is evaluated: by how much ``change`` of the unstable eigenvalues."""
-
-    kind: Kind
-    load: float
-    change: int
-    uncertainty: float
-    omega2: float
-    cluster: Cluster | None = None
-    note: str = ""
 
 
 class Sweep:
@@ -85,6 +51,7 @@ class Sweep:
         self.number = plan.spectrum or FREQUENCIES
         self.rows = FrequencyRows(self.eigensolver, self.number)
         self.curves = Curves(solver.system.comm)
+        self.critical = CriticalLoads(solver, self.eigensolver, self.number, observer.warn)
         self.last: Row | None = None
         self.latest: list[Point] = []
         self.branches: list[Branch] = []
@@ -212,17 +179,10 @@ class Sweep:
         point.curve = self.curves.numbers(found, keep=on_the_way)[: self.number]
 
     def _between(self, branch: Branch, first: Row, second: Row) -> None:
-        """Locate what happens between two loads: eigenvalues that collide, and real ones that pass through zero."""
-        (a, before), (b, after) = ((row.point, row.found) for row in (first, second))
+        """Take what happens between two loads into a branch: critical loads, in their order, each with its state."""
+        a, b = first.point, second.point
         with self.solver.system.clock.scope("location"):
-            events = self._collisions(a, b, before, after)
-            real = [f.diverged() for f in (before, after)]
-            for event in events:
-                if event.omega2 < 0:  # both are unstable before and after, but fewer are real
-                    real[0] -= event.change
-                    event.change = 0
-            events += self._diverging(a, b, *real)
-        events.sort(key=lambda e: abs(e.load - a.load))
+            events = self.critical.between(first, second)
         negative = a.negative
         for i, event in enumerate(events):
             point = a if event.load == a.load else b if event.load == b.load else None
@@ -246,212 +206,16 @@ class Sweep:
         for i in np.argsort(distance, kind="stable")[: cluster.size]:
             point.motion[i] = name
 
-    def _collisions(self, a: Point, b: Point, before: Frequencies, after: Frequencies) -> list[_Event]:
-        """Collisions between two loads, those at one and the same load together."""
-        events: list[_Event] = []
-        for here, there, found, others, sign in ((b, a, after, before, 1), (a, b, before, after, -1)):
-            for chosen in unmatched(found, others.values):
-                try:
-                    event = self._collision(here, there, found, chosen)
-                except ConvergenceError as trouble:
-                    value = found.values[chosen[0]]
-                    self.observer.warn(
-                        f"The eigenvalue {value:.6g} at {self._load} = {here.load:.6g} was not "
-                        f"followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
-                    )
-                    continue
-                if event is None:
-                    continue
-                event.change *= sign
-                same = [e for e in events if abs(e.load - event.load) < SAME * unit(e.load, one=self.units.load)]
-                if same:
-                    same[0].change += event.change
-                    if abs(event.omega2) < abs(same[0].omega2):
-                        same[0].omega2, same[0].cluster = event.omega2, event.cluster
-                else:
-                    events.append(event)
-        return events
-
-    def _collision(self, here: Point, there: Point, found: Frequencies, chosen: list[int]) -> _Event | None:
-        """Collision, on the way ``there``, of eigenvalues complex ``here``; None where they are complex there too."""
-        cluster = cluster_of(self.eigensolver.at(here.x), found, chosen)
-        other = measure(self.eigensolver.at(there.x), cluster)
-        scale = abs(other.values).max()
-        if abs(other.discriminant) < (MULTIPLE * scale) ** 2:
-            side = ">" if here.load > there.load else "<"
-            note = (
-                f"the frequencies are double at {self._load} = {there.load:.6g} and become complex at once: "
-                f"flutter at every {self._load} {side} {there.load:.6g} next to it"
-            )
-            floor = round_off(there.load, self.units.load)
-            return _Event(FLUTTER, there.load, cluster.size, floor, other.cluster.mean, other.cluster, note)
-        if other.discriminant < 0:
-            return None
-        located = locate_flutter(
-            self._measured(self.solver, self.eigensolver, here.x),
-            cluster,
-            (there.load + here.load) / 2,
-            abs(here.load - there.load),
-        )
-        return _Event(FLUTTER, located.load, cluster.size, located.uncertainty, located.cluster.mean, located.cluster)
-
-    @staticmethod
-    def _measured(solver: StaticSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> AtLoad:
-        """How a cluster is measured at a load: at the equilibrium near ``guess``."""
-
-        def measured(load: float, cluster: Cluster) -> Measured:
-            return measure(eigensolver.at(at_load(solver, guess, load)), cluster)
-
-        return measured
-
-    def _diverging(self, a: Point, b: Point, first: int, last: int) -> list[_Event]:
-        """Locate the loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``."""
-        loads = sorted((a.load, b.load))
-        found: list[float] = []
-        for number in range(min(first, last), max(first, last)):
-
-            def mu(load: float, number: int = number) -> float:
-                return self._real(a.x, load)[number]
-
-            try:
-                found.append(zero_between(mu, loads[0], loads[1], ROUND_OFF * max(map(abs, loads))))
-            except (ConvergenceError, IndexError, ValueError):
-                self.observer.warn(
-                    f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
-                )
-                return []
-        together: list[list[float]] = []
-        for load in sorted(found):
-            if together and abs(load - together[-1][0]) < TOGETHER * unit(load, one=self.units.load):
-                together[-1].append(load)
-            else:
-                together.append([load])
-        return [self._divergence(a.x, group, 1 if last > first else -1) for group in together]
-
-    def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> _Event:
-        """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
-        pencil, number = self.eigensolver.at(at_load(self.solver, guess, loads[0])), len(loads)
-        found = pencil.near(number + 2, SHIFT * self.units.omega2)
-        cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
-        load, uncertainty = _zero_between(
-            self._measured(self.solver, self.eigensolver, guess), cluster, loads[0], self.units.load
-        )
-        uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
-        return _Event(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
-
-    def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
-        """Real eigenvalues at a load near the origin, in ascending order."""
-        pencil = self.eigensolver.at(at_load(self.solver, guess, load))
-        before = NONE if self.last is None else self.last.found
-        return sorted(v.real for v in leftmost(pencil, self.number, before).values if v.imag == 0)
-
     def _special(self, branch: Branch, special: SpecialPoint) -> None:
         branch.special.append(special)
         self.observer.special(branch, special)
 
     def _error_bars(self, branch: Branch) -> None:
+        """Estimate the errors of all special points, and say where an accuracy that was asked for is not reached."""
+        asked = self.plan.accuracy
         with self.solver.system.clock.scope("error bars"):
-            system = self.solver.system
-            richer = StaticSolver(richer_system(system))
-            eigensolver, transfer = NonsymmetricSolver(richer.system), Transfer(system, richer.system)
-            rho, inside = halved(system.fields.discretization.degree), Inside(self.solver.shape, richer.shape)
+            errors = SweepErrors(self.solver, self.span)
             for s in branch.special:
-                point = s.point
-                guess = transfer(point.x, state=True)
-                x = at_load(richer, guess, point.load)
-                left = round_off(point.ordinate, self.units.ordinate)
-                again, about = richer.shape.ordinate(x), inside.change(point.x, x)
-                s.ordinate_error = s.error_estimate = bound(point.ordinate, again, left, rho, about)
-                if s.kind == FLUTTER:
-                    load, left, mu = self._richer_flutter(richer, eigensolver, transfer, guess, s)
-                    s.error_estimate = max(bound(point.load, load, left, rho), s.located_to)
-                    relative = left / max(abs(load), abs(self.span[1] - self.span[0]) * ROUND_OFF)
-                    s.omega2_error = bound(s.omega2, mu, MEAN * abs(mu) * max(relative, ROUND_OFF), rho)
-                elif s.kind == DIVERGENCE:
-                    measured, cluster = self._measured(richer, eigensolver, x), self._transferred(transfer, s)
-                    load = _zero(measured, cluster, point.load, self.units.load)
-                    s.error_estimate = max(bound(point.load, load, s.located_to, rho), s.located_to)
-                if s.kind in (FLUTTER, DIVERGENCE):
-                    s.ordinate_error += self._moved(richer, x, s)
-                asked = self.plan.accuracy
+                errors.estimate(s)
                 if asked is not None and s.error_estimate > asked * unit(s.point.load, one=self.units.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"
-
-    def _moved(self, richer: StaticSolver, x: PETSc.Vec, s: SpecialPoint) -> float:
-        """Change of the ordinate, on the ``richer`` mesh, over the error bar of a special point's load, where ``x`` is.
-
-        Of a bar wider than half of the range no more is asked for.
-        """
-        low, high = sorted(self.span)
-        step = min(s.error_estimate, (high - low) / 2) * (1.0 if s.point.load < (low + high) / 2 else -1.0)
-        beside = at_load(richer, x, s.point.load + step)
-        return abs(richer.shape.ordinate(beside) - richer.shape.ordinate(x))
-
-    def _transferred(self, transfer: Transfer, s: SpecialPoint) -> Cluster:
-        """The cluster of a special point on another discretisation."""
-        assert s.cluster is not None
-        columns = [transfer(v, state=False).array_r.real for v in as_vectors(self.solver.system, s.cluster.basis)]
-        return Cluster(np.stack(columns, axis=1), s.cluster.mean)
-
-    def _richer_flutter(
-        self,
-        richer: StaticSolver,
-        eigensolver: NonsymmetricSolver,
-        transfer: Transfer,
-        guess: PETSc.Vec,
-        s: SpecialPoint,
-    ) -> tuple[float, float, float]:
-        """Flutter load on the richer discretisation, its uncertainty there, and the double eigenvalue."""
-        measured, cluster = self._measured(richer, eigensolver, guess), self._transferred(transfer, s)
-        if s.note:  # double there, whatever the mesh
-            return s.point.load, 0.0, measured(s.point.load, cluster).cluster.mean
-        width = max(0.05 * abs(s.point.load), 0.01 * abs(self.span[1] - self.span[0]))
-        located = locate_flutter(measured, cluster, s.point.load, width)
-        return located.load, located.uncertainty, located.cluster.mean
-
-
-def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
-    """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none.
-
-    Raises :class:`SceneError` where a load drives a motion that nothing holds.
-    """
-    x, outcome = solver.at_load(guess, load)
-    if not outcome.converged:
-        raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
-    require_held(solver, x)
-    return x
-
-
-def require_held(solver: StaticSolver, x: PETSc.Vec) -> None:
-    """Raise :class:`SceneError` where the loads of a state ``x`` drive a motion that nothing holds."""
-    system = solver.system
-    if system.drift(x) > DRIVEN * system.stiffness_scale:
-        raise SceneError(
-            f"There is no equilibrium at {system.scene.load} = {system.scalar(x):g}: nothing holds the rod against the "
-            f"{' or the '.join(system.free_motions(x))}, and the loads drive it; hold that motion at one end, or "
-            "balance the loads."
-        )
-
-
-def _zero_between(measured: AtLoad, cluster: Cluster, load: float, one: float) -> tuple[float, float]:
-    """Load near ``load`` at which the mean of a cluster vanishes, and what round-off of the mean leaves open.
-
-    The mean is sampled over :data:`AROUND`, and interpolated: its scatter shows in the last coefficients.
-    """
-    half = AROUND * unit(load, one=one)
-    nodes = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
-    series = chebyshev.chebfit(nodes, [measured(load + half * t, cluster).cluster.mean for t in nodes.tolist()], 5)
-    root = real_root(series, 0.0)
-    if root is None:
-        raise ConvergenceError(f"The divergence load near {load:.6g} could not be located: use a smaller range.")
-    return load + half * root, half * zero_uncertainty(series, root)
-
-
-def _zero(measured: AtLoad, cluster: Cluster, load: float, one: float) -> float:
-    """Load near ``load``, of natural size ``one``, at which the mean of the eigenvalues of a cluster vanishes."""
-    from scipy.optimize import newton  # slow to load
-
-    def mean(load: float) -> float:
-        return measured(load, cluster).cluster.mean
-
-    return float(newton(mean, load, x1=load + BESIDE * unit(load, one=one), tol=round_off(load, one)))

@@ -1,0 +1,202 @@
+"""Loads of flutter and of divergence between two loads of a sweep.
+
+Where two real ones collide and become a complex pair, the square of half
+their difference ``D = ((mu1 - mu2)/2)^2`` passes through zero.  Unlike the eigenvalues, which have a square root
+there, ``D`` is a smooth function of the load: the discriminant of the pencil projected on the two of them.  Its zero
+is found by Chebyshev interpolation, at spectral accuracy and without ever solving at the double eigenvalue.  Where a
+single real one passes through zero the rod diverges: the eigenvalue itself is smooth there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from petsc4py import PETSc
+
+from rodfem.continuation.branch import Point
+from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
+from rodfem.continuation.interpolant import SHARP, in_doubt, real_root, zero_uncertainty
+from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, Kind
+from rodfem.continuation.static_solver import StaticSolver
+from rodfem.diagram.frequency_rows import SHIFT, Row, leftmost
+from rodfem.diagram.held import at_load
+from rodfem.errors import ConvergenceError
+from rodfem.roots import zero_between
+from rodfem.stability.cluster import Cluster, Measured, cluster_of, measure
+from rodfem.stability.frequencies import MULTIPLE, Frequencies
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.tolerances import ROUND_OFF, round_off, unit
+
+SAME = 1e-9
+"""Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
+BESIDE = 1e-4
+"""Relative distance of the first two loads of a secant method."""
+AROUND = 1e-4
+"""Half width, relative to a divergence load, over which its eigenvalues are sampled."""
+TOGETHER = 1e-6
+"""Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
+
+
+@dataclass
+class Critical:
+    """A critical load, before its state is evaluated; ``change`` is that of the number of unstable eigenvalues."""
+
+    kind: Kind
+    load: float
+    change: int
+    uncertainty: float
+    omega2: float
+    cluster: Cluster | None = None
+    note: str = ""
+
+
+class CriticalLoads:
+    """Locates the critical loads between two loads of a sweep."""
+
+    def __init__(
+        self, solver: StaticSolver, eigensolver: NonsymmetricSolver, number: int, warn: Callable[[str], None]
+    ) -> None:
+        """Know what computes equilibria and eigenvalues, the ``number`` of these, and whom to ``warn``."""
+        self.solver, self.eigensolver, self.number, self.warn = solver, eigensolver, number, warn
+        self.units, self._load = solver.system.scene.units, solver.system.scene.load
+
+    def between(self, first: Row, second: Row) -> list[Critical]:
+        """Critical loads between two rows, in their order: eigenvalues that collide, real ones that pass through zero.
+
+        Where the rows are neighbours, ``first`` comes before ``second`` in the sweep.
+        """
+        (a, before), (b, after) = ((row.point, row.found) for row in (first, second))
+        self._before = after
+        events = self._collisions(a, b, before, after)
+        real = [f.diverged() for f in (before, after)]
+        for event in events:
+            if event.omega2 < 0:  # both are unstable before and after, but fewer are real
+                real[0] -= event.change
+                event.change = 0
+        events += self._diverging(a, b, *real)
+        return sorted(events, key=lambda e: abs(e.load - a.load))
+
+    def _collisions(self, a: Point, b: Point, before: Frequencies, after: Frequencies) -> list[Critical]:
+        """Collisions between two loads, those at one and the same load together."""
+        events: list[Critical] = []
+        for here, there, found, others, sign in ((b, a, after, before, 1), (a, b, before, after, -1)):
+            for chosen in unmatched(found, others.values):
+                try:
+                    event = self._collision(here, there, found, chosen)
+                except ConvergenceError as trouble:
+                    value = found.values[chosen[0]]
+                    self.warn(
+                        f"The eigenvalue {value:.6g} at {self._load} = {here.load:.6g} was not "
+                        f"followed to where it becomes complex ({str(trouble).rstrip('.')}): use a smaller range."
+                    )
+                    continue
+                if event is None:
+                    continue
+                event.change *= sign
+                same = [e for e in events if abs(e.load - event.load) < SAME * unit(e.load, one=self.units.load)]
+                if same:
+                    same[0].change += event.change
+                    if abs(event.omega2) < abs(same[0].omega2):
+                        same[0].omega2, same[0].cluster = event.omega2, event.cluster
+                else:
+                    events.append(event)
+        return events
+
+    def _collision(self, here: Point, there: Point, found: Frequencies, chosen: list[int]) -> Critical | None:
+        """Collision, on the way ``there``, of eigenvalues complex ``here``; None where they are complex there too."""
+        cluster = cluster_of(self.eigensolver.at(here.x), found, chosen)
+        other = measure(self.eigensolver.at(there.x), cluster)
+        scale = abs(other.values).max()
+        if abs(other.discriminant) < (MULTIPLE * scale) ** 2:
+            side = ">" if here.load > there.load else "<"
+            note = (
+                f"the frequencies are double at {self._load} = {there.load:.6g} and become complex at once: "
+                f"flutter at every {self._load} {side} {there.load:.6g} next to it"
+            )
+            floor = round_off(there.load, self.units.load)
+            return Critical(FLUTTER, there.load, cluster.size, floor, other.cluster.mean, other.cluster, note)
+        if other.discriminant < 0:
+            return None
+        located = locate_flutter(
+            measured_at(self.solver, self.eigensolver, here.x),
+            cluster,
+            (there.load + here.load) / 2,
+            abs(here.load - there.load),
+        )
+        return Critical(FLUTTER, located.load, cluster.size, located.uncertainty, located.cluster.mean, located.cluster)
+
+    def _diverging(self, a: Point, b: Point, first: int, last: int) -> list[Critical]:
+        """Locate the loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``."""
+        loads = sorted((a.load, b.load))
+        found: list[float] = []
+        for number in range(min(first, last), max(first, last)):
+
+            def mu(load: float, number: int = number) -> float:
+                return self._real(a.x, load)[number]
+
+            try:
+                found.append(zero_between(mu, loads[0], loads[1], ROUND_OFF * max(map(abs, loads))))
+            except (ConvergenceError, IndexError, ValueError):
+                self.warn(
+                    f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
+                )
+                return []
+        together: list[list[float]] = []
+        for load in sorted(found):
+            if together and abs(load - together[-1][0]) < TOGETHER * unit(load, one=self.units.load):
+                together[-1].append(load)
+            else:
+                together.append([load])
+        return [self._divergence(a.x, group, 1 if last > first else -1) for group in together]
+
+    def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> Critical:
+        """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
+        pencil, number = self.eigensolver.at(at_load(self.solver, guess, loads[0])), len(loads)
+        found = pencil.near(number + 2, SHIFT * self.units.omega2)
+        cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
+        load, uncertainty = zero_of_the_mean_between(
+            measured_at(self.solver, self.eigensolver, guess), cluster, loads[0], self.units.load
+        )
+        uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
+        return Critical(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
+
+    def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
+        """Real eigenvalues at a load near the origin, in ascending order."""
+        pencil = self.eigensolver.at(at_load(self.solver, guess, load))
+        return sorted(v.real for v in leftmost(pencil, self.number, self._before).values if v.imag == 0)
+
+
+def measured_at(solver: StaticSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> AtLoad:
+    """How a ``solver`` and its ``eigensolver`` measure a cluster at a load: at the equilibrium near ``guess``."""
+
+    def measured(load: float, cluster: Cluster) -> Measured:
+        return measure(eigensolver.at(at_load(solver, guess, load)), cluster)
+
+    return measured
+
+
+def zero_of_the_mean_between(measured: AtLoad, cluster: Cluster, load: float, one: float) -> tuple[float, float]:
+    """Load near ``load`` at which the mean of a cluster vanishes, and what round-off of the mean leaves open.
+
+    The mean is sampled over :data:`AROUND`, and interpolated: its scatter shows in the last coefficients.
+    """
+    half = AROUND * unit(load, one=one)
+    nodes = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
+    series = chebyshev.chebfit(nodes, [measured(load + half * t, cluster).cluster.mean for t in nodes.tolist()], 5)
+    root = real_root(series, 0.0)
+    if root is None:
+        raise ConvergenceError(f"The divergence load near {load:.6g} could not be located: use a smaller range.")
+    return load + half * root, half * zero_uncertainty(series, root, in_doubt(series))
+
+
+def zero_of_the_mean(measured: AtLoad, cluster: Cluster, load: float, one: float) -> float:
+    """Load near ``load``, of natural size ``one``, at which the mean of the eigenvalues of a cluster vanishes."""
+    from scipy.optimize import newton  # slow to load
+
+    def mean(load: float) -> float:
+        return measured(load, cluster).cluster.mean
+
+    return float(newton(mean, load, x1=load + BESIDE * unit(load, one=one), tol=round_off(load, one)))

@@ -1,0 +1,34 @@
+"""Equilibria of a sweep: at a load, from one nearby, if nothing moves that nothing holds."""
+
+from __future__ import annotations
+
+from petsc4py import PETSc
+
+from rodfem.continuation.static_solver import StaticSolver
+from rodfem.errors import ConvergenceError, SceneError
+
+DRIVEN = 1e-7
+"""Drift, over the rod's lowest bending eigenvalue, above which loads drive a motion that nothing holds."""
+
+
+def at_load(solver: StaticSolver, guess: PETSc.Vec, load: float) -> PETSc.Vec:
+    """Equilibrium at a load from a ``guess`` nearby; raises :class:`ConvergenceError` where there is none.
+
+    Raises :class:`SceneError` where a load drives a motion that nothing holds.
+    """
+    x, outcome = solver.at_load(guess, load)
+    if not outcome.converged:
+        raise ConvergenceError(f"No equilibrium at {solver.system.scene.load} = {load:g}: use a smaller range.")
+    require_held(solver, x)
+    return x
+
+
+def require_held(solver: StaticSolver, x: PETSc.Vec) -> None:
+    """Raise :class:`SceneError` where the loads of a state ``x`` drive a motion that nothing holds."""
+    system = solver.system
+    if system.drift(x) > DRIVEN * system.stiffness_scale:
+        raise SceneError(
+            f"There is no equilibrium at {system.scene.load} = {system.scalar(x):g}: nothing holds the rod against the "
+            f"{' or the '.join(system.free_motions(x))}, and the loads drive it; hold that motion at one end, or "
+            "balance the loads."
+        )

@@ -1,0 +1,82 @@
+"""Error bars of the special points of a sweep, by a richer discretisation."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.adaptivity.error_estimate import bound, halved
+from rodfem.adaptivity.inside import Inside
+from rodfem.continuation.branch import SpecialPoint
+from rodfem.continuation.flutter import locate_flutter
+from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
+from rodfem.continuation.static_solver import StaticSolver
+from rodfem.diagram.critical_loads import measured_at, zero_of_the_mean
+from rodfem.diagram.held import at_load
+from rodfem.fem.transfer import Transfer, richer_system
+from rodfem.stability.cluster import Cluster, as_vectors
+from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.tolerances import ROUND_OFF, round_off
+
+MEAN = 10.0
+"""Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
+
+
+class SweepErrors:
+    """Estimates the errors of special points on the mesh of one solver, over a ``span`` of loads."""
+
+    def __init__(self, solver: StaticSolver, span: tuple[float, float]) -> None:
+        """Make the richer discretisation."""
+        self.solver, self.span, self.units = solver, span, solver.system.scene.units
+        system = solver.system
+        self.richer = StaticSolver(richer_system(system))
+        self.eigensolver = NonsymmetricSolver(self.richer.system)
+        self.transfer = Transfer(system, self.richer.system)
+        self.rho = halved(system.fields.discretization.degree)
+        self.inside = Inside(solver.shape, self.richer.shape)
+
+    def estimate(self, s: SpecialPoint) -> None:
+        """Set the error bars of a special point: of its load, its ordinate, and of the eigenvalues that collide."""
+        point, richer, rho = s.point, self.richer, self.rho
+        guess = self.transfer(point.x, state=True)
+        x = at_load(richer, guess, point.load)
+        left = round_off(point.ordinate, self.units.ordinate)
+        again, about = richer.shape.ordinate(x), self.inside.change(point.x, x)
+        s.ordinate_error = s.error_estimate = bound(point.ordinate, again, left, rho, about)
+        if s.kind == FLUTTER:
+            load, left, mu = self._flutter(guess, s)
+            s.error_estimate = max(bound(point.load, load, left, rho), s.located_to)
+            relative = left / max(abs(load), abs(self.span[1] - self.span[0]) * ROUND_OFF)
+            s.omega2_error = bound(s.omega2, mu, MEAN * abs(mu) * max(relative, ROUND_OFF), rho)
+        elif s.kind == DIVERGENCE:
+            measured = measured_at(richer, self.eigensolver, x)
+            load = zero_of_the_mean(measured, self._transferred(s), point.load, self.units.load)
+            s.error_estimate = max(bound(point.load, load, s.located_to, rho), s.located_to)
+        if s.kind in (FLUTTER, DIVERGENCE):
+            s.ordinate_error += self._moved(x, s)
+
+    def _moved(self, x: PETSc.Vec, s: SpecialPoint) -> float:
+        """Change of the ordinate, on the richer mesh, over the error bar of a special point's load, where ``x`` is.
+
+        Of a bar wider than half of the range no more is asked for.
+        """
+        low, high = sorted(self.span)
+        step = min(s.error_estimate, (high - low) / 2) * (1.0 if s.point.load < (low + high) / 2 else -1.0)
+        beside = at_load(self.richer, x, s.point.load + step)
+        return abs(self.richer.shape.ordinate(beside) - self.richer.shape.ordinate(x))
+
+    def _transferred(self, s: SpecialPoint) -> Cluster:
+        """The cluster of a special point on the richer discretisation."""
+        assert s.cluster is not None
+        vectors = as_vectors(self.solver.system, s.cluster.basis)
+        columns = [self.transfer(v, state=False).array_r.real for v in vectors]
+        return Cluster(np.stack(columns, axis=1), s.cluster.mean)
+
+    def _flutter(self, guess: PETSc.Vec, s: SpecialPoint) -> tuple[float, float, float]:
+        """Flutter load on the richer discretisation, its uncertainty there, and the double eigenvalue."""
+        measured, cluster = measured_at(self.richer, self.eigensolver, guess), self._transferred(s)
+        if s.note:  # double there, whatever the mesh
+            return s.point.load, 0.0, measured(s.point.load, cluster).cluster.mean
+        width = max(0.05 * abs(s.point.load), 0.01 * abs(self.span[1] - self.span[0]))
+        located = locate_flutter(measured, cluster, s.point.load, width)
+        return located.load, located.uncertainty, located.cluster.mean
