@@ -42,7 +42,19 @@ TOGETHER = 1e-6
 
 @dataclass
 class Critical:
-    """A critical load, before its state is evaluated; ``change`` is that of the number of unstable eigenvalues."""
+    """A critical load, before its state is evaluated.
+
+    Attributes
+    ----------
+    kind, load, uncertainty
+        Flutter or divergence, the load, and what its location leaves open.
+    change
+        Change of the number of unstable eigenvalues.
+    omega2, cluster
+        The eigenvalue there, and the cluster of those that collide or pass through zero.
+    note
+        Remark in words.
+    """
 
     kind: Kind
     load: float
@@ -59,7 +71,10 @@ class CriticalLoads:
     def __init__(
         self, solver: StaticSolver, eigensolver: NonsymmetricSolver, number: int, warn: Callable[[str], None]
     ) -> None:
-        """Know what computes equilibria and eigenvalues, the ``number`` of these, and whom to ``warn``."""
+        """Know what computes equilibria (``solver``) and their ``number`` of eigenvalues, and whom to ``warn``.
+
+        The ``eigensolver`` is that of the pencils.
+        """
         self.solver, self.eigensolver, self.number, self.warn = solver, eigensolver, number, warn
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
 
@@ -157,7 +172,7 @@ class CriticalLoads:
         pencil, number = self.eigensolver.at(at_load(self.solver, guess, loads[0])), len(loads)
         found = pencil.near(number + 2, SHIFT * self.units.omega2)
         cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
-        load, uncertainty = zero_of_the_mean_between(
+        load, uncertainty = interpolated_zero_of_the_mean(
             measured_at(self.solver, self.eigensolver, guess), cluster, loads[0], self.units.load
         )
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
@@ -178,10 +193,11 @@ def measured_at(solver: StaticSolver, eigensolver: NonsymmetricSolver, guess: PE
     return measured
 
 
-def zero_of_the_mean_between(measured: AtLoad, cluster: Cluster, load: float, one: float) -> tuple[float, float]:
-    """Load near ``load`` at which the mean of a cluster vanishes, and what round-off of the mean leaves open.
+def interpolated_zero_of_the_mean(measured: AtLoad, cluster: Cluster, load: float, one: float) -> tuple[float, float]:
+    """Load near ``load`` at which the mean of a ``cluster`` vanishes, and what round-off of the mean leaves open.
 
-    The mean is sampled over :data:`AROUND`, and interpolated: its scatter shows in the last coefficients.
+    The ``measured`` mean, at loads of natural size ``one``, is sampled over :data:`AROUND`, and interpolated: its
+    scatter shows in the last coefficients.  Raises :class:`ConvergenceError` where it does not vanish near by.
     """
     half = AROUND * unit(load, one=one)
     nodes = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
@@ -193,7 +209,7 @@ def zero_of_the_mean_between(measured: AtLoad, cluster: Cluster, load: float, on
 
 
 def zero_of_the_mean(measured: AtLoad, cluster: Cluster, load: float, one: float) -> float:
-    """Load near ``load``, of natural size ``one``, at which the mean of the eigenvalues of a cluster vanishes."""
+    """Load near ``load``, of natural size ``one``, at which the ``measured`` mean of a ``cluster`` vanishes."""
     from scipy.optimize import newton  # slow to load
 
     def mean(load: float) -> float:
