@@ -56,7 +56,7 @@ def test_what_a_series_leaves_out(f: Callable[[np.ndarray], np.ndarray], half: f
 
 @pytest.mark.parametrize("noise", [1e-6, 1e-3, 0.05])
 def test_noise_is_no_sharp_zero(noise: float) -> None:
-    """The last coefficient alone was less than the error in two cases of three, than a third of it in one of three."""
+    """The last coefficient alone is less than the error in two cases of three, than a third of it in one of three."""
     t, errors = chebyshev.chebpts1(NODES), np.random.default_rng(1).normal(size=(1000, NODES)) * noise
     ratios = []
     for values in (t - 0.1) * (1.0 + 0.2 * (t - 0.1)) + errors:
