@@ -155,7 +155,8 @@ class AccuracyControl:
         row = solver.axis if self._at_bound(point) else solver.row(point.tangent)
         point.error = correct(system, point.x, row, reach=POLISHED).error
         point.load, point.ordinate = system.scalar(point.x), solver.shape.ordinate(point.x)
-        point.energy, point.stretch = solver.energy(point.x), solver.shape.stretch(point.x)
+        point.energy, point.potential, point.conjugate = solver.energies(point.x)
+        point.stretch = solver.shape.stretch(point.x)
 
     def _at_bound(self, point: Point) -> bool:
         return min(abs(point.load - bound) for bound in self.bounds) < SAME_LOAD * abs(self.bounds[1] - self.bounds[0])

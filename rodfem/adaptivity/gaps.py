@@ -94,7 +94,7 @@ def sharpen(solver: BranchSolver, special: SpecialPoint, found: Unfolded) -> Non
         x=found.x,
         load=found.load,
         ordinate=solver.shape.ordinate(found.x),
-        energy=solver.energy(found.x),
+        **solver.energies(found.x)._asdict(),
         stretch=solver.shape.stretch(found.x),
     )
 

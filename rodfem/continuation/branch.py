@@ -37,6 +37,9 @@ class Point:
     energy
         Stored energy ``int W ds`` alone, without the potential of the loads: of two equilibria at one load the one with
         less of it need not be the one with less total energy.
+    potential, conjugate
+        Total potential energy ``V`` of rod, loads, springs and foundations, and ``-dV/dload``, what the load does work
+        on: :class:`~rodfem.fem.state.Energies`.  nan where a load has no potential.
     stretch
         Smallest stretch ``v3`` along the rod.
     negative, zero
@@ -91,6 +94,8 @@ class Point:
     undecided: int = 0
     soft: list[SoftMode] = field(default_factory=list)
     nearest: float = 0.0
+    potential: float = float("nan")
+    conjugate: float = float("nan")
 
     @property
     def index(self) -> int:

@@ -17,6 +17,7 @@ from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.newton import TOLERANCE, NewtonResult, correct, limits
+from rodfem.fem.state import Energies
 from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors
 from rodfem.stability.inertia import Index, Inertia
@@ -44,8 +45,8 @@ class Step:
         Cosine between the direction of the prediction and the tangent.
     length
         Distance from the last row, in the metric.
-    energy
-        Stored energy, where it is known.
+    energies
+        Its energies, where they are known.
     """
 
     x: PETSc.Vec
@@ -55,7 +56,7 @@ class Step:
     index: Index | None = None
     aligned: float = -1.0
     length: float = 0.0
-    energy: float | None = None
+    energies: Energies | None = None
 
 
 class BranchSolver(StaticSolver):
@@ -132,9 +133,9 @@ class BranchSolver(StaticSolver):
         tangent: PETSc.Vec | None,
         outcome: NewtonResult | None = None,
         index: Index | None = None,
-        energy: float | None = None,
+        energies: Energies | None = None,
     ) -> Point:
-        """Evaluate all records of the equilibrium ``x``; its index is counted, its energy summed, unless given.
+        """Evaluate all records of the equilibrium ``x``; its index is counted, its energies are summed, unless given.
 
         ``arclength`` and ``tangent`` are its place on the branch, ``outcome`` is the Newton iteration that led to it,
         ``index`` that of the factors, if they are those of ``x``.
@@ -148,7 +149,7 @@ class BranchSolver(StaticSolver):
             arclength=arclength,
             load=system.scalar(x),
             ordinate=self.shape.ordinate(x),
-            energy=self.energy(x) if energy is None else energy,
+            **(energies or self.energies(x))._asdict(),
             stretch=self.shape.stretch(x),
             negative=index.negative,
             zero=index.zero,
@@ -188,7 +189,7 @@ class BranchSolver(StaticSolver):
             made = self._whole(known, s, bounds, limits(system, STEPS, reach, TOLERANCE), SAME)
             if made is not None:
                 index = self.corrector.index(made.found, made.below, made.nearest)
-                numbers = made.aligned, made.length, made.energy
+                numbers = made.aligned, made.length, made.energies
                 return Step(made.x, system.scalar(made.x), made.outcome, made.tangent, index, *numbers)
         x, direction = predict(known, s)
         if system.symmetries:

@@ -23,6 +23,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem import verification
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.phase import SYMMETRIC_STATE, Phase
+from rodfem.fem.state import Energies
 from rodfem.linalg.compiled import module
 from rodfem.linalg.matrices import shared
 
@@ -65,8 +66,8 @@ class Made:
         Cosine between the direction of the prediction and the tangent.
     length
         Distance from the last state, in the metric.
-    energy
-        Stored energy.
+    energies
+        Stored and potential energy, and what the load does work on.
     """
 
     x: PETSc.Vec
@@ -77,7 +78,7 @@ class Made:
     outcome: NewtonResult
     aligned: float
     length: float
-    energy: float
+    energies: Energies
 
 
 @dataclass(frozen=True)
@@ -186,9 +187,7 @@ class CompiledStep:
         last = known[-1]
         rows, value, slope = weights(known, s)
         corrector.prepare(limits)
-        energy = system.equations.energy
-        step.energy, step.assemble = energy.pointer, energy.function
-        step.energy_constants = self._ffi.cast("double *", energy.constants.ctypes.data)
+        self._energies()
         step.norm = system.verification.norm
         held = [array("double[]", row.array_r) for row in rows]
         for i, row in enumerate(held):
@@ -199,6 +198,15 @@ class CompiledStep:
             status = self._lib.advance(step, len(rows), self._states, *given, *bounds, same)
         corrector.adopt(regular=status == MADE)
         return self._made() if status == MADE else None
+
+    def _energies(self) -> None:
+        """Hand over the forms of the energies, with the constants that they have now."""
+        step, equations = self._step, self.system.equations
+        step.assemble = equations.energy.function
+        for name, form in (("energy", equations.energy), ("potential", equations.potential)):
+            if form is not None:
+                setattr(step, name, form.pointer)
+                setattr(step, f"{name}_constants", self._ffi.cast("double *", form.constants.ctypes.data))
 
     def _serves(self) -> bool:
         """Whether the code does all that a step of the system asks for now."""
@@ -230,7 +238,10 @@ class CompiledStep:
             return None
         outcome = NewtonResult(True, newton.iterations, newton.error, newton.moved)
         self.checked = Checked(x, step.unbalanced, step.stretched)
-        return Made(x, tangent, found, corrector.nearest, below, outcome, step.along, step.length, step.energy_value)
+        energies = Energies(step.energy_value, step.potential_value, -float(corrector.load_equation[0]))
+        if system.equations.potential is None:
+            energies = Energies(step.energy_value, float("nan"), float("nan"))
+        return Made(x, tangent, found, corrector.nearest, below, outcome, step.along, step.length, energies)
 
     def _phase(self, x: PETSc.Vec) -> Phase:
         """Phase conditions at ``x``, which the code has just found."""

@@ -61,7 +61,7 @@ def follow(
                 return
         elif made.outcome is not None and made.tangent is not None and made.aligned > ALIGNED:
             place = last.arclength + made.length
-            point = solver.point(made.x, place, made.tangent, made.outcome, made.index, made.energy)
+            point = solver.point(made.x, place, made.tangent, made.outcome, made.index, made.energies)
             if steps.accepts(last, point):
                 yield point
                 order = 2 if system.damping else min(len(points) - 1, 3) + 1

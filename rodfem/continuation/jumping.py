@@ -75,7 +75,7 @@ def joined(solver: BranchSolver, a: Point, b: Point, rates: tuple[float, ...] = 
     of a jump stays.  One in proportion to its piece is that of a tangent along a symmetry, by which states do not move.
     ``rates`` are defects over lengths of the pieces that this is a half of.
     """
-    middle = _between(solver, a, b) if len(rates) < HALVINGS else None
+    middle = between(solver, a, b) if len(rates) < HALVINGS else None
     if middle is None:
         return False
     rows = (a, middle, b)
@@ -116,7 +116,7 @@ def _across(system: System, x: PETSc.Vec, chord: PETSc.Vec) -> float:
     return float(system.norm(rest))
 
 
-def _between(solver: BranchSolver, a: Point, b: Point) -> Point | None:
+def between(solver: BranchSolver, a: Point, b: Point) -> Point | None:
     """Equilibrium on a plane across the piece, with its tangent; None where there is none between the rows."""
     whole = solver.system.distance(a.x, b.x)
     for place in PLACES:

@@ -15,6 +15,7 @@ from rodfem.fem.fields import LOAD
 from rodfem.fem.newton import NewtonResult, correct, relax
 from rodfem.fem.resultants import Resultants
 from rodfem.fem.shape import Shape
+from rodfem.fem.state import Energies
 from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
 from rodfem.linalg.factorization import AlongRod, Factors
@@ -175,6 +176,10 @@ class StaticSolver:
     def may_move(self, x: PETSc.Vec) -> bool:
         """Whether an equilibrium is one of a family that no symmetry explains, as far as is known without counting."""
         return False
+
+    def energies(self, x: PETSc.Vec) -> Energies:
+        """Stored and potential energy of the equilibrium ``x``, and what the load does work on."""
+        return self.system.at(x).energies()
 
     def energy(self, x: PETSc.Vec) -> float:
         """Stored energy of the state ``x``."""

@@ -35,8 +35,8 @@ typedef struct {
     const double *u;            /* local values of the state whose equations were evaluated last */
     int quaternions;
     const int *quaternion;      /* quaternions x 4: local degrees of freedom */
-    const void *energy;         /* form of the stored energy, and its constants */
-    const double *energy_constants;
+    const void *energy, *potential; /* forms of the stored and the potential energy (NULL: none), and their constants */
+    const double *energy_constants, *potential_constants;
     /* symmetries: g = A x + c */
     int symmetries;
     Sparse generator;           /* A of all, one below the other: symmetries * drifts rows */
@@ -53,7 +53,7 @@ typedef struct {
     /* results */
     double weights[MOST * MOST]; /* of the generators in each condition, a row each; of those that vanish unscaled */
     double *x, *direction, *row, *tangent;
-    double predicted, along, length, energy_value, unbalanced, stretched;
+    double predicted, along, length, energy_value, potential_value, unbalanced, stretched;
     int broken, verified;
 } Step;
 
@@ -245,7 +245,10 @@ int advance(Step *step, int known, const double **states, const double *value, c
     for (int i = 0; i < n; i++) step->right[i] = step->x[i] - last[i];
     step->length = size_of(&step->metric, step->right);
     if (check(step, step->x)) return NOT_CORRECTED;
-    step->energy_value = 0;
-    return ((assemble_form *)step->assemble)(step->energy, NULL, step->u, step->energy_constants, &step->energy_value)
-        ? NOT_CORRECTED : MADE;
+    assemble_form *assemble = (assemble_form *)step->assemble;
+    step->energy_value = step->potential_value = 0;
+    if (assemble(step->energy, NULL, step->u, step->energy_constants, &step->energy_value)) return NOT_CORRECTED;
+    if (step->potential && assemble(step->potential, NULL, step->u, step->potential_constants, &step->potential_value))
+        return NOT_CORRECTED;
+    return MADE;
 }

@@ -18,6 +18,7 @@ from rodfem.continuation.observer import Observer
 from rodfem.continuation.special_points import COUPLED, find_special, same_point
 from rodfem.continuation.states_between import midpoint
 from rodfem.continuation.touching import Touching
+from rodfem.continuation.work import EnergyBalance
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.stability.round_off import resolve
 
@@ -48,7 +49,7 @@ class SpecialSearch:
         self.solver = meshes.solvers[0]
         self.level = 0
         self._open: list[Point] = []
-        self._touching = Touching()
+        self._touching, self._balance = Touching(), EnergyBalance()
         self._short = (-inf, inf, 0)
 
     def begin(self, first: Point, short: float = 0.0, until: float = -inf) -> None:
@@ -109,11 +110,27 @@ class SpecialSearch:
             return
         a, b = rows[-2:]
         if not suspected(self.solver, rows) or joined(self.solver, a, b):
+            self._check_work(rows)
             return
         self._shorten(a, b)
         self.observer.warn(
             f"Between loads {a.load:.8g} and {b.load:.8g} the branch may have been left for another one beside it: no "
             f"equilibria were found that join them; {SMALLER_STEPS}."
+        )
+
+    def _check_work(self, rows: Sequence[Point]) -> None:
+        """Raise :class:`Unresolved` if over a step the energy does not change by the work of the load.
+
+        Raises :class:`ConvergenceError`, which ends the branch, where shorter steps do not help.
+        """
+        if self._balance(self.solver, rows):
+            return
+        a, b = rows[-2:]
+        self._shorten(a, b)
+        raise ConvergenceError(
+            f"Between loads {a.load:.8g} and {b.load:.8g} the potential energy changes by "
+            f"{b.potential - a.potential:.3g}, which is not the work of the load: these are no states of one branch; "
+            f"{SMALLER_STEPS}."
         )
 
     @property

@@ -160,7 +160,7 @@ class Sweep:
             arclength=abs(load - self.span[0]),
             load=load,
             ordinate=solver.shape.ordinate(x),
-            energy=solver.energy(x),
+            **solver.energies(x)._asdict(),
             stretch=solver.shape.stretch(x),
             negative=0,
             zero=solver.system.active_drifts(x),

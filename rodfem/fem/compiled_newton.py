@@ -114,6 +114,8 @@ class CompiledNewton:
         rod.drift_column = self._ints(np.array([column[d] for d in drifts]))
         rod.starts, rod.indices = self._ints(metric.pattern.indptr), self._ints(metric.pattern.indices)
         rod.metric, rod.border = self._doubles(metric.values), self._doubles(self.border)
+        self.load_equation = np.zeros(1)
+        rod.load_equation = self._doubles(self.load_equation)
         self.newton = self.ffi.new("Newton *")
         self.factored, self.equations = np.zeros(n), np.zeros(n)
         self.newton.factored, self.newton.factored_equations = map(self._doubles, (self.factored, self.equations))

@@ -50,6 +50,9 @@ class Equations:
         Whether that is without any term.
     energy
         Stored energy ``int W ds``.
+    potential
+        The Lagrangian without the constraints at nodes: at an equilibrium, where constraints are fulfilled, the total
+        potential energy.  None where a load has no potential.
     ordinate
         Ordinate of the scene where that is an integral over the rod, else None.
     line
@@ -67,9 +70,11 @@ class Equations:
         forms = self._derive(fields)
         self._taken: Line | None = None
         self.cells = Cells.of(fields)
-        self._assemblers = [Assembler(form, self.cells) for form in form_compiler.compile_forms(forms)]
-        self.jacobian, self.residual, self.energy, self.metric, self.kinetic, *more = self._assemblers
-        self.ordinate = more[0] if more else None
+        compiled = form_compiler.compile_forms(list(forms.values()))
+        assemblers = {name: Assembler(form, self.cells) for name, form in zip(forms, compiled, strict=True)}
+        self._assemblers = list(assemblers.values())
+        self.jacobian, self.residual, self.energy, self.metric, self.kinetic = self._assemblers[:5]
+        self.potential, self.ordinate = assemblers.get("potential"), assemblers.get("ordinate")
         self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
 
     @cached_property
@@ -83,8 +88,8 @@ class Equations:
         pattern.sort_indices()
         return pattern, matrix_places(dofs, every, every, pattern)
 
-    def _derive(self, fields: Fields) -> list[Any]:
-        """Forms in UFL: second and first derivative of the Lagrangian, energy, metric, mass, ordinate along the rod."""
+    def _derive(self, fields: Fields) -> dict[str, Any]:
+        """Forms in UFL by the names of the attributes that they become."""
         self.fields, scene = fields, fields.scene
         mesh, k = fields.mesh, fields.discretization.degree
         self.names, self.line = list(scene.parameters), load_line(scene)
@@ -108,10 +113,16 @@ class Equations:
         inside = [(of, site) for of, site, measure in sites if measure is None and not of.nodal]
         rod = fields.formulation.integrand(self, f, c, W, along)
         L = (rod + sum(term for of, site in inside for term in of.lagrangian(site))) * dx
+        for of, site, measure in sites:
+            if measure is not None and not of.nodal:
+                L += sum(term * measure for term in of.lagrangian(site))
+        potential = L
+        # constraints at nodes, zero at an equilibrium.  The potential does not have them: in a functional FFCx 0.5
+        # takes, beside a rule of the same degree, the points of that rule for both
         if f.eta is not None:
             L += lagrangian.unit_norm(f.eta, f.q) * dx_nodes
         for of, site, measure in sites:
-            if measure is not None or of.nodal:
+            if of.nodal:
                 L += sum(term * (measure or dx_nodes) for term in of.lagrangian(site))
         work = sum(term * (measure or dx) for of, site, measure in sites for term in of.virtual_work(site))
         first = ufl.derivative(with_constants(L, mesh), u, test) - with_constants(work, mesh)
@@ -127,15 +138,17 @@ class Equations:
         kinetic += sum(term * (measure or dx) for of, site, measure in sites for term in of.kinetic(site))
         self.massless = apply_algebra_lowering(kinetic).empty()
         self.uniform = not extract_type(first, ufl.SpatialCoordinate) and not scene.joints
-        others = [W * dx, metric * dx, kinetic]
+        others = {"energy": W * dx, "metric": metric * dx, "kinetic": kinetic}
+        if scene.conservative:
+            others["potential"] = potential
         if not scene.ordinate.places:
-            others.append((0.0 * c.s + scene.ordinate.of(along, c)) * dx)
-        return [second, first, *(with_constants(form, mesh) for form in others)]
+            others["ordinate"] = (0.0 * c.s + scene.ordinate.of(along, c)) * dx
+        return {"jacobian": second, "residual": first} | {name: with_constants(x, mesh) for name, x in others.items()}
 
     @classmethod
     def compile_ahead(cls, fields: Fields) -> None:
         """Begin to compile beside this process what another instance finds then in the cache."""
-        form_compiler.compile_ahead(cls.__new__(cls)._derive(fields))
+        form_compiler.compile_ahead(list(cls.__new__(cls)._derive(fields).values()))
 
     def take(self, line: Line) -> None:
         """Let the constants of the forms be the parameters of a ``line``."""

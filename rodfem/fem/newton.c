@@ -37,6 +37,7 @@ typedef struct {
     const int *starts, *indices;
     const double *metric;       /* compressed sparse rows */
     double *border;             /* F_lam */
+    double *load_equation;      /* equation of the load at the last residual: the Lagrangian's derivative in it */
 } Rod;
 
 typedef struct {
@@ -97,6 +98,7 @@ int residual_at(const Rod *rod, const double *x, double *out)
     memset(out, 0, rod->n * sizeof(double));
     gather(rod, x);
     if (((assemble_form *)rod->assemble)(rod->residual, rod->equation_places, rod->u, rod->residual_constants, out)) return 1;
+    *rod->load_equation = out[rod->load];
     out[rod->load] = 0;
     for (int d = 0; d < rod->drifts; d++) {
         const double *condition = rod->conditions + (size_t)d * rod->n;

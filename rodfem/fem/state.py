@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,6 +26,26 @@ if TYPE_CHECKING:
     from rodfem.fem.parameters import Line
     from rodfem.fem.phase import Phase
     from rodfem.fem.system import System
+
+
+class Energies(NamedTuple):
+    """Energies of a state; those of the loads are nan where a load has no potential.
+
+    Attributes
+    ----------
+    energy
+        Stored energy ``int W ds`` of the rod.
+    potential
+        Total potential energy ``V``, of the rod, loads, springs and foundations: what is stationary at an equilibrium.
+    conjugate
+        ``-dV/dload`` at fixed state: what the load does work on, as the displacement of its point or the angle of its
+        end.  The distinguished ordinate of Maddocks, Arch. Ration. Mech. Anal. 99 (1987): along a branch
+        ``dV = -conjugate dload``.
+    """
+
+    energy: float
+    potential: float
+    conjugate: float
 
 
 class Evaluation(NodalValues):
@@ -76,6 +96,21 @@ class Evaluation(NodalValues):
         """Stored energy; collective."""
         return self.integral(self.equations.energy)
 
+    def energies(self) -> Energies:
+        """All energies of an equilibrium; collective.
+
+        The equations have one for the load, that nobody solves: ``dV/dload``.
+        """
+        if self.equations.potential is None:
+            return Energies(self.energy(), float("nan"), float("nan"))
+        out, fields = np.zeros(3), self.fields
+        self._add(self.equations.energy, None, out[:1])
+        self._add(self.equations.potential, None, out[1:2])
+        out[2] = -self.covector()[fields.copies[:, -1]].sum()
+        if fields.comm.size > 1:
+            out = fields.comm.allreduce(out, op=MPI.SUM)
+        return Energies(*out.tolist())
+
     def evaluate(self, expression: Callable[[], np.ndarray]) -> np.ndarray:
         """Values of a compiled expression: see :func:`rodfem.fem.form_compiler.expression`."""
         self._register()
@@ -111,6 +146,7 @@ class State(Evaluation):
             if (places := system.equation_places) is not None:
                 with out as array:
                     self._add(self.equations.residual, places, array)
+                    array[system.load_index] = 0.0
             else:
                 values = self.covector()[system.equation_targets]
                 out.setValues(system.equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)

@@ -112,7 +112,7 @@ class System:
         self.equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self.equation_numbers = number[self.equation_targets].astype(PETSc.IntType)
         dofs = self.equations.cells.dofs
-        self.equation_places = vector_places(dofs, without_load) if self.fields.compiled and comm.size == 1 else None
+        self.equation_places = vector_places(dofs, number) if self.fields.compiled and comm.size == 1 else None
         self._places: dict[tuple[int, bool], Places] = {}
         self._layouts: dict[int, Layout] = {}
         self._spread: dict[int, SpreadMatrix] = {}

@@ -104,7 +104,8 @@ COLUMN: Kinds = {
     "omega2": (_all(_all(_is_number, 2)), "a list of pairs of numbers"),
     "motion": (_all(_is_text), "a list of texts"),
     "curve": (_all(_is_count), "a list of whole numbers"),
-    **dict.fromkeys(("ordinate", "energy", "stretch", "slope", "drift", "arclength", "error", "estimate"), MAYBE),
+    **dict.fromkeys(("ordinate", "energy", "potential", "conjugate", "stretch", "slope"), MAYBE),
+    **dict.fromkeys(("drift", "arclength", "error", "estimate"), MAYBE),
 }
 SPECIAL: Kinds = {
     "kind": (lambda x: isinstance(x, str) and x in KINDS, f"one of {', '.join(KINDS)}"),

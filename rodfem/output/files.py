@@ -42,6 +42,8 @@ MEANING = {
     "load": "value of the parameter",
     "ordinate": "the scene's ordinate",
     "energy": "stored energy int W ds of the rod, without the potential of the loads, springs and foundations",
+    "potential": "total potential energy V of rod, loads, springs and foundations",
+    "conjugate": "-dV/dload, what the load does work on: along a branch dV = -conjugate dload",
     "negative": "number of negative eigenvalues of the constrained second variation (the index): 0 is stable",
     "zero": "number of eigenvalues that vanish, those of symmetries included",
     "stretch": "least stretch v3 along the rod",
@@ -56,7 +58,7 @@ MEANING = {
     "soft_uncertainty": "bounds of the errors of these by round-off, and by the mesh where there are error bars",
 }
 """Columns in words, as they stand in the file."""
-OPTIONAL = ("estimate", "spectrum", "negative_in_space", "omega2", "motion", "curve")
+OPTIONAL = ("potential", "conjugate", "estimate", "spectrum", "negative_in_space", "omega2", "motion", "curve")
 """Columns that a branch has where one of its rows has an entry."""
 UNDECIDED = "undecided"
 """Column that a branch has where one of its rows has undecided eigenvalues."""

@@ -127,6 +127,15 @@ ENTRIES = {
     "load | parameter": "The number that varies along a diagram, as the scene declares it.",
     "ordinate": "The scene's number of a state on the vertical axis of the diagram.",
     "energy | int W ds": "Stored energy of the rod alone, without the potential of loads, springs and foundations.",
+    "potential | total potential energy": (
+        "Energy V of the rod, its loads, springs and foundations, up to a constant: stationary at an equilibrium. "
+        "Where two stable states at one load have the same, that is Maxwell's load."
+    ),
+    "conjugate": (
+        "What the load does work on, -dV/dload: the displacement of a force's point, the angle of a moment. Along a "
+        "branch dV = -conjugate dload. Against the load it makes the distinguished diagram of Maddocks (1987): where a "
+        "fold opens to smaller loads, the index is greater on its side of greater conjugate."
+    ),
     "error bar | error_estimate | ordinate_error_estimate | estimate": (
         "In parentheses after a number: a bound of the error of the discretisation, by a second computation on a "
         "richer mesh. The error of the model is not in it."
