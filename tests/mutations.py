@@ -44,10 +44,24 @@ INERTIA = "tests/stability/test_inertia.py tests/stability/test_assessment.py"
 HARD = "tests/hard/test_hard_cases.py"
 DIAGRAM = "tests/diagram/test_diagram.py"
 STEP = "tests/continuation/test_compiled_step.py"
+WORK = "tests/continuation/test_work.py"
 
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "energy-is-not-compared-with-work": Fault(
+        f"{CONTINUATION}work.py", "return off <= SAFETY * expected + noise or", "return True or", WORK
+    ),
+    "energy-of-a-jump-vanishes": Fault(f"{CONTINUATION}work.py", "if off > last / SHRUNK:", "if False:", WORK),
+    "potential-of-constraints-at-nodes": Fault(
+        "rodfem/fem/equations.py", 'others["potential"] = potential', 'others["potential"] = L', WORK
+    ),
+    "conjugate-of-the-last-iterate": Fault(
+        "rodfem/fem/newton.c",
+        "    *rod->load_equation = out[rod->load];",
+        "    if (!*rod->load_equation) *rod->load_equation = out[rod->load];",
+        f"{WORK} {STEP}",
+    ),
     "jumps-to-another-branch": Fault(
         f"{CONTINUATION}jumping.py", "if moved <= FAR and off <= SHARE * moved", "if True", HARD
     ),
