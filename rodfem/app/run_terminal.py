@@ -18,6 +18,7 @@ from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.record import Record
 from rodfem.fem.system import System
+from rodfem.modes.typical import typical_modes
 from rodfem.output.checkpoint import Step, write_step
 from rodfem.output.files import save_run
 from rodfem.output.folder import remove_earlier
@@ -113,10 +114,11 @@ class Terminal(Report):
         """Save the branches that have not been saved by this process."""
         if self._saved == len(diagram):
             return
+        new = diagram.branches[self._saved :]
+        modes = typical_modes(new, diagram.solvers)
         with diagram.clock("files"), held():
             self._clear()
-            new = diagram.branches[self._saved :]
-            save_run(diagram.data, new, diagram.solvers, self.output, first=not self._saved)
+            save_run(diagram.data, new, diagram.solvers, self.output, first=not self._saved, modes=modes)
             self._saved = len(diagram)
 
     def _clear(self) -> None:

@@ -343,7 +343,7 @@ class Report(Observer):
 
     def timing(self, clock: Clock, points: int) -> None:
         """Print where the time went."""
-        names = ("setup", *WORK, "location", "error bars", "files")
+        names = ("setup", *WORK, "location", "error bars", "modes", "files")
         took = {name: f"{clock.seconds.get(name, 0.0):.2f} s" for name in names}
         parts = [f"{name} {seconds}" for name, seconds in took.items() if seconds != "0.00 s"]
         self.say(f"\nTime: {', '.join(parts)}; {clock.total():.2f} s in all")

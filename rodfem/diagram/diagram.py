@@ -21,6 +21,7 @@ from rodfem.diagram.solver import MESH, METHOD, POINT, Solver
 from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
+from rodfem.modes.typical import typical_modes
 from rodfem.output.files import as_data, save_run
 from rodfem.output.folder import PICTURES, locked, picture_at
 from rodfem.output.origin import origin
@@ -258,7 +259,8 @@ class Diagram:
         """
         folder = Path(folder)
         with locked(folder, self.solvers[0].system.comm):
-            save_run(self.data, self.branches, self.solvers, folder, first=True)
+            modes = typical_modes(self.branches, self.solvers)
+            save_run(self.data, self.branches, self.solvers, folder, first=True, modes=modes)
         return folder
 
     @checked(path=path("diagram.png"))

@@ -24,6 +24,8 @@ from rodfem.fem.fields import Fields
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM, STATES, UNREADABLE
 from rodfem.modes.perturbation import Motion, Motions
+from rodfem.modes.recorded import Typical
+from rodfem.modes.recorded import write as write_typical
 from rodfem.output.contents import read_diagram
 from rodfem.problem.arguments import checked
 from rodfem.problem.arguments import path as argument_path
@@ -117,6 +119,7 @@ def as_data(
             "stability_s": s.get("stability", 0.0),
             "location_s": s.get("location", 0.0),
             "error_bars_s": s.get("error bars", 0.0),
+            "modes_s": s.get("modes", 0.0),
             "setup_s": s.get("setup", 0.0),
             "total_s": clock.total(),
             "points": points,
@@ -201,7 +204,13 @@ def load_json(path: Path | str) -> dict[str, Any]:
 
 
 def save_run(
-    data: dict[str, Any], branches: Sequence[Branch], solvers: Sequence[StaticSolver], folder: Path, *, first: bool
+    data: dict[str, Any],
+    branches: Sequence[Branch],
+    solvers: Sequence[StaticSolver],
+    folder: Path,
+    *,
+    first: bool,
+    modes: Sequence[Sequence[Typical]],
 ) -> None:
     """Add ``branches`` to ``states.h5`` of a folder, and replace ``diagram.json``; collective, written on rank 0.
 
@@ -221,9 +230,11 @@ def save_run(
         Where the files are, which there is.
     first
         Whether ``states.h5`` is a new one.
+    modes
+        Modes of the typical states of each of the branches.
     """
     states = folder / "states.h5"
-    image = states_of(branches, solvers, states, run=data["run"], first=first)
+    image = states_of(branches, solvers, states, run=data["run"], first=first, modes=modes)
     on_first(solvers[0].system.comm, lambda: write_whole({folder / "diagram.json": as_json(data), states: image}))
 
 
@@ -237,14 +248,21 @@ def save_states(branch: Branch, solvers: Sequence[StaticSolver], path: Path, fir
 
 
 def states_of(
-    branches: Sequence[Branch], solvers: Sequence[StaticSolver], path: Path, *, first: bool, run: str = ""
+    branches: Sequence[Branch],
+    solvers: Sequence[StaticSolver],
+    path: Path,
+    *,
+    first: bool,
+    run: str = "",
+    modes: Sequence[Sequence[Typical]] | None = None,
 ) -> bytes:
     """Contents of an HDF5 file with the states of ``branches`` added, on rank 0; collective.
 
     Group ``/branches/<name>`` has ``load`` (P,), ``elements`` (P,), ``s`` (P, m), ``r`` (P, m, 3), ``q`` (P, m, 4),
     every further field and scalar with P rows, strains, forces and moments (:mod:`rodfem.fem.resultants`), and under
     ``special/<i>`` the null vectors of its special points: displacement ``r``, ``rotation`` in the space frame, and the
-    change of ``q``.  Below it are the groups of :func:`rodfem.problem.supports.write`, for pictures; the file has the
+    change of ``q``.  The ``modes`` of each branch, if given, are in the group of :mod:`rodfem.modes.recorded`.  Below
+    the branch are the groups of :func:`rodfem.problem.supports.write`, for pictures; the file has the
     name of the ``first`` branch and the bending stiffness under ``section``.  ``solvers`` are those of the meshes that
     points name; the rows of a mesh with fewer nodes end in nan.  ``path`` is that of the file, which stays as it is;
     ``run`` names the run that it is of.
@@ -258,13 +276,14 @@ def states_of(
         if first:
             file.attrs.update(STATES.mark_attributes(), first=branches[0].name, run=run)
             write_section(file, system.scene)
-        for branch, (samples, modes) in zip(branches, sampled, strict=True):
+        for branch, (samples, vectors), typical in zip(branches, sampled, modes or [()] * len(branches), strict=True):
             group = file.create_group(f"branches/{branch.name}")
             for name in samples[0]:
                 group[name] = _stacked([np.asarray(s[name]) for s in samples])
             write_supports(group, system.scene, samples)
-            for i, vectors in enumerate(modes):
-                for j, mode in enumerate(vectors):
+            write_typical(group, typical)
+            for i, null in enumerate(vectors):
+                for j, mode in enumerate(null):
                     target = group.create_group(f"special/{i}/null_vector_{j}")
                     target["r"], target["q"], target["rotation"] = mode.r, mode.q, mode.w
 

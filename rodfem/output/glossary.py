@@ -61,7 +61,9 @@ ENTRIES = {
         "Eigenvalue of the second variation with the rod's inertia (unit rotary inertia where it has none): the "
         "square of a frequency. A negative one is a growing motion."
     ),
-    "spectrum | left-most eigenvalues": "The smallest eigenvalues mu of a state, on request.",
+    "spectrum | left-most eigenvalues": (
+        "The smallest eigenvalues mu of a state: of typical ones in states.h5, of all on request."
+    ),
     "band | inside": (
         "Eigenvalues nearer to zero than the band have a sign that round-off of the factors hides; their Rayleigh "
         "quotients, each with an uncertainty, decide."

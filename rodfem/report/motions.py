@@ -1,17 +1,18 @@
-"""Modes of ``modes.h5`` as the page animates them: displacement and rotation of a drawn size, and moving supports."""
+"""Modes as the page animates them: displacement and rotation of a drawn size, and moving supports."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from rodfem.modes.modes import SYMMETRY, Modes, load_modes
+from rodfem.modes.modes import SYMMETRY, load_modes
+from rodfem.modes.recorded import Few
 from rodfem.output.glyphs import glyphs_of
 from rodfem.output.plot_modes import GROWTH, LARGEST
 from rodfem.output.view import POINT
@@ -24,25 +25,78 @@ from rodfem.report.stage import Stage
 
 Floats = NDArray[np.float64]
 
-EXACT = "0 (exact)"
-"""Eigenvalue of a symmetry."""
+EXACT, COUNTED = "0 (exact)", "0"
+"""Eigenvalues of a symmetry, and of one that vanishes as far as the state's count tells."""
+SAME = 1e-6
+"""Relative difference of an eigenvalue from another of the state up to which they are one."""
+SMALL = 1e-3
+"""Share of the greatest eigenvalue below which such differences are relative to this share."""
+
+
+class Shown(NamedTuple):
+    """A mode: eigenvalue ``value``, bound of its ``error`` (nan: not estimated), name of its ``motion``.
+
+    ``u`` and ``w`` (m, 3) are displacement and rotation at the nodes ``s`` (m,); ``zero`` says that the count at the
+    state has its eigenvalue among those that vanish.
+    """
+
+    value: complex
+    error: float
+    motion: str
+    s: Floats
+    u: NDArray[Any]
+    w: NDArray[Any]
+    zero: bool = False
+
+
+def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: Floats, zeros: int) -> list[Shown]:
+    """Modes of one state in ascending order, symmetries last: those with error bars, then others that are typical.
+
+    Parameters
+    ----------
+    path, place
+        The file with error bars, None where it has not this state, and the branch and row in it.
+    typical
+        Modes that the run has recorded there, at nodes ``s``.
+    zeros
+        Number of eigenvalues that vanish, symmetries included.
+    """
+    shown: list[Shown] = []
+    if path is not None:
+        modes = load_modes(path, *place)
+        each = zip(modes.value, modes.error, modes.motion, modes.displacement, modes.rotation, strict=True)
+        shown += [Shown(complex(mu), float(error), motion, modes.s, u, w) for mu, error, motion, u, w in each]
+    if typical is not None:
+        known, least = [mode.value for mode in shown], SMALL * abs(typical.value).max(initial=0.0)
+        new = [
+            not any(abs(x - mu) <= SAME * max(abs(mu), least) for x in known) and not (known and motion == SYMMETRY)
+            for mu, motion in zip(typical.value, typical.motion, strict=True)
+        ]
+        shown += [
+            Shown(complex(typical.value[i]), np.nan, typical.motion[i], s, typical.displacement[i], typical.rotation[i])
+            for i in np.flatnonzero(new)
+        ]
+    shown.sort(key=lambda mode: (mode.motion == SYMMETRY, mode.value.real))
+    others = [mode for mode in shown if mode.motion != SYMMETRY]
+    vanish = sorted(others, key=lambda mode: abs(mode.value))[: max(zeros - (len(shown) - len(others)), 0)]
+    return [mode._replace(zero=any(mode is other for other in vanish)) for mode in shown]
 
 
 def motions_of(
-    path: Path,
-    place: tuple[str, int],
+    modes: Sequence[Shown],
+    row: int,
     shapes: Shapes,
     setting: Setting,
     stage: Stage,
     shelf: Shelf,
     bodies: Sequence[int],
 ) -> list[dict[str, Any]]:
-    """Modes of one state, with the maps of its supports at an amplitude of one.
+    """Modes of one state as the page has them, with the maps of its supports at an amplitude of one.
 
     Parameters
     ----------
-    path, place
-        The file, and the branch and row in it.
+    modes, row
+        The modes, and the row of the branch.
     shapes, setting
         States of the branch, and what holds and loads this one.
     stage, shelf
@@ -50,7 +104,7 @@ def motions_of(
     bodies
         Numbers of those of this state.
     """
-    modes, (r, frames) = load_modes(path, *place), shapes[place[1]]
+    r, frames = shapes[row]
     span = float(np.linalg.norm(np.ptp(r, axis=0)))
 
     def moved(u: Floats, w: Floats) -> Any:
@@ -59,34 +113,33 @@ def motions_of(
         return packed([shelf.fitted(body, solid) for body, solid in zip(bodies, solids, strict=False)])
 
     out = []
-    for number in range(len(modes.value)):
-        u, w = (
-            CubicSpline(modes.s, part[number].astype(complex))(shapes.s)
-            for part in (modes.displacement, modes.rotation)
-        )
+    for mode in modes:
+        u, w = (CubicSpline(mode.s, part)(shapes.s) for part in (mode.u, mode.w))
         size = min(
             LARGEST[0] * span / max(_largest(u), POINT * span),
             LARGEST[1] / max(_largest(w), POINT),
         )
-        parts = [np.real, np.imag] if np.iscomplexobj(modes.value) and modes.value[number].imag else [np.real]
+        parts = [np.real, np.imag] if mode.value.imag else [np.real]
         out.append(
-            _about(modes, number)
+            _about(mode)
             | {"parts": [packed(size * np.concatenate([part(u), part(w)], axis=1)) for part in parts]}
             | {"maps": [moved(size * part(u), size * part(w)) for part in parts]}
         )
     return out
 
 
-def _about(modes: Modes, number: int) -> dict[str, Any]:
+def _about(mode: Shown) -> dict[str, Any]:
     """Eigenvalue, in words with its error, and what the motion does: ``zero``, ``grows`` or neither."""
-    mu, error = complex(modes.value[number]), float(modes.error[number])
+    mu, error = mode.value, mode.error
     known = bool(np.isfinite(error))
+    zero = mode.motion == SYMMETRY or mode.zero or abs(mu) <= (error if known else 0.0)
+    mu = 0j if zero and not known else mu
     root = np.sqrt(-mu)
-    zero = modes.motion[number] == SYMMETRY or abs(mu) <= (error if known else 0.0)
+    words = EXACT if mode.motion == SYMMETRY else eigenvalue_in_words(mu, error)
     return {
         "value": [mu.real, mu.imag],
-        "words": EXACT if modes.motion[number] == SYMMETRY else eigenvalue_in_words(mu, error),
-        "motion": modes.motion[number],
+        "words": words or (COUNTED if zero else ""),
+        "motion": mode.motion,
         "root": [float(root.real), float(root.imag)],
         "kind": "zero" if zero else "grows" if root.real > GROWTH * abs(root) else "swings",
     }

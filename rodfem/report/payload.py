@@ -55,6 +55,7 @@ def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
             for key, name in ((key, names.get(key, key)) for key in ordinates_of(data))
         ],
         "constants": data["constants"],
+        "natural": data.get("natural") or {},
         "complete": data.get("complete", True),
         "meaning": data.get("meaning", {}),
         "mesh": mesh_in_words(data["discretization"]),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rodfem.errors import InputError
 from rodfem.modes.modes import rows_with_modes
+from rodfem.modes.recorded import read as recorded
 from rodfem.output.glyphs import glyphs_of
 from rodfem.output.plot_images import is_traced
 from rodfem.output.sheet import PALETTE
@@ -19,7 +20,7 @@ from rodfem.output.solids import profile_of
 from rodfem.problem.setting import read as read_setting
 from rodfem.report.bodies import FLAT, Shelf
 from rodfem.report.branches import branch_data
-from rodfem.report.motions import motions_of
+from rodfem.report.motions import modes_of, motions_of
 from rodfem.report.packing import packed
 from rodfem.report.profiles import profiles_data
 from rodfem.report.shapes import Shapes, shapes_of, stations
@@ -47,19 +48,24 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
     for branch, colour in zip(data["branches"], cycle(PALETTE), strict=False):
         name = branch["name"]
         here, group = shapes[name], groups[name]
-        rows = [row for other, row in with_modes if other == name and row < len(here.r)]
         found = [_placed(here, row, group, stage, shelf) for row in range(len(here.r))]
-        modes = {}
-        for row in rows:
-            setting = read_setting(group, row)
-            modes[row] = motions_of(folder / "modes.h5", (name, row), here, setting, stage, shelf, found[row][0])
+        typical = {each.row: each for each in recorded(group)}
+        exact = {row for other, row in with_modes if other == name}
+        modes, missed = {}, {row: each.trouble for row, each in typical.items() if each.trouble}
+        for row in sorted(row for row in {*typical, *exact} if row < len(here.r)):
+            path, few = folder / "modes.h5" if row in exact else None, typical[row].found if row in typical else None
+            nodes, setting = group["s"][row], read_setting(group, row)
+            nodes = nodes[np.isfinite(nodes)]
+            shown = modes_of(path, (name, row), few, nodes, branch["columns"]["zero"][row])
+            if shown:
+                modes[row] = motions_of(shown, row, here, setting, stage, shelf, found[row][0])
         along = profiles_data(group, states)
         image = "" if is_traced(branch, data["branches"]) else branch.get("image", "")
         branches.append(
             branch_data(branch, here, colour, data.get("natural") or {})
             | _drawn(here, found)
             | along
-            | {"modes": modes, "image": image}
+            | {"modes": modes, "missed": missed, "image": image}
         )
     return _common(stage, shapes[stage.branch], data) | {"branches": branches, "solids": _solids(shelf)}
 

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.faults import as_failure
-from rodfem.stability.method import Method
+from rodfem.stability.method import Found, Method
 from rodfem.stability.methods import AUTO, METHODS, find
 from rodfem.stability.rank import rank_of
 from rodfem.stability.round_off import Decision, decide
@@ -150,6 +150,15 @@ class Assessor(Workspace):
             *(index, zero, found.values, found.vectors, found.errors, *inside, found.certified),
             *(perf_counter() - started, made + found.factorisations, name, reason + found.note),
         )
+
+    def leftmost(self, x: PETSc.Vec, number: int) -> Found:
+        """The ``number`` left-most eigenpairs of the conservative state ``x`` alone, without its index.
+
+        Raises :class:`ConvergenceError` where the eigensolver fails.
+        """
+        name, _ = self.choose(AUTO, number)
+        with as_failure(self.system.comm):
+            return self._method(name).leftmost(x, number, None)
 
     def _method(self, name: str) -> Method:
         """Method by name, kept for the next state."""

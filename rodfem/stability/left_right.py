@@ -38,9 +38,7 @@ def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
     Raises :class:`ConvergenceError` if a right eigenvalue has no left partner.
     """
     right, left = (find(2 * number + 2, 0.0) for find in (pencil.near, pencil.left))
-    upper = right.values.imag > -SAME * abs(right.values)  # one of each pair
-    nearest = [i for i in np.argsort(abs(right.values), kind="stable") if upper[i]][:number]
-    chosen = sorted(nearest, key=lambda i: right.values[i].real)
+    chosen = sorted(upper(right.values, number), key=lambda i: right.values[i].real)
     partners: list[int] = []
     for value in right.values[chosen]:
         distance = abs(left.values - value)
@@ -51,9 +49,7 @@ def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
                 f"The left mode of the eigenvalue {value:.6g} was not found: ask for fewer modes, or change the load."
             )
     comm = pencil.system.comm
-    X, Z = right.vectors[:, chosen], left.vectors[:, partners]
-    X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * pencil.weighed(X), axis=0)).real)
-    X = X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * pencil.weighed(X), axis=0))))
+    X, Z = alone(pencil, right.vectors[:, chosen]), left.vectors[:, partners]
     Z = Z @ np.linalg.inv(comm.allreduce(Z.T @ pencil.weighed(X)).T)
     values = right.values[chosen]
     return TwoSided(
@@ -64,3 +60,16 @@ def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
         Z,
         pencil.weighed(Z),
     )
+
+
+def upper(values: np.ndarray, number: int) -> list[int]:
+    """Places of the ``number`` of ``values`` nearest zero that have no negative imaginary part: one of each pair."""
+    kept = values.imag > -SAME * abs(values)
+    return [int(i) for i in np.argsort(abs(values), kind="stable") if kept[i]][:number]
+
+
+def alone(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
+    """Columns ``X`` (n, k) of ``vectors`` with ``X^* M X = 1``, and ``X^t M X`` real and positive, for each."""
+    comm, X = pencil.system.comm, vectors
+    X = X / np.sqrt(comm.allreduce(np.sum(X.conj() * pencil.weighed(X), axis=0)).real)
+    return np.asarray(X * np.exp(-0.5j * np.angle(comm.allreduce(np.sum(X * pencil.weighed(X), axis=0)))))

@@ -12,10 +12,12 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import demo_cases
 import numpy as np
 import pytest
 from output.test_formats import MESH, RUNS
@@ -59,6 +61,11 @@ GOLDEN = Path(__file__).with_name("golden.png")
 BLOCK, FORGIVEN, MOST = 8, 16.0, 12
 """Pixels of a block, grey levels by which it may differ, and how many may differ by more."""
 
+IN_PLANE = """const plot = document.getElementById("loci"), { xaxis, yaxis } = plot._fullLayout;
+    const box = plot.getBoundingClientRect();
+    return [box.x + xaxis._offset + xaxis.l2p(arguments[0]), box.y + yaxis._offset + yaxis.l2p(arguments[1])]"""
+"""Where the plane of loci has a point."""
+
 pytestmark = [
     pytest.mark.alone,
     pytest.mark.skipif(
@@ -88,6 +95,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
         run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
     plan = Plan((0.0, 12.0), at=(11.0,), depth=1, spectrum=2, modes=2)
     run(scenes()["euler"], MESH, plan, folder / "pinned", figures=False, quiet=True)
+    beck = demo_cases.scene("follower", span=(19.0, 21.0))
+    run(beck, MESH, Plan(error_bars=False, locus=("J1", 0.0, 0.004)), folder / "beck", figures=False, quiet=True)
     return folder
 
 
@@ -245,16 +254,52 @@ def test_the_slider_shows_all_states_of_a_load(opened: Callable[..., Any]) -> No
 
 
 def test_modes_move(opened: Callable[..., Any]) -> None:
+    """Where a state has none, those of the nearest on either side are offered, in the order of their loads."""
     page = opened("pinned")
-    page.execute_script("import('report/store').then((store) => store.select(0, 0))")
-    until(page, lambda: shown(page) == ("straight", 0) and "modes at" in page.find_element(By.ID, "modes").text)
+    rows = sorted(
+        map(int, page.execute_script("return import('report/data').then(({ data }) => data.branches[0].modes)"))
+    )
+    gap = next(a for a, b in pairwise(rows) if b > a + 1)
+    page.execute_script(
+        "import('report/store').then((store) => store.select(0, arguments[0]))".replace("arguments[0]", str(gap + 1))
+    )
+    until(page, lambda: shown(page) == ("straight", gap + 1) and "modes at" in page.find_element(By.ID, "modes").text)
+    offered = [float(text.split(" = ")[1]) for text in page.find_element(By.ID, "modes").text.split("modes at")[1:]]
+    loads = page.execute_script("return import('report/data').then(({ data }) => data.branches[0].load)")
+    assert offered == sorted(offered) and len(offered) == 2
+    assert offered == pytest.approx([loads[row] for row in (gap, rows[rows.index(gap) + 1])], rel=1e-4)
     page.find_element(By.CSS_SELECTOR, "#modes button").click()
-    until(page, lambda: "grows" in page.find_element(By.ID, "modes").text)
+    until(page, lambda: shown(page)[1] == gap and "swings" in page.find_element(By.ID, "modes").text)
     page.find_element(By.CSS_SELECTOR, "#modes button").click()
     first = picture(page)
     until(page, lambda: picture(page) != first)
-    press(page, Keys.HOME)
-    until(page, lambda: shown(page)[1] == 0)
+    press(page, Keys.END)
+    until(page, lambda: shown(page)[1] == len(loads) - 1 and "grows" in page.find_element(By.ID, "modes").text)
+
+
+def test_the_locus_of_a_flutter_load_leads_to_the_mode_that_flutters(opened: Callable[..., Any]) -> None:
+    """Beck's column: omega = 11.02 at P = 20.05.  A click on the curve shows that state, and its mode moves."""
+    page = opened("beck")
+    page.find_elements(By.CSS_SELECTOR, "#diagram-tabs button")[1].click()
+    until(page, lambda: page.find_elements(By.CSS_SELECTOR, "#loci .scatterlayer .trace"))
+    (locus,) = page.execute_script("return import('report/data').then(({ data }) => data.loci)")
+    ((_, row),) = locus["special"]
+    click(page, *page.execute_script(IN_PLANE, locus["x"][len(locus["x"]) // 4], locus["load"][len(locus["x"]) // 4]))
+    until(page, lambda: shown(page)[1] == row and "flutter" in page.find_element(By.ID, "sentence").text.lower())
+    assert float(re.findall(r"[\d.]+", page.find_element(By.ID, "state-load").text)[0]) == pytest.approx(
+        20.05, abs=5e-3
+    )
+    buttons = page.find_elements(By.CSS_SELECTOR, "#modes button")
+    values = [float(re.findall(r"[\d.]+", button.text)[0]) for button in buttons]
+    assert min(values) ** 0.5 == pytest.approx(11.02, abs=5e-3) and len({round(value, 1) for value in values}) == len(
+        values
+    )
+    still = picture(page)
+    buttons[values.index(min(values))].click()
+    until(page, lambda: page.find_element(By.CSS_SELECTOR, "#modes [aria-pressed=true]").text.startswith("●"))
+    moving = {picture(page) for _ in range(4)}
+    assert still not in moving
+    assert len(moving) > 1
 
 
 def test_each_number_has_its_error_or_says_that_it_has_none(opened: Callable[..., Any]) -> None:
@@ -340,15 +385,12 @@ def test_the_plane_of_loci_shows_states(opened: Callable[..., Any]) -> None:
     until(page, lambda: page.find_elements(By.CSS_SELECTOR, "#loci .scatterlayer .trace"))
     locus = page.execute_script("return import('report/data').then(({ data }) => data.loci[0])")
     ((branch, row),) = locus["special"]
-    script = """const plot = document.getElementById("loci"), { xaxis, yaxis } = plot._fullLayout;
-        const box = plot.getBoundingClientRect();
-        return [box.x + xaxis._offset + xaxis.l2p(arguments[0]), box.y + yaxis._offset + yaxis.l2p(arguments[1])]"""
     names = page.execute_script("return import('report/data').then(({ data }) => data.branches.map((b) => b.name))")
     last = len(locus["x"]) - 1
-    click(page, *page.execute_script(script, locus["x"][last // 4], locus["load"][last // 4]))
+    click(page, *page.execute_script(IN_PLANE, locus["x"][last // 4], locus["load"][last // 4]))
     until(page, lambda: shown(page) == (names[branch], row))
     other, edge, end = (column[REGION // 2] for column in locus["region"])
-    click(page, *page.execute_script(script, other, 0.3 * edge + 0.7 * end))
+    click(page, *page.execute_script(IN_PLANE, other, 0.3 * edge + 0.7 * end))
     until(page, lambda: shown(page) != (names[branch], row))
     load = page.execute_script("return import('report/store').then((store) => store.state.load)")
     assert load == pytest.approx(0.3 * edge + 0.7 * end, abs=0.02 * abs(edge - end))

@@ -75,7 +75,13 @@ def test_every_kind_of_run_has_a_page(results: Path, name: str) -> None:
         assert shown["pieces"][0]["rows"][0] == 0 and shown["pieces"][-1]["rows"][1] == rows - 1
         assert all(len(column) == rows for column in shown["ordinates"].values())
     assert bool(data["loci"]) == (name == "locus")
-    assert any(branch["modes"] for branch in data["branches"]) == (name in ("pinned", "follower", "foundation"))
+    for shown, branch in zip(data["branches"], saved["branches"], strict=True):
+        rows = {0, len(branch["columns"]["load"]) - 1} | {special["row"] for special in branch["special"]}
+        assert rows <= {int(row) for row in shown["modes"]} and not shown["missed"]
+        for modes in shown["modes"].values():
+            assert all(values["shape"] == [data["s"]["shape"][0], 6] for mode in modes for values in mode["parts"])
+    exact = [mode["words"] for branch in data["branches"] for modes in branch["modes"].values() for mode in modes]
+    assert any(re.search(r"\(\de-", words) for words in exact) == (name == "pinned")
     assert dict(data["origin"])["command"] and "dolfinx" in dict(data["origin"])["versions"]
 
 
@@ -83,9 +89,14 @@ def test_end_shortening_and_modes_are_those_of_the_files(results: Path) -> None:
     branches = payload_of(results / "pinned")["branches"]
     shortening = np.array(branches[1]["ordinates"]["end shortening"])
     assert shortening[0] == pytest.approx(0.0, abs=1e-6) and shortening.max() > 0.1
-    (row, modes), *_ = branches[0]["modes"].items()
-    assert branches[0]["load"][row] == 11.0 and modes[0]["kind"] == "grows" and modes[1]["kind"] == "swings"
+    (modes,) = [modes for row, modes in branches[0]["modes"].items() if branches[0]["load"][row] == 11.0]
+    assert modes[0]["kind"] == "grows" and modes[1]["kind"] == "swings"
     assert modes[0]["value"][0] < 0 < modes[1]["value"][0]
+    # --modes 2 has error bars of two of the four that every run records, and each is there once
+    *modes, turning = modes
+    assert [bool(mode["words"]) for mode in modes] == [True, True, False, False] and turning["motion"] == "symmetry"
+    values = [mode["value"][0] for mode in modes]
+    assert values == sorted(values) and min(np.diff(values)) > 1e-3
 
 
 def test_the_page_needs_no_network_and_runs_no_text(results: Path) -> None:

@@ -3,6 +3,7 @@
 export const data = JSON.parse(document.getElementById("payload").textContent);
 
 const unpacked = new Map();
+const NOTHING = 1e-12; // of its natural size, a number whose error is not estimated is zero
 
 // Values of an array that Python has packed; each is decoded once.
 export function values(packed) {
@@ -38,7 +39,8 @@ export function escaped(text) {
 // A number of a row with the bound of its error, or marked where that is not estimated.
 export function reading(branch, row, name) {
   const value = name === "load" ? branch.load[row] : branch.ordinates[name]?.[row];
-  return branch.readings[row]?.[name] ?? rough(value);
+  const none = Math.abs(value) < NOTHING * (data.natural[name] ?? 0);
+  return branch.readings[row]?.[name] ?? rough(none ? 0 : value);
 }
 
 // A number whose error is not estimated.

@@ -1,4 +1,4 @@
-// Buttons of the modes that a state has, and of the states that have some.
+// Buttons of the modes that a state has; where it has none, of the nearest states that have some.
 
 import { data, digits, rough } from "report/data";
 import { branch, select, showMode, state, subscribe } from "report/store";
@@ -23,21 +23,34 @@ function words(mode) {
   return `${mode.kind === "grows" ? "◌" : "●"} ${value} ${mode.kind}${mode === state.mode ? `: ${mode.motion}` : ""}`;
 }
 
+// The nearest states on either side that have modes, that of the smaller load first, as in the chart above.
+function nearest(rows) {
+  const b = branch(), found = [rows.filter((row) => row < state.row).at(-1), rows.find((row) => row > state.row)];
+  const ordered = found.filter((row) => row !== undefined).sort((p, q) => b.load[p] - b.load[q]);
+  return ordered.map((row) => button(`modes at ${data.symbol} = ${digits(b.load[row], 5)}`, null, () => select(state.branch, row)));
+}
+
+function quiet(text, title = "") {
+  const made = document.createElement("span");
+  made.className = "quiet";
+  made.textContent = text;
+  made.title = title;
+  return made;
+}
+
 function redraw() {
-  const b = branch(), here = b.modes[state.row] ?? [];
-  const rows = Object.keys(b.modes).map(Number), none = !rows.length && (b.spectrum || b.omega2) && document.createElement("span");
-  const key = [state.branch, here.length || none ? state.row : -1, here.indexOf(state.mode)].join();
+  const b = branch(), here = b.modes[state.row] ?? [], rows = Object.keys(b.modes).map(Number);
+  const key = [state.branch, state.row, here.indexOf(state.mode)].join();
   if (key === shown) return;
   shown = key;
   const buttons = here.map((mode) => button(words(mode), mode === state.mode, () => showMode(mode === state.mode ? null : mode), mode.kind));
-  if (none) {
-    none.className = "quiet";
-    none.title = "The command of this report, with these options besides: see About";
-    none.textContent = `Modes that move: run with --at ${digits(b.load[state.row], 4)} --modes 3`;
-  }
   buttons.forEach((one, i) => (one.title = `Mode ${i + 1}: ${here[i].motion}`));
-  const others = here.length ? [] : rows.map((row) => button(`modes at ${data.symbol} = ${digits(b.load[row])}`, null, () => select(state.branch, row)));
-  box.replaceChildren(...buttons, ...others, ...(none ? [none] : []));
+  const missed = b.missed?.[state.row], none = !here.length && !missed && !rows.length;
+  const others = [
+    ...(missed ? [quiet(`No modes: ${missed}`)] : here.length ? [] : nearest(rows)),
+    ...(none ? [quiet("No modes were computed: the rod has no inertia, or an earlier version of rodfem wrote the files.")] : []),
+  ];
+  box.replaceChildren(...buttons, ...others);
 }
 
 export function start() {

@@ -1,5 +1,5 @@
-// Left-most eigenvalues along the branch, by sign: negative ones are triangles, positive ones circles. Where none are
-// recorded, how many are negative.
+// Left-most eigenvalues along the branch, by sign: negative ones are triangles, positive ones circles. They are those of
+// every row where a run was asked for that, else those of the states that have modes; where there are none, the index.
 
 import { data, digits, escaped, rough } from "report/data";
 import { branch, select, state, subscribe } from "report/store";
@@ -17,10 +17,26 @@ const KINDS = [
   { name: "complex", test: ([, y]) => y !== 0, marker: { symbol: "x-thin", size: 6, line: { color: VERMILION, width: 1.8 } } },
 ];
 
-// (row, real part, imaginary part) of all eigenvalues that a branch has recorded.
+// Eigenvalues of the rows that have modes, without those of symmetries.
+const ofModes = (b) => Object.entries(b.modes).map(([row, modes]) => [Number(row), modes.filter((mode) => mode.motion !== "symmetry").map((mode) => mode.value)]);
+
+// Row and value of all eigenvalues that a branch has recorded.
 function recorded(b) {
-  const rows = b.spectrum?.map((each) => each.map((x) => [x, 0])) ?? b.omega2 ?? [];
-  return rows.flatMap((each, row) => each.map(([x, y]) => ({ row, value: [x, y] })));
+  const every = b.spectrum?.map((each) => each.map((x) => [x, 0])) ?? b.omega2;
+  return (every ? [...every.entries()] : ofModes(b)).flatMap(([row, each]) => each.map((value) => ({ row, value })));
+}
+
+// Thin lines that join the least eigenvalues of the states with modes, the second ones, and so on: these are continuous.
+function guides(b) {
+  if (b.spectrum || b.omega2) return [];
+  const rows = ofModes(b), most = Math.max(...rows.map(([, each]) => each.length));
+  return Array.from({ length: most }, (_, k) => ({
+    x: rows.map(([row]) => b.load[row]),
+    y: rows.map(([, each]) => each[k]?.[0] ?? null),
+    mode: "lines",
+    hoverinfo: "skip",
+    line: { color: "#c2cad2", width: 1 },
+  }));
 }
 
 // All eigenvalues; of squared frequencies the lowest two, which may meet.
@@ -74,10 +90,10 @@ function redraw() {
       marker,
     };
   });
-  const title = b.omega2 ? "Re ω²" : "μ";
+  const title = b.omega2 ? "Re ω²" : "eigenvalue μ";
   const how = layout(data.label, title, { margin: { l: 60, r: 8, t: 4, b: 34 }, uirevision: b.name });
   how.yaxis.range = range(b, all);
-  finish(traces, how);
+  finish([...guides(b), ...traces], how);
 }
 
 export function start() {

@@ -20,10 +20,10 @@ function redraw() {
   at("sentence").textContent = sentence + (special?.law ? ` ${special.law[0].toUpperCase()}${special.law.slice(1)}.` : "");
 }
 
-// Left-most eigenvalues of the state, those of the chart, but for those that buttons of modes have with an error.
+// Left-most eigenvalues of the state, but for those that buttons of modes have.
 function values(b) {
-  const known = (b.modes[state.row] ?? []).filter((mode) => mode.words).map((mode) => mode.value);
-  const same = (p, q) => Math.hypot(p[0] - q[0], p[1] - q[1]) <= SAME * Math.hypot(...q);
+  const known = (b.modes[state.row] ?? []).map((mode) => mode.value);
+  const same = (p, q) => Math.hypot(p[0] - q[0], Math.abs(p[1]) - Math.abs(q[1])) <= SAME * Math.hypot(...q);
   const all = b.spectrum?.[state.row]?.map((x) => [x, 0]) ?? b.omega2?.[state.row] ?? [];
   const found = all.filter((value) => !known.some((other) => same(value, other)));
   const each = found.slice(0, MOST).map(([x, y]) => {
@@ -34,10 +34,9 @@ function values(b) {
   });
   const none = document.createElement("span");
   none.className = "quiet";
-  const options = ["--spectrum 4", `--at ${digits(b.load[state.row], 4)}`, "--modes 3"].map((option) => Object.assign(document.createElement("code"), { textContent: option }));
-  if (!(b.spectrum || b.omega2 || known.length)) none.append("Values: run with ", ...options.flatMap((option) => [option, " "]));
-  none.title = "The command of this report, with these options besides: see About";
-  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω²:" : "μ:", ...each] : [none]));
+  if (!(b.spectrum || b.omega2 || known.length)) none.append("Values at every state: run with ", Object.assign(document.createElement("code"), { textContent: "--spectrum 4" }));
+  none.title = "The command of this report, with this option besides: see About";
+  at("values").replaceChildren(...(each.length ? [b.omega2 ? "ω²:" : "μ:", ...each] : none.hasChildNodes() ? [none] : []));
 }
 
 function line(list, name, text, code = false) {

@@ -1,0 +1,131 @@
+"""Modes that every run records: closed forms at the states of a diagram, what files hold of them, what they change."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import classics
+import h5py
+import numpy as np
+import pytest
+from closed_forms import column as beck_value
+from modes.test_modes import shape
+
+import rodfem
+from rodfem.diagram.plan import Plan
+from rodfem.errors import ConvergenceError
+from rodfem.fem.fields import Discretization
+from rodfem.modes.eigenmotions import Eigenmotions
+from rodfem.modes.modes import SYMMETRY
+from rodfem.modes.recorded import Typical, read
+from rodfem.modes.typical import EVENLY, FEWEST, typical_rows
+from rodfem.problem.scene import Inertia, Scene
+
+pytestmark = pytest.mark.alone
+MESH = Discretization("auto", 4, 6)
+
+
+def recorded(scene: Scene, plan: Plan, folder: Path, mesh: Discretization = MESH) -> dict[str, list[Typical]]:
+    """Modes in the file of a run, by branch."""
+    rodfem.run(scene, mesh, plan, folder, figures=False, quiet=True)
+    with h5py.File(folder / "states.h5") as file:
+        return {name: list(read(group)) for name, group in file["branches"].items()}
+
+
+@pytest.mark.short
+def test_euler_column(folder: Path) -> None:
+    """Clamped-free, EI = 1 and 2: mu = EI w^2 - P with w = pi/2, 3 pi/2, ..., torsion w^2; as many as the index."""
+    found = recorded(classics.euler("clamped-free"), Plan((0.0, 45.0), depth=0, error_bars=False), folder)
+    w = np.pi / 2 * np.arange(1, 14, 2)
+    modes = found["straight"]
+    loads = json.loads((folder / "diagram.json").read_text())["branches"][0]["columns"]["load"]
+    assert {0, len(loads) - 1} <= {each.row for each in modes}
+    critical = sorted(x for x in (*w**2, *2 * w**2) if x < 45.0)
+    assert all(min(abs(loads[each.row] - load) for each in modes) < 1e-5 for load in critical)
+    for each in modes:
+        expected = np.sort(np.concatenate([w**2 - loads[each.row], 2 * w**2 - loads[each.row], w**2]))
+        assert each.found is not None and len(each.found.value) >= max(FEWEST, (expected < -1e-3).sum())
+        np.testing.assert_allclose(each.found.value, expected[: len(each.found.value)], atol=1e-4)
+        first = np.abs(each.found.rotation[0]).max(axis=1)  # sqrt(2) sin w s, of unit kinetic energy, at the nodes
+        s = np.linspace(0, 1, len(first))[::6]
+        np.testing.assert_allclose(first[::6], 2**0.5 * np.sin(w[0] * s), atol=1e-5)
+
+
+def test_a_double_eigenvalue_has_one_mode(folder: Path) -> None:
+    """Where Beck's column flutters, P = 20.05, omega = 11.02 (Beck 1952): the one mode of the closed form there."""
+    found = recorded(classics.beck(span=(19.0, 21.0)), Plan(error_bars=False), folder, Discretization("auto", 6, 6))
+    branch = json.loads((folder / "diagram.json").read_text())["branches"][0]
+    (special,) = [s for s in branch["special"] if s["kind"] == "flutter"]
+    (few,) = [each.found for each in found[branch["name"]] if each.row == special["row"]]
+    assert few is not None and special["load"] == pytest.approx(20.0509536, abs=1e-6)
+    (i,) = np.flatnonzero(abs(few.value - special["omega2"]) < 1e-2 * special["omega2"])
+    assert few.value[i] == special["omega2"] and special["omega2"] ** 0.5 == pytest.approx(11.0156, abs=1e-4)
+    assert abs(few.displacement[i].imag).max() == 0.0
+    s = np.linspace(0, 1, few.displacement.shape[1])[::6]  # vertices
+    exact, moved = shape(special["omega2"], special["load"], s, False).real, few.displacement[i, ::6, 1].real
+    np.testing.assert_allclose(moved / moved[-1], exact / exact[-1], atol=1e-4)
+
+
+def test_a_complex_pair_is_one_mode(folder: Path) -> None:
+    """Beck's column after flutter, P = 30, against the equation of its frequencies."""
+    found = recorded(classics.beck(span=(29.0, 30.0)), Plan(error_bars=False), folder, Discretization("auto", 6, 6))
+    (*_, last) = next(iter(found.values()))
+    mu = beck_value(50 + 150j, 30.0)
+    assert last.found is not None and sum(last.found.value.imag != 0) == 1
+    assert min(abs(last.found.value - mu)) < 1e-6 * abs(mu)
+
+
+def test_symmetries_come_last(folder: Path) -> None:
+    """A pinned rod that turns about its axis as a whole: a mode of torsion whose eigenvalue is zero at every load."""
+    found = recorded(classics.euler("pinned-pinned"), Plan((0.0, 5.0), depth=0, error_bars=False), folder)
+    for each in found["straight"]:
+        assert each.found is not None and each.found.motion.count(SYMMETRY) == 1
+        assert each.found.motion[-1] == SYMMETRY and each.found.value[-1] == 0.0
+        turning = each.found.rotation[-1]
+        np.testing.assert_allclose(abs(turning[:, 2]), abs(turning[0, 2]), rtol=1e-9)
+        assert abs(turning[:, :2]).max() < 1e-9 * abs(turning[0, 2])
+
+
+def test_rows_that_are_typical(folder: Path) -> None:
+    """Both ends, evenly between by arclength, and each special point once."""
+    diagram = rodfem.trace(classics.euler("clamped-free"), MESH, Plan((0.0, 12.0), depth=1, error_bars=False))
+    for branch in diagram:
+        rows, along = typical_rows(branch), np.array([p.arclength for p in branch.points])
+        assert set(rows) >= {0, len(along) - 1} | {s.row for s in branch.special}
+        assert len(rows) <= EVENLY + len(branch.special)
+        largest = np.diff(along).max()
+        gaps = np.diff(along[sorted(rows)])
+        assert gaps.max() <= along[-1] / (EVENLY - 1) + largest
+
+
+def test_a_trace_is_the_same_with_and_without_them(folder: Path) -> None:
+    """Modes are computed between two branches: nothing of the next one may depend on that, not even its last bit."""
+    plan = Plan((0.0, 12.0), depth=2, error_bars=False)
+    rodfem.run(classics.euler("clamped-free"), MESH, plan, folder, figures=False, quiet=True)
+    alone = rodfem.trace(classics.euler("clamped-free"), MESH, plan)
+    saved = json.loads((folder / "diagram.json").read_text())["branches"]
+    assert saved == json.loads(json.dumps(alone.data["branches"]))
+
+
+def test_where_they_are_not_found_the_file_says_why(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, failed = Eigenmotions.few, []
+
+    def few(self: Eigenmotions, *what: object) -> object:
+        if not failed:
+            failed.append(what)
+            raise ConvergenceError("No eigenvalue was found.")
+        return whole(self, *what)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Eigenmotions, "few", few)
+    found = recorded(classics.euler("clamped-free"), Plan((0.0, 2.0), depth=0, error_bars=False), folder)["straight"]
+    assert [each.trouble for each in found] == ["No eigenvalue was found.", *[""] * (len(found) - 1)]
+    assert found[0].found is None and all(each.found is not None for each in found[1:])
+
+
+def test_a_rod_without_inertia_has_none(folder: Path) -> None:
+    nothing = Inertia(rho_A=lambda c: 0.0, rho_I=lambda c: (0.0, 0.0, 0.0))
+    scene = replace(classics.euler("clamped-free"), inertia=nothing)
+    found = recorded(scene, Plan((0.0, 2.0), depth=0, error_bars=False), folder)
+    assert found["straight"] == []
