@@ -2,18 +2,27 @@
 # Makes rodfem runnable on Debian 12, 13 or sid: system packages, .venv, and rodfem in it. Where nothing is missing
 # it does nothing, and needs neither network nor sudo.
 #
-#     tools/setup.sh EXTRAS        EXTRAS as in pyproject.toml: viz,test, dev or docs
+#     tools/setup.sh EXTRAS        EXTRAS as in pyproject.toml, with commas between: viz,test
 #
 # Where another Python has a dolfinx of its own (conda, the images of the FEniCS project), RODFEM_PYTHON names it: no
 # Debian package is installed then, and .venv sees what that Python sees.
 set -eu
 cd "$(dirname "$0")/.."
-extras=$1
 
 fail() {
     echo "rodfem: $*" >&2
     exit 1
 }
+
+# --- what is asked for ------------------------------------------------------------------------------------
+
+known=$(sed -n '/^\[project.optional-dependencies\]/,/^\[tool/s/^\([a-z]*\) = .*/\1/p' pyproject.toml | xargs)
+[ $# = 1 ] && [ -n "$1" ] ||
+    fail "tools/setup.sh takes one argument, the extras to install with commas between, as in 'tools/setup.sh viz,test': choose from $known."
+extras=$1
+for extra in $(echo "$extras" | tr , ' '); do
+    case " $known " in *" $extra "*) ;; *) fail "there is no extra '$extra' in pyproject.toml: choose from $known." ;; esac
+done
 
 # --- Debian packages -------------------------------------------------------------------------------------
 

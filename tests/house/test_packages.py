@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import tomllib
 import venv
 import zipfile
 from math import pi
@@ -120,3 +121,12 @@ def test_test_files_have_names_of_their_own() -> None:
     """Tests are no package: of two files with one name pytest refuses the second."""
     names = [path.name for path in (HOME / "tests").rglob("test_*.py")]
     assert sorted(set(names)) == sorted(names)
+
+
+@pytest.mark.parametrize(("given", "said"), [((), "takes one argument"), (("viz,tset",), "no extra 'tset'")])
+def test_setup_without_an_extra_that_exists(given: tuple[str, ...], said: str) -> None:
+    """One sentence, which names all there are, before anything is installed."""
+    extras = tomllib.loads((HOME / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    done = subprocess.run(["tools/setup.sh", *given], cwd=HOME, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert said in done.stderr and done.stderr.endswith(f": choose from {' '.join(extras)}.\n")
