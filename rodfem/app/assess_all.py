@@ -49,6 +49,7 @@ def assess_all(
         if mesh not in finders:
             finders[mesh] = ModeFinder(solvers[mesh], plan.error_bars)
         finder = finders[mesh]
+        report.working(f"{branch.name} at {where}: stability{' and modes' if plan.modes else ''}")
         try:
             if not plan.modes:
                 report.verdict(branch.name, where, finder.assessor(special.point.x, plan.method).at(special.point))
@@ -65,6 +66,7 @@ def assess_all(
         return
     pictures = [f"modes-{name.replace(' ', '-')}-{row}" for name, row in saved] if figures else []
     for (name, row), picture in zip(saved, pictures, strict=False):
+        report.working(f"{name}, row {row}: pictures and animations of its modes")
         for suffix in (".png", ".gif"):
             target = output / f"{picture}{suffix}"
             on_first(system.comm, partial(draw_modes, output / "modes.h5", name, row, target))

@@ -22,7 +22,7 @@ from rodfem.app.interrupts import listen
 from rodfem.app.pipes import end_quietly
 from rodfem.errors import ConvergenceError, InputError, SetupError
 
-NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
+NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib", "rich")
 
 
 def check_installation() -> None:

@@ -95,6 +95,7 @@ class _Loci:
                     "\nA locus stays on the mesh of its special point: its own estimate says how accurate it is"
                 )
             self.report.say(f"\nLocus of the {which}")
+            self.report.working(f"locus {len(self.saved) + 1}, of the {which}")
             try:
                 near.append(self._locus(special))
             except (InputError, ConvergenceError) as trouble:

@@ -103,8 +103,9 @@ def carry_out(
     """
     known = [Record(step.text, step.vectors) for step in terminal.steps]
     journal = Journal(known, terminal.keep, terminal.run)
-    diagram = traced(scene, discretization, terminal.plan, terminal, comm, journal)
-    _report(diagram, terminal, figures)
+    with terminal:
+        diagram = traced(scene, discretization, terminal.plan, terminal, comm, journal)
+        _report(diagram, terminal, figures)
     return diagram
 
 
@@ -128,6 +129,7 @@ def _report(diagram: Diagram, terminal: Terminal, figures: bool) -> None:
     if plan.locus is not None:
         follow_all(branches, diagram.solvers, plan, output, terminal, figures, known=terminal.goes_on)
     if figures:
+        terminal.working("pictures")
         on_first(comm, lambda: draw(output, terminal))
     diagram.complete = True
     with held():

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from math import isfinite
-from shutil import get_terminal_size
 from textwrap import fill, wrap
 from time import monotonic
-from typing import Any, TextIO
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self, TextIO
 
 import numpy as np
 from mpi4py import MPI
 
 from forms.kinematics import RODS
-from rodfem.app.colour import painted, wanted
 from rodfem.continuation.branch import ORDINATE, Branch, NormalForm, Point, SpecialPoint, not_followed
 from rodfem.continuation.kinds import END, FLUTTER
 from rodfem.continuation.observer import Observer
 from rodfem.errors import Argument
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
+from rodfem.launcher import RANK
 from rodfem.modes.modes import Modes
 from rodfem.output.digits import NO_ESTIMATE, in_decimals, in_words, index_in_words, number, rounded_up, with_unit
 from rodfem.output.summary import called, in_sentences
@@ -29,6 +31,9 @@ from rodfem.problem.units import ONES
 from rodfem.stability.assessment import Verdict
 from rodfem.stability.soft_mode import index_range
 from rodfem.timing import WORK, Clock
+
+if TYPE_CHECKING:
+    from rodfem.app.screen import Screen
 
 INDEX, UNSTABLE = "index", "unstable"
 """Headings of the number of negative eigenvalues; without a potential, of that of eigenvalues negative or complex."""
@@ -79,8 +84,17 @@ def broken(line: str, columns: int) -> list[str]:
     return wrap(line, columns, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
+def is_screen(stream: TextIO) -> bool:
+    """Whether a stream is a terminal on which a line can change.
+
+    What Open MPI gives its ranks is a terminal of its own, even where its output goes into a file: that is none.
+    """
+    dumb = os.environ.get("TERM") in ("dumb", "unknown")
+    return stream.isatty() and not dumb and not any(name in os.environ for name in RANK)
+
+
 class Report(Observer):
-    """Prints on rank 0."""
+    """Prints on rank 0: on a terminal in colours, with a line that says what is done now, until it is closed."""
 
     def __init__(
         self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None, words: Callable[[str], str] = str
@@ -89,28 +103,51 @@ class Report(Observer):
         self.count, self.words, self.units, self.wide = INDEX, words, ONES, 6
         self.on = comm.rank == 0
         self.stream = stream or sys.stdout
-        self.live = self.on and self.stream.isatty() and comm.size == 1
-        self.paint = painted if self.on and wanted(self.stream) else str
+        self.live = self.on and comm.size == 1 and is_screen(self.stream)
         self.known: list[Branch] = []
         self.load, self.told = "load", monotonic()
+
+    @cached_property
+    def screen(self) -> Screen:
+        """The terminal, where output is :attr:`live`."""
+        from rodfem.app.screen import Screen
+
+        return Screen(self.stream)
+
+    def __enter__(self) -> Self:
+        """Nothing is shown yet."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """Leave the terminal as it was, also after an error or an interrupt."""
+        self.close()
+
+    def close(self) -> None:
+        """Remove the line of what is done now."""
+        if self.live:
+            self.screen.close()
 
     @property
     def width(self) -> int:
         """Columns that a paragraph may take: no more than a terminal has."""
-        return min(WIDTH, get_terminal_size().columns) if self.live else WIDTH
+        return min(WIDTH, self.screen.width) if self.live else WIDTH
 
-    def say(self, line: str = "", end: str = "\n") -> None:
+    def say(self, line: str = "") -> None:
         """Print one line."""
-        if self.on:
-            if self.live:
-                self.stream.write("\r\033[K")
-            lines = self.words(line).split("\n")
-            if self.live and not end:
-                lines = [lines[0][: get_terminal_size().columns - 1]]
-            elif self.live:
-                lines = [part for one in lines for part in broken(one, get_terminal_size().columns)]
-            self.stream.write("\n".join(map(self.paint, lines)) + end)
+        if not self.on:
+            return
+        lines = self.words(line).split("\n")
+        if self.live:
+            for part in (part for one in lines for part in broken(one, self.screen.width)):
+                self.screen.show(part)
+        else:
+            self.stream.write("\n".join(lines) + "\n")
             self.stream.flush()
+
+    def working(self, words: str) -> None:
+        """Say on a terminal what is done now, and takes long."""
+        if self.live:
+            self.screen.status(self.words(words), long=True)
 
     def note(self, sentence: str) -> None:
         """Print it."""
@@ -183,14 +220,18 @@ class Report(Observer):
 
     def progress(self, branch: Branch, point: Point) -> None:
         """Keep one line up to date while a branch is traced; elsewhere than on a terminal print it now and then."""
-        if self.live or monotonic() - self.told > PAUSE:
-            self.told = monotonic()
-            self.say(
-                f"  ... {branch.name}: {self.load} = {in_decimals(point.load, 5, self.units.load)}, {self.count} "
-                f"{point.negative}, {len(branch.points)} points; {len(self.known)} known, "
-                f"{not_followed(self.known)} waiting",
-                end="" if self.live else "\n",
-            )
+        if not self.live and monotonic() - self.told < PAUSE:
+            return
+        self.told = monotonic()
+        words = (
+            f"{branch.name}, {len(self.known)} known, {not_followed(self.known)} waiting, "
+            f"{self.load} = {in_decimals(point.load, 5, self.units.load)}, {self.count} {point.negative}, "
+            f"{len(branch.points)} points"
+        )
+        if self.live:
+            self.screen.status(self.words(words), long=False)
+        else:
+            self.say(f"  ... {words}")
 
     def special(self, branch: Branch, special: SpecialPoint) -> None:
         """Print a special point as it is found, as AUTO does."""
