@@ -1,4 +1,4 @@
-"""Modes at a few typical states of each branch, which every run records: its ends, the middle, special points."""
+"""Modes at a few typical states of each branch, which every run records: its ends, evenly between, special points."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.modes.eigenmotions import Eigenmotions
 from rodfem.modes.recorded import Typical
 
-EVENLY = 3
+EVENLY = 5
 """States of a branch, evenly along it."""
 FEWEST, MOST = 4, 8
 """Modes of a state: those of negative eigenvalues are among them up to the latter."""

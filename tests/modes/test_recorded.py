@@ -89,7 +89,7 @@ def test_symmetries_come_last(folder: Path) -> None:
 
 
 def test_rows_that_are_typical(folder: Path) -> None:
-    """Both ends, the middle by arclength, and each special point once."""
+    """Both ends, evenly between by arclength, and each special point once."""
     diagram = rodfem.trace(classics.euler("clamped-free"), MESH, Plan((0.0, 12.0), depth=1, error_bars=False))
     for branch in diagram:
         rows, along = typical_rows(branch), np.array([p.arclength for p in branch.points])

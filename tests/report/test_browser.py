@@ -220,6 +220,29 @@ def test_labels_cover_neither_marks_nor_each_other(opened: Callable[..., Any], n
     assert (apart | np.eye(len(labels), dtype=bool)).all()
 
 
+@pytest.mark.parametrize("name", ["pinned", "locus"])
+def test_the_ring_of_a_state_covers_no_label_beside_it(opened: Callable[..., Any], name: str) -> None:
+    """On a projector, where labels are nearest to their curves: at each of the rows that a label stands at."""
+    page = opened(name, PROJECTOR)
+    script = """const done = arguments[0], plot = document.getElementById("diagram");
+        const box = (x) => { const r = x.getBoundingClientRect(); return [r.left, r.top, r.right, r.bottom]; };
+        const names = ["report/store", "report/data"];
+        Promise.all(names.map((name) => import(name))).then(([{ select, tell }, { data }]) => {
+          done(plot.layout.annotations.map(({ x, y }, i) => {
+            const here = (b, row) => b.load[row] === x && b.ordinates.ordinate[row] === y;
+            const rows = data.branches.map((b) => b.load.findIndex((_, row) => here(b, row)));
+            const number = rows.findIndex((row) => row >= 0);
+            select(number, rows[number]);
+            tell();
+            return [plot.querySelector(".cursor.point"), plot.querySelectorAll(".annotation-text-g")[i]].map(box);
+          }));
+        })"""
+    boxes = np.array(page.execute_async_script(script))
+    assert len(boxes) > 2
+    for ring, label in boxes:
+        assert (ring[:2] >= label[2:]).any() or (label[:2] >= ring[2:]).any()
+
+
 def test_keys_move_along_and_between_branches(opened: Callable[..., Any]) -> None:
     page = opened("pinned")
     branch, _ = shown(page)
@@ -321,7 +344,7 @@ def test_each_number_has_its_error_or_says_that_it_has_none(opened: Callable[...
     assert abs(value - np.pi**2) <= bound < 1e-9 and numbers.endswith("energy = ~0")
     load, numbers, values, modes = read("branch 1", row_of("user", 1), "state-load", "numbers", "values", "modes")
     assert load == "P = 11 (given)" and re.search(r"middle = 0\.2679\d+ \(\de-\d+\); energy = ~2\.1", numbers)
-    assert values == "" and len(re.findall(r"\d\.\d+ \(\de-\d+\) swings", modes)) == 2 and "0 (exact) zero" in modes
+    assert values == "" and len(re.findall(r"\d\.\d+ \(\de-\d+\) swings", modes)) == 2 and "0 (exact)" in modes
     load, numbers, values = read("branch 1", 3, "state-load", "numbers", "values")
     assert load.startswith("P = ~") and numbers.count("~") == numbers.count(" = ") == 2 == values.count("~")
     assert "~: error not estimated" in page.find_element(By.ID, "errors").text

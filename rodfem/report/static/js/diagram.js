@@ -13,7 +13,8 @@ const choice = document.getElementById("ordinate");
 const FREQUENCIES = { key: "frequencies", name: "frequencies" };
 const ordinates = [...(frequencies.ANY ? [FREQUENCIES] : []), ...data.ordinates];
 const NAMED = 12, MANY = 1500; // branches up to which each has its name in the plot; places that labels keep clear of
-const LETTER = 0.0095, TALL = 0.03, AWAY = 0.012; // half the size of a label, for each letter, and its distance: shares of the plot
+const LETTER = 0.0095, TALL = 0.03, AWAY = [0.022, 0.05]; // half the size of a label, for each letter, and its distances: shares of the plot
+const CLEAR = [14, 20]; // the same in pixels: the ring of the state that is shown has a radius of 10 with its edge
 const LINE = 0.03; // half the height that a label keeps clear of others
 const SHORTEST = 0.07, LEAST = 0.7; // pieces without a label; room for a name, of what it takes
 const SHARES = [0.5, 0.6, 0.4, 0.7, 0.3, 0.8, 0.2]; // of a piece at which a label may stand
@@ -91,14 +92,14 @@ function labels() {
   const place = (b, rows, text, wide, wanted, style) => {
     const room = ([x, v]) => taken.reduce((least, [p, q]) => Math.min(least, Math.max(Math.abs(p - x) / wide, Math.abs(q - v) / TALL)), 1);
     const places = rows.filter((row) => heights(b)[row] !== null).flatMap((row) => SIDES.map(([right, up]) => {
-      const [x, v] = at(b, row), middle = [x + (wide + AWAY) * right, v + 0.04 * up];
+      const [x, v] = at(b, row), middle = [x + (wide + AWAY[0]) * right, v + AWAY[1] * up];
       return { row, right, up, middle, room: room(middle) };
     }));
     const best = places.reduce((one, other) => (one && one.room >= other.room ? one : other), null);
     if (!best || best.room < wanted) return [];
     taken.push(...[-0.8, 0, 0.8].flatMap((share) => [-1, 0, 1].map((side) => [best.middle[0] + share * wide, best.middle[1] + side * LINE])));
     const { row, right, up } = best, xanchor = ["right", "center", "left"][right + 1];
-    return [{ x: b.load[row], y: heights(b)[row], text, showarrow: false, yshift: 13 * up, xshift: 7 * right, xanchor, font: { color: b.colour, ...style }, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0, captureevents: false }];
+    return [{ x: b.load[row], y: heights(b)[row], text, showarrow: false, yshift: CLEAR[1] * up, xshift: CLEAR[0] * right, xanchor, font: { color: b.colour, ...style }, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0, captureevents: false }];
   };
   const rowsOf = (first, last) => SHARES.map((share) => Math.round(first + share * (last - first)));
   const indices = data.branches.flatMap((b) => b.pieces.flatMap(({ rows: [first, last], index }) => {

@@ -20,7 +20,8 @@ function button(text, pressed, action, kind = "") {
 function words(mode) {
   const [x, y] = mode.value;
   const value = mode.words || `${rough(x, 5)}${y ? ` ${y > 0 ? "+" : "−"} ${digits(Math.abs(y), 5)} i` : ""}`;
-  return `${mode.kind === "grows" ? "◌" : "●"} ${value} ${mode.kind}${mode === state.mode ? `: ${mode.motion}` : ""}`;
+  const does = mode.kind === "zero" && value.startsWith("0") ? "" : ` ${mode.kind}`;
+  return `${mode.kind === "grows" ? "◌" : "●"} ${value}${does}${mode === state.mode ? `: ${mode.motion}` : ""}`;
 }
 
 // The nearest states on either side that have modes, that of the smaller load first, as in the chart above.

@@ -8,6 +8,7 @@ import { draw, layout } from "report/plotting";
 import { BLUE, DARK, DASHES, PLANAR, VERMILION } from "report/styles";
 
 const plot = document.getElementById("spectrum");
+const TALL = 150; // pixels that an axis takes with its name in words
 let shown = null, cursor = null;
 
 const KINDS = [
@@ -26,7 +27,7 @@ function recorded(b) {
   return (every ? [...every.entries()] : ofModes(b)).flatMap(([row, each]) => each.map((value) => ({ row, value })));
 }
 
-// Thin lines that join the least eigenvalues of the states with modes, the second ones, and so on: these are continuous.
+// Dotted lines that join the least eigenvalues of the states with modes, the second ones, and so on: these are continuous.
 function guides(b) {
   if (b.spectrum || b.omega2) return [];
   const rows = ofModes(b), most = Math.max(...rows.map(([, each]) => each.length));
@@ -35,7 +36,7 @@ function guides(b) {
     y: rows.map(([, each]) => each[k]?.[0] ?? null),
     mode: "lines",
     hoverinfo: "skip",
-    line: { color: "#c2cad2", width: 1 },
+    line: { color: "#aab4be", width: 1, dash: "1px,3px" },
   }));
 }
 
@@ -90,7 +91,7 @@ function redraw() {
       marker,
     };
   });
-  const title = b.omega2 ? "Re ω²" : "eigenvalue μ";
+  const title = b.omega2 ? "Re ω²" : plot.clientHeight < TALL ? "μ" : "eigenvalue μ";
   const how = layout(data.label, title, { margin: { l: 60, r: 8, t: 4, b: 34 }, uirevision: b.name });
   how.yaxis.range = range(b, all);
   finish([...guides(b), ...traces], how);

@@ -15,7 +15,8 @@ function redraw() {
   at("badge").textContent = `${NAMES[verdict]} · index ${index}`;
   at("state-load").textContent = `${data.symbol} = ${reading(b, state.row, "load")}`;
   at("state").textContent = `${b.name}, row ${state.row} of ${b.load.length}`;
-  at("numbers").textContent = READ.map(({ key, name }) => `${name} = ${reading(b, state.row, key)}`).join("; ");
+  const numbers = READ.map(({ key, name }, i) => `${name} = ${reading(b, state.row, key)}${i < READ.length - 1 ? "; " : ""}`);
+  at("numbers").replaceChildren(...numbers.map((words) => Object.assign(document.createElement("span"), { textContent: words })));
   values(b);
   at("sentence").textContent = sentence + (special?.law ? ` ${special.law[0].toUpperCase()}${special.law.slice(1)}.` : "");
 }
