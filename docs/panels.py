@@ -27,6 +27,8 @@ PARTS = (0.5, 0.7, 0.3, 0.85, 0.15)
 """Places of the number of a piece, in parts of its length on paper: the first that is clear of other numbers."""
 CLEAR = 18.0
 """Pixels between two numbers."""
+COUNT, IN_SPACE = "negative eigenvalues", " in the plane (in space)"
+"""What numbers at curves are, in the legend."""
 FREQUENCIES = 3
 """Left-most frequencies that are drawn."""
 ROOM, LEAST = 0.15, 1e-9
@@ -86,7 +88,9 @@ def legend_of(found: Mapping[str, Any]) -> list[Artist]:
     out: list[Artist] = [
         Line2D([], [], color="0.3", ls=style, lw=2.0, label=kind) for kind, style in styles.items() if kind in kinds
     ]
-    out.append(Line2D([], [], ls="none", marker="$n$", ms=6, color="0.3", label="negative eigenvalues"))
+    both = any(index != in_space for _, index, in_space in parts)
+    mark, size, words = (r"$n\,(m)$", 24, IN_SPACE) if both else ("$n$", 6, "")
+    out.append(Line2D([], [], ls="none", marker=mark, ms=size, color="0.3", label=f"{COUNT}{words}"))
     special = {special["kind"] for branch in found["branches"] for special in branch["special"]}
     for kind, style in MARKERS.items():
         if kind in special:

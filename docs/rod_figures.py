@@ -17,7 +17,8 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from panels import draw, legend_of
+from matplotlib.lines import Line2D
+from panels import COUNT, IN_SPACE, draw, legend_of
 
 from rodfem import Branch, Diagram, Discretization, Plan, Ring, Scene, trace
 from rodfem.output.glyphs import glyphs_of
@@ -28,11 +29,13 @@ from rodfem.problem.setting import Setting
 from rodfem.problem.supports import distributed_on, foundation_of, supports_of, ties_of
 
 DOCS = Path(__file__).parent
-COLUMNS, DPI, MOST_ENTRIES = 2, 110, 4
+COLUMNS, DPI, MOST_ENTRIES, LONG = 2, 110, 4, 40
 WIDTHS = [2.2, 1.25]
 """Of a diagram, and of the shape beside it."""
 FONT, SLENDER = 11.0, 45.0
 """Points of the text; the rod's length over the radius to which supports and loads are drawn."""
+FIRST = {"color": "0.75", "lw": 2.5}
+"""How the first state is drawn."""
 STILL = 1e-3
 """Ordinate below which a state has not moved."""
 MOST_BRANCHES = 6
@@ -89,8 +92,11 @@ def sheet(scenes: Mapping[str, Scene], path: Path) -> None:
                 axes.set_ylabel(scene.ordinate.name)
             if state:
                 shape(figure.add_subplot(grid[row, last]), diagram, *state)
+                handles.append(Line2D([], [], **FIRST, label="first state"))
         entries = {handle.get_label(): handle for handle in handles}
-        columns = min(len(entries), MOST_ENTRIES)
+        if COUNT + IN_SPACE in entries:
+            entries.pop(COUNT, None)
+        columns = min(len(entries), MOST_ENTRIES if max(map(len, entries)) < LONG else MOST_ENTRIES - 2)
         room = 0.29 * (ceil(len(entries) / columns) + 0.4) / figure.get_size_inches()[1]
         figure.get_layout_engine().set(rect=(0, room, 1, 1 - room))
         figure.legend(handles=list(entries.values()), loc="lower center", ncols=columns, frameon=False)
@@ -134,7 +140,7 @@ def shape(axes: Axes, diagram: Diagram, branch: Branch, row: int) -> None:
     right, up, _ = view_of(lines[0], moved, down=down)
     up = up * sign_of(moved[np.argmax(abs(moved @ up))] @ up) if down is None else up  # of two images the upper one
     view = np.array([right, up, np.cross(right, up)])
-    for r, style in zip(lines, ({"color": "0.75", "lw": 2.5}, {"color": "#5b8fc4", "lw": 4.0}), strict=True):
+    for r, style in zip(lines, (FIRST, {"color": "#5b8fc4", "lw": 4.0}), strict=True):
         axes.plot(r @ right, r @ up, solid_capstyle="round", zorder=2, **style)
     setting = Setting(
         supports=tuple(supports_of(scene, samples[1]).values()),

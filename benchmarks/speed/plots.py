@@ -33,6 +33,9 @@ FIGURES = {
 """Names of the files."""
 COLOURS = {1: "#d55e00", 2: "#e69f00", 3: "#a6a000", 4: "#009e73", 5: "#3aa6a0", 6: "#0072b2", 8: "#7a3fa0"}
 """Colour for each degree."""
+MARKS = {1: "X", 2: "P", 3: "<", 4: "D", 5: ">", 6: "o", 8: "h"}
+SIZES = {"X": 6.0, "P": 6.0, "D": 4.6, "h": 6.0}
+"""Mark for each degree, and sizes of those that are not 5 points wide: degrees never show by colour alone."""
 FLOOR, LOWEST = 1e-15, 3e-16
 """An error of zero is drawn here; the least error on the axes."""
 COLUMNS, WIDE, HIGH, DPI = 3, 3.9, 3.4, 110
@@ -44,6 +47,9 @@ PEER_BRANCH = {"flutter": "mu1, mu2"}
 REDUCED = "reduced"
 DEGREE = "rodfem, degree {}"
 HALF = "half the rod"
+UNKNOWN = "beyond the references"
+KNOWN = r"differ from the table by at most (\S+):\s+errors\s+below"
+"""What the page says about the accuracy of the references."""
 JUDGED = "rod", "discretisation"
 """First columns of the table of all judgements."""
 
@@ -104,7 +110,9 @@ def series(axes: Axes, points: Iterable[tuple[str, float, float]]) -> None:
         style: dict[str, Any] = {"color": colour, "markerfacecolor": colour if formulation == REDUCED else "white"}
         if formulation == joined:
             label = DEGREE.format(degree) if formulation == REDUCED else "_"
-            axes.loglog(*zip(*places, strict=True), "o-", lw=1.8, ms=5.0, label=label, zorder=4, **style)
+            mark = MARKS[degree]
+            size = SIZES.get(mark, 5.0)
+            axes.loglog(*zip(*places, strict=True), f"{mark}-", lw=1.8, ms=size, label=label, zorder=4, **style)
         for elements, time, error in group:
             if (elements, degree) == PAPER:
                 style |= {"mec": "black", "mew": 0.7, "ms": 13, "label": "_", "zorder": 6}
@@ -152,7 +160,12 @@ def ticks(axes: Axes) -> None:
 
 
 def sheet(
-    panels: Sequence[tuple[str, Callable[[Axes], None]]], path: Path, title: str, time: str, columns: int = COLUMNS
+    panels: Sequence[tuple[str, Callable[[Axes], None]]],
+    path: Path,
+    title: str,
+    time: str,
+    columns: int = COLUMNS,
+    known: float = 0.0,
 ) -> None:
     """Draw error against time in panels side by side, with one scale of the error and one legend below.
 
@@ -166,6 +179,8 @@ def sheet(
         Words for all of it, and for the axis of the time.
     columns
         Panels side by side.
+    known
+        Error below which the references tell nothing, shaded; zero: unknown.
     """
     lines = ceil(len(panels) / columns)
     with matplotlib.rc_context(STYLE | {"font.size": 10.0}):
@@ -175,6 +190,8 @@ def sheet(
         for number, (axes, (name, draw_panel)) in enumerate(zip(grid.ravel(), panels, strict=False)):
             draw_panel(axes)
             axes.set_ylim(LOWEST, 3.0)
+            if known:
+                axes.axhspan(LOWEST, known, color="0.93", zorder=0, label=UNKNOWN)
             axes.set_title(name, fontsize=11)
             ticks(axes)
             if number % columns == 0:
@@ -189,7 +206,8 @@ def sheet(
             ("the paper's: 150 linear elements", {"marker": "*", "ms": 13}),
         ):
             entries[label] = matplotlib.lines.Line2D([], [], ls="none", mfc="white", mec="0.2", **style)
-        order = sorted(entries, key=lambda label: [x in label for x in ("the paper", "hollow", "scipy", HALF, "AUTO")])
+        last = (UNKNOWN, "the paper", "hollow", "scipy", HALF, "AUTO")
+        order = sorted(entries, key=lambda label: [x in label for x in last])
         figure.suptitle(f"{title} (better: further down, and to the left)", fontsize=13)
         empty = lines * columns - len(panels)
         handles = [entries[label] for label in order]
@@ -207,7 +225,7 @@ def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str], 
     figure.legend(handles, labels, loc="lower center", ncols=columns, fontsize=10, frameon=False)
 
 
-def work_precision(page: Page, path: Path, special: bool) -> None:
+def work_precision(page: Page, path: Path, special: bool, known: float) -> None:
     """Largest error of a branch's targets against the time of the branch, or of a point of it."""
     found = rows_of(page, "All branches", "scene")
 
@@ -221,9 +239,11 @@ def work_precision(page: Page, path: Path, special: bool) -> None:
 
     panels = [(f"{scene}: {branch}", panel(scene, branch)) for scene, branch in targets(special)]
     if special:
-        sheet(panels, path, "A whole branch, its special points located", "milliseconds for the branch")
+        sheet(panels, path, "A whole branch, its special points located", "milliseconds for the branch", known=known)
     else:
-        sheet(panels, path, "Following a branch, with the index of every point", "milliseconds for a point")
+        sheet(
+            panels, path, "Following a branch, with the index of every point", "milliseconds for a point", known=known
+        )
 
 
 def eigenvalues(page: Page, path: Path) -> None:
@@ -264,10 +284,12 @@ def growth(page: Page, path: Path) -> None:
 
 def draw(path: Path) -> list[Path]:
     """Draw what a page has tables for, beside it; returns the pictures."""
-    page, drawn = read(path.read_text()), []
+    text, drawn = path.read_text(), []
+    page, said = read(text), re.search(KNOWN, text)
+    known = float(said[1]) if said else 0.0
     for key, section, head, make in (
-        ("equilibria", "All branches", ("scene",), lambda to: work_precision(page, to, special=False)),
-        ("special", "All branches", ("scene",), lambda to: work_precision(page, to, special=True)),
+        ("equilibria", "All branches", ("scene",), lambda to: work_precision(page, to, False, known)),
+        ("special", "All branches", ("scene",), lambda to: work_precision(page, to, True, known)),
         ("eigenvalues", "Eigenvalues", JUDGED, lambda to: eigenvalues(page, to)),
         ("growth", "Growth", ("state",), lambda to: growth(page, to)),
     ):
