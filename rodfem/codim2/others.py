@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil
+from rodfem.stability.nonsymmetric import SHIFT, Frequencies, NonsymmetricPencil
 
-NUMBER, SHIFT = 10, -10.0
-"""Eigenvalues that are sought besides those of the locus, and next to which one, over their natural size."""
+NUMBER = 10
+"""Eigenvalues that are sought besides those of the locus."""
 MET = 1e-4
 """Imaginary part, relative to the eigenvalue, below which a pair has only just met: it has a square root there."""
 VANISHED = "another eigenvalue has vanished since the row before, seen from the start"

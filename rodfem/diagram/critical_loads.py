@@ -21,13 +21,13 @@ from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
 from rodfem.continuation.interpolant import SHARP, in_doubt, real_root, zero_uncertainty
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, Kind
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.frequency_rows import SHIFT, Row, leftmost
+from rodfem.diagram.frequency_rows import Row, leftmost
 from rodfem.diagram.held import at_load
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, cluster_of, measure
 from rodfem.stability.frequencies import MULTIPLE, Frequencies
-from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 
 SAME = 1e-9

@@ -16,13 +16,12 @@ from mpi4py import MPI
 
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.frequency_rows import SHIFT
 from rodfem.diagram.held import at_load
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
-from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricSolver
 from rodfem.tolerances import unit
 
 MARGIN = 10.0

@@ -19,21 +19,13 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Point
 from rodfem.stability.followed_pairs import FollowedPairs
 from rodfem.stability.frequencies import ALIKE, EPS, NEAR_ZERO, REAL, Frequencies, named
-from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
+from rodfem.stability.nonsymmetric import BEYOND, SHIFT, NonsymmetricPencil, NonsymmetricSolver
 from rodfem.tolerances import unit
 
 FREQUENCIES = 6
 """Number of frequencies recorded at each load where nobody asks for another."""
-BEYOND = 6
-"""Eigenvalues that are sought beyond those that are recorded."""
 SEEN = 0.5
 """A pair within this fraction of the distance from the origin to the farthest eigenvalue found was found again."""
-SHIFT = -10.0
-"""Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix is singular.
-
-Far enough from it for a rod that floats, whose rigid motions are zero eigenvalues: what is nearest to the shift takes
-its digits from all others.
-"""
 OTHER = 3.0
 """Times this, the shift is another one, from which the same eigenvalues must be found."""
 BESIDE = 1e-4

@@ -8,6 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.static_solver import StaticSolver
+from rodfem.errors import ConvergenceError
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.modes.modes import SYMMETRY
 from rodfem.modes.perturbation import Motion, Motions
@@ -24,6 +25,10 @@ SEEN = 1e-3
 """Response of a mode to a functional, relative to the greatest one, below which the functional does not observe it."""
 DOUBLE = 1e-3
 """Eigenvalues nearer than this, relative, to a double one are that: round-off parts them by its square root."""
+
+
+CONVERGED = 1e-7
+"""Backward error above which a pair without a potential is none."""
 
 
 class Turned(NamedTuple):
@@ -49,6 +54,8 @@ class Eigenmotions:
 
     def few(self, x: PETSc.Vec, number: int, double: float = np.nan) -> Few:
         """The ``number`` left-most modes (nearest zero without a potential) of ``x``, without weights and error bars.
+
+        Rigid motions, whose eigenvalue is zero, are there besides.
 
         Raises :class:`~rodfem.errors.ConvergenceError` where the eigensolver fails.  ``double`` is the eigenvalue that
         is known to be a double one with a single vector, at flutter.
@@ -115,14 +122,18 @@ class Eigenmotions:
 
     def _few_nearest(self, x: PETSc.Vec, number: int, double: float) -> Few:
         pencil = self.assessor.nonsymmetric.at(x)
-        found = pencil.near(2 * number + 2, 0.0)
+        found = pencil.near_zero(2 * number)
         values, same = found.values, np.flatnonzero(abs(found.values - double) <= DOUBLE * abs(double))
         left_out = same[np.lexsort((values[same].real, -values[same].imag))][(len(same) + 1) // 2 :]
-        chosen = [i for i in upper(values, len(values)) if i not in left_out][:number]
-        chosen.sort(key=lambda i: values[i].real)
+        nearest = [i for i in upper(values, len(values)) if i not in left_out]
+        rigid = [i for i in nearest if found.kinds[i] == mode_type.RIGID]
+        moving = [i for i in nearest if i not in rigid][:number]
+        chosen = [*sorted(moving, key=lambda i: values[i].real), *rigid]
+        if len(chosen) and (worst := found.errors[chosen].max()) > CONVERGED:
+            raise ConvergenceError(f"Eigenvalues have a backward error of {worst:.0e}: use another discretisation.")
         columns, value = alone(pencil, found.vectors[:, chosen]), values[chosen]
         coalesced = np.isin(chosen, same)
-        value = np.where(coalesced, double, value)
+        value = np.where(coalesced, double, np.where(np.isin(chosen, rigid), 0.0, value))
         columns = np.where(coalesced, columns.real, columns)
         moved = self.signed([self.complex(x, column) for column in columns.T])[0]
         return Few(value, found.errors[chosen], tuple(found.kinds[i] for i in chosen), *stack(moved))

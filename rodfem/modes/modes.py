@@ -39,8 +39,8 @@ from rodfem.whole_files import with_added, write_whole
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
-SYMMETRY = "symmetry"
-"""Name of the motion in a symmetry mode."""
+SYMMETRY, RIGID = "symmetry", "rigid motion"
+"""Names of the motion in a symmetry mode, and in one of a rod that nothing holds, under loads without a potential."""
 FIELDS = ("value", "residual", "error", "displacement", "rotation", "rotation_body")
 LEFT = ("left_displacement", "left_rotation", "weight_displacement", "weight_rotation")
 

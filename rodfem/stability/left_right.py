@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodfem.errors import ConvergenceError
+from rodfem.stability import mode_type
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
 SAME = 1e-6
@@ -33,12 +34,16 @@ class TwoSided:
 
 
 def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
-    """Compute ``number`` biorthonormal left/right eigenpairs nearest zero.
+    """Compute ``number`` biorthonormal left/right eigenpairs nearest zero, those of rigid motions left out.
+
+    These have a zero eigenvalue, and under a thrust that follows the rod no vectors of their own: turning it
+    accelerates it.
 
     Raises :class:`ConvergenceError` if a right eigenvalue has no left partner.
     """
-    right, left = (find(2 * number + 2, 0.0) for find in (pencil.near, pencil.left))
-    chosen = sorted(upper(right.values, number), key=lambda i: right.values[i].real)
+    right, left = (find(2 * number) for find in (pencil.near_zero, pencil.left_near_zero))
+    moving = [i for i in upper(right.values, len(right.values)) if right.kinds[i] != mode_type.RIGID]
+    chosen = sorted(moving[:number], key=lambda i: right.values[i].real)
     partners: list[int] = []
     for value in right.values[chosen]:
         distance = abs(left.values - value)

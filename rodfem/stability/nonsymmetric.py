@@ -58,6 +58,14 @@ FAR = 1e5
 The pencil has infinite eigenvalues with Jordan blocks of size two, one for each pair of constraint and multiplier,
 which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than the nearest: those are not kept.
 """
+SHIFT = -10.0
+"""Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix may be singular.
+
+Far enough from it for a rod that floats, whose rigid motions are zero eigenvalues: what is nearest to the shift takes
+its digits from all others.
+"""
+BEYOND = 6
+"""Eigenvalues beside the shift that are sought beyond those nearest zero: a negative one may be nearer to it."""
 DENSE = 3
 """A pencil smaller than this many Krylov spaces is solved by dense reductions: it may have few finite eigenvalues."""
 SPARE = 2
@@ -148,8 +156,16 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         """
         return self._near(number, target, *self._whole())
 
+    def near_zero(self, number: int) -> Frequencies:
+        """Return more than the ``number`` eigenvalues nearest zero, in ascending order of their real parts."""
+        return self.near(number + BEYOND, SHIFT * self.system.scene.units.omega2)
+
+    def left_near_zero(self, number: int) -> Frequencies:
+        """Return the same of the transposed pencil."""
+        return self.left(number + BEYOND, SHIFT * self.system.scene.units.omega2)
+
     def left(self, number: int, target: complex) -> Frequencies:
-        """Return the same of the transposed pencil: ``vectors`` are left ones, ``z.S = mu z.M`` without conjugation."""
+        """Return those of the transposed pencil: ``vectors`` are left ones, ``z.S = mu z.M`` without conjugation."""
         matrix, mass = self._whole()
         transposed = matrix.copy()
         transposed.transpose()

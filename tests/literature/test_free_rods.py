@@ -14,6 +14,8 @@ import rodfem
 from forms import loads
 from forms.energy import bending_and_twist
 from rodfem import Discretization, End, Inertia, Ordinate, Parameter, Plan, Scene, SceneError, Solver, free
+from rodfem.modes.eigenmotions import Eigenmotions
+from rodfem.modes.modes import RIGID
 
 pytestmark = pytest.mark.alone
 
@@ -113,3 +115,27 @@ def test_a_spring_that_resists_turning_alone() -> None:
     massless = replace(floating((spring, free()), (0.0, 1.0)), inertia=Inertia())
     point = Solver(massless).equilibrium(0.0)
     assert (point.negative, point.zero) == (0, 3)
+
+
+def test_states_of_a_rod_that_a_thrust_accelerates() -> None:
+    """Beal's free beam without thrust: two planes of 22.37, 61.67; its rigid motions are neither unstable nor modes.
+
+    Their eigenvalue, zero, took the digits of all others next to zero: the verdict was one complex eigenvalue.
+    """
+    thrust = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
+    solver = Solver(floating(thrust, (1e-6, 50.0), distributed=lambda c: (0.0, 0.0, c.P)), MESH)
+    point = solver.equilibrium(1e-6)
+    verdict = solver.assess(point, number=4)
+    assert verdict.negative == 0 and max(verdict.errors) < 1e-12
+    squares = np.repeat(FREQUENCIES**2, 2)[:4]
+    others = [value for value in verdict.values.real if value > 1.0]
+    assert others == pytest.approx(squares[: len(others)], rel=1e-6) and len(others) > 1
+    modes = solver.modes(point, 4)
+    assert modes.value.real == pytest.approx(squares, rel=1e-6) and abs(modes.value.imag).max() < 1e-6
+    few = Eigenmotions(solver.equilibria).few(point.x, 4)
+    moving = [i for i, motion in enumerate(few.motion) if motion != RIGID]
+    assert few.value[moving] == pytest.approx(squares, rel=1e-6)
+    assert moving == [0, 1, 2, 3] and not few.value[4:].any()
+    # one plane's modes are free-free: cosh x s + cos x s - ..., with nodes at 0.2242 of the length
+    shape = np.linalg.norm(few.displacement[0].real, axis=1)
+    assert shape.argmin() in range(1, len(shape) - 1) and abs(shape[0] - shape[-1]) < 1e-4 * shape[0]

@@ -18,6 +18,6 @@ class ShiftInvert(Method):
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
         """By the Arnoldi method."""
-        near = self.work.nonsymmetric.at(x).near(number, 0.0)
+        near = self.work.nonsymmetric.at(x).near_zero(number)
         nearest = np.sort(np.argsort(abs(near.values), kind="stable")[:number])
         return Found(near.values[nearest], [], near.errors[nearest], factorisations=1)
