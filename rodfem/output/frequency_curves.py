@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
+from rodfem.modes.modes import RIGID
 from rodfem.output.collisions import between_rows
 from rodfem.output.intervals import intervals_of
 from rodfem.output.plot_pieces import STABLE
@@ -81,7 +82,8 @@ def curves(columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = ()
         zip(columns["load"], columns["omega2"], columns["motion"], columns["curve"], strict=True)
     ):
         for pair, motion, number in zip(pairs, motions, numbers, strict=True):
-            found.setdefault(number, []).append((load, row, complex(*pair) ** 0.5, motion))
+            root = 0j if motion == RIGID else complex(*pair) ** 0.5  # what the file has is round-off
+            found.setdefault(number, []).append((load, row, root, motion))
     for number, extra in between_rows(columns, special).items():
         motion = found[number][-1][3]
         same = {point.row for point in extra if point.load == columns["load"][point.row]}

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rodfem.continuation.kinds import KINDS
+from rodfem.modes.modes import RIGID
 from rodfem.output.endings import endings
 from rodfem.output.plot_pieces import pieces_of
 from rodfem.output.smooth import between
@@ -51,10 +52,18 @@ def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str, natural:
         "words": [told.index(each) for each in words],
         "told": [asdict(each) for each in told],
         "spectrum": columns.get("spectrum"),
-        "omega2": columns.get("omega2"),
+        "omega2": _without_noise(columns),
         "frequencies": frequencies_of(branch),
         "unexplained": [change["row"] for change in branch.get("unexplained") or ()],
     }
+
+
+def _without_noise(columns: Mapping[str, Any]) -> list[list[list[float]]] | None:
+    """Squared frequencies of each row; those of rigid motions, zero in exact arithmetic, are."""
+    if "omega2" not in columns:
+        return None
+    rows = zip(columns["omega2"], columns["motion"], strict=True)
+    return [[[0.0, 0.0] if name == RIGID else value for value, name in zip(*row, strict=True)] for row in rows]
 
 
 def _between(branch: Mapping[str, Any], ordinates: Mapping[str, Any]) -> dict[str, dict[int, list[list[float]]]]:

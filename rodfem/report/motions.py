@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from rodfem.modes.modes import SYMMETRY, load_modes
+from rodfem.modes.modes import RIGID, SYMMETRY, load_modes
 from rodfem.modes.recorded import Few
 from rodfem.output.glyphs import glyphs_of
 from rodfem.output.plot_modes import GROWTH, LARGEST
@@ -76,7 +76,7 @@ def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: 
             Shown(complex(typical.value[i]), np.nan, typical.motion[i], s, typical.displacement[i], typical.rotation[i])
             for i in np.flatnonzero(new)
         ]
-    shown.sort(key=lambda mode: (mode.motion == SYMMETRY, mode.value.real))
+    shown.sort(key=lambda mode: (mode.motion in (SYMMETRY, RIGID), mode.value.real))
     others = [mode for mode in shown if mode.motion != SYMMETRY]
     vanish = sorted(others, key=lambda mode: abs(mode.value))[: max(zeros - (len(shown) - len(others)), 0)]
     return [mode._replace(zero=any(mode is other for other in vanish)) for mode in shown]
@@ -132,10 +132,11 @@ def _about(mode: Shown) -> dict[str, Any]:
     """Eigenvalue, in words with its error, and what the motion does: ``zero``, ``grows`` or neither."""
     mu, error = mode.value, mode.error
     known = bool(np.isfinite(error))
-    zero = mode.motion == SYMMETRY or mode.zero or abs(mu) <= (error if known else 0.0)
-    mu = 0j if zero and not known else mu
+    exact = mode.motion in (SYMMETRY, RIGID)
+    zero = exact or mode.zero or abs(mu) <= (error if known else 0.0)
+    mu = 0j if zero and (exact or not known) else mu
     root = np.sqrt(-mu)
-    words = EXACT if mode.motion == SYMMETRY else eigenvalue_in_words(mu, error)
+    words = EXACT if exact else eigenvalue_in_words(mu, error)
     return {
         "value": [mu.real, mu.imag],
         "words": words or (COUNTED if zero else ""),

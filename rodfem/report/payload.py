@@ -56,6 +56,7 @@ def _about(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         ],
         "constants": data["constants"],
         "natural": data.get("natural") or {},
+        "units": {"load": data.get("parameter_unit") or "", "ordinate": data.get("ordinate_unit") or ""},
         "complete": data.get("complete", True),
         "meaning": data.get("meaning", {}),
         "mesh": mesh_in_words(data["discretization"]),

@@ -56,7 +56,8 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
             path, few = folder / "modes.h5" if row in exact else None, typical[row].found if row in typical else None
             nodes, setting = group["s"][row], read_setting(group, row)
             nodes = nodes[np.isfinite(nodes)]
-            shown = modes_of(path, (name, row), few, nodes, branch["columns"]["zero"][row])
+            zeros = 0 if "omega2" in branch["columns"] else branch["columns"]["zero"][row]
+            shown = modes_of(path, (name, row), few, nodes, zeros)
             if shown:
                 modes[row] = motions_of(shown, row, here, setting, stage, shelf, found[row][0])
         along = profiles_data(group, states)

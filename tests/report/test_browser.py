@@ -350,6 +350,13 @@ def test_each_number_has_its_error_or_says_that_it_has_none(opened: Callable[...
     assert "~: error not estimated" in page.find_element(By.ID, "errors").text
 
 
+def test_numbers_have_their_units(opened: Callable[..., Any]) -> None:
+    page = opened("pinned", change=lambda payload: payload | {"units": {"load": "N", "ordinate": "m"}})
+    load, numbers, slider = (page.find_element(By.ID, part).text for part in ("state-load", "numbers", "load-value"))
+    assert re.fullmatch(r"P = [^ ]+( \([\de-]+\))? N", load) and re.fullmatch(r"P = [\d.]+ N", slider)
+    assert re.fullmatch(r"displacement of the middle = [^ ]+( \([\de-]+\))? m; energy = ~[\d.]+", numbers)
+
+
 def test_strains_forces_and_moments_are_curves_with_names(opened: Callable[..., Any]) -> None:
     """Of a pinned column under the load P: the force has the size P, and the moment vanishes at the ends."""
     page = opened("pinned")

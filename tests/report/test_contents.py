@@ -11,11 +11,14 @@ import numpy as np
 import pytest
 
 from rodfem.errors import InputError
+from rodfem.modes.modes import RIGID
 from rodfem.output.digits import number
 from rodfem.output.endings import endings
 from rodfem.output.first_loss import first_loss
+from rodfem.output.frequency_curves import curves
 from rodfem.output.solids import ball, box, coil
 from rodfem.report.bodies import CLOSE, Shelf
+from rodfem.report.branches import _without_noise
 from rodfem.report.labels import html_of, plain_of
 from rodfem.report.packing import packed, plain, script_json
 from rodfem.report.readings import eigenvalue_in_words, readings_of
@@ -76,6 +79,16 @@ def test_words_of_frequencies() -> None:
     words = words_of(branch([0, 2, 1], omega2=omega2))
     assert "none" in words[0].sentence and "2 complex (flutter)" in words[1].sentence
     assert "1 negative (divergence)" in words[2].sentence and "flutter" not in words[2].sentence
+
+
+def test_rigid_motions_have_no_frequency() -> None:
+    """Round-off of either sign is neither a frequency nor a growth rate, nor a negative eigenvalue in the chart."""
+    omega2 = [[[-4e-11, 0.0], [25.0, 0.0]], [[3e-11, 0.0], [36.0, 0.0]]]
+    columns = {"load": [0.0, 1.0], "omega2": omega2, "motion": [[RIGID, "bending"]] * 2, "curve": [[0, 1]] * 2}
+    assert _without_noise(columns) == [[[0.0, 0.0], [25.0, 0.0]], [[0.0, 0.0], [36.0, 0.0]]]
+    bending, rigid = curves(columns)
+    assert rigid.motion == RIGID and rigid.real.tolist() == [0.0, 0.0] and bending.real.tolist() == [5.0, 6.0]
+    assert all(np.isnan(part).all() for curve in (bending, rigid) for part in curve.parts.values())
 
 
 def test_words_warn() -> None:

@@ -1,6 +1,6 @@
 // All states at one load, side by side: between two rows a state is interpolated for its picture.
 
-import { data, digits } from "report/data";
+import { data, digits, unit } from "report/data";
 import { select, state, subscribe } from "report/store";
 import { between, pointsOf } from "report/curve";
 import { listeners, makeRod, makeStripe, ROD, shapeOf, stage as main } from "report/rod";
@@ -109,7 +109,7 @@ export function start() {
   new ResizeObserver(later).observe(list);
   subscribe(() => {
     slider.value = Math.round((STEPS * (state.load - low)) / (high - low || 1));
-    value.textContent = `${data.symbol} = ${digits(state.load, 5)}`;
+    value.textContent = `${data.symbol} = ${digits(state.load, 5)}${unit("load")}`;
     later();
   });
 }

@@ -43,6 +43,9 @@ export function reading(branch, row, name) {
   return branch.readings[row]?.[name] ?? rough(none ? 0 : value);
 }
 
+// The unit of a number of a row, with the space before it; nothing where it has none.
+export const unit = (name) => (data.units[name] ? ` ${data.units[name]}` : "");
+
 // A number whose error is not estimated.
 export function rough(x, count = 6) {
   return x === null || x === undefined ? "unknown" : `~${digits(x, count)}`;

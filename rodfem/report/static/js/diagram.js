@@ -1,7 +1,7 @@
 // The bifurcation diagram: a trace for each piece of one index, special points, and the state that is shown; of loads
 // without a potential the frequencies come first.
 
-import { data, escaped, reading } from "report/data";
+import { data, escaped, reading, unit } from "report/data";
 import { select, state, subscribe } from "report/store";
 import { cursorOf } from "report/cursor";
 import * as frequencies from "report/frequencies";
@@ -30,8 +30,8 @@ export function hover(branch, row) {
   const special = branch.special.find((x) => x.row === row);
   const lines = [
     `<b>${escaped(branch.name)}</b>, row ${row}`,
-    `${escaped(data.symbol)} = ${escaped(reading(branch, row, "load"))}`,
-    `${escaped(ordinate.name)} = ${escaped(reading(branch, row, ordinate.key))}`,
+    `${escaped(data.symbol)} = ${escaped(reading(branch, row, "load") + unit("load"))}`,
+    `${escaped(ordinate.name)} = ${escaped(reading(branch, row, ordinate.key) + unit(ordinate.key))}`,
     `index ${escaped(words.index)}, ${words.verdict === "planar" ? "stable in the plane only" : words.verdict === "undecided" ? "stability undecided" : words.verdict}`,
     ...branch.endings.filter(([at]) => at === row).map(([, reason]) => `<b>ends here: ${escaped(reason)}</b>`),
     special ? `<b>${escaped(special.kind)}</b>${special.law ? `, ${escaped(special.law)}` : ""}` : "",

@@ -3,7 +3,7 @@
 import { Vector3 } from "three";
 
 const NAMES = ["e₁", "e₂", "e₃"];
-const INK = "#4a525c";
+const INK = "#4a525c", LINE = 1.8;
 
 // Length of one, two or five times a power of ten, not longer than a wanted one.
 function round(wanted) {
@@ -26,12 +26,20 @@ function arrow(context, x, y, dx, dy) {
   context.fill();
 }
 
+// Text with a white edge: it may stand before the rod.
+function halo(context, text, x, y) {
+  Object.assign(context, { strokeStyle: "white", lineWidth: 3, lineJoin: "round" });
+  context.strokeText(text, x, y);
+  Object.assign(context, { strokeStyle: INK, lineWidth: LINE });
+  context.fillText(text, x, y);
+}
+
 export function drawOverlay(context, stage, ratio) {
   const { width, height, camera, pixel } = stage;
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
   context.strokeStyle = context.fillStyle = INK;
-  context.lineWidth = 1.8;
+  context.lineWidth = LINE;
   context.font = "14px system-ui, sans-serif";
   context.textAlign = "center";
   context.textBaseline = "middle";
@@ -40,7 +48,7 @@ export function drawOverlay(context, stage, ratio) {
     const e = new Vector3().setComponent(i, 1).applyQuaternion(view);
     arrow(context, x, y, 30 * e.x, -30 * e.y);
     const short = Math.hypot(e.x, e.y) < 0.45;
-    context.fillText(name, x + (short ? -14 : 42 * e.x), y - (short ? -10 : 42 * e.y));
+    halo(context, name, x + (short ? -14 : 42 * e.x), y - (short ? -10 : 42 * e.y));
   });
   const length = round(110 * pixel), pixels = length / pixel, [end, base] = [width - 14, height - 14];
   context.beginPath();
@@ -49,5 +57,5 @@ export function drawOverlay(context, stage, ratio) {
   context.lineTo(end, base);
   context.lineTo(end, base - 5);
   context.stroke();
-  context.fillText(String(Number(length.toPrecision(3))), end - pixels / 2, base - 10);
+  halo(context, String(Number(length.toPrecision(3))), end - pixels / 2, base - 10);
 }

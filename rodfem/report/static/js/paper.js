@@ -6,7 +6,7 @@ const short = (x) => Number(x.toFixed(2));
 
 export class Paper {
   constructor(width, height) {
-    Object.assign(this, { width, height, parts: [], path: "", strokeStyle: "black", fillStyle: "black", lineWidth: 1, font: "14px sans-serif" });
+    Object.assign(this, { width, height, parts: [], path: "", strokeStyle: "black", fillStyle: "black", lineWidth: 1, font: "14px sans-serif", edge: "" });
   }
 
   setTransform() {}
@@ -32,9 +32,15 @@ export class Paper {
     this.parts.push(`<path d="${this.path}Z" fill="${text(this.fillStyle)}"/>`);
   }
 
+  // The edge of a text that is filled next.
+  strokeText() {
+    this.edge = `stroke="${text(this.strokeStyle)}" stroke-width="${short(this.lineWidth)}" stroke-linejoin="round" paint-order="stroke" `;
+  }
+
   fillText(words, x, y) {
     const [size] = this.font.match(/\d+/);
-    this.parts.push(`<text x="${short(x)}" y="${short(y)}" font-family="sans-serif" font-size="${size}" text-anchor="middle" dominant-baseline="central" fill="${text(this.fillStyle)}">${text(words)}</text>`);
+    this.parts.push(`<text x="${short(x)}" y="${short(y)}" font-family="sans-serif" font-size="${size}" text-anchor="middle" dominant-baseline="central" ${this.edge}fill="${text(this.fillStyle)}">${text(words)}</text>`);
+    this.edge = "";
   }
 
   // Points of a line or, filled, of a facet, in pixels.

@@ -22,6 +22,7 @@ const axis = (title) => ({
   gridcolor: "#e7ebef",
   zerolinecolor: "#c2cad2",
   linecolor: "#8b95a1",
+  exponentformat: "power", // not plotly's 20p and 400M
   ticks: "outside",
   ticklen: 4,
   tickcolor: "#8b95a1",

@@ -26,6 +26,7 @@ export const makeStripe = () => new Tube(data.stripe, values(data.stripe), stati
 export const shapeOf = (b, row) => entry(b.shape, row);
 export const stage = new Stage(document.getElementById("rod"));
 const rod = makeRod(ROD), stripe = makeStripe(), first = makeRod(FIRST, 0.55), solids = new Solids();
+Object.assign(first.material, { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 4 }); // behind the state where they coincide
 let controls = null, pending = false, turned = false;
 export const listeners = []; // of changes of the view
 

@@ -40,9 +40,10 @@ function guides(b) {
   }));
 }
 
-// All eigenvalues; of squared frequencies the lowest two, which may meet.
+// All eigenvalues; of squared frequencies the lowest two that are not zero, which may meet.
 function range(b, all) {
-  const highest = b.omega2 ? b.omega2.map((each) => Math.max(...each.slice(0, 2).map((x) => x[0]))) : all.map((each) => each.value[0]);
+  const lowest = (each) => each.map(([x]) => x).filter((x) => x).slice(0, 2);
+  const highest = b.omega2 ? b.omega2.flatMap(lowest) : all.map((each) => each.value[0]);
   const low = Math.min(0, ...all.map((each) => each.value[0])), high = Math.max(0, ...highest), room = 0.07 * (high - low) || 1;
   return [low - room, high + room];
 }

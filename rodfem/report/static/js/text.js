@@ -1,11 +1,11 @@
 // The state in words: titles, verdict, and where the report comes from.
 
-import { data, digits, reading, rough } from "report/data";
+import { data, digits, reading, rough, unit } from "report/data";
 import { branch, state, subscribe, words } from "report/store";
 
 const at = (id) => document.getElementById(id);
 const MOST = 4; // eigenvalues in words
-const SAME = 1e-6; // relative difference of eigenvalues that are one
+const SAME = 1e-6, COALESCED = 1e-3; // relative differences of eigenvalues that are one; round-off parts a double one by its root
 const READ = data.ordinates.filter(({ key }, i) => !i || key === "energy");
 const NAMES = { stable: "STABLE", unstable: "UNSTABLE", planar: "STABLE IN PLANE", critical: "CRITICAL", undecided: "UNDECIDED" };
 
@@ -13,9 +13,9 @@ function redraw() {
   const b = branch(), { verdict, index, sentence } = words(b, state.row), special = b.special.find((x) => x.row === state.row);
   at("badge").className = `badge ${verdict}`;
   at("badge").textContent = `${NAMES[verdict]} · index ${index}`;
-  at("state-load").textContent = `${data.symbol} = ${reading(b, state.row, "load")}`;
+  at("state-load").textContent = `${data.symbol} = ${reading(b, state.row, "load")}${unit("load")}`;
   at("state").textContent = `${b.name}, row ${state.row} of ${b.load.length}`;
-  const numbers = READ.map(({ key, name }, i) => `${name} = ${reading(b, state.row, key)}${i < READ.length - 1 ? "; " : ""}`);
+  const numbers = READ.map(({ key, name }, i) => `${name} = ${reading(b, state.row, key)}${unit(key)}${i < READ.length - 1 ? "; " : ""}`);
   at("numbers").replaceChildren(...numbers.map((words) => Object.assign(document.createElement("span"), { textContent: words })));
   values(b);
   at("sentence").textContent = sentence + (special?.law ? ` ${special.law[0].toUpperCase()}${special.law.slice(1)}.` : "");
@@ -24,9 +24,10 @@ function redraw() {
 // Left-most eigenvalues of the state, but for those that buttons of modes have.
 function values(b) {
   const known = (b.modes[state.row] ?? []).map((mode) => mode.value);
-  const same = (p, q) => Math.hypot(p[0] - q[0], Math.abs(p[1]) - Math.abs(q[1])) <= SAME * Math.hypot(...q);
+  const near = b.special.some((x) => x.row === state.row && x.kind === "flutter") ? COALESCED : SAME;
+  const same = (p, q) => Math.hypot(p[0] - q[0], Math.abs(p[1]) - Math.abs(q[1])) <= near * Math.hypot(...q);
   const all = b.spectrum?.[state.row]?.map((x) => [x, 0]) ?? b.omega2?.[state.row] ?? [];
-  const found = all.filter((value) => !known.some((other) => same(value, other)));
+  const found = all.filter((value) => value.some((x) => x) && !known.some((other) => same(value, other)));
   const each = found.slice(0, MOST).map(([x, y]) => {
     const span = document.createElement("span");
     span.className = x < 0 || y ? "negative" : "positive";
