@@ -22,6 +22,8 @@ from rodfem.report.writhe import writhe
 
 UNLISTED = ("load", "negative", "zero", "mesh", "unstable", "negative_in_space", "drift", "error")
 """Columns that are no ordinates: the abscissa, counts, and residuals."""
+VANISHED = 1e-9
+"""Share of the greatest recorded eigenvalue up to which one may be one that vanishes."""
 SHORTENING, WRITHE = "end shortening", "writhe"
 DERIVED = {
     SHORTENING: "end shortening: length − distance of the ends",
@@ -51,11 +53,24 @@ def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str, natural:
         "special": [_special(x) for x in branch["special"]],
         "words": [told.index(each) for each in words],
         "told": [asdict(each) for each in told],
-        "spectrum": columns.get("spectrum"),
+        "spectrum": _spectrum(branch),
         "omega2": _without_noise(columns),
         "frequencies": frequencies_of(branch),
         "unexplained": [change["row"] for change in branch.get("unexplained") or ()],
     }
+
+
+def _spectrum(branch: Mapping[str, Any]) -> list[list[float]] | None:
+    """Left-most eigenvalues of each row, those that vanish as zero: no more of them than the row's count has."""
+    columns = branch["columns"]
+    if "spectrum" not in columns:
+        return None
+    found = [list(values) for values in columns["spectrum"]]
+    for values, zero in zip(found, columns["zero"], strict=True):
+        for i in sorted(range(len(values)), key=lambda i: abs(values[i]))[:zero]:
+            if abs(values[i]) < VANISHED * max(map(abs, values)):
+                values[i] = 0.0
+    return found
 
 
 def _without_noise(columns: Mapping[str, Any]) -> list[list[list[float]]] | None:

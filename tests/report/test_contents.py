@@ -18,7 +18,7 @@ from rodfem.output.first_loss import first_loss
 from rodfem.output.frequency_curves import curves
 from rodfem.output.solids import ball, box, coil
 from rodfem.report.bodies import CLOSE, Shelf
-from rodfem.report.branches import _without_noise
+from rodfem.report.branches import _spectrum, _without_noise
 from rodfem.report.labels import html_of, plain_of
 from rodfem.report.packing import packed, plain, script_json
 from rodfem.report.readings import eigenvalue_in_words, readings_of
@@ -79,6 +79,14 @@ def test_words_of_frequencies() -> None:
     words = words_of(branch([0, 2, 1], omega2=omega2))
     assert "none" in words[0].sentence and "2 complex (flutter)" in words[1].sentence
     assert "1 negative (divergence)" in words[2].sentence and "flutter" not in words[2].sentence
+
+
+def test_eigenvalues_that_vanish_are_zero() -> None:
+    """As many as the count of the row has, whatever the sign of their round-off; others keep theirs."""
+    spectrum = [[-2e-13, 3e-14, 4.0], [-2e-13, 3e-14, 4.0], [1e-3, 2.0, 4.0]]
+    found = _spectrum(branch([0, 0, 0], spectrum=spectrum, zero=[0, 1, 1]))
+    assert found == [spectrum[0], [-2e-13, 0.0, 4.0], spectrum[2]]
+    assert _spectrum(branch([0])) is None
 
 
 def test_rigid_motions_have_no_frequency() -> None:
