@@ -45,6 +45,7 @@ HARD = "tests/hard/test_hard_cases.py"
 DIAGRAM = "tests/diagram/test_diagram.py"
 STEP = "tests/continuation/test_compiled_step.py"
 WORK = "tests/continuation/test_work.py"
+RECORDED = "tests/modes/test_recorded.py"
 
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
@@ -320,6 +321,24 @@ FAULTS = {
     ),
     "scene-of-another-name": Fault(
         "rodfem/diagram/saved.py", "if (name, load) != (scene.name, scene.load):", "if load != scene.load:", DIAGRAM
+    ),
+    "rigid-motions-take-all-digits": Fault(
+        f"{STABILITY}nonsymmetric.py",
+        "return self.near(number + BEYOND, SHIFT * self.system.scene.units.omega2)",
+        "return self.near(number + BEYOND, 0.0)",
+        "tests/literature/test_free_rods.py",
+    ),
+    "double-eigenvalue-of-flutter-twice": Fault(
+        "rodfem/modes/eigenmotions.py",
+        "for i in upper(values, len(values)) if i not in left_out]",
+        "for i in upper(values, len(values))]",
+        RECORDED,
+    ),
+    "recorded-modes-without-those-of-special-points": Fault(
+        "rodfem/modes/typical.py", "    for special in branch.special:\n", "    for special in ():\n", RECORDED
+    ),
+    "terminal-left-without-its-cursor": Fault(
+        "rodfem/app/screen.py", "            self._progress.stop()\n", "", "tests/app/test_screen.py"
     ),
 }
 

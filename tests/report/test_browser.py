@@ -296,6 +296,12 @@ def test_modes_move(opened: Callable[..., Any]) -> None:
     page.find_element(By.CSS_SELECTOR, "#modes button").click()
     first = picture(page)
     until(page, lambda: picture(page) != first)
+    pressed = (
+        "[...document.querySelectorAll('#modes button')].findIndex((x) => x.getAttribute('aria-pressed') === 'true')"
+    )
+    for key, number in (("2", 1), ("2", -1), ("1", 0), (Keys.ESCAPE, -1)):
+        press(page, key)
+        until(page, lambda number=number: page.execute_script(f"return {pressed}") == number)
     press(page, Keys.END)
     until(page, lambda: shown(page)[1] == len(loads) - 1 and "grows" in page.find_element(By.ID, "modes").text)
 

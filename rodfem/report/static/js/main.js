@@ -1,7 +1,7 @@
 // Starts all parts, and listens to keys.
 
 import { data } from "report/data";
-import { branch, select, state, tell } from "report/store";
+import { branch, select, showMode, state, tell } from "report/store";
 import * as coexisting from "report/coexisting";
 import * as diagram from "report/diagram";
 import * as legend from "report/legend";
@@ -42,7 +42,15 @@ const KEYS = {
   Home: () => select(state.branch, 0),
   End: () => select(state.branch, Infinity),
   " ": toggle,
+  Escape: () => showMode(null),
 };
+
+// Let a mode of the state move, by its number from 1 on, or stop it.
+function move(number) {
+  const mode = branch().modes[state.row]?.[number - 1];
+  if (mode) showMode(mode === state.mode ? null : mode);
+}
+for (let number = 1; number <= 9; number++) KEYS[number] = () => move(number);
 
 document.addEventListener("keydown", (event) => {
   const busy = event.target.closest("select, input[type=range], dialog") || (event.key === " " && event.target.closest("button"));

@@ -45,7 +45,7 @@ function redraw() {
   if (key === shown) return;
   shown = key;
   const buttons = here.map((mode) => button(words(mode), mode === state.mode, () => showMode(mode === state.mode ? null : mode), mode.kind));
-  buttons.forEach((one, i) => (one.title = `Mode ${i + 1}: ${here[i].motion}`));
+  buttons.forEach((one, i) => (one.title = `Mode ${i + 1}: ${here[i].motion} (key ${i + 1})`));
   const missed = b.missed?.[state.row], none = !here.length && !missed && !rows.length;
   const others = [
     ...(missed ? [quiet(`No modes: ${missed}`)] : here.length ? [] : nearest(rows)),

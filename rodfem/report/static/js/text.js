@@ -67,6 +67,7 @@ function about() {
 export function start() {
   at("title").textContent = data.title;
   at("constants").textContent = Object.entries(data.constants).map(([name, value]) => `${name} = ${digits(value)}`).join(", ") + (data.complete ? "" : " (the run is not complete)");
+  at("constants").title = at("constants").textContent; // cut off in a narrow window
   at("notes").textContent = data.notes.length ? `not drawn: ${data.notes.join(", ")}` : "";
   about();
   subscribe(redraw);
