@@ -46,9 +46,10 @@ def write(group: h5py.Group, typical: Sequence[Typical]) -> None:
         return
     own, text = group.create_group(GROUP), h5py.string_dtype()
     own["row"] = [each.row for each in typical]
-    own["trouble"] = np.array([each.trouble for each in typical], dtype=text)
+    own.create_dataset("trouble", data=[each.trouble for each in typical], dtype=text)
     known = [None if each.found is None else each.found._asdict() for each in typical]
-    own["motion"] = np.array(_stacked([None if one is None else one["motion"] for one in known], ""), dtype=text)
+    motions = _stacked([None if one is None else one["motion"] for one in known], "")
+    own.create_dataset("motion", data=motions, dtype=text)
     for name in ("value", "residual", "displacement", "rotation"):
         own[name] = _stacked([None if one is None else one[name] for one in known], np.nan)
 

@@ -9,6 +9,7 @@ import numpy as np
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.faults import as_failure
 from rodfem.modes.eigenmotions import Eigenmotions
 from rodfem.modes.recorded import Typical
 
@@ -51,7 +52,9 @@ def of_branch(branch: Branch, solvers: Sequence[StaticSolver]) -> list[Typical]:
         if point.mesh not in finders:
             finders[point.mesh] = Eigenmotions(solvers[point.mesh])
         try:
-            out.append(Typical(row, finders[point.mesh].few(point.x, number, double.get(row, np.nan))))
+            with as_failure(solvers[point.mesh].system.comm):
+                found = finders[point.mesh].few(point.x, number, double.get(row, np.nan))
+            out.append(Typical(row, found))
         except (ConvergenceError, InputError) as trouble:
             out.append(Typical(row, None, str(trouble)))
     return out

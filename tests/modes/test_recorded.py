@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,12 +17,14 @@ from modes.test_modes import shape
 import rodfem
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError
+from rodfem.faults import in_words
 from rodfem.fem.fields import Discretization
 from rodfem.modes.eigenmotions import Eigenmotions
 from rodfem.modes.modes import SYMMETRY
 from rodfem.modes.recorded import Typical, read
 from rodfem.modes.typical import EVENLY, FEWEST, typical_rows
 from rodfem.problem.scene import Inertia, Scene
+from rodfem.report.payload import payload_of
 
 pytestmark = pytest.mark.alone
 MESH = Discretization("auto", 4, 6)
@@ -109,19 +112,28 @@ def test_a_trace_is_the_same_with_and_without_them(folder: Path) -> None:
     assert saved == json.loads(json.dumps(alone.data["branches"]))
 
 
-def test_where_they_are_not_found_the_file_says_why(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("fault", [lambda: ConvergenceError("No eigenvalue was found."), MemoryError])
+@pytest.mark.parametrize("often", [1, 100])
+def test_where_they_are_not_found_the_file_says_why(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, fault: Callable[[], Exception], often: int
+) -> None:
+    """At one state or at all: the run goes on, and its report has the sentence."""
     whole, failed = Eigenmotions.few, []
 
     def few(self: Eigenmotions, *what: object) -> object:
-        if not failed:
+        if len(failed) < often:
             failed.append(what)
-            raise ConvergenceError("No eigenvalue was found.")
+            raise fault()
         return whole(self, *what)  # type: ignore[arg-type]
 
     monkeypatch.setattr(Eigenmotions, "few", few)
     found = recorded(classics.euler("clamped-free"), Plan((0.0, 2.0), depth=0, error_bars=False), folder)["straight"]
-    assert [each.trouble for each in found] == ["No eigenvalue was found.", *[""] * (len(found) - 1)]
-    assert found[0].found is None and all(each.found is not None for each in found[1:])
+    sentence = in_words(fault()) if fault is MemoryError else str(fault())
+    assert [each.trouble for each in found] == [sentence if i < often else "" for i in range(len(found))]
+    assert [each.found is None for each in found] == [i < often for i in range(len(found))]
+    (shown,) = payload_of(folder)["branches"]
+    assert list(shown["missed"].values()) == [sentence] * min(often, len(found))
+    assert len(shown["modes"]) == max(len(found) - often, 0)
 
 
 def test_a_rod_without_inertia_has_none(folder: Path) -> None:
