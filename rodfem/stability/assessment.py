@@ -172,7 +172,7 @@ class Assessor(Workspace):
         try:
             return decide(self.inertia.at(x))
         except ConvergenceError:
-            rank_of(self.pencil(x, "full"))
+            rank_of(self.pencil(x, "full"), length=self.system.scene.length)
             raise
 
 

@@ -86,8 +86,33 @@ def _equilibrated(C: sp.spmatrix) -> sp.spmatrix:
     return C
 
 
-def rank_of(pencil: Pencil, scalars: Sequence[str] = ()) -> float:
-    """``sigma_min(C)`` of a pencil; infinite without constraints.  ``scalars`` are words for its scalar multipliers.
+def _without_noise(pencil: Pencil, C: sp.spmatrix, length: float) -> sp.spmatrix:
+    """``C`` without the entries that are round-off beside the largest one of their column.
+
+    A row of nothing else would be one of norm one when it is equilibrated.  Derivatives in a position are those in
+    ``length``, so that none of the two kinds of entries is small for its unit.
+    """
+    comm, units = pencil.K.comm.tompi4py(), np.ones(C.shape[0])
+    for name in ("r", "ends"):
+        units[np.concatenate(comm.allgather(pencil.where.get(name, np.zeros(0, dtype=int)))).astype(int)] = length
+    C = sp.csc_matrix(sp.diags(units) @ C)
+    largest = np.asarray(abs(C).max(axis=0).todense()).ravel()
+    C.data[abs(C.data) <= DEPENDENT * np.repeat(largest, np.diff(C.indptr))] = 0.0
+    C.eliminate_zeros()
+    return C
+
+
+def rank_of(pencil: Pencil, scalars: Sequence[str] = (), length: float = 1.0) -> float:
+    """``sigma_min(C)`` of a pencil; infinite without constraints.
+
+    Parameters
+    ----------
+    pencil
+        Blocks of a state.
+    scalars
+        Words for its scalar multipliers.
+    length
+        Of the rod: positions are measured by it where units must not count.
 
     Raises :class:`SceneError` that names the constraints which depend on one another.
     """
@@ -97,7 +122,8 @@ def rank_of(pencil: Pencil, scalars: Sequence[str] = ()) -> float:
     sigma, vector = smallest_singular(C)
     if sigma > DEPENDENT * _greatest(C, 0):
         return sigma
-    equal = _equilibrated(C)  # in metres and newtons of a molecule, say, columns are of very different sizes
+    # in metres and newtons of a molecule, say, columns are of very different sizes
+    equal = _equilibrated(_without_noise(pencil, C, length))
     least, vector = smallest_singular(equal)
     if least > DEPENDENT * _greatest(equal, 0):
         return sigma
@@ -130,4 +156,5 @@ def require_independent_constraints(system: System, x: PETSc.Vec, start: PETSc.V
     if start is not None and system.norm(start - x) < ROUND:
         x = start
     scalars = [u for u in system.fields.unknown_scalars if u.multiplier]
-    rank_of(Blocks(system, "full").assemble(x), [u.group.equation.format(u.component + 1) for u in scalars])
+    words = [u.group.equation.format(u.component + 1) for u in scalars]
+    rank_of(Blocks(system, "full").assemble(x), words, system.scene.length)

@@ -24,7 +24,7 @@ from rodfem.linalg.selection import factors_of
 from rodfem.problem.scene import Inertia
 from rodfem.stability import methods
 from rodfem.stability.assessment import Assessor, assess
-from rodfem.stability.blocks import Blocks
+from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.stability.inertia import Inertia as Count
 from rodfem.stability.method import Method
 from rodfem.stability.methods import METHODS, find
@@ -420,6 +420,20 @@ def test_smallest_singular_value_is_of_the_size_of_an_element() -> None:
         pencil = Blocks(solver.system).assemble(solver.start(20.0))
         ratios.append(rank_of(pencil) * n)
     assert abs(np.diff(ratios)).max() < 0.05 * ratios[-1]
+
+
+def test_round_off_is_no_independence() -> None:
+    """Two constraints on one unknown differ by round-off of another one; in a tiny rod by what is none."""
+    comm = MPI.COMM_SELF
+    unit, where = petsc_matrix(comm, sp.identity(3, format="csr")), {"q": np.array([0, 1]), "r": np.array([2])}
+
+    def pencil(C: list[list[float]]) -> Pencil:
+        return Pencil(unit, petsc_matrix(comm, sp.csr_matrix(np.array(C))), unit, None, where, np.zeros(2), True)
+
+    with pytest.raises(SceneError, match="depend on one another"):
+        rank_of(pencil([[1.0, 1.0], [0.0, 1e-16], [0.0, 0.0]]))
+    tiny = pencil([[1.0, -1.0], [0.0, 0.0], [1e13, 1e13]])  # a rotation and a position, in a rod of the length 1e-13
+    assert rank_of(tiny, length=1e-13) == pytest.approx(2**0.5)
 
 
 def test_dependent_constraints_are_named() -> None:
