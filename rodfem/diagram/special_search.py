@@ -51,6 +51,7 @@ class SpecialSearch:
         self._open: list[Point] = []
         self._touching, self._balance = Touching(), EnergyBalance()
         self._short = (-inf, inf, 0)
+        self._lost: tuple[Row, Row] | None = None
 
     def begin(self, first: Point, short: float = 0.0, until: float = -inf) -> None:
         """Begin a branch at its last row so far, with steps of at most ``short`` up to the arclength ``until``."""
@@ -189,9 +190,11 @@ class SpecialSearch:
         # invariant: from one decided row to the next the special points in between explain the change of the index
         sure = [rows[0], *(row for row in rows[1:-1] if row.decided), rows[-1]]
         for p, q in pairwise(sure):
+            self._lost = None
             specials = self._between(p, q, why)
             found += specials
             if not ended and not chained(p.low, p.high, specials, q.low, q.high):
+                self._jumped(p, q)
                 self._shorten(p.point, q.point)
         for i, special in enumerate(found):
             if same_point(self.solver, special, found[:i]) is not None:
@@ -206,6 +209,28 @@ class SpecialSearch:
         for trouble in why:
             self.observer.warn(trouble)
         return found
+
+    def _jumped(self, p: Row, q: Row) -> None:
+        """Raise :class:`Gap` if the step from ``p`` to ``q``, which is not explained, has jumped one.
+
+        No special point can be located on a piece that begins on one branch and ends on another, but each end of the
+        shortest such piece is near the states at which the two would cross, with nearly their null vectors.
+        """
+        if self._lost is None:
+            return
+        a, b = self._lost
+        if a.low == b.low or self._persistent(a.point.x):
+            return
+        for row in (a, b):
+            vectors = self.solver.inertia.modes_near_zero(row.point.x, abs(b.low - a.low))
+            apart = abs(b.point.load - a.point.load)
+            special = SpecialPoint(IMPERFECT, row.point, a.low, b.low, apart, vectors)
+            gap = self.gaps.examine(self.solver, special)
+            step = q.point.arclength - p.point.arclength
+            if gap is not None and self.solver.system.distance(gap.point.x, row.point.x) < step:
+                if self.gaps.open(gap, self.solver):
+                    raise gap
+                return
 
     def _shorten(self, a: Point, b: Point) -> None:
         """Shorten steps from ``a`` to beyond ``b`` and raise :class:`Unresolved`; return if they are short already."""
@@ -255,6 +280,7 @@ class SpecialSearch:
         # bisection: on a shorter piece fewer crossings fall together, until each half explains its own ends
         middle = midpoint(self.solver, p.point, q.point) if halvings else None
         if middle is None:
+            self._lost = self._lost or (p, q)
             if why:
                 loads = f"{p.point.load:.8g} and {q.point.load:.8g}"
                 troubles.append(f"A special point between loads {loads} is missing: {why}")

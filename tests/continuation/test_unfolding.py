@@ -12,7 +12,20 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc
 
 from forms.energy import bending_and_twist
-from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, Solver, clamped, free, pinned, sliding, trace
+from rodfem import (
+    Discretization,
+    Ordinate,
+    Parameter,
+    Plan,
+    Scene,
+    Solver,
+    StepControl,
+    clamped,
+    free,
+    pinned,
+    sliding,
+    trace,
+)
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.unfolding import unfold
@@ -84,6 +97,16 @@ def test_both_pieces_of_a_broken_pitchfork(lateral: float) -> None:
     against = min(p.ordinate for p in detached.points)
     assert against == pytest.approx(-tip, abs=10 * lateral + 1e-9)
     assert {round(p.load, 9) for p in (detached.points[0], detached.points[-1])} == {4.0}
+
+
+@pytest.mark.parametrize("lateral", [1e-5, 2e-4])
+def test_a_jump_at_which_nothing_can_be_located_is_one_across_a_gap(lateral: float) -> None:
+    """Long steps end on the other branch, and shorter ones after them do not: the gap is known from the first."""
+    found = diagram(cantilever(lateral), steps=StepControl(first=0.05, largest=0.3))
+    first, detached = found.branches
+    assert {p.negative for p in first.points} == {0}
+    (fold,) = [s for s in detached.special if s.kind == FOLD]
+    assert fold.point.load == pytest.approx(fold_of(lateral), abs=2e-11)
 
 
 def test_unfolding_is_the_work_of_the_imperfection() -> None:
