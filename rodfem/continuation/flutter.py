@@ -27,11 +27,16 @@ AtLoad = Callable[[float, Cluster], Measured]
 
 @dataclass(frozen=True)
 class Located:
-    """Load of a collision, its uncertainty for the given mesh, and the cluster there."""
+    """Load of a collision, its ``uncertainty`` for the given mesh, and the ``cluster`` there.
+
+    ``slope`` is the derivative of ``D`` in the load, and ``clear`` a load near by at which the eigenvalues are apart.
+    """
 
     load: float
     uncertainty: float
     cluster: Cluster
+    slope: float
+    clear: float
 
 
 def unmatched(found: Frequencies, others: np.ndarray) -> list[list[int]]:
@@ -65,16 +70,17 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
     sharp.  The cluster is taken over from where its eigenvalues are farthest apart.  ``at`` computes eigenvalues at a
     load, ``width`` is the first half length of the piece, in the load.
     """
-    half, best = width, Located(load, np.inf, cluster)
+    half, best, clear = width, Located(load, np.inf, cluster, np.nan, load), load
     t = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
     for _ in range(12):
-        found = [at(float(node), cluster) for node in load + half * t]
+        nodes = [float(node) for node in load + half * t]
+        found = [at(node, cluster) for node in nodes]
         d, mean = np.array([f.discriminant for f in found]), np.array([f.cluster.mean for f in found])
         series = chebyshev.chebfit(t, d, 5)
         root = real_root(series, 0.0)
-        clearest = max(found, key=lambda f: f.spread)
+        clearest, node = max(zip(found, nodes, strict=True), key=lambda pair: pair[0].spread)
         if clearest.spread > RANK:
-            cluster = clearest.cluster
+            cluster, clear = clearest.cluster, node
         if root is None:
             slope = (d[-1] - d[0]) / (2 * half)
             load += float(np.clip(-(d[0] + d[-1]) / 2 / slope, -2 * half, 2 * half))
@@ -83,7 +89,8 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
         cluster = Cluster(cluster.basis, float(chebyshev.chebval(root, chebyshev.chebfit(t, mean, 5))))
         uncertainty = max(half * zero_uncertainty(series, root, in_doubt(series)), ROUND_OFF * abs(load))
         if abs(root) < 1 and uncertainty < best.uncertainty:
-            best = Located(load, uncertainty, cluster)
+            slope = float(chebyshev.chebval(root, chebyshev.chebder(series))) / half
+            best = Located(load, uncertainty, cluster, slope, clear)
         elif best.uncertainty < ENOUGH * abs(load):
             break
         if best.uncertainty < SHARP * abs(load):

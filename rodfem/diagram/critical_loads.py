@@ -10,14 +10,14 @@ single real one passes through zero the rod diverges: the eigenvalue itself is s
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
+from rodfem.continuation.flutter import Located, locate_flutter, unmatched
 from rodfem.continuation.interpolant import SHARP, in_doubt, real_root, zero_uncertainty
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, Kind
 from rodfem.continuation.static_solver import StaticSolver
@@ -26,8 +26,9 @@ from rodfem.diagram.held import at_load
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, cluster_of, measure
+from rodfem.stability.cluster_noise import ClusterNoise, noise_of
 from rodfem.stability.frequencies import MULTIPLE, Frequencies
-from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricSolver
+from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricPencil, NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 
 SAME = 1e-9
@@ -135,8 +136,8 @@ class CriticalLoads:
             return Critical(FLUTTER, there.load, cluster.size, floor, other.cluster.mean, other.cluster, note)
         if other.discriminant < 0:
             return None
-        located = locate_flutter(
-            measured_at(self.solver, self.eigensolver, here.x),
+        located = located_flutter(
+            Measuring(self.solver, self.eigensolver, here.x),
             cluster,
             (there.load + here.load) / 2,
             abs(here.load - there.load),
@@ -173,7 +174,7 @@ class CriticalLoads:
         found = pencil.near(number + 2, SHIFT * self.units.omega2)
         cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
         load, uncertainty = interpolated_zero_of_the_mean(
-            measured_at(self.solver, self.eigensolver, guess), cluster, loads[0], self.units.load
+            Measuring(self.solver, self.eigensolver, guess), cluster, loads[0], self.units.load
         )
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
         return Critical(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
@@ -184,16 +185,40 @@ class CriticalLoads:
         return sorted(v.real for v in leftmost(pencil, self.number, self._before).values if v.imag == 0)
 
 
-def measured_at(solver: StaticSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> AtLoad:
+class Measuring:
     """How a ``solver`` and its ``eigensolver`` measure a cluster at a load: at the equilibrium near ``guess``."""
 
-    def measured(load: float, cluster: Cluster) -> Measured:
-        return measure(eigensolver.at(at_load(solver, guess, load)), cluster)
+    def __init__(self, solver: StaticSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> None:
+        """Compute nothing yet."""
+        self.solver, self.eigensolver, self.guess = solver, eigensolver, guess
 
-    return measured
+    def __call__(self, load: float, cluster: Cluster) -> Measured:
+        """Measure the cluster; raises :class:`ConvergenceError` where it is not found."""
+        return measure(self._pencil(load), cluster)
+
+    def noise(self, load: float, cluster: Cluster) -> ClusterNoise:
+        """Round-off of what is measured; raises :class:`ConvergenceError` where the cluster is not found."""
+        pencil = self._pencil(load)
+        return noise_of(pencil, measure(pencil, cluster))
+
+    def _pencil(self, load: float) -> NonsymmetricPencil:
+        return self.eigensolver.at(at_load(self.solver, self.guess, load))
 
 
-def interpolated_zero_of_the_mean(measured: AtLoad, cluster: Cluster, load: float, one: float) -> tuple[float, float]:
+def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: float) -> Located:
+    """Collision as :func:`~rodfem.continuation.flutter.locate_flutter` finds it; round-off of the matrix counts, too.
+
+    Of a ``measured`` ``cluster``, from about the ``load`` on, in pieces of the half ``width`` at first.  Raises
+    :class:`ConvergenceError` where that does.
+    """
+    found = locate_flutter(measured, cluster, load, width)
+    noise = measured.noise(found.clear, found.cluster).discriminant
+    return replace(found, uncertainty=found.uncertainty + abs(noise / found.slope))
+
+
+def interpolated_zero_of_the_mean(
+    measured: Measuring, cluster: Cluster, load: float, one: float
+) -> tuple[float, float]:
     """Load near ``load`` at which the mean of a ``cluster`` vanishes, and what round-off of the mean leaves open.
 
     The ``measured`` mean, at loads of natural size ``one``, is sampled over :data:`AROUND`, and interpolated: its
@@ -205,14 +230,21 @@ def interpolated_zero_of_the_mean(measured: AtLoad, cluster: Cluster, load: floa
     root = real_root(series, 0.0)
     if root is None:
         raise ConvergenceError(f"The divergence load near {load:.6g} could not be located: use a smaller range.")
-    return load + half * root, half * zero_uncertainty(series, root, in_doubt(series))
+    noise = measured.noise(load + half * root, cluster).mean
+    return load + half * root, half * zero_uncertainty(series, root, in_doubt(series) + noise)
 
 
-def zero_of_the_mean(measured: AtLoad, cluster: Cluster, load: float, one: float) -> float:
-    """Load near ``load``, of natural size ``one``, at which the ``measured`` mean of a ``cluster`` vanishes."""
+def zero_of_the_mean(measured: Measuring, cluster: Cluster, load: float, one: float) -> tuple[float, float]:
+    """Load near ``load``, of natural size ``one``, at which the ``measured`` mean of a ``cluster`` vanishes.
+
+    Also what round-off of the mean leaves open of it.
+    """
     from scipy.optimize import newton  # slow to load
 
     def mean(load: float) -> float:
         return measured(load, cluster).cluster.mean
 
-    return float(newton(mean, load, x1=load + BESIDE * unit(load, one=one), tol=round_off(load, one)))
+    step = BESIDE * unit(load, one=one)
+    found = float(newton(mean, load, x1=load + step, tol=round_off(load, one)))
+    slope = (mean(found + step) - mean(found - step)) / (2 * step)
+    return found, abs(measured.noise(found, cluster).mean / slope)

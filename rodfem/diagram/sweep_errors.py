@@ -8,10 +8,9 @@ from petsc4py import PETSc
 from rodfem.adaptivity.error_estimate import bound, halved
 from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import SpecialPoint
-from rodfem.continuation.flutter import locate_flutter
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.critical_loads import measured_at, zero_of_the_mean
+from rodfem.diagram.critical_loads import Measuring, located_flutter, zero_of_the_mean
 from rodfem.diagram.held import at_load
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.stability.cluster import Cluster, as_vectors
@@ -49,9 +48,9 @@ class SweepErrors:
             relative = left / max(abs(load), abs(self.span[1] - self.span[0]) * ROUND_OFF)
             s.omega2_error = bound(s.omega2, mu, MEAN * abs(mu) * max(relative, ROUND_OFF), rho)
         elif s.kind == DIVERGENCE:
-            measured = measured_at(richer, self.eigensolver, x)
-            load = zero_of_the_mean(measured, self._transferred(s), point.load, self.units.load)
-            s.error_estimate = max(bound(point.load, load, s.located_to, rho), s.located_to)
+            measured = Measuring(richer, self.eigensolver, x)
+            load, left = zero_of_the_mean(measured, self._transferred(s), point.load, self.units.load)
+            s.error_estimate = max(bound(point.load, load, max(left, s.located_to), rho), s.located_to)
         if s.kind in (FLUTTER, DIVERGENCE):
             s.ordinate_error += self._moved(x, s)
 
@@ -74,9 +73,9 @@ class SweepErrors:
 
     def _flutter(self, guess: PETSc.Vec, s: SpecialPoint) -> tuple[float, float, float]:
         """Flutter load on the richer discretisation, its uncertainty there, and the double eigenvalue."""
-        measured, cluster = measured_at(self.richer, self.eigensolver, guess), self._transferred(s)
+        measured, cluster = Measuring(self.richer, self.eigensolver, guess), self._transferred(s)
         if s.note:  # double there, whatever the mesh
             return s.point.load, 0.0, measured(s.point.load, cluster).cluster.mean
         width = max(0.05 * abs(s.point.load), 0.01 * abs(self.span[1] - self.span[0]))
-        located = locate_flutter(measured, cluster, s.point.load, width)
+        located = located_flutter(measured, cluster, s.point.load, width)
         return located.load, located.uncertainty, located.cluster.mean

@@ -12,6 +12,7 @@ by their values or by the names of their motions: the vectors of a double eigenv
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,24 +59,36 @@ class Measured:
 
 def cluster_of(pencil: NonsymmetricPencil, found: Frequencies, chosen: list[int]) -> Cluster:
     """Cluster of the ``chosen`` ones of eigenvalues found at a state, closed under conjugation."""
-    return Cluster(_real_span(pencil, found.vectors[:, chosen]), float(found.values[chosen].real.mean()))
+    return Cluster(real_span(pencil, found.vectors[:, chosen]), float(found.values[chosen].real.mean()))
 
 
 def measure(pencil: NonsymmetricPencil, cluster: Cluster) -> Measured:
     """Find at a state a cluster known from a state nearby; raises :class:`ConvergenceError`."""
-    basis, size = _real_span(pencil, cluster.basis), cluster.size
-    beside = BESIDE * pencil.system.scene.units.omega2
+    found, chosen, values = members(pencil, real_span(pencil, cluster.basis), cluster, pencil.near)
+    here = cluster_of(pencil, found, chosen)
+    return Measured(float(((values - here.mean) ** 2).mean().real), values, here)
+
+
+def members(
+    pencil: NonsymmetricPencil, basis: np.ndarray, cluster: Cluster, near: Callable[[int, complex], Frequencies]
+) -> tuple[Frequencies, list[int], np.ndarray]:
+    """Eigenvalues of a ``pencil`` ``near`` the mean of a ``cluster`` that are its own, by shares in its ``basis``.
+
+    Returns what was found, the places of its own in that, and their values.  Of left vectors, which are orthogonal to
+    the right ones of all other eigenvalues, any share tells.  Raises :class:`ConvergenceError`.
+    """
+    size, beside = cluster.size, BESIDE * pencil.system.scene.units.omega2
+    least = LEAST if near == pencil.near else REAL
     for number in (size + 2, 3 * size + 10):
-        found = pencil.near(number, 0.97 * cluster.mean if abs(cluster.mean) > beside else -beside)
+        found = near(number, 0.97 * cluster.mean if abs(cluster.mean) > beside else -beside)
         inside = pencil.product(basis, found.weighed)
         energy = pencil.squares(found.vectors, found.weighed)
         share = (abs(inside) ** 2).sum(axis=0) / energy
         chosen = sorted(np.argsort(-share, kind="stable")[:size].tolist())
         values = found.values[chosen]
         closed = abs(values.imag.sum()) < REAL * abs(values).max()
-        if len(chosen) == size and closed and share[chosen].min() > LEAST:
-            here = cluster_of(pencil, found, chosen)
-            return Measured(float(((values - here.mean) ** 2).mean().real), values, here)
+        if len(chosen) == size and closed and share[chosen].min() > least:
+            return found, chosen, values
     raise ConvergenceError(f"the {size} eigenvalues near {cluster.mean:.6g} are not found again")
 
 
@@ -90,7 +103,7 @@ def as_vectors(system: System, columns: np.ndarray) -> list[PETSc.Vec]:
     return out
 
 
-def _real_span(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
+def real_span(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
     """Real basis (n, k), orthonormal in the mass, of the span of ``vectors`` (n, k), closed under conjugation."""
     parts = np.concatenate([vectors.real, vectors.imag], axis=1) if np.iscomplexobj(vectors) else vectors
     squares, turn = np.linalg.eigh(pencil.product(parts, pencil.weighed(parts)))
