@@ -96,6 +96,8 @@ def mesh_of(options: argparse.Namespace, own: Discretization | None) -> Discreti
         if options.accuracy is not None and name in given:
             raise InputError(f"--accuracy chooses elements and degree itself: leave out --{name}, or --accuracy.")
     own = own or Discretization()
+    if options.accuracy is not None and own.vertices is None:
+        own = replace(own, elements=Discretization.elements, degree=Discretization.degree)
     return replace(own, factors=options.factors, **given)
 
 

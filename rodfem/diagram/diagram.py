@@ -210,7 +210,7 @@ class Diagram:
     def again(self, discretization: Discretization | None = None, **changes: Any) -> Diagram:
         """Trace once more with another discretisation or plan: ``again(span=(60, 4))``, ``again(accuracy=1e-8)``.
 
-        ``changes`` are fields of :class:`~rodfem.Plan`.  The mesh stays unless one is given.  Raises
+        ``changes`` are fields of :class:`~rodfem.Plan`.  The mesh stays unless one is given, or an accuracy.  Raises
         :class:`~rodfem.errors.InputError` for a change that a plan has not.
         """
         from rodfem.diagram.trace import trace
@@ -221,8 +221,10 @@ class Diagram:
                 f"A plan has no {unknown[0]!r}: choose one of {', '.join(known)}, or give a Discretization first."
             )
         system = self.solvers[0].system
-        mesh = discretization or system.fields.discretization
-        return trace(self.scene, mesh, replace(self.plan, **changes), comm=system.comm)
+        mesh, plan = discretization or system.fields.discretization, replace(self.plan, **changes)
+        if discretization is None and plan.accuracy is not None and mesh.vertices is None:
+            mesh = Discretization(mesh.formulation, factors=mesh.factors)
+        return trace(self.scene, mesh, plan, comm=system.comm)
 
     def _finest(self) -> int:
         """Number of the mesh with most unknowns."""

@@ -119,6 +119,8 @@ def traced(
         asked = as_asked(scene, discretization, plan) | {"equations": fingerprint(found.system)}
         recorder.asked(asked)
         recorder.system(found.system, plan.accuracy)
+        if unused := _not_used(discretization, plan):
+            recorder.note(unused)
         if doubt := round_off_of_strains(scene):
             recorder.warn(doubt)
         if doubt := unbroken(scene, partial(_inside, scene, found.system, plan.accuracy is not None)):
@@ -162,6 +164,21 @@ def _mesh(
     mesh, change = frequency_mesh(scene, discretization.formulation, plan.accuracy, plan.over(scene), number, comm)
     observer.frequency_mesh(mesh, number, change, plan.accuracy)
     return replace(mesh, factors=discretization.factors)
+
+
+def _not_used(given: Discretization, plan: Plan) -> str:
+    """Sentence on elements and a degree in whose place the accuracy of a plan chooses; empty without such."""
+    own = Discretization()
+    if (
+        plan.accuracy is None
+        or given.vertices is not None
+        or (given.elements, given.degree) == (own.elements, own.degree)
+    ):
+        return ""
+    return (
+        f"  The accuracy chooses the meshes, not elements={given.elements} and degree={given.degree}: "
+        "give vertices, too, for a mesh to begin with."
+    )
 
 
 def _inside(scene: Scene, system: System, adaptive: bool, s: float) -> bool:

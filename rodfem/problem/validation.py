@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields
 from keyword import iskeyword
 from math import isfinite
 from numbers import Real
@@ -375,8 +376,14 @@ def check_reach(scene: Scene) -> None:
 
 
 def check_places(scene: Scene) -> None:
-    """Raise :class:`SceneError` for attachments, constraints and breaks that are not on the rod."""
+    """Raise :class:`SceneError` for attachments, constraints and breaks that are not on the rod, or for empty ones."""
     a, b = scene.interval
+    for x in scene.attachments:
+        if all(getattr(x, field.name) is None for field in fields(x) if field.name != "s"):
+            raise SceneError(
+                f"Nothing is attached at s = {x.s:g}: give the attachment a force, a follower force, an energy, a mass "
+                f"or a rotary inertia; a joint of two elements is breaks=({x.s:g},)."
+            )
     places = [("attachment", x.s) for x in scene.attachments] + [("break", s) for s in scene.breaks]
     places += [("constraint", x.s) for x in scene.constraints if x.s is not None]
     for what, s in places:

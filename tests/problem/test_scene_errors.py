@@ -230,6 +230,7 @@ def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
         ({"ends": Ring(odd=True), "start": lambda s: turns(s, 2)}, r"Ring\(odd=False\)"),
         # places
         ({"attachments": (Attachment(1.5, force=lambda c: ZERO),)}, "attachment at s = 1.5 is not on the rod"),
+        ({"attachments": (Attachment(0.5),)}, r"Nothing is attached at s = 0.5: .*a mass.*breaks=\(0.5,\)"),
         ({"constraints": (at(-0.5, lambda x, c: x.r[0]),)}, "constraint at s = -0.5 is not on the rod"),
         ({"breaks": (2.0,)}, "break at s = 2 is not on the rod"),
         ({"planar": "e3"}, "planar across 'e3'"),
