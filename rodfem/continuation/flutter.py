@@ -29,14 +29,22 @@ AtLoad = Callable[[float, Cluster], Measured]
 class Located:
     """Load of a collision, its ``uncertainty`` for the given mesh, and the ``cluster`` there.
 
-    ``slope`` is the derivative of ``D`` in the load, and ``clear`` a load near by at which the eigenvalues are apart.
+    ``slope`` is the derivative of ``D`` in the load, ``drift`` that of the mean, and ``left`` what its interpolation
+    leaves open of the mean.  At the load ``clear``, near by, the eigenvalues are apart.
     """
 
     load: float
     uncertainty: float
     cluster: Cluster
     slope: float
+    drift: float
+    left: float
     clear: float
+
+    @property
+    def mean_uncertainty(self) -> float:
+        """Uncertainty of the mean of the cluster."""
+        return self.left + abs(self.drift) * self.uncertainty
 
 
 def unmatched(found: Frequencies, others: np.ndarray) -> list[list[int]]:
@@ -70,7 +78,7 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
     sharp.  The cluster is taken over from where its eigenvalues are farthest apart.  ``at`` computes eigenvalues at a
     load, ``width`` is the first half length of the piece, in the load.
     """
-    half, best, clear = width, Located(load, np.inf, cluster, np.nan, load), load
+    half, best, clear = width, Located(load, np.inf, cluster, *3 * (np.nan,), load), load
     t = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
     for _ in range(12):
         nodes = [float(node) for node in load + half * t]
@@ -86,11 +94,12 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
             load += float(np.clip(-(d[0] + d[-1]) / 2 / slope, -2 * half, 2 * half))
             continue
         load += half * root
-        cluster = Cluster(cluster.basis, float(chebyshev.chebval(root, chebyshev.chebfit(t, mean, 5))))
+        means = chebyshev.chebfit(t, mean, 5)
+        cluster = Cluster(cluster.basis, float(chebyshev.chebval(root, means)))
         uncertainty = max(half * zero_uncertainty(series, root, in_doubt(series)), ROUND_OFF * abs(load))
         if abs(root) < 1 and uncertainty < best.uncertainty:
-            slope = float(chebyshev.chebval(root, chebyshev.chebder(series))) / half
-            best = Located(load, uncertainty, cluster, slope, clear)
+            slope, drift = (float(chebyshev.chebval(root, chebyshev.chebder(f))) / half for f in (series, means))
+            best = Located(load, uncertainty, cluster, slope, drift, in_doubt(means), clear)
         elif best.uncertainty < ENOUGH * abs(load):
             break
         if best.uncertainty < SHARP * abs(load):

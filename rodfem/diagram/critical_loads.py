@@ -212,8 +212,9 @@ def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: f
     :class:`ConvergenceError` where that does.
     """
     found = locate_flutter(measured, cluster, load, width)
-    noise = measured.noise(found.clear, found.cluster).discriminant
-    return replace(found, uncertainty=found.uncertainty + abs(noise / found.slope))
+    noise = measured.noise(found.clear, found.cluster)
+    moved = abs(noise.discriminant / found.slope)
+    return replace(found, uncertainty=found.uncertainty + moved, left=found.left + noise.mean)
 
 
 def interpolated_zero_of_the_mean(

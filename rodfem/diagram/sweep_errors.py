@@ -18,7 +18,7 @@ from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off
 
 MEAN = 10.0
-"""Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
+"""Round-off of the mean of two eigenvalues that meet, relative to it, over that of the load."""
 
 
 class SweepErrors:
@@ -43,10 +43,9 @@ class SweepErrors:
         again, about = richer.shape.ordinate(x), self.inside.change(point.x, x)
         s.ordinate_error = s.error_estimate = bound(point.ordinate, again, left, rho, about)
         if s.kind == FLUTTER:
-            load, left, mu = self._flutter(guess, s)
+            load, left, mu, doubt = self._flutter(guess, s)
             s.error_estimate = max(bound(point.load, load, left, rho), s.located_to)
-            relative = left / max(abs(load), abs(self.span[1] - self.span[0]) * ROUND_OFF)
-            s.omega2_error = bound(s.omega2, mu, MEAN * abs(mu) * max(relative, ROUND_OFF), rho)
+            s.omega2_error = bound(s.omega2, mu, max(doubt, MEAN * abs(mu) * ROUND_OFF), rho)
         elif s.kind == DIVERGENCE:
             measured = Measuring(richer, self.eigensolver, x)
             load, left = zero_of_the_mean(measured, self._transferred(s), point.load, self.units.load)
@@ -71,11 +70,11 @@ class SweepErrors:
         columns = [self.transfer(v, state=False).array_r.real for v in vectors]
         return Cluster(np.stack(columns, axis=1), s.cluster.mean)
 
-    def _flutter(self, guess: PETSc.Vec, s: SpecialPoint) -> tuple[float, float, float]:
-        """Flutter load on the richer discretisation, its uncertainty there, and the double eigenvalue."""
+    def _flutter(self, guess: PETSc.Vec, s: SpecialPoint) -> tuple[float, float, float, float]:
+        """Flutter load on the richer discretisation, its uncertainty there, the double eigenvalue and that of it."""
         measured, cluster = Measuring(self.richer, self.eigensolver, guess), self._transferred(s)
         if s.note:  # double there, whatever the mesh
-            return s.point.load, 0.0, measured(s.point.load, cluster).cluster.mean
+            return s.point.load, 0.0, measured(s.point.load, cluster).cluster.mean, 0.0
         width = max(0.05 * abs(s.point.load), 0.01 * abs(self.span[1] - self.span[0]))
         located = located_flutter(measured, cluster, s.point.load, width)
-        return located.load, located.uncertainty, located.cluster.mean
+        return located.load, located.uncertainty, located.cluster.mean, located.mean_uncertainty
