@@ -319,6 +319,42 @@ FAULTS = {
         "if comm.bcast(True):",
         f"{KILLS} {FILES} tests/hard/test_numerical_faults.py",
     ),
+    "what-is-steep-is-not-seen": Fault(
+        "rodfem/problem/smoothness.py",
+        "<= np.maximum(most, SEEN",
+        "<= np.maximum(1e3 * most, SEEN",
+        "tests/problem/test_smoothness.py",
+    ),
+    "kinks-beside-the-end-of-a-piece": Fault(
+        "rodfem/problem/smoothness.py",
+        "- ends).max() <= ENDS * self.size",
+        "- ends).max() < np.inf",
+        "tests/problem/test_smoothness.py",
+    ),
+    "gaps-that-are-jumped-are-forgotten": Fault(
+        "rodfem/diagram/special_search.py",
+        "                self._jumped(p, q)\n",
+        "",
+        "tests/continuation/test_unfolding.py",
+    ),
+    "round-off-makes-constraints-independent": Fault(
+        f"{STABILITY}rank.py",
+        "_equilibrated(_without_noise(pencil, C, length))",
+        "_equilibrated(C)",
+        "tests/stability/test_assessment.py",
+    ),
+    "flutter-without-the-matrix-s-round-off": Fault(
+        f"{STABILITY}cluster_noise.py",
+        "of(2 * W @ B.T))",
+        "0.0)",
+        "tests/stability/test_cluster_noise.py",
+    ),
+    "modules-beside-a-file-come-first": Fault(
+        "rodfem/app/persons_file.py",
+        "sys.path.append(str(path.parent))",
+        "sys.path.insert(0, str(path.parent))",
+        "tests/app/test_run_command.py",
+    ),
     "scene-of-another-name": Fault(
         "rodfem/diagram/saved.py", "if (name, load) != (scene.name, scene.load):", "if load != scene.load:", DIAGRAM
     ),

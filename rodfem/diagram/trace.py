@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rodfem import compat
+from rodfem.adaptivity.error_estimate import halved
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer, Recorder
@@ -30,6 +31,7 @@ from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
 from rodfem.problem.jumps import unbroken
 from rodfem.problem.scene import Scene
+from rodfem.problem.smoothness import Rules, unresolved
 from rodfem.problem.validation import round_off_of_strains
 from rodfem.ranks import end_together
 from rodfem.timing import Clock
@@ -125,6 +127,8 @@ def traced(
             recorder.warn(doubt)
         if doubt := unbroken(scene, partial(_inside, scene, found.system, plan.accuracy is not None)):
             recorder.warn(doubt)
+        if plan.accuracy is None or not scene.conservative:
+            _warn_of_what_is_sharp(scene, found.system, recorder)
         if compiled and plan.error_bars and form_compiler.ALONE:
             compile_richer(found.system)
 
@@ -142,6 +146,9 @@ def traced(
         diagram.run = journal.run or diagram.run
         try:
             tracer.run()
+            if plan.accuracy is not None and scene.conservative:
+                for number in sorted({point.mesh for branch in diagram for point in branch.points}):
+                    _warn_of_what_is_sharp(scene, tracer.solvers[number].system, recorder)
         except BaseException as trouble:  # an interrupt, too: nothing that has been computed is lost
             if diagram.branches:
                 trouble.diagram = diagram  # type: ignore[attr-defined]
@@ -179,6 +186,19 @@ def _not_used(given: Discretization, plan: Plan) -> str:
         f"  The accuracy chooses the meshes, not elements={given.elements} and degree={given.degree}: "
         "give vertices, too, for a mesh to begin with."
     )
+
+
+def _warn_of_what_is_sharp(scene: Scene, system: System, observer: Observer) -> None:
+    """Warn of what changes too steeply along the rod for the elements of a system."""
+    k, ends = system.fields.discretization.degree, np.sort(system.fields.vertices.reshape(-1, 2), axis=1)
+    own, richer = (system.equations.quadrature_degree(degree) // 2 + 1 for degree in (k, k + 1))
+
+    def elements(s: float) -> list[tuple[float, float]]:
+        mine = [(float(a), float(b)) for a, b in ends[(ends[:, 0] <= s) & (s <= ends[:, 1])]]
+        return sorted({element for part in system.comm.allgather(mine) for element in part})
+
+    if doubt := unresolved(scene, elements, Rules(own, richer, halved(k))):
+        observer.warn(doubt)
 
 
 def _inside(scene: Scene, system: System, adaptive: bool, s: float) -> bool:

@@ -37,7 +37,7 @@ JUMP = 1e-9
 """Least jump, relative to the greater of the two values."""
 
 
-class _Arclength(ufl.classes.Variable):  # type: ignore[misc]
+class Arclength(ufl.classes.Variable):  # type: ignore[misc]
     """The arclength, with the value that it is given last."""
 
     __slots__ = ("value",)
@@ -49,9 +49,9 @@ class _Arclength(ufl.classes.Variable):  # type: ignore[misc]
 
 def jumps(scene: Scene) -> dict[str, list[float]]:
     """Arclengths inside the rod at which a function of the scene jumps, by its words, in ascending order."""
-    s = _Arclength(ufl.as_ufl(0.0))
+    s = Arclength(ufl.as_ufl(0.0))
     found: dict[str, list[float]] = {}
-    for what, expressions in _along(scene, s):
+    for what, expressions in along(scene, s):
         places = {x for x in _changes(expressions, s, scene) if _jumps_at(expressions, s, x, scene.length)}
         if places:
             found[what] = sorted({*found.get(what, []), *places})
@@ -70,7 +70,7 @@ def unbroken(scene: Scene, inside: Callable[[float], bool]) -> str:
     return ""
 
 
-def _along(scene: Scene, s: Any) -> Iterator[tuple[str, list[Any]]]:
+def along(scene: Scene, s: Any) -> Iterator[tuple[str, list[Any]]]:
     """Functions that hold along the rod, in words, as expressions of the arclength ``s`` at some states."""
     c = scene.constants(max(scene.span, key=abs), s)  # at no load, where nothing would jump
     places = [_place(scene, s, state) for state in STATES]
@@ -90,7 +90,7 @@ def _place(scene: Scene, s: Any, state: Any) -> Any:
     return place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=scene.length)
 
 
-def _changes(expressions: list[Any], s: _Arclength, scene: Scene) -> Iterator[float]:
+def _changes(expressions: list[Any], s: Arclength, scene: Scene) -> Iterator[float]:
     """Arclengths inside the rod at which a comparison with the arclength changes."""
     a, b = scene.interval
     inner = np.linspace(a, b, GRID + 1)[1:-1] + BESIDE * scene.length / GRID
@@ -111,7 +111,7 @@ def _changes(expressions: list[Any], s: _Arclength, scene: Scene) -> Iterator[fl
                     yield round(at, 14 - int(np.ceil(np.log10(scene.length))))
 
 
-def _jumps_at(expressions: list[Any], s: _Arclength, x: float, length: float) -> bool:
+def _jumps_at(expressions: list[Any], s: Arclength, x: float, length: float) -> bool:
     """Whether one of the expressions jumps at an arclength."""
     for expression in expressions:
         sides = []
