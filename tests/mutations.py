@@ -319,6 +319,15 @@ FAULTS = {
         "if comm.bcast(True):",
         f"{KILLS} {FILES} tests/hard/test_numerical_faults.py",
     ),
+    "bracket-on-the-other-side": Fault(
+        f"{CONTINUATION}locate.py", "return low if first else high", "return high if first else low", LOCATE
+    ),
+    "two-measures-of-an-eigenvalue-are-one": Fault(
+        f"{CONTINUATION}special_points.py",
+        "return index, 2 * float(",
+        "return index, 0 * float(",
+        LOCATE,
+    ),
     "what-is-steep-is-not-seen": Fault(
         "rodfem/problem/smoothness.py",
         "<= np.maximum(most, SEEN",

@@ -9,6 +9,7 @@ and ``F_lam`` the derivative of the equations in the load, ``phi . F_lam != 0`` 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 from petsc4py import PETSc
@@ -21,8 +22,8 @@ from rodfem.continuation.locate import across, locate, locate_mode
 from rodfem.continuation.prediction import hermite
 from rodfem.continuation.states_between import solve_at
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
-from rodfem.stability.inertia import NULL, Factored
-from rodfem.stability.round_off import decide, quotient_error, resolve
+from rodfem.stability.inertia import NULL, Factored, Index
+from rodfem.stability.round_off import Decision, decide, quotient_error, resolve
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
@@ -32,6 +33,8 @@ LEVEL = 1e-3
 """Slope of the load, relative to its span, below which it is taken for zero."""
 INSENSITIVE = 1e-10
 """A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
+MISSED = 10.0
+"""Eigenvalues within the band of a count are zero at a located point up to so many of its uncertainties."""
 APART = 1e-7
 """Arclength above which there is a state to count at between two special points."""
 
@@ -49,7 +52,8 @@ def special_at(
     x = located.x
     tangent = located.tangent / system.norm(located.tangent)
     found = inertia.at(x)
-    point = solver.point(x, arclength, tangent, index=decide(found).index)
+    index, missed = _index_of(decide(found), found, located)
+    point = solver.point(x, arclength, tangent, index=index)
     null_count = point.zero - found.drifts
     if null_count < 1:  # what was interpolated has no zero there: two branches were taken for one
         raise ConvergenceError(
@@ -65,12 +69,29 @@ def special_at(
     turning = abs(system.scalar(tangent)) < LEVEL * abs(system.scene.span[1] - system.scene.span[0])
     kind = FOLD if turning and coupling > COUPLED else BRANCH_POINT
     apart = _apart(found, vectors, located)
+    left = located.uncertainty + missed
     special = SpecialPoint(
-        kind, point, located.before, located.after, located.uncertainty + apart, [v.copy() for v in vectors], coupling
+        kind, point, located.before, located.after, left + apart, [v.copy() for v in vectors], coupling
     )
-    if apart > located.uncertainty:
+    if apart > left:
         special.note = f"{len(vectors)} eigenvalues that are not told apart vanish within {apart:.0e}"
     return special
+
+
+def _index_of(decision: Decision, found: Factored, located: Located) -> tuple[Index, float]:
+    """Index at a located point, and the uncertainty of its load by round-off that the location does not show.
+
+    An eigenvalue is located by solutions with factors, and decided by Rayleigh quotients.  On long uniform meshes
+    rounding is alike in all elements and adds up, differently for the two: what the quotients miss zero by counts
+    twice.  No more than :data:`MISSED` times the uncertainty of the location, it is a zero nevertheless.
+    """
+    index = decision.index
+    near = abs(decision.inside) <= MISSED * abs(located.rate) * located.along
+    if index.zero > found.drifts or not near.any():
+        return index, 0.0
+    negative = int((near & (decision.inside < 0)).sum())
+    index = replace(index, negative=index.negative - negative, zero=index.zero + int(near.sum()))
+    return index, 2 * float(abs(decision.inside[near]).max() * abs(located.slope / located.rate))
 
 
 def _apart(found: Factored, vectors: Sequence[PETSc.Vec], located: Located) -> float:

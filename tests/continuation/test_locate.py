@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,10 +12,14 @@ from hemitropic_cases import explored
 from numpy.polynomial import chebyshev
 from numpy.polynomial.polynomial import polyfromroots
 
+from rodfem.continuation import locate
 from rodfem.continuation.flutter import locate_flutter
 from rodfem.continuation.interpolant import NODES, in_doubt, left_out, real_root
 from rodfem.continuation.kinds import FOLD
+from rodfem.continuation.special_points import _index_of
 from rodfem.stability.cluster import Cluster, Measured
+from rodfem.stability.inertia import Index
+from rodfem.stability.round_off import Decision
 
 pytestmark = pytest.mark.alone
 
@@ -75,3 +81,28 @@ def test_a_fold_is_located_to_round_off() -> None:
     """The first nodes about it leave 5e-11: those nearer to it leave a fiftieth of that."""
     (fold,) = (s for branch in explored() for s in branch.special if s.kind == FOLD)
     assert fold.located_to < 5e-12
+
+
+@pytest.mark.parametrize("falling", [True, False])
+def test_a_bracket_ends_where_the_eigenvalue_is_negative(falling: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Number 1 changes its sign at 0.3: beyond it, or before, it may have another number."""
+    count = lambda s: 2 if (s > 0.3) == falling else 1  # noqa: E731
+    monkeypatch.setattr(locate, "solve_beside", lambda solver, curve, s, h: (s, s))
+    inertia = SimpleNamespace(at=lambda s: SimpleNamespace(below=lambda mu: count(s)), tolerance=1e-7)
+    solver: Any = SimpleNamespace(inertia=inertia)
+    curve: Any = None
+    s = locate.bracket(solver, curve, (0.0, 1.0), 1, (), 1e-6)
+    assert abs(s - 0.3) < 1e-6 and count(s) == 2
+
+
+def test_round_off_that_two_measures_differ_by() -> None:
+    """A double eigenvalue is located to 5e-7 by solutions, and its quotients are 9e-7 (1e5 linear elements)."""
+    found: Any = SimpleNamespace(drifts=1)
+    located: Any = SimpleNamespace(along=5e-8, rate=-10.0, slope=0.2)
+    quotients = np.array([-9e-7, 8e-7, 1e-5])
+    index, missed = _index_of(Decision(Index(3, 1, 0.0, 0.0), 5e-5, quotients, quotients), found, located)
+    assert (index.negative, index.zero) == (2, 3)
+    assert missed == pytest.approx(2 * 9e-7 * 0.2 / 10)
+    for decision in (Index(3, 2, 0.0, 0.0), 1), (Index(3, 1, 0.0, 0.0), 20):  # decided as zero; another eigenvalue
+        index, missed = _index_of(Decision(decision[0], 5e-5, decision[1] * quotients, quotients), found, located)
+        assert (index, missed) == (decision[0], 0.0)
