@@ -328,6 +328,9 @@ FAULTS = {
         "return index, 0 * float(",
         LOCATE,
     ),
+    "what-newton-leaves-is-nothing": Fault(
+        "rodfem/adaptivity/error_estimate.py", "left = STEADY * moved + ROUND_OFF", "left = ROUND_OFF", ERRORS
+    ),
     "what-is-steep-is-not-seen": Fault(
         "rodfem/problem/smoothness.py",
         "<= np.maximum(most, SEEN",

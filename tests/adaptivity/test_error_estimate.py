@@ -19,10 +19,13 @@ from scipy.integrate import OdeSolution, solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, clamped, free, trace
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, Solver, clamped, free, trace
+from rodfem.adaptivity import error_estimate
+from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, USER
+from rodfem.fem.newton import correct
 from rodfem.output.digits import number
 
 LARGE = 3.0
@@ -225,3 +228,23 @@ def test_printed_bars_hold() -> None:
     for value, error in zip(rng.normal(size=300), 10.0 ** rng.uniform(-12, 0, 300), strict=True):
         shown, _, bar = number(value, error).partition(" (")
         assert abs(float(shown) - value) + error <= float(bar[:-1]) * (1 + 1e-9) <= 3 * error
+
+
+def test_what_newtons_method_leaves_open_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is stopped a thousandth of the way to the state at another load: one more step takes that back."""
+    solver = Solver(classics.lateral(), Discretization("reduced", 4, 4))
+    point, other = (solver.equilibrium(load) for load in (1.0, 2.0))
+    richer, stopped = Enriched(solver.equilibria), []
+
+    def early(system: Any, x: Any, row: Any, **given: Any) -> Any:
+        outcome, load = correct(system, x, row, **given), system.scalar(x)
+        x.axpy(1e-3, richer.transfer(other.x, state=True) - x)
+        system.set_load(x, load)
+        stopped.append(richer.solver.shape.ordinate(x))
+        return outcome
+
+    monkeypatch.setattr(error_estimate, "correct", early)
+    again = richer.again(point, fixed_load=True)
+    moved = abs(again.ordinate - stopped[0])
+    assert again.ordinate_left == pytest.approx(error_estimate.STEADY * moved, rel=1e-3)
+    assert moved > 1e-6
