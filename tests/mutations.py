@@ -328,6 +328,12 @@ FAULTS = {
         "return index, 0 * float(",
         LOCATE,
     ),
+    "steps-of-another-run": Fault(
+        "rodfem/diagram/journal.py", "if name != names[0]:", "if False:", "tests/hard/test_resume.py"
+    ),
+    "decided-zeros-without-symmetries": Fault(
+        f"{STABILITY}round_off.py", "zero=zero + known", "zero=zero", "tests/stability/test_round_off.py"
+    ),
     "what-newton-leaves-is-nothing": Fault(
         "rodfem/adaptivity/error_estimate.py", "left = STEADY * moved + ROUND_OFF", "left = ROUND_OFF", ERRORS
     ),

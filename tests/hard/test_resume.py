@@ -25,7 +25,8 @@ import rodfem
 import rodfem.app.run
 from rodfem.app.run_terminal import Terminal
 from rodfem.codim2 import locus as locus_module
-from rodfem.diagram.record import CLASSES
+from rodfem.diagram.journal import Journal
+from rodfem.diagram.record import CLASSES, Record
 from rodfem.errors import InputError
 from rodfem.output.checkpoint import path_of
 from rodfem.problem.scene import Scene
@@ -266,3 +267,14 @@ def test_a_program_that_is_killed(folder: Path) -> None:
     )
     assert refused.returncode == 2
     assert "was run with span = [0.0, 0.3], not [0.0, 0.25]: give what was run" in refused.stderr
+
+
+@pytest.mark.alone
+def test_steps_come_in_their_order() -> None:
+    """A step that is a later one of the run that was interrupted is of another run; one that is none is new."""
+    journal = Journal([Record({"name": name}, []) for name in ("straight", "branch 1", "branch 2")])
+    first = journal.next("straight")
+    assert first is not None and first.text["name"] == "straight"
+    with pytest.raises(InputError, match="came to 'branch 1' where this one comes to 'branch 2'"):
+        journal.next("branch 2")
+    assert journal.next("found 1") is None

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
 from rodfem.linalg.matrices import petsc_matrix
-from rodfem.stability.round_off import quotient_error, rounding
+from rodfem.stability.inertia import Index
+from rodfem.stability.round_off import decide, quotient_error, rounding
 
 pytestmark = pytest.mark.alone
 
@@ -26,3 +30,21 @@ def test_rounding_of_a_product() -> None:
     assert rounding(matrix, v, x) == pytest.approx(EPS * np.sqrt(comm.allreduce(parts.sum())), rel=1e-12)
     parts = (v.array_r[:, None] * own.toarray() * v.array_r) ** 2
     assert quotient_error(matrix, v) == pytest.approx(10 * EPS * np.sqrt(comm.allreduce(parts.sum())), rel=1e-12)
+
+
+def test_zeros_of_symmetries_stay_zeros() -> None:
+    """Of three eigenvalues in the band one is a symmetry's; the quotients of the others are 1e-3 and -2e-3."""
+    matrix = petsc_matrix(MPI.COMM_SELF, sp.diags([1e-3, -2e-3, 5.0, 7.0]).tocsr())
+    vectors = []
+    for i in range(4):
+        vectors.append(matrix.createVecRight())
+        vectors[-1].setValue(i, 1.0)
+        vectors[-1].assemble()
+    inertia = SimpleNamespace(tolerance=0.01, resolution=0.01, scale=1.0)
+    theta = np.array([1e-3, -2e-3, 5.0, 7.0])
+    found: Any = SimpleNamespace(
+        count=lambda: Index(2, 3, 0.0, 0.0), drifts=1, inertia=inertia, shift=0.0, matrix=matrix,
+        nearest=lambda number: (theta, vectors),
+    )  # fmt: skip
+    index = decide(found).index
+    assert (index.negative, index.zero) == (3, 1)
