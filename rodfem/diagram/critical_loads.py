@@ -27,6 +27,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, cluster_of, measure
 from rodfem.stability.frequencies import MULTIPLE, Frequencies
+from rodfem.stability.mode_type import RIGID
 from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 
@@ -36,6 +37,8 @@ BESIDE = 1e-4
 """Relative distance of the first two loads of a secant method."""
 AROUND = 1e-4
 """Half width, relative to a divergence load, over which its eigenvalues are sampled."""
+CLEAR = 1e-4
+"""Distance from a collision, relative to a step of the sweep, at which its eigenvalues are counted: they are apart."""
 TOGETHER = 1e-6
 """Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
 
@@ -54,6 +57,8 @@ class Critical:
         The eigenvalue there, and the cluster of those that collide or pass through zero.
     note
         Remark in words.
+    still
+        Number of eigenvalues of the cluster that are zero at all loads: those of rigid motions.
     """
 
     kind: Kind
@@ -63,6 +68,7 @@ class Critical:
     omega2: float
     cluster: Cluster | None = None
     note: str = ""
+    still: int = 0
 
 
 class CriticalLoads:
@@ -76,7 +82,7 @@ class CriticalLoads:
         The ``eigensolver`` is that of the pencils.
         """
         self.solver, self.eigensolver, self.number, self.warn = solver, eigensolver, number, warn
-        self.units, self._load = solver.system.scene.units, solver.system.scene.load
+        self.units, self._load, self._still = solver.system.scene.units, solver.system.scene.load, 0
 
     def between(self, first: Row, second: Row) -> list[Critical]:
         """Critical loads between two rows, in their order: eigenvalues that collide, real ones that pass through zero.
@@ -84,15 +90,28 @@ class CriticalLoads:
         Where the rows are neighbours, ``first`` comes before ``second`` in the sweep.
         """
         (a, before), (b, after) = ((row.point, row.found) for row in (first, second))
-        self._before = after
+        self._before, self._still = after, min(f.kinds.count(RIGID) for f in (before, after))
         events = self._collisions(a, b, before, after)
-        real = [f.diverged() for f in (before, after)]
-        for event in events:
-            if event.omega2 < 0:  # both are unstable before and after, but fewer are real
-                real[0] -= event.change
-                event.change = 0
-        events += self._diverging(a, b, *real)
+        negative = [event for event in events if event.omega2 < 0]
+        for event in negative:  # both are unstable before and after
+            event.change = 0
+        known = {a.load: before, b.load: after}
+        for piece in self._pieces(a, b, [event.load for event in negative]):
+            counts = [(known[x] if x in known else self._near(a.x, x)).diverged() for x in piece]
+            events += self._diverging(a.x, piece, *counts)
         return sorted(events, key=lambda e: abs(e.load - a.load))
+
+    @staticmethod
+    def _pieces(a: Point, b: Point, collisions: list[float]) -> list[tuple[float, float]]:
+        """Ranges of the load between ``a`` and ``b``, in their order, in which no two negative eigenvalues collide.
+
+        Where two do, fewer are real on one side: what passes through zero has another number in ascending order.
+        """
+        width, edges = b.load - a.load, [a.load]
+        for load in sorted(collisions, key=lambda x: abs(x - a.load)):
+            edges += [load - CLEAR * width, load + CLEAR * width]
+        edges.append(b.load)
+        return [(x, y) for x, y in zip(edges[::2], edges[1::2], strict=True) if (y - x) * width > 0]
 
     def _collisions(self, a: Point, b: Point, before: Frequencies, after: Frequencies) -> list[Critical]:
         """Collisions between two loads, those at one and the same load together."""
@@ -143,20 +162,23 @@ class CriticalLoads:
         )
         return Critical(FLUTTER, located.load, cluster.size, located.uncertainty, located.cluster.mean, located.cluster)
 
-    def _diverging(self, a: Point, b: Point, first: int, last: int) -> list[Critical]:
-        """Locate the loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``."""
-        loads = sorted((a.load, b.load))
+    def _diverging(self, guess: PETSc.Vec, span: tuple[float, float], first: int, last: int) -> list[Critical]:
+        """Locate the loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``.
+
+        At the loads of the ``span``, in the order of the sweep, so many are negative.
+        """
+        loads = sorted(span)
         found: list[float] = []
         for number in range(min(first, last), max(first, last)):
 
             def mu(load: float, number: int = number) -> float:
-                return self._real(a.x, load)[number]
+                return self._real(guess, load)[number]
 
             try:
                 found.append(zero_between(mu, loads[0], loads[1], ROUND_OFF * max(map(abs, loads))))
             except (ConvergenceError, IndexError, ValueError):
                 self.warn(
-                    f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
+                    f"Divergence between {span[0]:.6g} and {span[1]:.6g} could not be located: use a smaller range."
                 )
                 return []
         together: list[list[float]] = []
@@ -165,23 +187,31 @@ class CriticalLoads:
                 together[-1].append(load)
             else:
                 together.append([load])
-        return [self._divergence(a.x, group, 1 if last > first else -1) for group in together]
+        return [self._divergence(guess, group, 1 if last > first else -1) for group in together]
 
     def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> Critical:
-        """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
+        """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero.
+
+        Those that are zero at all loads are among them: there they are not told apart, and they add nothing.
+        """
         pencil, number = self.eigensolver.at(at_load(self.solver, guess, loads[0])), len(loads)
-        found = pencil.near(number + 2, SHIFT * self.units.omega2)
-        cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
+        size = number + self._still
+        found = pencil.near(size + 2, SHIFT * self.units.omega2)
+        cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:size].tolist())
         load, uncertainty = interpolated_zero_of_the_mean(
             measured_at(self.solver, self.eigensolver, guess), cluster, loads[0], self.units.load
         )
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
-        return Critical(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
+        return Critical(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster, still=self._still)
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
-        """Real eigenvalues at a load near the origin, in ascending order."""
-        pencil = self.eigensolver.at(at_load(self.solver, guess, load))
-        return sorted(v.real for v in leftmost(pencil, self.number, self._before).values if v.imag == 0)
+        """Real eigenvalues at a load near the origin, in ascending order, but for those that are zero at all loads."""
+        real = [v.real for v in self._near(guess, load).values if v.imag == 0]
+        return sorted(sorted(real, key=abs)[self._still :])
+
+    def _near(self, guess: PETSc.Vec, load: float) -> Frequencies:
+        """Eigenvalues at a load near the origin, and what became of the complex ones after it."""
+        return leftmost(self.eigensolver.at(at_load(self.solver, guess, load)), self.number, self._before)
 
 
 def measured_at(solver: StaticSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> AtLoad:

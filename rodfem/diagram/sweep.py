@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.eigenvalue_curves import Curves
-from rodfem.continuation.kinds import END, FLUTTER, USER
+from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.prediction import ROWS, predict_at_load
 from rodfem.continuation.static_solver import StaticSolver
@@ -191,7 +191,9 @@ class Sweep:
             if i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
                 after_it = b.negative  # of all eigenvalues that are recorded
             if event.cluster is not None:
-                self._name(point, event.cluster)
+                self._name(point, event.cluster, event.cluster.size - event.still)
+            if event.kind == DIVERGENCE and (zero := point.negative - min(negative, after_it)) > 0:
+                point.negative, point.zero = point.negative - zero, point.zero + zero
             special = SpecialPoint(event.kind, point, negative, after_it, event.uncertainty, omega2=event.omega2)
             special.cluster, special.note = event.cluster, event.note
             if point is not a and point is not b:
@@ -199,11 +201,11 @@ class Sweep:
             self._special(branch, special)
             negative = after_it
 
-    def _name(self, point: Point, cluster: Cluster) -> None:
-        """Name the motions of the eigenvalues that collide at a point by all that they do: their vectors are one."""
+    def _name(self, point: Point, cluster: Cluster, number: int) -> None:
+        """Name the ``number`` of motions that meet at a point by all that a cluster does: their vectors are one."""
         name = self.eigensolver.at(point.x).motion(cluster.basis)
         distance = [abs(complex(*value) - cluster.mean) for value in point.omega2]
-        for i in np.argsort(distance, kind="stable")[: cluster.size]:
+        for i in np.argsort(distance, kind="stable")[:number]:
             point.motion[i] = name
 
     def _special(self, branch: Branch, special: SpecialPoint) -> None:

@@ -11,12 +11,13 @@ import pytest
 import ufl
 from classics import FORMULATIONS, ON_AXIS, RIGID, column, explore, push, sweep
 from scipy.linalg import eigvals, expm
-from scipy.optimize import brentq
+from scipy.optimize import brentq, root
 from scipy.special import fresnel
 
+import rodfem
 from forms import loads
 from forms.energy import bending_and_twist, logarithmic_stretch
-from rodfem import Inertia, Ordinate, Ring, Scene, at, clamped, elastic, free, hinged, pinned, sliding
+from rodfem import Discretization, Inertia, Ordinate, Ring, Scene, at, clamped, elastic, free, hinged, pinned, sliding
 from rodfem.output.digits import number, rounded_up
 
 pytestmark = pytest.mark.alone
@@ -88,6 +89,39 @@ def test_beck_on_a_foundation() -> None:
         potential=lambda x, c: loads.spring(x.r, (50.0, 50.0, 0.0)),
     )  # fmt: skip
     assert sweep(rod).loads("flutter") == pytest.approx([20.0509536], rel=1e-8)
+
+
+@pytest.mark.parametrize("span", [(20.0, 60.0), (60.0, 20.0)])
+def test_divergence_and_flutter_in_one_step(span: tuple[float, float]) -> None:
+    """Beck's column with a spring at its tip: ``w'''' + P w'' = mu w``, ``w'' = 0`` and ``w''' = k w`` there.
+
+    In one step of the sweep the second eigenvalue becomes negative, too, and meets the first one: from then on they
+    are complex, and neither is counted as negative.
+    """
+    k, forth = 60.0, 1 if span[0] < span[1] else -1
+
+    def tip(P: float, mu: complex) -> complex:
+        right = expm(np.array([[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [mu, 0, -P, 0]], dtype=complex))[:, 2:]
+        return complex(np.linalg.det([right[2], right[3] - k * right[0]]))
+
+    def double(unknown: np.ndarray) -> list[float]:
+        value = tip(unknown[0], unknown[1] + 1e-20j)
+        return [value.real, value.imag / 1e-20]
+
+    diverging = zeros(lambda P: tip(P, 0.0).real, 20.0, 60.0, 40)
+    flutter, mu = root(double, [46.77, -20.0], tol=1e-13).x
+    assert mu < 0 < flutter - diverging[1] < 0.4
+    spring: Any = lambda x, c: loads.spring(x.r, (0.0, c.k, 0.0))  # noqa: E731
+    rod = column(
+        "sprung", (clamped(), free(follower=push, energy=spring)), span, inertia=MASS,
+        constants={"P": span[0], "B2": 90.0, "k": k},
+    )  # fmt: skip
+    diagram = rodfem.trace(rod, Discretization(elements=4, degree=6))
+    expected = [(diverging[0], (0, 1)), (diverging[1], (1, 2)), (flutter, (2, 2))]
+    for s, (load, change) in zip(diagram.special()[::forth], expected, strict=True):
+        assert abs(s.point.load - load) < s.error_estimate < 1e-6
+        assert (s.negative_before, s.negative_after)[::forth] == change
+    assert not diagram.warnings
 
 
 def test_hauger() -> None:
