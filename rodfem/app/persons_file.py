@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -11,11 +13,37 @@ from types import ModuleType
 
 from rodfem.errors import InputError
 
+_read: list[Path] = []
+"""The files that are read for the rod that they state."""
+
+
+class RunsItselfError(BaseException):
+    """A file that is read for its rod asks for a run of its own: reading it ends there, the rod is stated."""
+
+
+@contextmanager
+def for_its_rod(file: Path) -> Iterator[None]:
+    """Read a ``file`` up to where it runs its rod itself: the range and the options are the command line's."""
+    _read.append(file)
+    try:
+        yield
+    except RunsItselfError:
+        pass
+    finally:
+        _read.pop()
+
+
+def leave_the_run() -> None:
+    """Raise :class:`RunsItselfError` where a file is read for its rod: it would be run twice."""
+    if _read:
+        raise RunsItselfError
+
 
 def load(file: Path, name: str | None = None) -> ModuleType:
     """Module of a file, by its own name or another one.
 
-    Raises :class:`~rodfem.errors.InputError` where it is missing, or fails: with the last of its own lines that ran.
+    Raises :class:`~rodfem.errors.InputError` where it is missing, fails, or ends the program: with the last of its own
+    lines that ran.
     """
     if not file.is_file():
         raise InputError(f"{file} is no file: give the path of a Python program.")
@@ -26,13 +54,14 @@ def load(file: Path, name: str | None = None) -> ModuleType:
     sys.modules[spec.name] = module  # where pickling, and dataclasses, look
     sys.path.insert(0, str(path.parent))
     try:
-        spec.loader.exec_module(module)
+        with for_its_rod(path) if name is None else nullcontext():
+            spec.loader.exec_module(module)
     except InputError:
         raise
-    except Exception as trouble:  # whatever the file does
+    except (Exception, SystemExit) as trouble:  # whatever the file does
         line = getattr(trouble, "lineno", None) if isinstance(trouble, SyntaxError) else _last_line(path, trouble)
         where = f"{file}, line {line}" if line else f"{file}"
-        words = f"{where}: {type(trouble).__name__}: {trouble}{_there_are(trouble)}"
+        words = f"{where}: {type(trouble).__name__}: {trouble}{_there_are(trouble)}{_hides(path, trouble)}"
         raise InputError(f"{words}; run {_python()} {file} to see more.") from trouble
     finally:
         if before is not None:
@@ -40,12 +69,19 @@ def load(file: Path, name: str | None = None) -> ModuleType:
     return module
 
 
-def _last_line(path: Path, trouble: Exception) -> int | None:
+def _hides(path: Path, trouble: BaseException) -> str:
+    """Say of a file with the name of a package that it was imported in the place of that."""
+    if not isinstance(trouble, ImportError) or trouble.path != str(path):
+        return ""
+    return f": {path.name} hides the package {path.stem}, so give it another name"
+
+
+def _last_line(path: Path, trouble: BaseException) -> int | None:
     """Last line of a file that ran before it failed."""
     return next((f.lineno for f in reversed(extract_tb(trouble.__traceback__)) if f.filename == str(path)), None)
 
 
-def _there_are(trouble: Exception) -> str:
+def _there_are(trouble: BaseException) -> str:
     """Public functions and classes of a module of rodfem in which a name was looked for in vain."""
     module = getattr(trouble, "obj", None)
     if not isinstance(trouble, AttributeError) or not isinstance(module, ModuleType):

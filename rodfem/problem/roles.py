@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import wraps
+from logging import getLogger
 from typing import TYPE_CHECKING, Any
 
 from rodfem.errors import SceneError
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from rodfem.problem.load import Load
 
 Conversion = Callable[[Any], Any]
+LOG_OF_UFL = getLogger("UFL")
 UFL = "write it with UFL (ufl.cosh, ufl.conditional), without math, numpy and if"
 
 
@@ -126,6 +128,7 @@ def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[...
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
+        silent, LOG_OF_UFL.disabled = LOG_OF_UFL.disabled, True  # what it prints is in what it raises
         try:
             value = function(*arguments) if role.placed else function(*map(Placeless, arguments))
             return value if role.returns is None else role.returns(value)
@@ -138,6 +141,8 @@ def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[...
             wrong = isinstance(trouble, AttributeError) or "subscriptable" in first
             hint = role.meanings if wrong and role.meanings else role.hint
             raise SceneError(f"The {what} fails with {type(trouble).__name__}, {first!r}: {hint}.") from trouble
+        finally:
+            LOG_OF_UFL.disabled = silent
 
     call.guards = what  # type: ignore[attr-defined]
     return call
@@ -173,13 +178,13 @@ def changes(owner: Any, visit: Visit, place: str = "", *, nested: bool = True) -
 
 def _visited(owner: Any, declared: Any, value: Any, visit: Visit, place: str) -> Any:
     role = declared.get("role")
-    if is_object(value):
-        return _changed(value, visit, place)
     if role is not None:
         role = role if isinstance(role, Role) else role(owner)
         if role.or_value and not callable(value):
             return value
         return visit(role.words.format(place), value, role)
+    if is_object(value):
+        return _changed(value, visit, place)
     if isinstance(value, (tuple, list)) and any(map(is_object, value)):
         places = declared.get("places") or ("",) * len(value)
         found = tuple(_changed(x, visit, where) for x, where in zip(value, places, strict=True))
