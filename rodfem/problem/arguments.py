@@ -60,7 +60,9 @@ def _belongs(named: Iterable[str], checks: dict[str, Check]) -> str:
     for name in named:
         for argument, check in reversed(checks.items()):
             kind = getattr(check, "kind", None)
-            if name not in checks and isinstance(kind, type) and is_dataclass(kind) and name in {f.name for f in fields(kind)}:
+            if not isinstance(kind, type) or not is_dataclass(kind) or name in checks:
+                continue
+            if name in {f.name for f in fields(kind)}:
                 return f"; give {argument}={kind.__name__}({name}=...)"
     return ""
 
