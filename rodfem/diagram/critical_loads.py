@@ -26,8 +26,7 @@ from rodfem.diagram.held import at_load
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, cluster_of, measure
-from rodfem.stability.frequencies import MULTIPLE, Frequencies
-from rodfem.stability.mode_type import RIGID
+from rodfem.stability.frequencies import MULTIPLE, REAL, Frequencies
 from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 
@@ -41,6 +40,9 @@ CLEAR = 1e-4
 """Distance from a collision, relative to a step of the sweep, at which its eigenvalues are counted: they are apart."""
 TOGETHER = 1e-6
 """Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
+
+
+MeanAtLoad = Callable[[float], float]
 
 
 @dataclass
@@ -90,7 +92,7 @@ class CriticalLoads:
         Where the rows are neighbours, ``first`` comes before ``second`` in the sweep.
         """
         (a, before), (b, after) = ((row.point, row.found) for row in (first, second))
-        self._before, self._still = after, min(f.kinds.count(RIGID) for f in (before, after))
+        self._before, self._still = after, min(before.still(), after.still())
         events = self._collisions(a, b, before, after)
         negative = [event for event in events if event.omega2 < 0]
         for event in negative:  # both are unstable before and after
@@ -175,7 +177,7 @@ class CriticalLoads:
                 return self._real(guess, load)[number]
 
             try:
-                found.append(zero_between(mu, loads[0], loads[1], ROUND_OFF * max(map(abs, loads))))
+                found.append(self._zero(mu, loads[0], loads[1]))
             except (ConvergenceError, IndexError, ValueError):
                 self.warn(
                     f"Divergence between {span[0]:.6g} and {span[1]:.6g} could not be located: use a smaller range."
@@ -187,21 +189,30 @@ class CriticalLoads:
                 together[-1].append(load)
             else:
                 together.append([load])
-        return [self._divergence(guess, group, 1 if last > first else -1) for group in together]
+        return [self._divergence(guess, group, loads, 1 if last > first else -1) for group in together]
 
-    def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> Critical:
+    def _zero(self, mu: Callable[[float], float], low: float, high: float) -> float:
+        """Load at which ``mu`` vanishes: a bound where it does there but for noise, in which its sign says nothing."""
+        for load in (low, high):
+            if abs(mu(load)) <= REAL * self.units.omega2:
+                return load
+        return zero_between(mu, low, high, ROUND_OFF * max(abs(low), abs(high)))
+
+    def _divergence(self, guess: PETSc.Vec, loads: list[float], bounds: list[float], sign: int) -> Critical:
         """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero.
 
-        Those that are zero at all loads are among them: there they are not told apart, and they add nothing.
+        Those that are zero at all loads are among them: there they are not told apart, and they add nothing.  The load
+        is within ``bounds``.
         """
         pencil, number = self.eigensolver.at(at_load(self.solver, guess, loads[0])), len(loads)
         size = number + self._still
         found = pencil.near(size + 2, SHIFT * self.units.omega2)
         cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:size].tolist())
-        load, uncertainty = interpolated_zero_of_the_mean(
-            measured_at(self.solver, self.eigensolver, guess), cluster, loads[0], self.units.load
-        )
+        mean = mean_at(self.solver, self.eigensolver, guess, cluster, self._still)
+        load, uncertainty = interpolated_zero(mean, loads[0], self.units.load)
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
+        inside = min(max(load, bounds[0]), bounds[1])
+        load, uncertainty = inside, uncertainty + abs(load - inside)
         return Critical(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster, still=self._still)
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
@@ -223,26 +234,42 @@ def measured_at(solver: StaticSolver, eigensolver: NonsymmetricSolver, guess: PE
     return measured
 
 
-def interpolated_zero_of_the_mean(measured: AtLoad, cluster: Cluster, load: float, one: float) -> tuple[float, float]:
-    """Load near ``load`` at which the mean of a ``cluster`` vanishes, and what round-off of the mean leaves open.
+def mean_at(
+    solver: StaticSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec, cluster: Cluster, still: int
+) -> MeanAtLoad:
+    """Mean of the eigenvalues of a ``cluster`` against the load, ``still`` of which are zero at all loads.
 
-    The ``measured`` mean, at loads of natural size ``one``, is sampled over :data:`AROUND`, and interpolated: its
-    scatter shows in the last coefficients.  Raises :class:`ConvergenceError` where it does not vanish near by.
+    Vectors of those are no better than round-off: where there are any, the eigenvalues nearest zero are taken.
+    ``solver`` and ``eigensolver`` compute equilibria from ``guess``, and their pencils.
+    """
+
+    def mean(load: float) -> float:
+        pencil = eigensolver.at(at_load(solver, guess, load))
+        if not still:
+            return measure(pencil, cluster).cluster.mean
+        values = pencil.near(cluster.size + 2, SHIFT * solver.system.scene.units.omega2).values
+        return float(values[np.argsort(abs(values), kind="stable")[: cluster.size]].real.mean())
+
+    return mean
+
+
+def interpolated_zero(mean: MeanAtLoad, load: float, one: float) -> tuple[float, float]:
+    """Load near ``load`` at which a ``mean`` of eigenvalues vanishes, and what its round-off leaves open.
+
+    At loads of natural size ``one`` it is sampled over :data:`AROUND`, and interpolated: its scatter shows in the last
+    coefficients.  Raises :class:`ConvergenceError` where it does not vanish near by.
     """
     half = AROUND * unit(load, one=one)
     nodes = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
-    series = chebyshev.chebfit(nodes, [measured(load + half * t, cluster).cluster.mean for t in nodes.tolist()], 5)
+    series = chebyshev.chebfit(nodes, [mean(load + half * t) for t in nodes.tolist()], 5)
     root = real_root(series, 0.0)
     if root is None:
         raise ConvergenceError(f"The divergence load near {load:.6g} could not be located: use a smaller range.")
     return load + half * root, half * zero_uncertainty(series, root, in_doubt(series))
 
 
-def zero_of_the_mean(measured: AtLoad, cluster: Cluster, load: float, one: float) -> float:
-    """Load near ``load``, of natural size ``one``, at which the ``measured`` mean of a ``cluster`` vanishes."""
+def zero_near(mean: MeanAtLoad, load: float, one: float) -> float:
+    """Load near ``load``, of natural size ``one``, at which a ``mean`` of eigenvalues vanishes."""
     from scipy.optimize import newton  # slow to load
-
-    def mean(load: float) -> float:
-        return measured(load, cluster).cluster.mean
 
     return float(newton(mean, load, x1=load + BESIDE * unit(load, one=one), tol=round_off(load, one)))

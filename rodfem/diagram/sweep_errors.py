@@ -11,7 +11,7 @@ from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.flutter import locate_flutter
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.critical_loads import measured_at, zero_of_the_mean
+from rodfem.diagram.critical_loads import mean_at, measured_at, zero_near
 from rodfem.diagram.held import at_load
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.stability.cluster import Cluster, as_vectors
@@ -49,8 +49,9 @@ class SweepErrors:
             relative = left / max(abs(load), abs(self.span[1] - self.span[0]) * ROUND_OFF)
             s.omega2_error = bound(s.omega2, mu, MEAN * abs(mu) * max(relative, ROUND_OFF), rho)
         elif s.kind == DIVERGENCE:
-            measured = measured_at(richer, self.eigensolver, x)
-            load = zero_of_the_mean(measured, self._transferred(s), point.load, self.units.load)
+            cluster = self._transferred(s)
+            still = cluster.size - abs(s.negative_after - s.negative_before)
+            load = zero_near(mean_at(richer, self.eigensolver, x, cluster, still), point.load, self.units.load)
             s.error_estimate = max(bound(point.load, load, s.located_to, rho), s.located_to)
         if s.kind in (FLUTTER, DIVERGENCE):
             s.ordinate_error += self._moved(x, s)

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.stability.frequencies import REAL, Frequencies
+from rodfem.stability.frequencies import REAL, STILL, Frequencies
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 from rodfem.tolerances import TINY
 
@@ -62,7 +62,11 @@ def cluster_of(pencil: NonsymmetricPencil, found: Frequencies, chosen: list[int]
 
 
 def measure(pencil: NonsymmetricPencil, cluster: Cluster) -> Measured:
-    """Find at a state a cluster known from a state nearby; raises :class:`ConvergenceError`."""
+    """Find at a state a cluster known from a state nearby; raises :class:`ConvergenceError`.
+
+    Vectors of a non-symmetric pencil are not orthogonal: those of rigid motions, zero at all loads, may have a greater
+    share in the subspace than its own.  They are none of a cluster away from zero.
+    """
     basis, size = _real_span(pencil, cluster.basis), cluster.size
     beside = BESIDE * pencil.system.scene.units.omega2
     for number in (size + 2, 3 * size + 10):
@@ -70,6 +74,8 @@ def measure(pencil: NonsymmetricPencil, cluster: Cluster) -> Measured:
         inside = pencil.product(basis, found.weighed)
         energy = pencil.squares(found.vectors, found.weighed)
         share = (abs(inside) ** 2).sum(axis=0) / energy
+        if abs(cluster.mean) > beside:
+            share[abs(found.values) < STILL * abs(found.values).max()] = 0.0
         chosen = sorted(np.argsort(-share, kind="stable")[:size].tolist())
         values = found.values[chosen]
         closed = abs(values.imag.sum()) < REAL * abs(values).max()
