@@ -17,7 +17,7 @@ from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.flutter import AtLoad, locate_flutter, unmatched
+from rodfem.continuation.flutter import ENOUGH, AtLoad, locate_flutter, unmatched
 from rodfem.continuation.interpolant import SHARP, in_doubt, real_root, zero_uncertainty
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, Kind
 from rodfem.continuation.static_solver import StaticSolver
@@ -32,10 +32,10 @@ from rodfem.tolerances import ROUND_OFF, round_off, unit
 
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
-BESIDE = 1e-4
+BESIDE = 1e-6
 """Relative distance of the first two loads of a secant method."""
-AROUND = 1e-4
-"""Half width, relative to a divergence load, over which its eigenvalues are sampled."""
+AROUND = (1e-4, 1e-5, 1e-6)
+"""Half widths, relative to a divergence load, over which its eigenvalues are sampled."""
 CLEAR = 1e-4
 """Distance from a collision, relative to a step of the sweep, at which its eigenvalues are counted: they are apart."""
 TOGETHER = 1e-6
@@ -189,7 +189,13 @@ class CriticalLoads:
                 together[-1].append(load)
             else:
                 together.append([load])
-        return [self._divergence(guess, group, loads, 1 if last > first else -1) for group in together]
+        out = []
+        for group in together:
+            try:
+                out.append(self._divergence(guess, group, loads, 1 if last > first else -1))
+            except ConvergenceError as trouble:
+                self.warn(str(trouble))
+        return out
 
     def _zero(self, mu: Callable[[float], float], low: float, high: float) -> float:
         """Load at which ``mu`` vanishes: a bound where it does there but for noise, in which its sign says nothing."""
@@ -256,16 +262,26 @@ def mean_at(
 def interpolated_zero(mean: MeanAtLoad, load: float, one: float) -> tuple[float, float]:
     """Load near ``load`` at which a ``mean`` of eigenvalues vanishes, and what its round-off leaves open.
 
-    At loads of natural size ``one`` it is sampled over :data:`AROUND`, and interpolated: its scatter shows in the last
-    coefficients.  Raises :class:`ConvergenceError` where it does not vanish near by.
+    At loads of natural size ``one`` it is sampled over the widest of :data:`AROUND`, and interpolated: its scatter
+    shows in the last coefficients.  Where a collision is as near, the mean is not smooth, or there is none: then over
+    a narrower one.  Raises :class:`ConvergenceError` where it does not vanish near by.
     """
-    half = AROUND * unit(load, one=one)
-    nodes = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
-    series = chebyshev.chebfit(nodes, [mean(load + half * t) for t in nodes.tolist()], 5)
-    root = real_root(series, 0.0)
-    if root is None:
+    nodes, found = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6), []
+    for half in (width * unit(load, one=one) for width in AROUND):
+        try:
+            values = [mean(load + half * t) for t in nodes.tolist()]
+        except ConvergenceError:
+            continue
+        series = chebyshev.chebfit(nodes, values, 5)
+        root = real_root(series, 0.0)
+        if root is not None:
+            found.append((half * zero_uncertainty(series, root, in_doubt(series)), load + half * root))
+            if found[-1][0] < ENOUGH * unit(load, one=one):
+                break
+    if not found:
         raise ConvergenceError(f"The divergence load near {load:.6g} could not be located: use a smaller range.")
-    return load + half * root, half * zero_uncertainty(series, root, in_doubt(series))
+    uncertainty, at = min(found)
+    return at, uncertainty
 
 
 def zero_near(mean: MeanAtLoad, load: float, one: float) -> float:

@@ -80,8 +80,7 @@ class Sweep:
         branch.renumber()
         warn = self.observer.warn
         if self.plan.error_bars:
-            with without("No errors were estimated", comm, warn):
-                self._error_bars(branch)
+            self._error_bars(branch)
         self.observer.finished(branch)
         with without("The asymmetry of the tangent matrix was not measured", comm, warn):
             self._asymmetry(last)
@@ -216,8 +215,9 @@ class Sweep:
         """Estimate the errors of all special points, and say where an accuracy that was asked for is not reached."""
         asked = self.plan.accuracy
         with self.solver.system.clock.scope("error bars"):
-            errors = SweepErrors(self.solver, self.span)
+            comm, warn, errors = self.solver.system.comm, self.observer.warn, SweepErrors(self.solver, self.span)
             for s in branch.special:
-                errors.estimate(s)
+                with without(f"No error of the {s.kind.words} at {s.point.load:.6g} was estimated", comm, warn):
+                    errors.estimate(s)
                 if asked is not None and s.error_estimate > asked * unit(s.point.load, one=self.units.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"

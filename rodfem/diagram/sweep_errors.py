@@ -18,6 +18,8 @@ from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off
 
+WIDTH = 0.01
+"""Half width of the piece on which a flutter load is looked for, relative to it or to the range."""
 MEAN = 10.0
 """Most that the mean of two eigenvalues that meet changes by, relative to it, over the relative change of the load."""
 
@@ -78,6 +80,6 @@ class SweepErrors:
         measured, cluster = measured_at(self.richer, self.eigensolver, guess), self._transferred(s)
         if s.note:  # double there, whatever the mesh
             return s.point.load, 0.0, measured(s.point.load, cluster).cluster.mean
-        width = max(0.05 * abs(s.point.load), 0.01 * abs(self.span[1] - self.span[0]))
+        width = WIDTH * max(abs(s.point.load), abs(self.span[1] - self.span[0]))
         located = locate_flutter(measured, cluster, s.point.load, width)
         return located.load, located.uncertainty, located.cluster.mean

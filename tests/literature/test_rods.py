@@ -124,6 +124,37 @@ def test_divergence_and_flutter_in_one_step(span: tuple[float, float]) -> None:
     assert not diagram.warnings
 
 
+@pytest.mark.parametrize("share", [0.356, 0.3546])
+def test_divergence_beside_flutter(share: float) -> None:
+    """Where 0.35431 of a thrust turns with the tip, two frequencies become zero at once (Kordas & Zyczkowski 1963).
+
+    A little above that the rod, unstable from ``w^2`` on, ``cos w = -a/(1 - a)``, is stable from ``(2 pi - w)^2`` to a
+    flutter load that is greater by 6e-5 or 2e-6 of it: the eigenvalue that vanishes is not smooth over more.
+    """
+
+    def tip(P: float, mu: complex) -> complex:
+        right = expm(np.array([[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [mu, 0, -P, 0]], dtype=complex))[:, 2:]
+        return complex(np.linalg.det([right[2], right[3] + (1 - share) * P * right[1]]))
+
+    def double(unknown: np.ndarray) -> list[float]:
+        value = tip(unknown[0], unknown[1] + 1e-20j)
+        return [value.real, value.imag / 1e-20]
+
+    w = acos(-share / (1 - share))
+    flutter, mu = root(double, [17.0, 600 * (share - 0.35431)], tol=1e-13).x
+    rod = column(
+        "partly", (clamped(), free(lambda c: (0, 0, -(1 - c.k) * c.P), follower=lambda c: (0, 0, -c.k * c.P))),
+        (0.0, 20.0), inertia=MASS, constants={"B2": 90.0, "k": share},
+    )  # fmt: skip
+    diagram = rodfem.trace(rod, Discretization(elements=4, degree=6))
+    expected = [(w**2, 0, 1), ((2 * pi - w) ** 2, 1, 0), (flutter, 0, 2)]
+    assert 0 < flutter / expected[1][0] - 1 < 7e-5 and mu > 0
+    for s, (load, *change) in zip(diagram.special(), expected, strict=True):
+        assert [s.negative_before, s.negative_after] == change
+        assert abs(s.point.load - load) < s.error_estimate < 1e-5
+    assert not diagram.warnings
+
+
 def test_hauger() -> None:
     """Tangential thrust ``P (1 - s)`` along a rod that bends alike in all planes, against polynomials of degree 15."""
     x, weight = np.polynomial.legendre.leggauss(40)
