@@ -189,6 +189,7 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ({"energy": lambda v, k, c: 1.0}, "stored energy is flat"),
     ({"energy": lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + k[2] ** 2) ** 2}, "stored energy is flat"),
     ({"ends": (clamped(), elastic(lambda c: NAN, force=lambda c: (0, 0, -c.P)))}, "nan in it"),
+    ({"potential": lambda x, c: ufl.atan3(x.d1[0], x.d1[1])}, r"no attribute 'atan3'.: choose ufl.atan"),
     # a value, a cross-section or a text where a function or a number belongs
     (lambda: {"ends": (clamped((0, 0, 1)), TIP)}, r"f.c., as in lambda c: \(0, 0, 1\)\."),  # type: ignore[arg-type]
     (lambda: {"inertia": Inertia(2.0)}, r"f.c., as in lambda c: 2.0\."),  # type: ignore[arg-type]
