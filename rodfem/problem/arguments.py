@@ -43,7 +43,8 @@ def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
             try:
                 given = signature.bind(*arguments, **named)
             except TypeError as trouble:  # Python's own words lack the function and what it takes
-                words = f"{function.__name__}() {trouble}: its arguments are {', '.join(signature.parameters)}"
+                names = [name for name in signature.parameters if name != "self"]
+                words = f"{function.__name__}() {trouble}: its arguments are {', '.join(names)}"
                 raise TypeError(f"{words}{_belongs(named, checks)}") from None
             for name, check in checks.items():
                 if name in given.arguments and given.arguments[name] is not defaults[name]:

@@ -279,6 +279,8 @@ def test_what_belongs_to_a_plan_or_a_mesh_is_named() -> None:
     ):
         with pytest.raises(TypeError, match=f"unexpected keyword argument '{name}': its arguments are .*; {words}"):
             rodfem.trace(scene(), **{name: 1})
+    with pytest.raises(TypeError, match="its arguments are scene, discretization, comm"):
+        rodfem.Solver()  # type: ignore[call-arg]
     with pytest.raises(TypeError, match=r"its arguments are .* comm$"):
         rodfem.trace(scene(), nonsense=1)  # type: ignore[call-arg]
 
