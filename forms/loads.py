@@ -52,8 +52,8 @@ def rotational_spring(q: Expr, stiffness: Any, rotation: Sequence[Any] = IDENTIT
 def pressure(r: Expr, dr: Expr, p: Any, normal: Sequence[float] = (0.0, 1.0, 0.0)) -> Expr:
     """Potential ``p/2 n . (r x r')`` per unit length of a pressure on a rod in the plane across ``normal``.
 
-    Minus ``p`` times the area that the rod sweeps about the origin: its force is ``p n x r'``, at right angles to the
-    deformed rod (so that it follows), and per unit of deformed length.  It has a potential where the ends do not move,
+    ``p`` times the area that the rod sweeps about the origin, counted about ``n``: its force is ``p n x r'``, across
+    the deformed rod (so that it follows), per unit of deformed length.  It has a potential where the ends do not move,
     move on straight lines through the origin, or are joined.  ``r`` (3,) and its derivative ``dr`` (3,) are the
     centreline's.
     """

@@ -3,9 +3,9 @@
 #
 # ## Idea
 #
-# A dead force has a potential. A force that *turns with the rod*, the thrust of a rocket or the pull of a jet of water,
-# has none: move the tip aside, turn it, move it back, turn it back, and work has been gained. There is no energy to be
-# minimal, no index to count. Equilibrium is now the principle of virtual work, and stability is a matter of motion:
+# A dead force has a potential. A force that *turns with the rod*, the thrust of a rocket or the recoil of a jet of
+# water, has none: move the tip aside, turn it, move it back, turn it back, and work has been gained. There is no energy
+# to be minimal, no index to count. Equilibrium is now the principle of virtual work, stability a matter of motion:
 #
 # $$\delta E[q; \eta] + P\,f(q; \eta) = 0 \text{ for all } \eta, \qquad S x = \mu M x, \qquad \mu = \omega^2 .$$
 #

@@ -55,6 +55,9 @@ def main(
         parser = parser_of(statement, usual, program or Path(sys.argv[0]).name)
     except InputError as trouble:
         complain(str(trouble))
+    varied = f"--{usual.load}"
+    if varied in [word.split("=")[0] for word in ours] and varied not in parser._option_string_actions:
+        complain(f"{usual.load} is the load, which a run varies: give its range, {parser.option('span')} FROM TO.")
     options = parser.parse_args(ours)
     start_petsc(petsc)
     try:

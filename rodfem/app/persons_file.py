@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from importlib.machinery import SourceFileLoader
 from importlib.util import find_spec, module_from_spec, spec_from_loader
 from pathlib import Path
@@ -18,17 +19,43 @@ from types import ModuleType
 
 from rodfem.errors import InputError
 
+_read: list[Path] = []
+"""The files that are read for the rod that they state."""
+
+
+class RunsItselfError(BaseException):
+    """A file that is read for its rod asks for a run of its own: reading it ends there, the rod is stated."""
+
+
+@contextmanager
+def for_its_rod(file: Path) -> Iterator[None]:
+    """Read a ``file`` up to where it runs its rod itself: the range and the options are the command line's."""
+    _read.append(file)
+    try:
+        yield
+    except RunsItselfError:
+        pass
+    finally:
+        _read.pop()
+
+
+def leave_the_run() -> None:
+    """Raise :class:`RunsItselfError` where a file is read for its rod: it would be run twice."""
+    if _read:
+        raise RunsItselfError
+
 
 def load(file: Path, name: str | None = None) -> ModuleType:
     """Module of a file, by its own name or another one.
 
-    Raises :class:`~rodfem.errors.InputError` where it is missing, imports one of two modules of the same name, or
-    fails: with the last of its own lines that ran.
+    Raises :class:`~rodfem.errors.InputError` where it is missing, imports one of two modules of the same name, ends the
+    program, or fails: with the last of its own lines that ran.
     """
     if not file.is_file():
         raise InputError(f"{file} is no file: give the path of a Python program.")
     path = file.resolve()
     _require_one_of_each(path)
+    stated = nullcontext() if name else for_its_rod(path)
     name = name or (f"{file.stem}_" if _elsewhere(file.stem, path) else file.stem)
     spec = spec_from_loader(name, SourceFileLoader(name, str(path)))
     assert spec is not None and spec.loader is not None
@@ -36,10 +63,11 @@ def load(file: Path, name: str | None = None) -> ModuleType:
     sys.modules[spec.name] = module  # where pickling, and dataclasses, look
     sys.path.append(str(path.parent))
     try:
-        spec.loader.exec_module(module)
+        with stated:
+            spec.loader.exec_module(module)
     except InputError:
         raise
-    except Exception as trouble:  # whatever the file does
+    except (Exception, SystemExit) as trouble:  # whatever the file does
         line = getattr(trouble, "lineno", None) if isinstance(trouble, SyntaxError) else _last_line(path, trouble)
         where = f"{file}, line {line}" if line else f"{file}"
         words = f"{where}: {type(trouble).__name__}: {trouble}{_there_are(trouble)}"
@@ -90,12 +118,12 @@ def _elsewhere(name: str, beside: Path) -> str:
     return spec.origin if Path(spec.origin).is_absolute() else "a module of Python's own"
 
 
-def _last_line(path: Path, trouble: Exception) -> int | None:
+def _last_line(path: Path, trouble: BaseException) -> int | None:
     """Last line of a file that ran before it failed."""
     return next((f.lineno for f in reversed(extract_tb(trouble.__traceback__)) if f.filename == str(path)), None)
 
 
-def _there_are(trouble: Exception) -> str:
+def _there_are(trouble: BaseException) -> str:
     """Public functions and classes of a module of rodfem in which a name was looked for in vain."""
     module = getattr(trouble, "obj", None)
     if not isinstance(trouble, AttributeError) or not isinstance(module, ModuleType):

@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from rodfem.app.interrupts import held
 from rodfem.app.loci import follow_all
+from rodfem.app.persons_file import leave_the_run
 from rodfem.app.run_terminal import Terminal
 from rodfem.app.terminal import Report
 from rodfem.diagram.diagram import Diagram
@@ -61,7 +62,7 @@ def run(
 
     Files are updated after every branch: an interrupted run keeps all completed branches, and goes on from there by
     :func:`rodfem.resume`.  Those of an earlier run in the folder stay until the first branch is complete.  Returns the
-    diagram.  Raises
+    diagram.  A file that ``rodfem run FILE.py`` reads for its rod ends here: that command runs it.  Raises
     :class:`~rodfem.errors.InputError` for bad input, before any computation, and where the folder cannot be written any
     more or is in use by another process, and
     :class:`~rodfem.errors.ConvergenceError` where not even a first equilibrium is found.
@@ -85,6 +86,7 @@ def run(
     words
         Rewords each line on the terminal.
     """
+    leave_the_run()
     plan, discretization = plan or Plan(), discretization or Discretization()
     output = Path(output or Path("results") / scene.name)
     plan.check(scene, discretization)

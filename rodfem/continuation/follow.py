@@ -42,6 +42,7 @@ def follow(
     span = abs(system.scene.span[1] - system.scene.span[0])
     low, high = (bound + sign * ON_BOUND * span for bound, sign in zip(bounds, (-1, 1), strict=True))
     solver.corrector.restart()
+    missed = ""
     while len(points) < steps.most:
         last = points[-1]
         if len(points) % PILE == 0:
@@ -59,20 +60,21 @@ def follow(
                 yield point
                 yield "end of range"
                 return
+            missed = f"; no state is found at {bound:.6g}: let the range end elsewhere if that is a bifurcation"
         elif made.outcome is not None and made.tangent is not None and made.aligned > ALIGNED:
             place = last.arclength + made.length
             point = solver.point(made.x, place, made.tangent, made.outcome, made.index, made.energies)
             if steps.accepts(last, point):
                 yield point
                 order = 2 if system.damping else min(len(points) - 1, 3) + 1
-                step = steps.after(step, made.outcome.moved, order)
+                step, missed = steps.after(step, made.outcome.moved, order), ""
                 continue
         step /= 2
         if step < min(steps.smallest, 0.01 * most):
             why = f"steps below {steps.smallest:g}"
             if last.zero > (drifts := system.active_drifts(last.x)):
                 why += f"; {last.zero - drifts} eigenvalues vanish there to working accuracy"
-            yield f"no convergence at {system.scene.load} = {last.load:.6g} ({why})"
+            yield f"no convergence at {system.scene.load} = {last.load:.6g} ({why}{missed})"
             return
     yield f"{steps.most} points reached"
 

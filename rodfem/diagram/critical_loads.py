@@ -17,7 +17,7 @@ from numpy.polynomial import chebyshev
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.flutter import Located, locate_flutter, unmatched
+from rodfem.continuation.flutter import ENOUGH, Located, locate_flutter, unmatched
 from rodfem.continuation.interpolant import SHARP, in_doubt, real_root, zero_uncertainty
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, Kind
 from rodfem.continuation.static_solver import StaticSolver
@@ -27,16 +27,18 @@ from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, cluster_of, measure
 from rodfem.stability.cluster_noise import ClusterNoise, noise_of
-from rodfem.stability.frequencies import MULTIPLE, Frequencies
+from rodfem.stability.frequencies import MULTIPLE, REAL, Frequencies
 from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricPencil, NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off, unit
 
 SAME = 1e-9
 """Loads, or eigenvalues, that differ by less than this, relative to them, are one."""
-BESIDE = 1e-4
+BESIDE = 1e-6
 """Relative distance of the first two loads of a secant method."""
-AROUND = 1e-4
-"""Half width, relative to a divergence load, over which its eigenvalues are sampled."""
+AROUND = (1e-4, 1e-5, 1e-6)
+"""Half widths, relative to a divergence load, over which its eigenvalues are sampled."""
+CLEAR = 1e-4
+"""Distance from a collision, relative to a step of the sweep, at which its eigenvalues are counted: they are apart."""
 TOGETHER = 1e-6
 """Divergence loads that differ by less than this, relative, are those of a multiple eigenvalue with its round-off."""
 
@@ -55,6 +57,8 @@ class Critical:
         The eigenvalue there, and the cluster of those that collide or pass through zero.
     note
         Remark in words.
+    still
+        Number of eigenvalues of the cluster that are zero at all loads: those of rigid motions.
     """
 
     kind: Kind
@@ -64,6 +68,7 @@ class Critical:
     omega2: float
     cluster: Cluster | None = None
     note: str = ""
+    still: int = 0
 
 
 class CriticalLoads:
@@ -77,7 +82,7 @@ class CriticalLoads:
         The ``eigensolver`` is that of the pencils.
         """
         self.solver, self.eigensolver, self.number, self.warn = solver, eigensolver, number, warn
-        self.units, self._load = solver.system.scene.units, solver.system.scene.load
+        self.units, self._load, self._still = solver.system.scene.units, solver.system.scene.load, 0
 
     def between(self, first: Row, second: Row) -> list[Critical]:
         """Critical loads between two rows, in their order: eigenvalues that collide, real ones that pass through zero.
@@ -85,15 +90,28 @@ class CriticalLoads:
         Where the rows are neighbours, ``first`` comes before ``second`` in the sweep.
         """
         (a, before), (b, after) = ((row.point, row.found) for row in (first, second))
-        self._before = after
+        self._before, self._still = after, min(before.still(), after.still())
         events = self._collisions(a, b, before, after)
-        real = [f.diverged() for f in (before, after)]
-        for event in events:
-            if event.omega2 < 0:  # both are unstable before and after, but fewer are real
-                real[0] -= event.change
-                event.change = 0
-        events += self._diverging(a, b, *real)
+        negative = [event for event in events if event.omega2 < 0]
+        for event in negative:  # both are unstable before and after
+            event.change = 0
+        known = {a.load: before, b.load: after}
+        for piece in self._pieces(a, b, [event.load for event in negative]):
+            counts = [(known[x] if x in known else self._near(a.x, x)).diverged() for x in piece]
+            events += self._diverging(a.x, piece, *counts)
         return sorted(events, key=lambda e: abs(e.load - a.load))
+
+    @staticmethod
+    def _pieces(a: Point, b: Point, collisions: list[float]) -> list[tuple[float, float]]:
+        """Ranges of the load between ``a`` and ``b``, in their order, in which no two negative eigenvalues collide.
+
+        Where two do, fewer are real on one side: what passes through zero has another number in ascending order.
+        """
+        width, edges = b.load - a.load, [a.load]
+        for load in sorted(collisions, key=lambda x: abs(x - a.load)):
+            edges += [load - CLEAR * width, load + CLEAR * width]
+        edges.append(b.load)
+        return [(x, y) for x, y in zip(edges[::2], edges[1::2], strict=True) if (y - x) * width > 0]
 
     def _collisions(self, a: Point, b: Point, before: Frequencies, after: Frequencies) -> list[Critical]:
         """Collisions between two loads, those at one and the same load together."""
@@ -144,20 +162,23 @@ class CriticalLoads:
         )
         return Critical(FLUTTER, located.load, cluster.size, located.uncertainty, located.cluster.mean, located.cluster)
 
-    def _diverging(self, a: Point, b: Point, first: int, last: int) -> list[Critical]:
-        """Locate the loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``."""
-        loads = sorted((a.load, b.load))
+    def _diverging(self, guess: PETSc.Vec, span: tuple[float, float], first: int, last: int) -> list[Critical]:
+        """Locate the loads at which real eigenvalues pass through zero, from ``first`` negative ones to ``last``.
+
+        At the loads of the ``span``, in the order of the sweep, so many are negative.
+        """
+        loads = sorted(span)
         found: list[float] = []
         for number in range(min(first, last), max(first, last)):
 
             def mu(load: float, number: int = number) -> float:
-                return self._real(a.x, load)[number]
+                return self._real(guess, load)[number]
 
             try:
-                found.append(zero_between(mu, loads[0], loads[1], ROUND_OFF * max(map(abs, loads))))
+                found.append(self._zero(mu, loads[0], loads[1]))
             except (ConvergenceError, IndexError, ValueError):
                 self.warn(
-                    f"Divergence between {a.load:.6g} and {b.load:.6g} could not be located: use a smaller range."
+                    f"Divergence between {span[0]:.6g} and {span[1]:.6g} could not be located: use a smaller range."
                 )
                 return []
         together: list[list[float]] = []
@@ -166,23 +187,46 @@ class CriticalLoads:
                 together[-1].append(load)
             else:
                 together.append([load])
-        return [self._divergence(a.x, group, 1 if last > first else -1) for group in together]
+        out = []
+        for group in together:
+            try:
+                out.append(self._divergence(guess, group, loads, 1 if last > first else -1))
+            except ConvergenceError as trouble:
+                self.warn(str(trouble))
+        return out
 
-    def _divergence(self, guess: PETSc.Vec, loads: list[float], sign: int) -> Critical:
-        """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
+    def _zero(self, mu: Callable[[float], float], low: float, high: float) -> float:
+        """Load at which ``mu`` vanishes: a bound where it does there but for noise, in which its sign says nothing."""
+        for load in (low, high):
+            if abs(mu(load)) <= REAL * self.units.omega2:
+                return load
+        return zero_between(mu, low, high, ROUND_OFF * max(abs(low), abs(high)))
+
+    def _divergence(self, guess: PETSc.Vec, loads: list[float], bounds: list[float], sign: int) -> Critical:
+        """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero.
+
+        Those that are zero at all loads are among them: there they are not told apart, and they add nothing.  The load
+        is within ``bounds``.
+        """
         pencil, number = self.eigensolver.at(at_load(self.solver, guess, loads[0])), len(loads)
-        found = pencil.near(number + 2, SHIFT * self.units.omega2)
-        cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:number].tolist())
-        load, uncertainty = interpolated_zero_of_the_mean(
-            Measuring(self.solver, self.eigensolver, guess), cluster, loads[0], self.units.load
-        )
+        size = number + self._still
+        found = pencil.near(size + 2, SHIFT * self.units.omega2)
+        cluster = cluster_of(pencil, found, np.argsort(abs(found.values), kind="stable")[:size].tolist())
+        mean = Mean(Measuring(self.solver, self.eigensolver, guess), cluster, self._still)
+        load, uncertainty = interpolated_zero(mean, loads[0], self.units.load)
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
-        return Critical(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster)
+        inside = min(max(load, bounds[0]), bounds[1])
+        load, uncertainty = inside, uncertainty + abs(load - inside)
+        return Critical(DIVERGENCE, load, sign * number, uncertainty, 0.0, cluster, still=self._still)
 
     def _real(self, guess: PETSc.Vec, load: float) -> list[float]:
-        """Real eigenvalues at a load near the origin, in ascending order."""
-        pencil = self.eigensolver.at(at_load(self.solver, guess, load))
-        return sorted(v.real for v in leftmost(pencil, self.number, self._before).values if v.imag == 0)
+        """Real eigenvalues at a load near the origin, in ascending order, but for those that are zero at all loads."""
+        real = [v.real for v in self._near(guess, load).values if v.imag == 0]
+        return sorted(sorted(real, key=abs)[self._still :])
+
+    def _near(self, guess: PETSc.Vec, load: float) -> Frequencies:
+        """Eigenvalues at a load near the origin, and what became of the complex ones after it."""
+        return leftmost(self.eigensolver.at(at_load(self.solver, guess, load)), self.number, self._before)
 
 
 class Measuring:
@@ -194,15 +238,40 @@ class Measuring:
 
     def __call__(self, load: float, cluster: Cluster) -> Measured:
         """Measure the cluster; raises :class:`ConvergenceError` where it is not found."""
-        return measure(self._pencil(load), cluster)
+        return measure(self.pencil(load), cluster)
 
     def noise(self, load: float, cluster: Cluster) -> ClusterNoise:
         """Round-off of what is measured; raises :class:`ConvergenceError` where the cluster is not found."""
-        pencil = self._pencil(load)
+        pencil = self.pencil(load)
         return noise_of(pencil, measure(pencil, cluster))
 
-    def _pencil(self, load: float) -> NonsymmetricPencil:
+    def pencil(self, load: float) -> NonsymmetricPencil:
+        """Pencil at a load."""
         return self.eigensolver.at(at_load(self.solver, self.guess, load))
+
+
+@dataclass(frozen=True)
+class Mean:
+    """Mean of the eigenvalues of a ``measured`` ``cluster`` against the load, ``still`` of which are zero at all loads.
+
+    Vectors of those are no better than round-off: where there are any, the eigenvalues nearest zero are taken.
+    """
+
+    measured: Measuring
+    cluster: Cluster
+    still: int
+
+    def __call__(self, load: float) -> float:
+        """Mean at a load; raises :class:`ConvergenceError` where the cluster is not found."""
+        if not self.still:
+            return self.measured(load, self.cluster).cluster.mean
+        pencil, size = self.measured.pencil(load), self.cluster.size
+        values = pencil.near(size + 2, SHIFT * pencil.system.scene.units.omega2).values
+        return float(values[np.argsort(abs(values), kind="stable")[:size]].real.mean())
+
+    def noise(self, load: float) -> float:
+        """Round-off of the matrix in the mean, which does not scatter; unknown, and zero, where some are zero."""
+        return 0.0 if self.still else self.measured.noise(load, self.cluster).mean
 
 
 def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: float) -> Located:
@@ -217,35 +286,40 @@ def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: f
     return replace(found, uncertainty=found.uncertainty + moved, left=found.left + noise.mean)
 
 
-def interpolated_zero_of_the_mean(
-    measured: Measuring, cluster: Cluster, load: float, one: float
-) -> tuple[float, float]:
-    """Load near ``load`` at which the mean of a ``cluster`` vanishes, and what round-off of the mean leaves open.
+def interpolated_zero(mean: Mean, load: float, one: float) -> tuple[float, float]:
+    """Load near ``load`` at which a ``mean`` of eigenvalues vanishes, and what its round-off leaves open.
 
-    The ``measured`` mean, at loads of natural size ``one``, is sampled over :data:`AROUND`, and interpolated: its
-    scatter shows in the last coefficients.  Raises :class:`ConvergenceError` where it does not vanish near by.
+    At loads of natural size ``one`` it is sampled over the widest of :data:`AROUND`, and interpolated: its scatter
+    shows in the last coefficients.  Where a collision is as near, the mean is not smooth, or there is none: then over
+    a narrower one.  Raises :class:`ConvergenceError` where it does not vanish near by.
     """
-    half = AROUND * unit(load, one=one)
-    nodes = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
-    series = chebyshev.chebfit(nodes, [measured(load + half * t, cluster).cluster.mean for t in nodes.tolist()], 5)
-    root = real_root(series, 0.0)
-    if root is None:
+    nodes, found = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6), []
+    for half in (width * unit(load, one=one) for width in AROUND):
+        try:
+            series = chebyshev.chebfit(nodes, [mean(load + half * t) for t in nodes.tolist()], 5)
+            root = real_root(series, 0.0)
+            if root is None:
+                continue
+            doubt = in_doubt(series) + mean.noise(load + half * root)
+        except ConvergenceError:
+            continue
+        found.append((half * zero_uncertainty(series, root, doubt), load + half * root))
+        if found[-1][0] < ENOUGH * unit(load, one=one):
+            break
+    if not found:
         raise ConvergenceError(f"The divergence load near {load:.6g} could not be located: use a smaller range.")
-    noise = measured.noise(load + half * root, cluster).mean
-    return load + half * root, half * zero_uncertainty(series, root, in_doubt(series) + noise)
+    uncertainty, at = min(found)
+    return at, uncertainty
 
 
-def zero_of_the_mean(measured: Measuring, cluster: Cluster, load: float, one: float) -> tuple[float, float]:
-    """Load near ``load``, of natural size ``one``, at which the ``measured`` mean of a ``cluster`` vanishes.
+def zero_near(mean: Mean, load: float, one: float) -> tuple[float, float]:
+    """Load near ``load``, of natural size ``one``, at which a ``mean`` of eigenvalues vanishes.
 
     Also what round-off of the mean leaves open of it.
     """
     from scipy.optimize import newton  # slow to load
 
-    def mean(load: float) -> float:
-        return measured(load, cluster).cluster.mean
-
     step = BESIDE * unit(load, one=one)
     found = float(newton(mean, load, x1=load + step, tol=round_off(load, one)))
     slope = (mean(found + step) - mean(found - step)) / (2 * step)
-    return found, abs(measured.noise(found, cluster).mean / slope)
+    return found, abs(mean.noise(found) / slope)

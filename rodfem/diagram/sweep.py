@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.eigenvalue_curves import Curves
-from rodfem.continuation.kinds import END, FLUTTER, USER
+from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.prediction import ROWS, predict_at_load
 from rodfem.continuation.static_solver import StaticSolver
@@ -80,8 +80,7 @@ class Sweep:
         branch.renumber()
         warn = self.observer.warn
         if self.plan.error_bars:
-            with without("No errors were estimated", comm, warn):
-                self._error_bars(branch)
+            self._error_bars(branch)
         self.observer.finished(branch)
         with without("The asymmetry of the tangent matrix was not measured", comm, warn):
             self._asymmetry(last)
@@ -191,7 +190,9 @@ class Sweep:
             if i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
                 after_it = b.negative  # of all eigenvalues that are recorded
             if event.cluster is not None:
-                self._name(point, event.cluster)
+                self._name(point, event.cluster, event.cluster.size - event.still)
+            if event.kind == DIVERGENCE and (zero := point.negative - min(negative, after_it)) > 0:
+                point.negative, point.zero = point.negative - zero, point.zero + zero
             special = SpecialPoint(event.kind, point, negative, after_it, event.uncertainty, omega2=event.omega2)
             special.cluster, special.note = event.cluster, event.note
             if point is not a and point is not b:
@@ -199,11 +200,11 @@ class Sweep:
             self._special(branch, special)
             negative = after_it
 
-    def _name(self, point: Point, cluster: Cluster) -> None:
-        """Name the motions of the eigenvalues that collide at a point by all that they do: their vectors are one."""
+    def _name(self, point: Point, cluster: Cluster, number: int) -> None:
+        """Name the ``number`` of motions that meet at a point by all that a cluster does: their vectors are one."""
         name = self.eigensolver.at(point.x).motion(cluster.basis)
         distance = [abs(complex(*value) - cluster.mean) for value in point.omega2]
-        for i in np.argsort(distance, kind="stable")[: cluster.size]:
+        for i in np.argsort(distance, kind="stable")[:number]:
             point.motion[i] = name
 
     def _special(self, branch: Branch, special: SpecialPoint) -> None:
@@ -214,8 +215,9 @@ class Sweep:
         """Estimate the errors of all special points, and say where an accuracy that was asked for is not reached."""
         asked = self.plan.accuracy
         with self.solver.system.clock.scope("error bars"):
-            errors = SweepErrors(self.solver, self.span)
+            comm, warn, errors = self.solver.system.comm, self.observer.warn, SweepErrors(self.solver, self.span)
             for s in branch.special:
-                errors.estimate(s)
+                with without(f"No error of the {s.kind.words} at {s.point.load:.6g} was estimated", comm, warn):
+                    errors.estimate(s)
                 if asked is not None and s.error_estimate > asked * unit(s.point.load, one=self.units.load):
                     s.note = s.note or f"accuracy {asked:g} not reached"

@@ -10,13 +10,15 @@ from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.critical_loads import Measuring, located_flutter, zero_of_the_mean
+from rodfem.diagram.critical_loads import Mean, Measuring, located_flutter, zero_near
 from rodfem.diagram.held import at_load
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off
 
+WIDTH = 0.01
+"""Half width of the piece on which a flutter load is looked for, relative to it or to the range."""
 MEAN = 10.0
 """Round-off of the mean of two eigenvalues that meet, relative to it, over that of the load."""
 
@@ -47,8 +49,10 @@ class SweepErrors:
             s.error_estimate = max(bound(point.load, load, left, rho), s.located_to)
             s.omega2_error = bound(s.omega2, mu, max(doubt, MEAN * abs(mu) * ROUND_OFF), rho)
         elif s.kind == DIVERGENCE:
-            measured = Measuring(richer, self.eigensolver, x)
-            load, left = zero_of_the_mean(measured, self._transferred(s), point.load, self.units.load)
+            cluster = self._transferred(s)
+            still = cluster.size - abs(s.negative_after - s.negative_before)
+            mean = Mean(Measuring(richer, self.eigensolver, x), cluster, still)
+            load, left = zero_near(mean, point.load, self.units.load)
             s.error_estimate = max(bound(point.load, load, max(left, s.located_to), rho), s.located_to)
         if s.kind in (FLUTTER, DIVERGENCE):
             s.ordinate_error += self._moved(x, s)
@@ -75,6 +79,6 @@ class SweepErrors:
         measured, cluster = Measuring(self.richer, self.eigensolver, guess), self._transferred(s)
         if s.note:  # double there, whatever the mesh
             return s.point.load, 0.0, measured(s.point.load, cluster).cluster.mean, 0.0
-        width = max(0.05 * abs(s.point.load), 0.01 * abs(self.span[1] - self.span[0]))
+        width = WIDTH * max(abs(s.point.load), abs(self.span[1] - self.span[0]))
         located = located_flutter(measured, cluster, s.point.load, width)
         return located.load, located.uncertainty, located.cluster.mean, located.mean_uncertainty

@@ -62,7 +62,10 @@ class Discretization:
             object.__setattr__(self, "vertices", reals("vertices", self.vertices, (0.0, 0.5, 1.0)))
         known = formulations.names()
         if not isinstance(self.formulation, str) or self.formulation not in known:
-            raise InputError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(known)}.")
+            named = (
+                "" if isinstance(self.formulation, str) else ", and give numbers by name, as in elements=8, degree=6"
+            )
+            raise InputError(f"Unknown formulation {self.formulation!r}: choose one of {', '.join(known)}{named}.")
         if self.factors not in FACTORS:
             raise InputError(f"Nothing factors matrices by the name {self.factors!r}: choose {' or '.join(FACTORS)}.")
         if self.elements < 1:

@@ -78,8 +78,7 @@ TOP: Kinds = {
     "accuracy": MAYBE,
     "discretization": OBJECT,
     "origin": OBJECT,
-    "meshes": OBJECTS,
-    "branches": OBJECTS,
+    **dict.fromkeys(("meshes", "branches"), (lambda x: x != [] and OBJECTS[0](x), "a list of objects, one or more")),
 }
 MESH: Kinds = {"formulation": TEXT, "elements": COUNT, "degree": COUNT, "unknowns": COUNT, "vertices": LENGTHS}
 BRANCH: Kinds = {
@@ -177,7 +176,7 @@ def _check(data: Mapping[str, Any], kinds: Kinds, where: Path | str) -> None:
     for name, (test, words) in kinds.items():
         if name in data and not test(data[name]):
             raise InputError(
-                f"{where} has the {name} {SHORT.repr(data[name])}, where {words} was expected: run the scene again."
+                f"{where} has the {name} {SHORT.repr(data[name])} in the place of {words}: run the scene again."
             )
 
 

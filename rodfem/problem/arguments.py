@@ -10,6 +10,7 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable, Iterable
+from dataclasses import fields, is_dataclass
 from functools import wraps
 from math import isfinite
 from pathlib import Path
@@ -42,8 +43,9 @@ def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
             try:
                 given = signature.bind(*arguments, **named)
             except TypeError as trouble:  # Python's own words lack the function and what it takes
-                words = f"{function.__name__}() {trouble}: its arguments are {', '.join(signature.parameters)}"
-                raise TypeError(words) from None
+                names = [name for name in signature.parameters if name != "self"]
+                words = f"{function.__name__}() {trouble}: its arguments are {', '.join(names)}"
+                raise TypeError(f"{words}{_belongs(named, checks)}") from None
             for name, check in checks.items():
                 if name in given.arguments and given.arguments[name] is not defaults[name]:
                     given.arguments[name] = check(name, given.arguments[name])
@@ -54,6 +56,18 @@ def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
     return decorate
 
 
+def _belongs(named: Iterable[str], checks: dict[str, Check]) -> str:
+    """Say which of the last arguments is of a dataclass that has one of some names as a field; empty where none is."""
+    for name in named:
+        for argument, check in reversed(checks.items()):
+            kind = getattr(check, "kind", None)
+            if not isinstance(kind, type) or not is_dataclass(kind) or name in checks:
+                continue
+            if name in {f.name for f in fields(kind)}:
+                return f"; give {argument}={kind.__name__}({name}=...)"
+    return ""
+
+
 def a(kind: type | tuple[type, ...], example: str) -> Check:
     """Check for an object of a class, or of one of some; raises :class:`InputError` for anything else."""
 
@@ -62,6 +76,7 @@ def a(kind: type | tuple[type, ...], example: str) -> Check:
             raise InputError(f"{name} is {SHORT.repr(value)}: give {example}.")
         return value
 
+    check.kind = kind  # type: ignore[attr-defined]
     return check
 
 

@@ -10,7 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from difflib import get_close_matches
 from functools import wraps
+from logging import getLogger
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from rodfem.errors import SceneError
@@ -19,6 +22,7 @@ if TYPE_CHECKING:
     from rodfem.problem.load import Load
 
 Conversion = Callable[[Any], Any]
+LOG_OF_UFL = getLogger("UFL")
 UFL = "write it with UFL (ufl.cosh, ufl.conditional), without math, numpy and if"
 
 
@@ -126,6 +130,7 @@ def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[...
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
+        silent, LOG_OF_UFL.disabled = LOG_OF_UFL.disabled, True  # what it prints is in what it raises
         try:
             value = function(*arguments) if role.placed else function(*map(Placeless, arguments))
             return value if role.returns is None else role.returns(value)
@@ -136,11 +141,22 @@ def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[...
         except (Exception, SystemExit) as trouble:  # whatever a person's function may raise
             first = str(trouble).split("\n", 1)[0].rstrip(".")
             wrong = isinstance(trouble, AttributeError) or "subscriptable" in first
-            hint = role.meanings if wrong and role.meanings else role.hint
+            hint = _spelled(trouble) or (role.meanings if wrong and role.meanings else role.hint)
             raise SceneError(f"The {what} fails with {type(trouble).__name__}, {first!r}: {hint}.") from trouble
+        finally:
+            LOG_OF_UFL.disabled = silent
 
     call.guards = what  # type: ignore[attr-defined]
     return call
+
+
+def _spelled(trouble: BaseException) -> str:
+    """Names like one that a module was asked for in vain: that of the arctangent differs between versions of UFL."""
+    module = getattr(trouble, "obj", None)
+    if not isinstance(trouble, AttributeError) or not isinstance(module, ModuleType):
+        return ""
+    near = get_close_matches(trouble.name or "", dir(module), n=3)
+    return f"choose {' or '.join(f'{module.__name__}.{name}' for name in near)}" if near else ""
 
 
 def functions_of(owner: Any, *, nested: bool = True) -> list[tuple[str, Callable[..., Any], Role]]:
@@ -173,13 +189,13 @@ def changes(owner: Any, visit: Visit, place: str = "", *, nested: bool = True) -
 
 def _visited(owner: Any, declared: Any, value: Any, visit: Visit, place: str) -> Any:
     role = declared.get("role")
-    if is_object(value):
-        return _changed(value, visit, place)
     if role is not None:
         role = role if isinstance(role, Role) else role(owner)
         if role.or_value and not callable(value):
             return value
         return visit(role.words.format(place), value, role)
+    if is_object(value):
+        return _changed(value, visit, place)
     if isinstance(value, (tuple, list)) and any(map(is_object, value)):
         places = declared.get("places") or ("",) * len(value)
         found = tuple(_changed(x, visit, where) for x, where in zip(value, places, strict=True))

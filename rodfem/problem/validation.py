@@ -22,7 +22,7 @@ from rodfem.problem.end import SIDES, End
 from rodfem.problem.kinds import check_scalar, real, reals
 from rodfem.problem.local_state import STATES, asked_for, asks_where, floats, functions_of_places, some_places
 from rodfem.problem.results import check_expression, check_results, check_same
-from rodfem.problem.roles import functions_of, is_object
+from rodfem.problem.roles import Role, functions_of, is_object
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def check_kinds(scene: Scene) -> None:
     check_places_are_numbers(scene)
     for what, function, role in functions_of(scene):
         if not callable(function):
-            raise SceneError(f"The {what} is {function!r}: give a function {role.call}.")
+            raise SceneError(f"The {what} is {function!r}: give a function {role.call}{_as_function(function, role)}.")
         try:
             inspect.signature(function).bind(*range(role.arguments))
         except (TypeError, ValueError):  # ValueError for classes of Python's own, which have no signature
@@ -84,12 +84,26 @@ def check_kinds(scene: Scene) -> None:
             ) from None
 
 
+def _as_function(value: Any, role: Role) -> str:
+    """How a function of the constants that returns a ``value`` is written; how that of a cross-section is found."""
+    if role.call == "f(c)" and (len(value) == role.size if isinstance(value, tuple | list) else role.size == 0):
+        return f", as in lambda c: {value!r}"
+    return ", as section.energy(rod) is" if callable(getattr(value, "energy", None)) else ""
+
+
 def check_parameter(name: object, parameter: Any) -> None:
     """Raise :class:`SceneError` for a parameter whose name, value, label, words, unit or bounds make no sense."""
     if not isinstance(name, str) or not name.isidentifier() or iskeyword(name) or name == "s" or name.startswith("__"):
         raise SceneError(f"A parameter cannot have the name {name!r}: choose another (s is the arclength).")
     value = getattr(parameter, "value", parameter)
     texts = [getattr(parameter, text, "") for text in ("label", "words", "unit")]
+    try:
+        real(name, value, 0.0)
+    except InputError:
+        if value is not parameter:
+            raise SceneError(
+                f"The value of the parameter {name} is {value!r}: give a number first, as in Parameter(1.0, 'P')."
+            ) from None
     try:
         real(name, value, 0.0)
         bounds = reals(name, getattr(parameter, "admissible", (0.0, 1.0)), (0.0, 1.0), 2)

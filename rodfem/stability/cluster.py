@@ -20,7 +20,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.stability.frequencies import REAL, Frequencies
+from rodfem.stability.frequencies import REAL, STILL, Frequencies
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 from rodfem.tolerances import TINY
 
@@ -75,7 +75,9 @@ def members(
     """Eigenvalues of a ``pencil`` ``near`` the mean of a ``cluster`` that are its own, by shares in its ``basis``.
 
     Returns what was found, the places of its own in that, and their values.  Of left vectors, which are orthogonal to
-    the right ones of all other eigenvalues, any share tells.  Raises :class:`ConvergenceError`.
+    the right ones of all other eigenvalues, any share tells.  Right vectors are not orthogonal: those of rigid motions,
+    zero at all loads, may have a greater share in the subspace than its own.  They are none of a cluster away from
+    zero.  Raises :class:`ConvergenceError`.
     """
     size, beside = cluster.size, BESIDE * pencil.system.scene.units.omega2
     least = LEAST if near == pencil.near else REAL
@@ -84,6 +86,8 @@ def members(
         inside = pencil.product(basis, found.weighed)
         energy = pencil.squares(found.vectors, found.weighed)
         share = (abs(inside) ** 2).sum(axis=0) / energy
+        if abs(cluster.mean) > beside:
+            share[abs(found.values) < STILL * abs(found.values).max()] = 0.0
         chosen = sorted(np.argsort(-share, kind="stable")[:size].tolist())
         values = found.values[chosen]
         closed = abs(values.imag.sum()) < REAL * abs(values).max()

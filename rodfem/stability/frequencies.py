@@ -20,7 +20,7 @@ MULTIPLE = 1e-8
 ALIKE = 1e-6
 """Eigenvalues that differ by less than this, relative, have one name: where another is near the shift, digits go."""
 STILL = 1e-10
-"""Share of the farthest eigenvalue below which that of a rod that nothing holds is zero."""
+"""Share of the farthest eigenvalue below which one is zero."""
 NEAR_ZERO = 1e-2
 """Share of the farthest eigenvalue below which differences of others are relative to this share."""
 EPS = float(np.finfo(float).eps)
@@ -51,6 +51,10 @@ class Frequencies:
     def diverged(self) -> int:
         """Number of negative real eigenvalues."""
         return int(((self.values.imag == 0) & (self.values.real < -self.noise)).sum())
+
+    def still(self) -> int:
+        """Number of eigenvalues that are zero: of rigid motions, and their partners in Jordan blocks."""
+        return int((abs(self.values) < STILL * abs(self.values).max(initial=0.0)).sum())
 
     def unstable(self, tolerance: float) -> int:
         """Number of eigenvalues with a negative real part or a non-zero imaginary part."""

@@ -69,6 +69,7 @@ def test_a_file_with_a_rod(text: str, tmp_path: Path, capsys: pytest.CaptureFixt
         (FUNCTION.replace("EI: float = 1", "EI=None"), "The argument EI of column has the default None"),
         (FUNCTION.replace("EI: float = 1", "degree=1, EI=1.0"), "has the name of an option of all rods"),
         (FUNCTION.replace("return Scene(", "return (lambda **_: 3)("), "column returns 3"),
+        (SCENE + "exit(0)", "line 16: SystemExit: 0"),
     ],
 )
 def test_files_with_mistakes(text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -79,6 +80,29 @@ def test_files_with_mistakes(text: str, words: str, tmp_path: Path, capsys: pyte
     said = capsys.readouterr().err
     assert left.value.code == 2
     assert said.startswith("error: ") and said.count("\n") == 1 and words in said
+
+
+def test_a_load_is_no_constant(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(SCENE)
+    for words in (["--P", "3"], ["--P=3"]):
+        with pytest.raises(SystemExit):
+            console.main(["run", str(file), *words])
+        assert capsys.readouterr().err == "error: P is the load, which a run varies: give its range, --range FROM TO.\n"
+
+
+def test_a_file_that_runs_its_rod_itself(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The rod is traced once, over the range of the command line, and nothing is written where the file says."""
+    file, there, here = (tmp_path / name for name in ("mine.py", "there", "here"))
+    file.write_text(f"{SCENE}\nimport rodfem\nrodfem.run(column, output={str(there)!r})\nnot_reached()\n")
+    console.main(["run", str(file), "--range", "0", "3", "--quick", "--output", str(here)])
+    assert capsys.readouterr().out.count("column: ") == 1
+    assert not there.exists() and rodfem.load_json(here / "diagram.json")["range"] == [0.0, 3.0]
+    rodfem.run(load(file).column, output=there, figures=False, quiet=True)  # as ever, once it has been read
+    assert (there / "diagram.json").exists()
+    for name in ("", "diagram.json", "states.h5"):
+        console.main(["info", str(here / name)])
+        assert capsys.readouterr().out.startswith("column: EI = 1\n")
 
 
 def test_a_named_scene(tmp_path: Path) -> None:

@@ -8,12 +8,26 @@ from math import hypot, pi
 import numpy as np
 import pytest
 from numpy.polynomial import Legendre
+from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
 import rodfem
 from forms import loads
 from forms.energy import bending_and_twist
-from rodfem import Discretization, End, Inertia, Ordinate, Parameter, Plan, Scene, SceneError, Solver, free
+from rodfem import (
+    Attachment,
+    Discretization,
+    End,
+    Inertia,
+    Ordinate,
+    Parameter,
+    Plan,
+    Ring,
+    Scene,
+    SceneError,
+    Solver,
+    free,
+)
 from rodfem.modes.eigenmotions import Eigenmotions
 from rodfem.modes.modes import RIGID
 
@@ -97,6 +111,73 @@ def test_thrust_along_the_end() -> None:
     assert found.kind == "flutter" and (found.negative_before, found.negative_after) == (0, 4)
     assert abs(found.point.load - low) < 1e-4 and found.error_estimate < 1e-6
     assert found.point.load == pytest.approx(109.69, abs=5e-3)
+
+
+def test_thrust_along_the_end_of_a_rod_with_a_mass_at_its_nose() -> None:
+    """The compression is ``P (m + s)/(1 + m)``.  In each plane two eigenvalues are zero at all loads: by Galerkin.
+
+    The determinant is ``mu^2 (a + b mu + ...)``, and the rod diverges where ``a``, a contour integral, vanishes.  Then
+    a second eigenvalue does, and meets the first one: no less than these two negative ones are complex after that.
+    """
+    m, degrees = 1.0, range(16)
+    x, w = np.polynomial.legendre.leggauss(40)
+    x, w = (x + 1) / 2, w / 2
+    f, df, ddf = (np.array([Legendre.basis(d, domain=[0, 1]).deriv(n)(x) for d in degrees]) for n in (0, 1, 2))
+    nose, tip, slope = (np.array([Legendre.basis(d, domain=[0, 1]).deriv(n)(s) for d in degrees])
+                        for n, s in ((0, 0.0), (0, 1.0), (1, 1.0)))  # fmt: skip
+    mass = (f * w) @ f.T + m * np.outer(nose, nose)
+
+    def stiffness(P: float) -> np.ndarray:
+        return (ddf * w) @ ddf.T - (df * w * P * (m + x) / (1 + m)) @ df.T + P * np.outer(tip, slope)
+
+    def vanishing(P: float) -> float:
+        S, circle = stiffness(P), 30.0 * np.exp(2j * pi * (np.arange(32) + 0.5) / 32)
+        size = np.linalg.slogdet(S - circle[0] * mass)[1]
+        signs, sizes = np.linalg.slogdet(S - circle[:, None, None] * mass)
+        return float(np.mean(signs * np.exp(sizes - size) / circle**2).real)
+
+    def discriminant(P: float) -> float:
+        mu = eigvals(stiffness(P), mass)
+        first, second = mu[np.argsort(abs(mu))][2:4]
+        return float(((first - second) ** 2).real)
+
+    expected = [brentq(vanishing, 30, 40), brentq(vanishing, 78, 79.5), brentq(discriminant, 79.5, 80.2)]
+    rod = replace(
+        floating((free(lambda c: (0.0, 0.0, c.P * m / (1 + m))), free(follower=lambda c: (0.0, 0.0, -c.P))),
+                 (30.0, 90.0), distributed=lambda c: (0.0, 0.0, c.P / (1 + m))),
+        attachments=(Attachment(0.0, mass=lambda c: m),),
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1000.0, 1000.0)),
+    )  # fmt: skip
+    found = rodfem.trace(rod, MESH)
+    assert [(s.kind.words, s.negative_before, s.negative_after) for s in found.special()] == [
+        ("divergence", 0, 1), ("divergence", 1, 2), ("flutter", 2, 2),
+    ]  # fmt: skip
+    for s, load in zip(found.special(), expected, strict=True):
+        assert abs(s.point.load - load) < s.error_estimate + 1e-11 * load < 1e-8
+        assert s.point.negative == min(s.negative_before, s.negative_after)
+    assert not found.warnings
+
+
+def test_ring_under_a_pressure_that_follows() -> None:
+    """Out of its plane, by ``v`` and a twist ``a`` of n waves, a ring of radius one under forces P along its normal.
+
+    ``B n^2 (n^2 v + a) + C n^2 (v + a) = P (n^2 v + a)`` and ``B (n^2 v + a) + C n^2 (v + a) = 0``, so that
+    ``P = B (n^2 - 1)`` whatever C is, as in its plane: two modes at a time.  Both are loads of the sweep, at which the
+    eigenvalues vanish but for round-off.
+    """
+    C, ring = 0.7, lambda s: np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1)
+    scene = Scene(
+        "pressed", (0.0, 2 * pi), "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (1.0, 9.0, C)), {"P": Parameter(0.0)}, "P", Ring(),
+        Ordinate("width", s=pi, of=lambda r, q: float(np.linalg.norm(r))), (0.0, 10.0), start=ring,
+        follower=lambda c: (c.P, 0.0, 0.0), inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.1)),
+    )  # fmt: skip
+    found = rodfem.trace(scene, Discretization("pointwise", 12, 6))
+    assert {3.0, 8.0} < {p.load for p in found[0].points}
+    for s, n in zip(found.special(), (2, 3), strict=True):
+        assert abs(s.point.load - (n * n - 1)) < s.error_estimate < 1e-8
+        assert (s.kind.words, s.negative_before, s.negative_after) == ("divergence", 2 * (n - 2), 2 * (n - 1))
+    assert not found.warnings
 
 
 def test_forces_that_nothing_balances() -> None:

@@ -11,7 +11,9 @@ import pytest
 import ufl
 from classics import BEAM, ON_AXIS, RIGID, circle, column, push
 from scipy.integrate import solve_ivp
+from scipy.linalg import eigvalsh, null_space
 from scipy.optimize import brentq
+from scipy.special import ellipe, ellipj, ellipk
 
 import rodfem
 from forms.energy import bending_and_twist
@@ -44,10 +46,11 @@ def ring(turns: int, load: str, span: tuple[float, float], **more: Any) -> Scene
         "energy": lambda v, k, c: bending_and_twist((k[0], k[1] - c.k0, k[2]), (B, B, c.C)),
         "parameters": {name: Parameter(value) for name, value in values.items()},
         "ordinate": Ordinate("width", s=pi, of=lambda r, q: hypot(*r)),
+        "ends": Ring(odd=turns % 2 == 1),
+        "start": circle,
     }
     return Scene(
-        name="ring", interval=(0.0, 2 * pi * turns), rod=RIGID, ends=Ring(odd=turns % 2 == 1), start=circle, load=load,
-        span=span, **given | more,
+        name="ring", interval=(0.0, 2 * pi * turns), rod=RIGID, load=load, span=span, **given | more,
     )  # type: ignore[arg-type]  # fmt: skip
 
 
@@ -161,3 +164,66 @@ def test_signs_of_quaternions(start: Any, rotation: tuple[float, float, float, f
     rod = column("signs", (clamped(rotation=rotation), free(push)), (0.0, 4.0), start=start)
     (found,) = rodfem.trace(rod, plan=FIRST).special()
     assert abs(found.point.load - pi**2 / 4) < found.error_estimate < 1e-9
+
+
+def eight(C: float, m: float) -> float:
+    """The eigenvalue of the figure eight that is not zero for all C, of the four smallest, by Fourier series.
+
+    A rotation ``a`` of the sections out of the plane has the second variation ``int B (d1.a')^2 + C (d3.a')^2 - B
+    theta' e2.(a x a') + n.(a x (a x d3))`` under ``n = B w^2 e3``, and ``int e2.(a x d3) = 0`` closes the rod.
+    """
+    s = 2 * pi * np.arange(256) / 256
+    waves, w = np.arange(24)[:, None], 2 * ellipk(m) / pi
+    f = np.concatenate([np.cos(waves * s), np.sin(waves[1:] * s)])
+    df = np.concatenate([-waves * np.sin(waves * s), waves[1:] * np.cos(waves[1:] * s)])
+    sn, cn, _, _ = ellipj(w * s, m)
+    x, z, bent = np.sin(2 * np.arcsin(sqrt(m) * sn)), np.cos(2 * np.arcsin(sqrt(m) * sn)), 2 * sqrt(m) * w * cn
+    across, along = np.concatenate([df * z, -df * x]), np.concatenate([df * x, df * z])
+    a1, a3 = np.concatenate([f, 0 * f]), np.concatenate([0 * f, f])
+    da1, da3 = np.concatenate([df, 0 * df]), np.concatenate([0 * df, df])
+    mixed = (a1 * bent) @ da3.T - (a3 * bent) @ da1.T + w**2 * ((a1 * x) @ a3.T - (a1 * z) @ a1.T)
+    closed = null_space((a3 * x - a1 * z).sum(axis=1)[None])
+    size = closed.T @ (across @ across.T + C * along @ along.T + (mixed + mixed.T) / 2) @ closed
+    return float(eigvalsh(size)[:4].sum())
+
+
+def test_figure_eight() -> None:
+    """A closed elastica that crosses itself, ``2 E(m) = K(m)``: stable in space where C exceeds two.
+
+    What leaves there ends as a circle of one excess turn, where that becomes unstable: at C = sqrt(3) (Michell).
+    """
+    m = brentq(lambda m: 2 * ellipe(m) - ellipk(m), 0.5, 0.99, xtol=1e-15)
+
+    def start(s: np.ndarray) -> np.ndarray:
+        half = np.arcsin(sqrt(m) * ellipj(2 * ellipk(m) / pi * s, m)[0])
+        return np.stack([np.cos(half), 0 * s, np.sin(half), 0 * s], axis=1)
+
+    twist = Ordinate("twist", s=None, of=lambda x, c: x.k[2] / (2 * pi))
+    rod = ring(1, "C", (1.6, 2.2), ends=Ring(odd=False), start=start, ordinate=twist,
+               energy=lambda v, k, c: bending_and_twist(k, (B, B, c.C)))  # fmt: skip
+    diagram = rodfem.trace(rod, Discretization(elements=16, degree=6), Plan(depth=1))
+    (found,), (last,) = (diagram.special("branch point", name) for name in ("ring", "branch 1"))
+    expected = brentq(eight, 1.6, 2.2, args=(m,), xtol=1e-13)
+    assert expected == pytest.approx(2.0, abs=1e-10)
+    assert (found.negative_before, found.negative_after, found.point.ordinate) == (1, 0, pytest.approx(0.0, abs=1e-10))
+    assert abs(found.point.load - expected) < found.error_estimate + 1e-11 < 1e-9
+    assert {p.negative for p in diagram["branch 1"].points} == {0}
+    assert abs(last.point.load - sqrt(3)) < 1e-9 and abs(last.point.ordinate) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_moebius_band() -> None:
+    """Ends that meet, one turned by pi: an oblong section fits its own back, and the band slides along itself.
+
+    Where it does it can be at any place along the band: a family of states at that angle, at which the range ends.
+    """
+    turned: Any = lambda c: (-ufl.cos(c.phi / 2), 0.0, 0.0, -ufl.sin(c.phi / 2))  # noqa: E731
+    band = ring(1, "phi", (0.0, 3.3), ends=(clamped(), clamped(rotation=turned)),
+                energy=lambda v, k, c: bending_and_twist(k, (B, 1.5, c.C)))  # fmt: skip
+    diagram = rodfem.trace(band, Discretization(elements=14, degree=6), Plan(depth=1))
+    (found,) = diagram.special("branch point")
+    assert (found.negative_before, found.negative_after) == (1, 0)
+    assert max(abs(p.load - pi) for p in diagram["branch 1"].points) < 1e-8
+    assert abs(found.point.load - pi) < found.error_estimate < 1e-9
+    assert "meets a family of states at one and the same load" in diagram.in_words()
+    warnings = " ".join(diagram.again(span=(0.0, pi), depth=0).warnings)
+    assert "no state is found at 3.14159: let the range end elsewhere if that is a bifurcation" in warnings

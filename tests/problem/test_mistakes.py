@@ -7,6 +7,7 @@ import random
 import time
 from collections.abc import Callable
 from fractions import Fraction
+from logging import getLogger
 from pathlib import Path
 from typing import Any
 
@@ -37,10 +38,11 @@ from rodfem import (
     free,
     hinged,
     integral,
+    section,
     sliding_hinge,
 )
 from rodfem.diagram import solver
-from rodfem.errors import InputError
+from rodfem.errors import InputError, SceneError
 
 pytestmark = pytest.mark.alone
 
@@ -187,6 +189,13 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ({"energy": lambda v, k, c: 1.0}, "stored energy is flat"),
     ({"energy": lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + k[2] ** 2) ** 2}, "stored energy is flat"),
     ({"ends": (clamped(), elastic(lambda c: NAN, force=lambda c: (0, 0, -c.P)))}, "nan in it"),
+    ({"potential": lambda x, c: ufl.atan3(x.d1[0], x.d1[1])}, r"no attribute 'atan3'.: choose ufl.atan"),
+    # a value, a cross-section or a text where a function or a number belongs
+    (lambda: {"ends": (clamped((0, 0, 1)), TIP)}, r"f.c., as in lambda c: \(0, 0, 1\)\."),  # type: ignore[arg-type]
+    (lambda: {"inertia": Inertia(2.0)}, r"f.c., as in lambda c: 2.0\."),  # type: ignore[arg-type]
+    ({"energy": section.circle(1.0, E=1.0, nu=0.3)}, r"is Section.*: give a function W.*, as section.energy\(rod\) is"),
+    ({"ends": right(force=Parameter(1.0))}, r"force on the right end is Parameter.*: give a function f\(c\)\."),
+    (lambda: numbers(B=Parameter("B", 1.0)), "value of the parameter B is 'B': give a number first"),  # type: ignore[arg-type]
     (lambda: {"ends": (clamped(), sliding_hinge((1, 0, 0), (NAN, 0, 1)))}, "direction in which a hinge slides"),
     (lambda: {"ends": (clamped(), sliding_hinge((1, 0, 0), (0, 0, 1), force=3))}, "force is 3: give a function"),  # type: ignore[arg-type]
 ]
@@ -225,6 +234,7 @@ PLANS: list[tuple[Callable[[], Any], str]] = [
     (lambda: control(aim=INF), "aim = inf lead"),
     *((lambda x=x: Plan(steps=IndexStepControl(resolved=x)), "resolved is") for x in (NAN, INF, -1.0, "a")),
     (lambda: Discretization(elements=10**9), "too large"),
+    (lambda: Discretization(8, 6), "formulation 8: choose .*, and give numbers by name, as in elements=8, degree=6"),  # type: ignore[arg-type]
     (lambda: Discretization(elements=2, vertices=(0.0, 1e-300, 1.0)), "must ascend"),
     (lambda: Discretization(elements=2, vertices={0.0, 0.5, 1.0}), "vertices is"),  # type: ignore[arg-type]
     (lambda: Discretization(["reduced"]), "Unknown formulation"),  # type: ignore[arg-type]
@@ -260,6 +270,27 @@ def test_arguments_of_functions(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=words):
             call()
     assert not list(tmp_path.iterdir())
+
+
+def test_what_belongs_to_a_plan_or_a_mesh_is_named() -> None:
+    for name, words in (
+        ("at", r"give plan=Plan\(at=...\)"),
+        ("degree", r"give discretization=Discretization\(degree="),
+    ):
+        with pytest.raises(TypeError, match=f"unexpected keyword argument '{name}': its arguments are .*; {words}"):
+            rodfem.trace(scene(), **{name: 1})
+    with pytest.raises(TypeError, match="its arguments are scene, discretization, comm"):
+        rodfem.Solver()  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match=r"its arguments are .* comm$"):
+        rodfem.trace(scene(), nonsense=1)  # type: ignore[call-arg]
+
+
+def test_ufl_prints_nothing_besides(capfd: pytest.CaptureFixture[str]) -> None:
+    """Its logger writes what it raises, once or twice, and the sentence has that."""
+    with pytest.raises(SceneError, match=r"write it with UFL .ufl.cosh, ufl.conditional., without math, numpy and if"):
+        scene(energy=lambda v, k, c: stiff(1.0, k) if k[0] > 0 else stiff(2.0, k))
+    assert capfd.readouterr() == ("", "")
+    assert not getLogger("UFL").disabled
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import inf
-from pathlib import Path
 from typing import Any
 
-from rodfem.app.cli import Parser
+from rodfem.app.cli import Parser, run_folder
 from rodfem.continuation.kinds import KINDS
 from rodfem.output.contents import read_diagram
 from rodfem.output.digits import number
@@ -20,7 +19,7 @@ NEEDED = ("parameter", "constants", "branches", "meshes", "discretization", "ord
 def main(words: Sequence[str]) -> None:
     """Print them; raises :class:`~rodfem.errors.InputError` where the folder has no diagram."""
     parser = Parser(prog="rodfem info", description=__doc__)
-    parser.add_argument("folder", type=Path, help="that of a run, as results/cord")
+    parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
     folder = parser.parse_args(words).folder
     print("\n".join(lines(read_diagram(folder / "diagram.json", NEEDED))))
 
