@@ -214,7 +214,7 @@ FAULTS = {
     ),
     "divergence-by-vectors-of-rigid-motions": Fault(
         "rodfem/diagram/critical_loads.py",
-        "if not still:",
+        "if not self.still:",
         "if True:",
         "tests/literature/test_free_rods.py",
     ),
