@@ -44,12 +44,20 @@ INERTIA = "tests/stability/test_inertia.py tests/stability/test_assessment.py"
 HARD = "tests/hard/test_hard_cases.py"
 DIAGRAM = "tests/diagram/test_diagram.py"
 STEP = "tests/continuation/test_compiled_step.py"
+RESUME = "tests/hard/test_resume.py"
 WORK = "tests/continuation/test_work.py"
 RECORDED = "tests/modes/test_recorded.py"
 
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "resume-forgets-gaps": Fault("rodfem/diagram/bookkeeper.py", "self.gaps.known = [Gap", "_ = [Gap", RESUME),
+    "resume-forgets-bands": Fault(
+        "rodfem/diagram/bookkeeper.py", 'inertia.resolution, inertia.tolerance = memory["band"]', "pass", RESUME
+    ),
+    "resume-forgets-points-that-were-met": Fault(
+        "rodfem/diagram/bookkeeper.py", "special.switched = flag", "pass", RESUME
+    ),
     "energy-is-not-compared-with-work": Fault(
         f"{CONTINUATION}work.py", "return off <= SAFETY * expected + noise or", "return True or", WORK
     ),

@@ -18,13 +18,17 @@ import demo_cases
 import hemitropic_cases
 import numpy as np
 import pytest
+from classics import column
 from hard.folders import HOME, alike, check_states, contents
 from mpi4py import MPI
 
 import rodfem
 import rodfem.app.run
+from rodfem import clamped, free
 from rodfem.app.run_terminal import Terminal
 from rodfem.codim2 import locus as locus_module
+from rodfem.continuation.branch import Branch
+from rodfem.diagram.bookkeeper import Bookkeeper, Recalled
 from rodfem.diagram.journal import Journal
 from rodfem.diagram.record import CLASSES, Record
 from rodfem.errors import InputError
@@ -47,10 +51,17 @@ def beck() -> Scene:
     return demo_cases.scene("follower", span=(0.0, 22.0))
 
 
+def crooked() -> Scene:
+    """A cantilever under its thrust and a small force across: its branch point is a gap."""
+    return column("crooked", (clamped(), free(lambda c: (0.0, 1e-6, -c.P))), (0.0, 4.0))
+
+
 CASES: dict[str, tuple[Callable[[], Scene], rodfem.Plan]] = {
     "hemitropic": (hemitropic_cases.scene, rodfem.Plan((0.0, 0.3), error_bars=False)),
     "search": (cord, rodfem.Plan((60.0, 30.0), at=(40.0,), tries=3, error_bars=False)),
     "accuracy": (cord, rodfem.Plan((60.0, 40.0), accuracy=1e-5)),
+    "family": (lambda: demo_cases.scene("cord", turns=1, span=(30.0, 0.0)), rodfem.Plan((30.0, 0.0), error_bars=False)),
+    "crooked": (crooked, rodfem.Plan((0.0, 4.0), error_bars=False)),
     "sweep": (beck, rodfem.Plan((0.0, 22.0), error_bars=False)),
 }
 
@@ -278,3 +289,44 @@ def test_steps_come_in_their_order() -> None:
     with pytest.raises(InputError, match="came to 'branch 1' where this one comes to 'branch 2'"):
         journal.next("branch 2")
     assert journal.next("found 1") is None
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("name", ["hemitropic", "accuracy", "family", "crooked"])
+def test_a_step_that_is_recalled_leaves_what_it_left(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Meshes, bands, gaps, branch points that were met: a record of it after its recall is the record that was kept."""
+    scene, plan = CASES[name][0](), CASES[name][1]
+    kept, again, record, recall = list[Record](), list[Record](), Bookkeeper._record, Bookkeeper.recall
+
+    def keeping(self: Bookkeeper, *what: Any) -> Record:
+        kept.append(record(self, *what))
+        return kept[-1]
+
+    def recalling(self: Bookkeeper, name: str) -> Recalled | None:
+        if self.journal.done < len(self.journal.known):  # whatever a solver has in it when a step is recalled
+            for solver in self.meshes.solvers:
+                solver.inertia.resolution, solver.inertia.tolerance, solver.system.damping = 0.1, 0.2, 0.3
+                solver.system.verification.dropped, solver.system.verification.norm = {99}, 0.4
+            for special in (s for branch in self.branches for s in branch.special):
+                special.switched = not special.switched
+        found = recall(self, name)
+        if found is not None:
+            before = self.branches
+            self.branches = [*before, found.found] if isinstance(found.found, Branch) else before
+            again.append(record(self, name, found.found, found.left))
+            self.branches = before
+        return found
+
+    monkeypatch.setattr(rodfem.app.run, "remove_steps", lambda folder: None)
+    with monkeypatch.context() as patch:
+        patch.setattr(Bookkeeper, "_record", keeping)
+        run_of(scene, plan, folder)
+    monkeypatch.setattr(Bookkeeper, "recall", recalling)
+    rodfem.resume(folder, scene, MESH, plan, figures=False, quiet=True)
+    assert len(kept) == len(again) > 1
+    for one, other in zip(kept, again, strict=True):
+        for key in ("found", "left", "meshes", "memory", "gaps", "switched"):
+            assert json.dumps(one.text[key]) == json.dumps(other.text[key]), key  # nan is nan there
+        for a, b in zip(one.vectors, other.vectors, strict=False):  # those of richer meshes, which come last, not yet
+            np.testing.assert_array_equal(a, b)
+    assert name != "crooked" or kept[-1].text["gaps"]
