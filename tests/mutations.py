@@ -51,6 +51,12 @@ RECORDED = "tests/modes/test_recorded.py"
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "bar-below-the-location": Fault(
+        "rodfem/adaptivity/error_estimate.py", "max(load_error, special.located_to)", "load_error", ERRORS
+    ),
+    "bar-of-another-law": Fault(
+        "rodfem/adaptivity/error_estimate.py", "if again is None or not alike(again, law):", "if again is None:", ERRORS
+    ),
     "resume-forgets-gaps": Fault("rodfem/diagram/bookkeeper.py", "self.gaps.known = [Gap", "_ = [Gap", RESUME),
     "resume-forgets-bands": Fault(
         "rodfem/diagram/bookkeeper.py", 'inertia.resolution, inertia.tolerance = memory["band"]', "pass", RESUME

@@ -24,6 +24,7 @@ from rodfem.adaptivity import error_estimate
 from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, USER
 from rodfem.fem.newton import correct
 from rodfem.output.digits import number
@@ -40,6 +41,12 @@ def explored(scene: Scene, mesh: tuple[int, int] | float, at: tuple[float, ...] 
     accuracy = mesh if isinstance(mesh, float) else None
     d = Discretization("auto", *mesh) if isinstance(mesh, tuple) else None
     return trace(scene, d, Plan(at=at, depth=depth, steps=classics.WIDE, accuracy=accuracy)).branches
+
+
+def branch_solver(diagram: Diagram) -> BranchSolver:
+    """Solver of the first mesh."""
+    assert isinstance(diagram.solvers[0], BranchSolver)
+    return diagram.solvers[0]
 
 
 def check(value: float, exact: float, bar: float) -> None:
@@ -248,3 +255,22 @@ def test_what_newtons_method_leaves_open_counts(monkeypatch: pytest.MonkeyPatch)
     moved = abs(again.ordinate - stopped[0])
     assert again.ordinate_left == pytest.approx(error_estimate.STEADY * moved, rel=1e-3)
     assert moved > 1e-6
+
+
+@pytest.mark.alone
+def test_a_bar_is_no_less_than_the_location_and_a_law_of_another_kind_has_none() -> None:
+    """Of Euler's column, whose mesh leaves no error, with a location that is said to be poor."""
+    diagram = trace(classics.euler("pinned-pinned"), Discretization("reduced", 8, 8), Plan(span=(0.0, 12.0), depth=1))
+    special = diagram.special("branch point")[0]
+    richer, law, way = Enriched(branch_solver(diagram)), special.law, diagram.branches[1].points[1].x - special.point.x
+    way.scale(1 / richer.coarse.system.norm(way))
+    assert law is not None
+    poor = replace(special, located_to=1e-3)
+    richer.estimate(poor)
+    assert poor.error_estimate == 1e-3
+    (_, origin, rho) = richer.origins[0]
+    richer.origins = [(poor, origin, rho)]
+    richer.law(poor, way, own := replace(law, kind="pitchfork"))
+    richer.law(poor, way, other := replace(own, power=own.power + 1))
+    assert own.uncertainty < 1e-3
+    assert other.uncertainty == np.inf
