@@ -102,6 +102,8 @@ def merge_doubles(branch: Branch) -> None:
             q.null_vectors = p.null_vectors + q.null_vectors
             q.negative_before = p.negative_before
             q.point.zero += p.multiplicity
+            if p.negative_after > p.negative_before:  # those of p are negative at q, and count as zero now
+                q.point.negative -= p.multiplicity
             q.note = f"{q.multiplicity} eigenvalues that this mesh does not tell apart vanish within {apart:.0e}"
             branch.special.remove(p)
             branch.points = [point for point in branch.points if point is not p.point]

@@ -126,6 +126,7 @@ def test_a_double_point_that_the_mesh_splits() -> None:
     assert (special.negative_before, special.negative_after, special.multiplicity) == (4, 6, 2)
     assert abs(special.point.load - np.sqrt(15) / 1.5) < special.error_estimate
     assert "does not tell apart" in special.note
+    assert special.point.negative == min(special.negative_before, special.negative_after)
     assert not branch.unexplained
 
 
