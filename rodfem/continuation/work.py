@@ -32,10 +32,8 @@ SAFETY = 4.0
 """Imbalance, relative to what is expected after the step before, up to which nothing is suspected."""
 ROUND_OFF = 1e-10
 """Imbalance that is none, relative to the energies themselves."""
-DIVISIONS, SHRUNK = 3, 4.0
+DIVISIONS, SHRUNK = 3, 6.0
 """How many times a step is divided, and by how much each division but the first makes the imbalance smaller."""
-VANISHED = 1e-4
-"""Imbalance, relative to that before any division, that has vanished."""
 
 
 class EnergyBalance:
@@ -64,12 +62,16 @@ class EnergyBalance:
         # a drift is a load as well, and does work
         noise = ROUND_OFF * max(scale, solver.units.energy) + max(a.drift, b.drift) * length
         expected = changed * max(1.0, length / before) ** ORDER
-        return off <= SAFETY * expected + noise or _vanishes(solver, a, b, off, noise)
+        return off <= SAFETY * expected + noise or _vanishes(solver, a, b, noise)
 
 
-def _vanishes(solver: BranchSolver, a: Point, b: Point, first: float, noise: float) -> bool:
-    """Whether the imbalance between two rows, ``first`` as it was found, vanishes as the piece is divided."""
-    pieces, off = [a, b], inf
+def _vanishes(solver: BranchSolver, a: Point, b: Point, noise: float) -> bool:
+    """Whether the imbalance between two rows vanishes as the piece is divided.
+
+    Work is that of trapezoids, extrapolated as if the pieces were halves (Romberg): on one branch a sixteenth is left
+    by a division.  At a jump a trapezoid is wrong in proportion to its length, and half of that is left.
+    """
+    pieces, trapezoids, off = [a, b], _trapezoids([a, b]), inf
     for _ in range(DIVISIONS):
         divided = [a]
         for p, q in pairwise(pieces):
@@ -79,21 +81,26 @@ def _vanishes(solver: BranchSolver, a: Point, b: Point, first: float, noise: flo
             middle.load = solver.system.scalar(middle.x)
             middle.energy, middle.potential, middle.conjugate = solver.energies(middle.x)
             divided += [middle, q]
-        pieces, last = divided, off
-        off = abs(b.potential - a.potential + _work(pieces, a, b))
-        if off <= max(noise, VANISHED * first):
+        before, last = trapezoids, off
+        pieces, trapezoids = divided, _trapezoids(divided)
+        off = abs(b.potential - a.potential + (4 * trapezoids - before) / 3)
+        if off <= noise:
             return True
         if off > last / SHRUNK:
             return False
     return True
 
 
+def _trapezoids(rows: Sequence[Point]) -> float:
+    """``int c dlam`` from the first of the rows to the last."""
+    return sum((p.conjugate + q.conjugate) / 2 * (q.load - p.load) for p, q in pairwise(rows))
+
+
 def _integral(rows: Sequence[Point]) -> tuple[float, float]:
     """``int c dlam`` over the last step through all ``rows``, and its largest change by one row more."""
     a, b = rows[-2:]
     works = [_work(rows[-count:], a, b) for count in range(3, len(rows) + 1)]
-    trapezoid = (a.conjugate + b.conjugate) / 2 * (b.load - a.load)
-    return works[-1], max(abs(x - y) for x, y in pairwise([trapezoid, *works]))
+    return works[-1], max(abs(x - y) for x, y in pairwise([_trapezoids([a, b]), *works]))
 
 
 def _work(rows: Sequence[Point], a: Point, b: Point) -> float:

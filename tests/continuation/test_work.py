@@ -110,7 +110,7 @@ def test_a_jump_is_not_balanced(diagram: Diagram) -> None:
                     jump = replace(near, arclength=last.arclength)
                     told.append(not EnergyBalance()(solver, [*branch[:i], jump]))
     assert len(told) > 150
-    assert sum(told) >= 0.98 * len(told)
+    assert sum(told) > 0.95 * len(told)
 
 
 @alone
