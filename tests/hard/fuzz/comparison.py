@@ -232,11 +232,20 @@ def check_pair(first: Diagram, second: Diagram, out: Compared) -> None:
     check_asked(a, b, first.scene.units, out)
     if not (all(map(whole, first)) and all(map(whole, second))) or max(len(first), len(second)) >= MOST_BRANCHES:
         return
-    if len(first) != len(second):
-        out.differs.append(f"{len(first)} branches, and {len(second)}")
+    found = [joined(first), joined(second)]
+    if len(found[0]) != len(found[1]):
+        out.differs.append(f"{len(found[0])} branches, and {len(found[1])}")
     else:
-        pools = [sorted((s for x in d.branches[1:] for s in singular(x)), key=_place) for d in (first, second)]
+        pools = [sorted((s for x in branches[1:] for s in singular(x)), key=_place) for branches in found]
         check_specials("branches", *pools, out)
+
+
+def joined(diagram: Diagram) -> list[Branch]:
+    """Branches that branch points join to the first.
+
+    A detached one is beyond a gap: found where a step happens to lead across, it need not be, without a search.
+    """
+    return [b for b in diagram if not b.name.startswith("detached")]
 
 
 def whole(branch: Branch) -> bool:
