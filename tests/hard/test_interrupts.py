@@ -76,7 +76,8 @@ def test_two_ranks(folder: Path, whom: str, number: int, status: int) -> None:
     ended = struck((*HEMITROPIC, str(folder)), 2, SECOND_BRANCH, whom, number)
     assert ended.left == []
     assert ended.status == status
-    assert ended.errors.count("interrupted; the branches that were finished are in") == (number != signal.SIGKILL)
+    said = ended.errors.count("interrupted; the branches that were finished are in")
+    assert said <= 1 if whom == "mpirun" else said == 1  # mpirun need not wait for the words of its ranks
     assert branches_in(folder)[0] == "straight"
 
 
