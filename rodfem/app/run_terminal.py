@@ -108,17 +108,17 @@ class Terminal(Report):
     def complete(self, diagram: Diagram) -> None:
         """Save all that there is: an interrupted run keeps all completed branches."""
         if len(diagram) > self._known:  # until then the files have more
-            self.save(diagram, modes=False)  # mpirun waits a second for its ranks
+            self.save(diagram)
 
-    def save(self, diagram: Diagram, *, modes: bool = True) -> None:
-        """Save the branches that have not been saved by this process, with ``modes`` of typical states."""
+    def save(self, diagram: Diagram) -> None:
+        """Save the branches that have not been saved by this process."""
         if self._saved == len(diagram):
             return
         new = diagram.branches[self._saved :]
-        found = typical_modes(new, diagram.solvers) if modes else [[] for _ in new]
+        modes = typical_modes(new, diagram.solvers)
         with diagram.clock("files"), held():
             self._clear()
-            save_run(diagram.data, new, diagram.solvers, self.output, first=not self._saved, modes=found)
+            save_run(diagram.data, new, diagram.solvers, self.output, first=not self._saved, modes=modes)
             self._saved = len(diagram)
 
     def _clear(self) -> None:
