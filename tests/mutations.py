@@ -51,6 +51,9 @@ RECORDED = "tests/modes/test_recorded.py"
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "zeros-beyond-a-row": Fault(
+        f"{CONTINUATION}special_points.py", "return outside > max(", "return outside > 1e9 + max(", LOCATE
+    ),
     "bar-below-the-location": Fault(
         "rodfem/adaptivity/error_estimate.py", "max(load_error, special.located_to)", "load_error", ERRORS
     ),

@@ -143,9 +143,10 @@ def find_special(
     still = solver.inertia.modes_near_zero(a.x, persistent) if rest and persistent else []
     while rest:
         special = _special(solver, a, b, rest[0], "mu", still)
-        if (known := same_point(solver, special, found)) is not None:
+        known = special if _beyond(special, a, b) else same_point(solver, special, found)
+        if known is not None:
             special = _another(solver, a, b, known, still)
-            if same_point(solver, special, found) is not None:
+            if _beyond(special, a, b) or same_point(solver, special, found) is not None:
                 raise ConvergenceError(
                     f"Beside load {known.point.load:.8g} another eigenvalue vanishes, where none was found",
                     SMALLER_STEPS,
@@ -164,6 +165,16 @@ def same_point(solver: BranchSolver, special: SpecialPoint, found: Sequence[Spec
         if near and not across(solver.system, special.null_vectors, known.null_vectors):
             return known
     return None
+
+
+def _beyond(special: SpecialPoint, a: Point, b: Point) -> bool:
+    """Whether a point found is one of the piece next to that from ``a`` to ``b``, whose indices it does not explain.
+
+    Of two eigenvalues that pass zero next to a row, one on either side of it, either may be taken for the other.
+    """
+    outside = max(a.arclength - special.point.arclength, special.point.arclength - b.arclength)
+    change = special.negative_after - special.negative_before
+    return outside > max(APART, special.located_to) and change * (b.negative - a.negative) <= 0
 
 
 def _another(solver: BranchSolver, a: Point, b: Point, known: SpecialPoint, still: Sequence[PETSc.Vec]) -> SpecialPoint:

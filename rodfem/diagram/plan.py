@@ -11,7 +11,7 @@ from rodfem.problem.events import Event
 from rodfem.problem.kinds import flag, real, reals, whole
 from rodfem.problem.local_state import asked_for
 from rodfem.problem.scene import Scene
-from rodfem.problem.validation import check_load
+from rodfem.problem.validation import FLEXIBLE, check_load, round_off_of_strains
 from rodfem.stability import methods
 
 MODES, METHOD, SPECTRUM = Argument("Plan", "modes"), Argument("Plan", "method"), Argument("Plan", "spectrum")
@@ -122,7 +122,7 @@ class Plan:
         for event in self.events:
             event.check(scene.length)
         if self.accuracy is not None:
-            self._check_accuracy(self.accuracy)
+            self._check_accuracy(self.accuracy, scene)
         low, high = sorted(span)
         for load in self.at:
             if not low <= load <= high:
@@ -159,12 +159,14 @@ class Plan:
             raise InputError("Counting alone finds no modes", Remedy("leave out {}, or name another {}", MODES, METHOD))
 
     @staticmethod
-    def _check_accuracy(accuracy: float) -> None:
+    def _check_accuracy(accuracy: float, scene: Scene) -> None:
         if not FINEST <= accuracy <= COARSEST:
             raise InputError(
                 f"An accuracy of {accuracy:g} is not attainable: ask for one between {FINEST:g} (round-off) and "
                 f"{COARSEST:g}."
             )
+        if doubt := round_off_of_strains(scene):
+            raise InputError(f"{doubt}: no accuracy can be promised; {FLEXIBLE}, or give a mesh.")
 
     def _check_mesh(self, scene: Scene, discretization: Discretization) -> None:
         if self.accuracy is not None and discretization.vertices is None:

@@ -32,7 +32,7 @@ from rodfem.problem.arguments import a, checked
 from rodfem.problem.jumps import unbroken
 from rodfem.problem.scene import Scene
 from rodfem.problem.smoothness import Rules, unresolved
-from rodfem.problem.validation import round_off_of_strains
+from rodfem.problem.validation import FLEXIBLE, round_off_of_strains
 from rodfem.ranks import end_together
 from rodfem.timing import Clock
 from rodfem.tolerances import SAME_PLACE, same_place
@@ -124,7 +124,8 @@ def traced(
         if unused := _not_used(discretization, plan):
             recorder.note(unused)
         if doubt := round_off_of_strains(scene):
-            recorder.warn(doubt)
+            recorder.warn(f"{doubt}: no error is estimated; {FLEXIBLE}.")
+            plan = replace(plan, error_bars=False)  # two meshes have that round-off alike: no bar would hold it
         if doubt := unbroken(scene, partial(_inside, scene, found.system, plan.accuracy is not None)):
             recorder.warn(doubt)
         if plan.accuracy is None or not scene.conservative:

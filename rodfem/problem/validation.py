@@ -33,6 +33,7 @@ LARGEST, TINIEST = 1e60, 1e-60
 """Lengths, widths of ranges and stiffnesses whose powers are floats."""
 EPS, FELT = float(np.finfo(float).eps), 1e-3
 """Round-off of a strain, and what of it is felt in bending, relative."""
+FLEXIBLE = "choose a kind of rod without the stiff strains"
 SOFTEST, STIFFEST = 1e-8, 1e-15
 """Least stiffness over the greatest one, of bending and twist, and of all strains with the rod's length as unit."""
 
@@ -295,7 +296,7 @@ def check_convexity(scene: Scene) -> None:
                 raise SceneError(
                     f"The stored energy is convex, but for round-off{where}: with the rod's length as unit its second "
                     f"derivative at the undeformed state has eigenvalues from {values[0]:.3g} to {values[-1]:.3g}; "
-                    "choose constants that are nearer to each other, or a kind of rod without the stiff strains."
+                    f"{FLEXIBLE}, or constants that are nearer to each other."
                 )
 
 
@@ -306,15 +307,12 @@ def in_lengths(stiffness: np.ndarray, scene: Scene) -> np.ndarray:
 
 
 def round_off_of_strains(scene: Scene) -> str:
-    """Sentence for a rod whose stiff strains have a round-off that is felt in bending, which no error bar holds."""
+    """How stiff the strains of a rod are whose round-off is felt in bending; empty for any other rod."""
     values = np.linalg.eigvalsh(in_lengths(scene.stiffness(), scene))
     ratio = values[-1] / values[0]
     if ratio * EPS < FELT:
         return ""
-    return (
-        f"Shear or stretch is {ratio:.0e} times as stiff as bending, and its round-off {ratio * EPS:.0e} of bending: "
-        "no error bar holds that; choose a kind of rod without the stiff strains."
-    )
+    return f"Shear or stretch is {ratio:.0e} times as stiff as bending, and its round-off {ratio * EPS:.0e} of bending"
 
 
 def is_definite(matrix: np.ndarray) -> bool:

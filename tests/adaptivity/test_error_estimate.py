@@ -26,6 +26,7 @@ from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, USER
+from rodfem.errors import InputError
 from rodfem.fem.newton import correct
 from rodfem.output.digits import number
 
@@ -258,6 +259,18 @@ def test_what_newtons_method_leaves_open_counts(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.alone
+def test_round_off_that_two_meshes_have_alike_has_no_bar() -> None:
+    """Haringx' column with stretch 2e13 times as stiff as bending: its load is right to 2e-10, which no bar told."""
+    scene = classics.shearable("flexible", 1e13, 2e13)
+    diagram = trace(scene, Discretization("reduced", 8, 6), Plan(depth=0))
+    (lost,) = (s for s in diagram[0].special if s.kind == BRANCH_POINT)
+    assert abs(lost.point.load - pi**2 / 4) < 1e-8
+    assert all(np.isnan(s.error_estimate) for s in diagram[0].special)
+    assert "2e+13 times as stiff as bending" in diagram.warnings[0] and "no error is estimated" in diagram.warnings[0]
+    with pytest.raises(InputError, match=r"2e\+13 times as stiff as bending.*no accuracy can be promised"):
+        trace(scene, plan=Plan(depth=0, accuracy=1e-6))
+
+
 def test_a_bar_is_no_less_than_the_location_and_a_law_of_another_kind_has_none() -> None:
     """Of Euler's column, whose mesh leaves no error, with a location that is said to be poor."""
     diagram = trace(classics.euler("pinned-pinned"), Discretization("reduced", 8, 8), Plan(span=(0.0, 12.0), depth=1))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hard.bifurcations import opposite_other
 from hemitropic_cases import explored
 from numpy.polynomial import chebyshev
 from numpy.polynomial.polynomial import polyfromroots
@@ -81,6 +82,13 @@ def test_a_fold_is_located_to_round_off() -> None:
     """The first nodes about it leave 5e-11: those nearer to it leave a fiftieth of that."""
     (fold,) = (s for branch in explored() for s in branch.special if s.kind == FOLD)
     assert fold.located_to < 5e-12
+
+
+@pytest.mark.parametrize("apart", [3e-4, 1e-4])
+def test_a_zero_beyond_a_row_is_none_of_the_step_to_it(apart: float) -> None:
+    """Two eigenvalues pass zero, one just before a row and one just after it: neither is taken for the other."""
+    found = opposite_other(apart)
+    assert found.right and not found.said, found
 
 
 @pytest.mark.parametrize("falling", [True, False])

@@ -69,11 +69,11 @@ BIFURCATIONS = (
     ),
     Case(
         "two eigenvalues that cross in opposite directions", "the index is 1 on either side, 0 between", SAID,
-        "d - P and d + P", "distance in load", bifurcations.opposite, (1e-4, 1e-6, 1e-8), POWERS[:8:2],
+        "d - P and d + P", "distance in load", bifurcations.opposite, (1e-4, 1e-6, 1e-8), POWERS[:8],
     ),
     Case(
         "the same, the index 2 between", "neither end of the step shows them", SAID,
-        "-d - P and P - d", "distance in load", bifurcations.opposite_other, (1e-4, 1e-8), POWERS[:8:2],
+        "-d - P and P - d", "distance in load", bifurcations.opposite_other, (1e-4, 1e-8), POWERS[:8],
     ),
     Case(
         "a transcritical point", "the load changes along the null vector", EXACT,
