@@ -161,8 +161,8 @@ class CompiledStep:
 
     def _sparse(self, sparse: Any, pattern: sp.csr_matrix, values: np.ndarray) -> None:
         sparse.rows = pattern.shape[0]
-        sparse.starts = self._array(pattern.indptr.astype(np.int32), "int")
-        sparse.indices = self._array(pattern.indices.astype(np.int32), "int")
+        sparse.starts = self._array(pattern.indptr.astype(np.int32, copy=False), "int")
+        sparse.indices = self._array(pattern.indices.astype(np.int32, copy=False), "int")
         sparse.values = self._array(values)
 
     def __call__(

@@ -33,9 +33,9 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
+from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine
 from rodfem.stability.bordered import Bordered
-from rodfem.stability.round_off import rounding
 from rodfem.tolerances import TINY
 
 DIFFERENCE = 1e-4

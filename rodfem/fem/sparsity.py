@@ -30,7 +30,7 @@ def bordered_pattern(fields: Fields) -> sp.csr_matrix:
         indptr = np.append(indptr, indptr[-1] + n * np.arange(1, size + 1))
         indices = np.append(indices, np.tile(np.arange(n, dtype=np.int32), size))
     shape = (fields.local_unknowns, n)
-    return sp.csr_matrix((np.ones(len(indices)), indices, indptr), shape=shape)
+    return sp.csr_matrix((np.ones(len(indices), dtype=np.int8), indices, indptr), shape=shape)
 
 
 def metric_pattern(fields: Fields) -> sp.csr_matrix:
@@ -41,7 +41,7 @@ def metric_pattern(fields: Fields) -> sp.csr_matrix:
     names = [name for name in (fields.turning.name, "r" if "r" in fields.dofs else "v") if name in fields.dofs]
     rows = sum(_own_rows(fields, [name]) for name in names)
     size = (fields.local_unknowns, fields.unknowns)
-    diagonal = sp.eye(*size, k=fields.offset, format="csr")
+    diagonal = sp.eye(*size, k=fields.offset, dtype=np.int8, format="csr")
     pattern = sp.csr_matrix((rows.data, rows.indices, np.pad(rows.indptr, (0, size[0] - rows.shape[0]), "edge")), size)
     pattern = (pattern + diagonal).tocsr()
     pattern.sort_indices()

@@ -45,7 +45,7 @@ typedef struct chain {
     int rest;                /* unknowns that an open chain leaves: delayed ones, then the border */
     Front *front;
     int *unknowns, *target;  /* of all fronts; places of the entries in their fronts, row and column in turn */
-    long *source;            /* places of the entries among the values of the matrix */
+    int *source;             /* places of the entries among the values of the matrix */
     int *starts, *indices, *places; /* pattern of the matrix, and places of its entries among the values given */
     double *scale, *work, *dense, *schur, *forward, *back;
     char *of_border;
@@ -57,14 +57,20 @@ typedef struct chain {
     double determinant, growth;
 } chain;
 
+static int resize(Pile *pile, size_t room)
+{
+    void *data = realloc(pile->data, room * pile->width);
+    if (!data) return 0;
+    pile->data = data;
+    pile->room = room;
+    return 1;
+}
+
 static void *room_for(Pile *pile, size_t more)
 {
     if (pile->used + more > pile->room) {
-        size_t room = 2 * (pile->used + more);
-        void *data = realloc(pile->data, room * pile->width);
-        if (!data) return NULL;
-        pile->data = data;
-        pile->room = room;
+        size_t used = pile->used + more;
+        if (!resize(pile, used + used / 4 + 16)) return NULL; /* the largest piles by far are kept: twice is too much */
     }
     void *at = (char *)pile->data + pile->used * pile->width;
     pile->used += more;
@@ -114,7 +120,7 @@ chain *chain_new(int n, const int *starts, const int *indices, const int *places
     int *active = malloc((n + 1) * sizeof(int)), *owner = malloc((n + 1) * sizeof(int));
     int *below = calloc(n + 2, sizeof(int)), *rows = malloc((starts[n] + 1) * sizeof(int)); /* the transposed pattern */
     int *entry = malloc((starts[n] + 1) * sizeof(int));
-    Pile unknowns = {NULL, 0, 0, sizeof(int)}, target = {NULL, 0, 0, 2 * sizeof(int)}, source = {NULL, 0, 0, sizeof(long)};
+    Pile unknowns = {NULL, 0, 0, sizeof(int)}, target = {NULL, 0, 0, 2 * sizeof(int)}, source = {NULL, 0, 0, sizeof(int)};
     if (!c || !seen || !active || !owner || !below || !rows || !entry) goto failed;
     c->n = n; c->symmetric = symmetric; c->open = open; c->largest = largest;
     c->border = n - begin[groups - 1];
@@ -171,6 +177,7 @@ chain *chain_new(int n, const int *starts, const int *indices, const int *places
     close_front(&c->front[c->fronts - 1], &unknowns, active, 0); /* all are fully summed */
     c->unknowns = unknowns.data;
     unknowns.data = NULL;
+    if (!resize(&source, starts[n] + 1) || !resize(&target, starts[n] + 1)) goto failed;
     int *list = c->unknowns;
     for (int i = 0; i < c->fronts; i++) { /* each entry belongs to the front that first has one of its unknowns */
         Front *f = &c->front[i];
@@ -186,7 +193,7 @@ chain *chain_new(int n, const int *starts, const int *indices, const int *places
                 int p = k, q = c->place[v];
                 if (symmetric && q > p && owner[v] == i) continue; /* once, by its row in the lower triangle */
                 if (symmetric && q > p) { int t = p; p = q; q = t; }
-                long *from = room_for(&source, 1);
+                int *from = room_for(&source, 1);
                 int *to = room_for(&target, 1);
                 if (!from || !to) goto failed;
                 *from = places[e]; to[0] = p; to[1] = q;
@@ -197,7 +204,7 @@ chain *chain_new(int n, const int *starts, const int *indices, const int *places
             for (int e = below[v]; e < below[v + 1]; e++) {
                 int u = rows[e];
                 if (owner[u] <= i) continue;
-                long *from = room_for(&source, 1);
+                int *from = room_for(&source, 1);
                 int *to = room_for(&target, 1);
                 if (!from || !to) goto failed;
                 *from = places[entry[e]]; to[0] = c->place[u]; to[1] = k;
@@ -205,6 +212,7 @@ chain *chain_new(int n, const int *starts, const int *indices, const int *places
         }
         f->entries = (long)source.used - f->first;
     }
+    if (!resize(&source, source.used + 1) || !resize(&target, target.used + 1)) goto failed; /* of symmetric ones half */
     c->source = source.data;
     c->target = target.data;
     free(seen); free(active); free(owner); free(below); free(rows); free(entry);

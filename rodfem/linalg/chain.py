@@ -60,7 +60,7 @@ def sequence(starts: np.ndarray, columns: np.ndarray, border: np.ndarray) -> tup
     inner = len(numbers)
     if not inner:
         return border, np.array([0, n])
-    rows = sp.csr_matrix((np.ones(len(columns)), columns, starts), shape=(n, n))[numbers]
+    rows = sp.csr_matrix((np.ones(len(columns), dtype=np.int8), columns, starts), shape=(n, n))[numbers]
     fields = rows[:, numbers]
     along = np.asarray(reverse_cuthill_mckee(fields, symmetric_mode=True), dtype=np.int64)
     along = _towards(sp.csc_matrix(rows[:, border]), along)
@@ -113,7 +113,7 @@ class Elimination:
         compiled = module("chain", DECLARATIONS)
         self.lib, self.ffi = compiled.lib, compiled.ffi
         self.rows, self.regular = len(starts) - 1, False
-        places = np.arange(len(indices)) if places is None else places
+        places = np.arange(len(indices), dtype=np.int32) if places is None else places
         pattern = [np.ascontiguousarray(x, dtype=np.int32) for x in (starts, indices, places, *order)]
         made = self.lib.chain_new(
             self.rows,

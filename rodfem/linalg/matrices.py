@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,8 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import _sparsetools
+
+EPS = float(np.finfo(float).eps)
 
 
 def first_of(comm: MPI.Comm, count: int) -> int:
@@ -51,6 +53,15 @@ def local_rows(matrix: PETSc.Mat) -> sp.csr_matrix:
     return sp.csr_matrix((values, columns, starts), shape=(len(starts) - 1, matrix.getSize()[1]))
 
 
+def rounding(matrix: PETSc.Mat, v: PETSc.Vec, x: PETSc.Vec) -> float:
+    """Change of ``v.Sx`` by independent relative errors eps of all entries of a ``matrix`` S."""
+    comm, known = matrix.comm.tompi4py(), shared(matrix)
+    rows = local_rows(matrix) if known is None else known.matrix
+    entries = sp.csr_matrix((abs(rows.data) ** 2, rows.indices, rows.indptr), shape=rows.shape)
+    squares = np.concatenate(comm.allgather(abs(x.array_r) ** 2))
+    return float(EPS * np.sqrt(comm.allreduce(float(abs(v.array_r) ** 2 @ times(entries, squares)))))
+
+
 def gathered(matrix: PETSc.Mat) -> sp.csr_matrix:
     """All of a matrix on every rank."""
     return sp.vstack(matrix.comm.tompi4py().allgather(local_rows(matrix))).tocsr()
@@ -72,7 +83,7 @@ class Shared:
 def shared_matrix(comm: MPI.Comm, pattern: sp.csr_matrix) -> PETSc.Mat:
     """Zero matrix on the one rank of ``comm`` with a ``pattern``, whose indices are sorted; see :func:`shared`."""
     values = np.zeros(pattern.nnz)
-    index = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
+    index = (x.astype(PETSc.IntType, copy=False) for x in (pattern.indptr, pattern.indices))
     matrix = PETSc.Mat().createAIJWithArrays(pattern.shape, (*index, values), comm=comm)
     matrix.setAttr("shared", Shared(values, pattern))
     return matrix
@@ -90,7 +101,7 @@ def places_in(pattern: sp.csr_matrix, other: sp.csr_matrix) -> np.ndarray:
         np.repeat(np.arange(x.shape[0]), np.diff(x.indptr)) * x.shape[1] + x.indices.astype(np.int64)
         for x in (pattern, other)
     ]
-    return np.asarray(np.searchsorted(*numbers))
+    return np.searchsorted(*numbers).astype(np.int32)
 
 
 STORED = """
@@ -118,8 +129,6 @@ class Entries:
     ----------
     starts, columns
         Pattern of the rows, with global columns in ascending order.
-    places
-        Places of these entries among :meth:`values`: those in columns of this rank's unknowns are stored first.
     number
         How many there are.
     """
@@ -127,11 +136,23 @@ class Entries:
     def __init__(self, matrix: PETSc.Mat) -> None:
         """Learn the pattern of ``matrix``."""
         self.matrix = matrix
-        self.starts, self.columns, _ = matrix.getValuesCSR()
-        begin, end = matrix.getOwnershipRangeColumn()
-        own = (self.columns >= begin) & (self.columns < end)
-        self._counts, self.number = [int(own.sum()), int((~own).sum())], len(own)
-        self.places = np.where(own, np.cumsum(own) - 1, self._counts[0] + np.cumsum(~own) - 1)
+        if (known := shared(matrix)) is not None:
+            self.starts, self.columns = known.pattern.indptr, known.pattern.indices
+        else:
+            self.starts, self.columns, _ = matrix.getValuesCSR()
+        self.number = len(self.columns)
+
+    @cached_property
+    def places(self) -> np.ndarray:
+        """Places of these entries among :meth:`values`: those in columns of this rank's unknowns are stored first."""
+        own = self._own
+        return np.where(own, np.cumsum(own) - 1, np.count_nonzero(own) + np.cumsum(~own) - 1)
+
+    @property
+    def _own(self) -> np.ndarray:
+        """Whether an entry is in a column of this rank's unknowns."""
+        begin, end = self.matrix.getOwnershipRangeColumn()
+        return np.asarray((self.columns >= begin) & (self.columns < end))
 
     def values(self) -> list[np.ndarray]:
         """Values now, in the arrays of PETSc: not to be kept."""
@@ -142,6 +163,12 @@ class Entries:
         blocks = ffi.new("void *[2]")
         lib.MatMPIAIJGetSeqAIJ(whole, blocks, blocks + 1, ffi.NULL)
         return [self._values(block, n) for block, n in zip(blocks, self._counts, strict=True)]
+
+    @cached_property
+    def _counts(self) -> tuple[int, int]:
+        """Number of entries in columns of this rank's unknowns, and in others."""
+        own = int(np.count_nonzero(self._own))
+        return own, self.number - own
 
     @staticmethod
     def _values(block: Any, number: int) -> np.ndarray:

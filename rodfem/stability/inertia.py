@@ -24,7 +24,7 @@ from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Factors, Sizes
-from rodfem.linalg.matrices import local_rows, places_in, shared
+from rodfem.linalg.matrices import local_rows, places_in, rounding, shared
 from rodfem.linalg.orthogonal import Basis, combine, generic, orthonormalize
 from rodfem.linalg.selection import factors_of
 from rodfem.tolerances import TINY
@@ -373,9 +373,4 @@ class Factored:
         First-order perturbation theory: entries ``S_ij`` that err by ``eps |S_ij|`` each, at random, move it by
         ``eps sqrt(sum (S_ij mode_i mode_j)^2)``; :data:`NOISE` times that is returned.
         """
-        first, columns, values = self.matrix.getValuesCSR()
-        comm = self._own().system.comm
-        every = np.concatenate(comm.allgather(mode.array_r.real))
-        rows = np.repeat(mode.array_r.real, np.diff(first))
-        squares = float(np.sum((values.real * rows * every[columns]) ** 2))
-        return float(NOISE * EPS * np.sqrt(comm.allreduce(squares)))
+        return NOISE * rounding(self.matrix, mode, mode)

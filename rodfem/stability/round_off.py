@@ -16,12 +16,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.linalg.matrices import local_rows
-from rodfem.stability.inertia import EPS, NULL, ZERO_BAND, Factored, Index
+from rodfem.linalg.matrices import rounding
+from rodfem.stability.inertia import NULL, ZERO_BAND, Factored, Index
 
 MANY = 100
 """Most eigenvalues in the band that are decided one by one."""
@@ -97,11 +96,3 @@ def resolve(found: Factored) -> tuple[int, int]:
 def quotient_error(matrix: PETSc.Mat, y: PETSc.Vec) -> float:
     """Ten times the change of ``y.Sy`` by independent relative errors eps of all entries of S."""
     return 10 * rounding(matrix, y, y)
-
-
-def rounding(matrix: PETSc.Mat, v: PETSc.Vec, x: PETSc.Vec) -> float:
-    """Change of ``v.Sx`` by independent relative errors eps of all entries of S."""
-    comm, rows = matrix.comm.tompi4py(), local_rows(matrix)
-    rows.data = abs(rows.data) ** 2
-    squares = np.concatenate(comm.allgather(abs(x.array_r) ** 2))
-    return float(EPS * np.sqrt(comm.allreduce(float(abs(v.array_r) ** 2 @ (rows @ squares)), op=MPI.SUM)))
