@@ -54,6 +54,18 @@ FAULTS = {
     "zeros-beyond-a-row": Fault(
         f"{CONTINUATION}special_points.py", "return outside > max(", "return outside > 1e9 + max(", LOCATE
     ),
+    "rows-beyond-a-meeting-are-kept": Fault(
+        "rodfem/diagram/tracer.py",
+        "                branch.cut(special.point.arclength)\n",
+        "                branch.points = [p for p in branch.points if p.arclength <= special.point.arclength]\n",
+        "tests/hard/test_fuzz.py",
+    ),
+    "first-states-without-forces": Fault(
+        f"{CONTINUATION}static_solver.py",
+        "self.at_load(self._balanced(guess), load)",
+        "self.at_load(guess, load)",
+        FOLLOW,
+    ),
     "bar-below-the-location": Fault(
         "rodfem/adaptivity/error_estimate.py", "max(load_error, special.located_to)", "load_error", ERRORS
     ),

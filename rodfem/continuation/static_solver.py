@@ -23,6 +23,8 @@ from rodfem.problem.units import Units
 
 STILL = 1e-6
 """Damping of Newton's method at a singular first state, over the lowest bending eigenvalue."""
+HOLDS = 1e6
+"""Damping that holds a state while the multipliers of its constraints are found, over the lowest bending eigenvalue."""
 STRAYED = 0.3
 """If Newton's method moves the initial guess farther than this (metric norm), the result is not accepted as the first
 state."""
@@ -89,6 +91,10 @@ class StaticSolver:
         """
         guess = self.start(load)
         x, outcome = self.at_load(guess, load)
+        if not (outcome.converged and self._turned(guess, x) < STRAYED):
+            near, found = self.at_load(self._balanced(guess), load)
+            if found.converged and self._turned(guess, near) < STRAYED:
+                x, outcome = near, found
         good = outcome.converged and (self._turned(guess, x) < STRAYED or self.is_stable(x))
         if good and not self.may_move(x):
             return x, outcome
@@ -101,6 +107,22 @@ class StaticSolver:
             return x, outcome
         other = self.downhill(load)
         return other if other[1].converged else (x, outcome)
+
+    def _balanced(self, x: PETSc.Vec) -> PETSc.Vec:
+        """The state ``x`` with the multipliers of its constraints that balance it best, a least-squares estimate.
+
+        One step of Newton's method with so much damping that nothing else moves.  Without the forces in it, rotations
+        of a free rod under dead loads cost nothing: Newton's method leaves even an equilibrium, in any direction.
+        """
+        system, out = self.system, x.copy()
+        equations, step = system.new_vector(), system.new_vector()
+        system.set_phase(x)
+        state = system.at(x)
+        state.residual(equations)
+        state.factor(self.axis, damping=HOLDS * system.stiffness_scale)
+        if system.solve(equations, step):
+            out.axpy(-1.0, step)
+        return out
 
     def _turned(self, guess: PETSc.Vec, x: PETSc.Vec) -> float:
         """Distance of two states without that of their strains, in the metric: a straight rod may stretch far."""

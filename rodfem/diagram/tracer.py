@@ -195,14 +195,14 @@ class Tracer:
             self._check_invariants(item)
             self.control.row(item, self.solver)
             self.zeros.check(self.solver, history, item, self.specials.level)
-            if item.stretch <= 0:
-                self._end_at_zero_stretch(branch, previous, item)
-                return
-            if self.solver.convexity is not None and not self.solver.convexity.holds(item.x):
+            if item.stretch > 0 and self.solver.convexity is not None and not self.solver.convexity.holds(item.x):
                 why = f"the stored energy is not convex any more at {self.scene.load} = {item.load:.6g}"
                 branch.ended = self._rest(branch) or why
                 return
             try:
+                if item.stretch <= 0:
+                    self._end_at_zero_stretch(branch, previous, item)
+                    return
                 reason = self._between(branch, previous, item, self._own(branch, history[-4:]), closed=bool(last))
             except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
                 branch.cut(self.specials.settled)
@@ -264,17 +264,18 @@ class Tracer:
                 reason = meeting(branch, special, self.branches, self.alike, self.scene.load)
             branch.insert(special)
             self.observer.special(branch, special)
-            if reason:  # it ends before a row that was taken for one of it
-                branch.points = [p for p in branch.points if p.arclength <= special.point.arclength]
+            if reason:  # it ends before rows, and loads asked for, that were taken for some of it
+                branch.cut(special.point.arclength)
                 return reason
         return ""
 
     def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> None:
         """Add the last admissible point, where the smallest stretch vanishes, and say so."""
-        branch.ended = "stretch reaches zero"
         last = last_admissible(self.solver, a, b)
-        if self._between(branch, a, last):
+        if reason := self._between(branch, a, last):
+            branch.ended = reason
             return
+        branch.ended = "stretch reaches zero"
         end = end_at_zero_stretch(self.solver, last, error_bars=self.plan.error_bars)
         if not isnan(end.error_estimate):
             self.control.check(end)

@@ -10,6 +10,7 @@ import closed_form_hemitropic
 import numpy as np
 import pytest
 import reference_values
+from hard.published import pressed
 from hemitropic_cases import DEFAULT, explored, follower, specials, user_points
 from numpy.polynomial.legendre import leggauss
 
@@ -183,6 +184,21 @@ def _rows(branch: Branch) -> list[Point]:
     """Points of a branch without its special points."""
     special = {id(s.point) for s in branch.special if s.kind == "branch point"}
     return [p for p in branch.points if id(p) not in special]
+
+
+@pytest.mark.parametrize("factors", ["chain", "petsc"])
+@pytest.mark.parametrize("mesh", [(4, 3), (6, 3), (8, 4), (14, 6)])
+def test_an_equilibrium_is_a_first_state_that_stays(mesh: tuple[int, int], factors: str) -> None:
+    """A circle pressed by forces of fixed direction is unstable; turned by pi, which round-off decided, it is not."""
+    discretization = Discretization("pointwise", *mesh, factors=factors)
+    for load in (0.2, 1.0):
+        solver = rodfem.Solver(pressed("dead", (load, 5.0)), discretization).equilibria
+        x, outcome = solver.first(load)
+        assert outcome.converged
+        assert solver.inertia.at(x).count().negative == 1
+        r = solver.shape.sample(x)["r"]
+        assert np.hypot(r[:, 0] - 1, r[:, 2]) == pytest.approx(1, abs=0.01)
+        assert r[len(r) // 2] == pytest.approx((2, 0, 0), abs=0.01)
 
 
 @pytest.mark.alone

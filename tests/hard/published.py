@@ -73,14 +73,17 @@ RINGS: dict[str, tuple[dict[str, Any], Any, int]] = {
 """Load, its critical values for n waves, and the index of the circle at small loads (under a dead load it turns)."""
 
 
+def pressed(kind: str, span: tuple[float, float]) -> Scene:
+    """A circle of radius and bending stiffness one in its plane."""
+    return column("ring", Ring(), span, start=classics.circle, planar="e2", constants={"P": span[0], "B2": 1.0},
+                  **classics.ROUND, **RINGS[kind][0])  # fmt: skip
+
+
 def ring(kind: str) -> Measured:
     """Modes 2 to 5 of a circle in its plane, two of each."""
-    load, critical, index = RINGS[kind]
+    _, critical, index = RINGS[kind]
     expected = [Change(critical(n), index + 2 * (n - 2), index + 2 * (n - 1)) for n in (2, 3, 4, 5)]
-    span = (0.3, expected[-1].load + 1.0)
-    scene = column("ring", Ring(), span, start=classics.circle, planar="e2", constants={"P": span[0], "B2": 1.0},
-                   **classics.ROUND, **load)  # fmt: skip
-    diagram = run(scene, Discretization("pointwise", 16, 6))
+    diagram = run(pressed(kind, (0.3, expected[-1].load + 1.0)), Discretization("pointwise", 16, 6))
     return compare(singular(diagram[0]), expected, said(diagram))
 
 

@@ -64,6 +64,16 @@ def test_the_way_down_leaves_a_saddle() -> None:
     assert [point.negative for point in found] == [0, 0]
 
 
+@pytest.mark.parametrize(("number", "ended"), [(177, "stretch reaches zero"), (400, "meets branch 1")])
+def test_how_branches_end(number: int, ended: str) -> None:
+    """A gap in the last step before the stretch vanishes; a branch found to meet another before loads asked for."""
+    rod = scene(15, number)
+    diagram = trace(rod, comparison.meshes(rod, number)[0], comparison.plans(rod, 1)[0])
+    assert any(branch.ended.startswith(ended) for branch in diagram)
+    for branch in diagram:
+        assert all(branch.points[s.row] is s.point for s in branch.special)
+
+
 def test_forces_of_a_taut_rod_are_not_determined() -> None:
     """Its ends are as far apart as it is long: by round-off some meshes converge to a force of 1e9, others refuse."""
     taut, plan = scene(11, 221), Plan(depth=0, steps=StepControl(most=3), error_bars=False)
