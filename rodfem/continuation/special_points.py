@@ -113,9 +113,8 @@ def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> f
     derivative = matrix * solver.axis
     system.set_load(derivative, 0.0)
     derivative, null_vector = system.in_units(derivative, 1), system.in_units(null_vector, -1)
-    if (
-        derivative.norm() < INSENSITIVE * system.matrix_in_units(matrix).norm()
-    ):  # a trivial state: its equations do not feel the load
+    # by a load of natural size; of a trivial state the equations do not feel it
+    if derivative.norm() * solver.units.load < INSENSITIVE * system.matrix_in_units(matrix).norm():
         return 0.0
     return float(abs(derivative.dot(null_vector)) / (derivative.norm() * null_vector.norm()))
 

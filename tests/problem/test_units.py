@@ -15,6 +15,7 @@ from rescaled import differences, rescaled
 import rodfem
 from forms.energy import bending_and_twist
 from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free
+from rodfem.continuation.special_points import coupling_of
 from rodfem.output import digits
 from rodfem.problem.local_state import Constants
 
@@ -68,6 +69,25 @@ def test_dimensionless_diagram(length: float, stiffness: float, rod: str) -> Non
         assert [p.negative for p in a.points] == [p.negative for p in b.points]
         found = np.array([(s.point.load / load, s.point.ordinate / area) for s in b.special])
         np.testing.assert_allclose(found, [(s.point.load, s.point.ordinate) for s in a.special], rtol=1e-9, atol=1e-10)
+
+
+def aside(length: float, stiffness: float) -> Scene:
+    """The flexible column with a tenth of its natural load aside: it bends from the first load on."""
+    lateral = 0.1 * stiffness / length**2
+    return replace(column(length, stiffness, "flexible"), ends=(clamped(), free(force=lambda c: (0.0, lateral, -c.P))))
+
+
+@pytest.mark.parametrize("units", [(1.0, 1e6), (1e-3, 1.0), (1e4, 1e9), DNA[:2]])
+def test_coupling_to_the_load(units: tuple[float, float]) -> None:
+    """Cosine between a mode and the derivative in the load, which tells folds from branch points."""
+    found = []
+    for length, stiffness in ((1.0, 1.0), units):
+        solver = rodfem.Solver(aside(length, stiffness), MESH)
+        x = solver.equilibrium(2.0 * stiffness / length**2).x
+        (mode,) = solver.equilibria.inertia.modes_near_zero(x, 1)
+        found.append(coupling_of(solver.equilibria, x, mode))
+    assert found[0] > 1e-3
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
 def pushed(length: float, stiffness: float, mass: float) -> Scene:
