@@ -1,6 +1,6 @@
 """Scenes stated in other units of length and force; ``python -m tests.rescaled`` compares all recorded scenes.
 
-Parameters, the load among them, keep their values: what they stand for is converted where a scene uses it.
+Parameters keep their values: what they stand for is converted where a scene uses it.  The load has a unit of its own.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ import rodfem
 from rodfem.problem.roles import Role, changes
 from rodfem.problem.scene import Scene
 
-DNA = 1e-8, 1e-12
-"""Metres and newtons of one unit of length and force."""
+DNA = 1e-8, 1e-12, 1.0
+STEEL = 0.1, 1e5, 1e7
+"""Metres and newtons of one unit of length and force, and what of the load is one of the scene's own unit."""
 
 
 class InUnits:
@@ -35,11 +36,11 @@ class InUnits:
         return value * self.factors[name] if name in self.factors else value
 
 
-def rescaled(scene: Scene, length: float, force: float) -> Scene:
-    """The same rod in units of which ``length`` and ``force`` make one of the scene's own; masses keep theirs."""
+def rescaled(scene: Scene, length: float, force: float, load: float = 1.0) -> Scene:
+    """The same rod in units; ``length``, ``force`` and ``load`` are one of the scene's own in these; masses keep theirs."""
 
     def constants(c: Any) -> InUnits:
-        return InUnits(c, {"s": 1 / length})
+        return InUnits(c, {"s": 1 / length, scene.load: 1 / load})
 
     def place(x: Any) -> InUnits:
         return InUnits(x, {"s": 1 / length, "length": 1 / length, "r": 1 / length, "k": length})
@@ -85,12 +86,18 @@ def rescaled(scene: Scene, length: float, force: float) -> Scene:
     if not scene.has_inertia:
         new["inertia"] = rodfem.Inertia(rho_I=lambda c: (length**2,) * 3)
     a, b = (s * length for s in scene.interval)
-    return replace(scene, interval=(a, b), breaks=tuple(s * length for s in scene.breaks), **new)
+    first = scene.parameters[scene.load]
+    low, high = (x * load for x in first.admissible)
+    new["parameters"] = scene.parameters | {
+        scene.load: replace(first, value=first.value * load, admissible=(low, high))
+    }
+    span = scene.span[0] * load, scene.span[1] * load
+    return replace(scene, interval=(a, b), span=span, breaks=tuple(s * length for s in scene.breaks), **new)
 
 
-def differences(scene: Scene, length: float, force: float) -> list[str]:
+def differences(scene: Scene, length: float, force: float, load: float = 1.0) -> list[str]:
     """What differs between the diagrams of a scene in its own and in other units, in words."""
-    one, other = (golden_cases.trace(s, error_bars=False) for s in (scene, rescaled(scene, length, force)))
+    one, other = (golden_cases.trace(s, error_bars=False) for s in (scene, rescaled(scene, length, force, load)))
     out = [f"warning: {sentence}" for sentence in other.warnings if sentence not in one.warnings]
     if [b.name for b in one] != [b.name for b in other]:
         out.append(f"branches {[b.name for b in one]} and {[b.name for b in other]}")
@@ -103,8 +110,8 @@ def differences(scene: Scene, length: float, force: float) -> list[str]:
             out.append(f"{a.name}: special points {kinds[0]} and {kinds[1]}")
             continue
         for s, t in zip(a.special, b.special, strict=True):
-            if abs(s.point.load - t.point.load) > 1e-9 * max(1.0, abs(s.point.load)):
-                out.append(f"{a.name}: {s.kind} at {s.point.load:.12g} and {t.point.load:.12g}")
+            if abs(s.point.load - t.point.load / load) > 1e-9 * max(1.0, abs(s.point.load)):
+                out.append(f"{a.name}: {s.kind} at {s.point.load:.12g} and {t.point.load / load:.12g}")
     return out
 
 
@@ -112,7 +119,12 @@ def main() -> None:
     """Compare all recorded scenes, or those whose names hold a word given."""
     for name, make in golden_cases.cases().items():
         if not sys.argv[1:] or any(word in name for word in sys.argv[1:]):
-            print(name, "; ".join(differences(make(), *DNA)) or "the same", flush=True)
+            print(
+                name,
+                *("; ".join(differences(make(), *units)) or "the same" for units in (DNA, STEEL)),
+                sep=" | ",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

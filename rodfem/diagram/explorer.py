@@ -87,10 +87,13 @@ class Explorer(Tracer):
         return any(apart < SAME for apart, _ in known.nearest(point.x))
 
     def _detached(self, gap: Gap, depth: int) -> None:
-        """Trace the branch on the other side of a gap, which no step from this side reaches."""
+        """Trace the branch on the other side of a gap, which no step from this side reaches.
+
+        A state that is squeezed to nothing, or through it, is none of a rod.
+        """
         self.use(gap.point.mesh)
         for point in arms(self.solver, gap):
-            if self.low < point.load < self.high and not self._on_branch(point):
+            if self.low < point.load < self.high and point.stretch > 0 and not self._on_branch(point):
                 number = 1 + sum(b.name.startswith("detached") for b in self.branches)
                 self.trace_whole(point, f"detached {number}", depth)
 

@@ -10,7 +10,7 @@ import hemitropic_cases
 import numpy as np
 import pytest
 from rescaled import DNA as METRES_AND_NEWTONS
-from rescaled import differences, rescaled
+from rescaled import STEEL, differences, rescaled
 
 import rodfem
 from forms.energy import bending_and_twist
@@ -176,3 +176,10 @@ def test_recorded_scenes(name: str) -> None:
     What mixes units takes a fold for a branch point, loses symmetries, and finds others that are none.
     """
     assert not differences(golden_cases.cases()[name](), *METRES_AND_NEWTONS)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("name", ["classic haringx", "classic bow", "classic Beck"])
+def test_loads_have_units_too(name: str) -> None:
+    """Loads of 1e7 newtons on a bar of steel."""
+    assert not differences(golden_cases.cases()[name](), *STEEL)
