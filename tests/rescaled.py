@@ -37,7 +37,7 @@ class InUnits:
 
 
 def rescaled(scene: Scene, length: float, force: float, load: float = 1.0) -> Scene:
-    """The same rod in units; ``length``, ``force`` and ``load`` are one of the scene's own in these; masses keep theirs."""
+    """The same rod where one ``length``, ``force`` and ``load`` of the scene are so many units; masses keep theirs."""
 
     def constants(c: Any) -> InUnits:
         return InUnits(c, {"s": 1 / length, scene.load: 1 / load})

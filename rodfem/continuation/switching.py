@@ -174,6 +174,7 @@ def start_branch(
     The second is nearer where the load has turned back before it, or its index is not that with which the branch
     begins: the fold, or the branch point, that says why is on the branch.  So it is where its load is out of bounds.
     Nor is it farther away than the branch that it leaves began: beside a nearly double point branches are short.
+    Eigenvalues that stay zero on the trunk without a symmetry need not on the branch: its index is not known then.
     ``name``, ``parent`` and ``depth`` are recorded in the branch; ``solver`` has the mesh, and ``bounds`` are the least
     and the greatest load.
     """
@@ -186,12 +187,19 @@ def start_branch(
     if fold is not None and (beyond := leave(solver, special, direction, NEAREST)) is not None:
         return _through(special, fold, Branch(name, parent, depth, [origin, beyond]))
     side = _side(solver, special, direction)
-    while amplitude > NEAREST and (not bounds[0] <= first.load <= bounds[1] or _changed(special, side, ways, first)):
+    still = special.point.zero - special.multiplicity - solver.system.active_drifts(special.point.x)
+
+    def known(load: float) -> int | None:
+        return None if still else index_beside(special, load, ways)
+
+    while amplitude > NEAREST and (
+        not bounds[0] <= first.load <= bounds[1] or _changed(special, side, known(first.load), first)
+    ):
         amplitude /= 4
         first = leave(solver, special, direction, amplitude) or first
     span = solver.system.scene.span
     vertical = abs(first.slope) < VERTICAL * abs(span[1] - span[0])  # the load changes by round-off
-    begins = None if vertical else index_beside(special, first.load, ways)
+    begins = None if vertical else known(first.load)
     return Branch(name, parent, depth, [origin, first], begins=begins)
 
 
@@ -266,9 +274,8 @@ def fold_beside(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Ve
     return fold
 
 
-def _changed(special: SpecialPoint, side: float, ways: int, first: Point) -> bool:
+def _changed(special: SpecialPoint, side: float, begins: int | None, first: Point) -> bool:
     """Whether the load has turned back before the point ``first`` of a branch, or its index is another one there."""
-    begins = index_beside(special, first.load, ways)
     if special.law is not None and special.law.kind == "vertical branch":
         return False
     if begins is not None and not first.negative <= begins <= first.negative + first.zero:

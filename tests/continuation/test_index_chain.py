@@ -8,6 +8,7 @@ from math import cos, pi, sin, sqrt
 from typing import Any
 
 import demo_cases
+import golden_cases
 import hemitropic_cases
 import numpy as np
 import pytest
@@ -370,3 +371,12 @@ def test_the_last_step_to_a_bound_goes_the_way_of_the_prediction() -> None:
     assert _to_load(solver, [last], last.load + 0.02, last.load + 0.01, 0.02, 1e-5) is not None
     wrong = replace(last, tangent=aside)
     assert _to_load(solver, [wrong], last.load + 0.02, last.load + 0.01, 0.02, 1e-5) is None
+
+
+def test_what_is_free_on_the_trunk_alone_leaves_the_index_of_a_branch_open() -> None:
+    """A straight rod between planes turns freely about its axis, a bent one does not: no change of index is missing."""
+    diagram = golden_cases.trace(golden_cases.cases()["classic turning in a plane"](), error_bars=False)
+    branch = next(b for b in diagram if b.parent)
+    assert {p.zero for p in diagram[0].points if p.load < 15} == {1}
+    assert (branch.points[1].negative, branch.points[1].zero) == (1, 0)
+    assert not any(b.unexplained for b in diagram)
