@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hard.bifurcations import opposite_other
+from hard.bifurcations import folds, opposite_other
 from hemitropic_cases import explored
 from numpy.polynomial import chebyshev
 from numpy.polynomial.polynomial import polyfromroots
 
-from rodfem.continuation import locate
+from rodfem.continuation import locate, special_points
 from rodfem.continuation.flutter import locate_flutter
 from rodfem.continuation.interpolant import NODES, in_doubt, left_out, real_root
 from rodfem.continuation.kinds import FOLD
@@ -82,6 +82,13 @@ def test_a_fold_is_located_to_round_off() -> None:
     """The first nodes about it leave 5e-11: those nearer to it leave a fiftieth of that."""
     (fold,) = (s for branch in explored() for s in branch.special if s.kind == FOLD)
     assert fold.located_to < 5e-12
+
+
+def test_a_fold_that_does_not_feel_the_load_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the slope and by its eigenvalue it is the same point, and there is no other."""
+    monkeypatch.setattr(special_points, "coupling_of", lambda *given: 0.0)
+    found = folds(1e-2)
+    assert found.right and not found.said, found
 
 
 @pytest.mark.parametrize("apart", [3e-4, 1e-4])
