@@ -66,6 +66,21 @@ FAULTS = {
         "self.at_load(guess, load)",
         FOLLOW,
     ),
+    "loads-felt-by-their-unit": Fault(
+        f"{CONTINUATION}special_points.py",
+        "derivative.norm() * solver.units.load <",
+        "derivative.norm() <",
+        "tests/problem/test_units.py",
+    ),
+    "what-is-free-on-the-trunk-stays-free": Fault(
+        f"{CONTINUATION}switching.py", "return None if still else index_beside(", "return index_beside(", CHAIN
+    ),
+    "folds-that-are-not-felt-are-lost": Fault(
+        f"{CONTINUATION}special_points.py", "and changed and _explains(known, rest[0])", "and not changed", LOCATE
+    ),
+    "detached-through-nothing": Fault(
+        "rodfem/diagram/explorer.py", "and point.stretch > 0 and not", "and not", "tests/hard/test_fuzz.py"
+    ),
     "bar-below-the-location": Fault(
         "rodfem/adaptivity/error_estimate.py", "max(load_error, special.located_to)", "load_error", ERRORS
     ),
@@ -134,7 +149,10 @@ FAULTS = {
         HARD,
     ),
     "crossing-at-a-fold-counts-twice": Fault(
-        f"{CONTINUATION}special_points.py", "if not own <= order < own +", "if own <= order < own +", f"{CORD} {GOLDEN}"
+        f"{CONTINUATION}special_points.py",
+        "if not _explains(found[0], order)]",
+        "if _explains(found[0], order)]",
+        f"{CORD} {GOLDEN}",
     ),
     "two-points-are-one": Fault(
         f"{CONTINUATION}special_points.py",
