@@ -13,6 +13,7 @@ from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent, between, p
 from rodfem.codim2.singular import Destroyed
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
+from rodfem.fem.convexity import Convexity
 from rodfem.roots import zero_between
 
 LOCATED = 1e-8
@@ -65,6 +66,9 @@ class Tracer:
     def __init__(self, criterion: Criterion, plane: Plane, steps: StepControl) -> None:
         """Steps are relative to the bounds of the plane."""
         self.criterion, self.plane, self.steps = criterion, plane, steps
+        scene = plane.system.scene
+        varies = not scene.is_quadratic() or scene.energy_depends_on("s", *plane.names)
+        self.convexity = Convexity(plane.system) if varies else None
 
     def run(self, start: LocusPoint) -> Half:
         """Follow to an end."""
@@ -87,7 +91,7 @@ class Tracer:
                     half.ended = f"no convergence with steps of {self.steps.smallest:g}: {trouble}"
                     return half
                 continue
-            half.ended = self._between(half, last, node)
+            half.ended = self._lost_convexity(node) or self._between(half, last, node)
             if half.ended:
                 return half
             half.nodes.append(node)
@@ -103,6 +107,20 @@ class Tracer:
             step = self.steps.after(step, moved, order)
         half.ended = f"{self.steps.most} points reached"
         return half
+
+    def _lost_convexity(self, node: LocusPoint) -> str:
+        """Why a curve ends before a node at which the stored energy is not convex any more; empty where it is."""
+        if self.convexity is None:
+            return ""
+        system = self.plane.system
+        with self.plane.kept():
+            system.line = self.plane.along(node.p, 0)
+            x = node.x.copy()
+            system.set_load(x, float(node.p[0]))
+            if self.convexity.holds(x):
+                return ""
+        where = ", ".join(f"{name} = {v:.8g}" for name, v in zip(self.plane.names, node.p, strict=True))
+        return f"the stored energy is not convex any more near {where}"
 
     def _next(self, history: list[LocusPoint], step: float) -> tuple[LocusPoint, float, str]:
         """Next node, how far it is from its prediction, and the bound that it is on; ConvergenceError to retry."""

@@ -15,7 +15,6 @@ from rodfem.continuation.corrector import SAME, STEPS, Corrector
 from rodfem.continuation.prediction import across_orbit, predict
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
-from rodfem.fem.convexity import Convexity
 from rodfem.fem.newton import TOLERANCE, NewtonResult, correct, limits
 from rodfem.fem.state import Energies
 from rodfem.fem.system import System
@@ -74,12 +73,6 @@ class BranchSolver(StaticSolver):
         self._whole = None if compiled is None else CompiledStep(compiled)
         self.modes = spectrum
         self.spectrum = SymmetricSolver(self.inertia) if spectrum else None
-
-    @cached_property
-    def convexity(self) -> Convexity | None:
-        """Convexity of the stored energy, where it varies along a branch."""
-        scene = self.system.scene
-        return Convexity(self.system) if not scene.is_quadratic() or scene.depends_on_s() else None
 
     @cached_property
     def space(self) -> InSpace | None:

@@ -11,6 +11,8 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import Kind
+from rodfem.errors import SceneError
+from rodfem.fem.convexity import Convexity
 from rodfem.fem.fields import LOAD
 from rodfem.fem.newton import NewtonResult, correct, relax
 from rodfem.fem.resultants import Resultants
@@ -62,6 +64,27 @@ class StaticSolver:
     def resultants(self) -> Resultants:
         """Strains, contact forces and moments of the states, compiled when they are first asked for."""
         return Resultants(self.shape)
+
+    @cached_property
+    def convexity(self) -> Convexity | None:
+        """Convexity of the stored energy, where it varies: from state to state, along the rod, or with the load."""
+        scene = self.system.scene
+        varies = not scene.is_quadratic() or scene.energy_depends_on("s", scene.load)
+        return Convexity(self.system) if varies else None
+
+    def lost_convexity(self, x: PETSc.Vec) -> str:
+        """Why a branch ends at the state ``x``, where the stored energy is not convex any more; empty where it is."""
+        if self.convexity is None or self.convexity.holds(x):
+            return ""
+        return f"the stored energy is not convex any more at {self.system.scene.load} = {self.system.scalar(x):.6g}"
+
+    def require_convexity(self, x: PETSc.Vec) -> None:
+        """Raise :class:`SceneError` for a state ``x`` to begin with along which the stored energy is not convex."""
+        if self.lost_convexity(x):
+            raise SceneError(
+                f"The stored energy is not convex somewhere along the state at {self.system.scene.load} = "
+                f"{self.system.scalar(x):g}: choose constants that make it so, or another load."
+            )
 
     @property
     def units(self) -> Units:

@@ -153,11 +153,7 @@ class Explorer(Tracer):
                 "load, give the scene a start nearer to one, or see whether constraints repeat each other or what an "
                 "end holds."
             )
-        if solver.convexity is not None and not solver.convexity.holds(x):
-            raise SceneError(
-                f"The stored energy is not convex somewhere along the first state, at {self.scene.load} = {start:g}: "
-                "choose constants that make it so."
-            )
+        solver.require_convexity(x)
         point = solver.point(x, 0.0, solver.load_tangent(x, stop > start), outcome)
         self._check_arithmetic()
         self._check_forces(point)

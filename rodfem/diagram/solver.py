@@ -196,8 +196,8 @@ class Solver:
             scene's own start is taken, as for the first state of a diagram.
 
         Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, or whose index the mesh cannot
-        hold, :class:`~rodfem.errors.SceneError` where constraints of the scene follow from others, and
-        :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found.
+        hold, :class:`~rodfem.errors.SceneError` where constraints of the scene follow from others or the stored energy
+        is not convex, and :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found.
         """
         scene, found = self.scene, self.equilibria
         scene.parameters[scene.load].check(scene.load, load)
@@ -210,6 +210,7 @@ class Solver:
                 f"No equilibrium was found at {scene.load} = {load:g}: go there in steps of the load, each from the "
                 "state before."
             )
+        found.require_convexity(x)
         if scene.constraints and not self._independent:
             require_independent_constraints(found.system, x, found.start(load))
             self._independent = True

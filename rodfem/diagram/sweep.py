@@ -68,8 +68,7 @@ class Sweep:
         self.branches.append(branch)
         try:
             with as_failure(comm):
-                self._sweep(branch)
-            branch.ended = "end of range"
+                branch.ended = self._sweep(branch) or "end of range"
         except ConvergenceError as trouble:
             if not branch.points:
                 raise
@@ -87,8 +86,8 @@ class Sweep:
         self.finished()
         return self.branches
 
-    def _sweep(self, branch: Branch) -> None:
-        """Compute the points of a branch, load by load, and the special points between them."""
+    def _sweep(self, branch: Branch) -> str:
+        """Compute the points of a branch, load by load, and the special points between them; why it ends early."""
         a, b = self.span
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
         loads = loads if a < b else loads[::-1]
@@ -98,6 +97,7 @@ class Sweep:
         if self.solver.system.scene.constraints:  # others are independent
             require_independent_constraints(self.solver.system, x)
         x = at_load(self.solver, x, float(loads[0]))
+        self.solver.require_convexity(x)
         if words := self.rows.first(x):
             self.observer.warn(
                 f"The eigenvalues omega^2 of the first state are not well defined ({words}): do not trust any of this "
@@ -107,12 +107,16 @@ class Sweep:
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         try:
             for load in loads.tolist():
-                self.latest = [*self.latest[1 - ROWS :], self._point(self._next(load, x))]
+                state = self._next(load, x)
+                if why := self.solver.lost_convexity(state):
+                    return why
+                self.latest = [*self.latest[1 - ROWS :], self._point(state)]
                 for notice in self.solver.notices():
                     self.observer.warn(notice)
                 self._take(branch, self.rows.add(self.latest[-1]))
         finally:  # also where there is no equilibrium, or at an interrupt: nothing that has been computed is lost
             self._take(branch, self.rows.finish())
+        return ""
 
     def _next(self, load: float, first: PETSc.Vec) -> PETSc.Vec:
         """Equilibrium at the next ``load``, predicted by the last ones; the ``first`` one where there are none."""

@@ -195,8 +195,7 @@ class Tracer:
             self._check_invariants(item)
             self.control.row(item, self.solver)
             self.zeros.check(self.solver, history, item, self.specials.level)
-            if item.stretch > 0 and self.solver.convexity is not None and not self.solver.convexity.holds(item.x):
-                why = f"the stored energy is not convex any more at {self.scene.load} = {item.load:.6g}"
+            if item.stretch > 0 and (why := self.solver.lost_convexity(item.x)):
                 branch.ended = self._rest(branch) or why
                 return
             try:

@@ -409,9 +409,13 @@ class Scene(Contribution):
 
     def depends_on_s(self) -> bool:
         """Whether the stored energy is a function of the arclength too."""
+        return self.energy_depends_on("s")
+
+    def energy_depends_on(self, *names: str) -> bool:
+        """Whether the stored energy is a function of one of the parameters ``names``, or of the arclength ``s``."""
         c, asked = watched(self.constants())
         self.energy_at(np.zeros(3), np.zeros(3), c)
-        return "s" in asked
+        return bool(asked & set(names))
 
     def energy_at(self, v: np.ndarray, k: np.ndarray, c: Constants) -> float:
         """Stored energy per length where the strains (3,) differ by ``v`` and ``k`` from the undeformed ones."""
