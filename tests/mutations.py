@@ -81,6 +81,18 @@ FAULTS = {
     "detached-through-nothing": Fault(
         "rodfem/diagram/explorer.py", "and point.stretch > 0 and not", "and not", "tests/hard/test_fuzz.py"
     ),
+    "eigenvalues-beside-the-edge-of-the-band": Fault(
+        f"{STABILITY}round_off.py",
+        "if inertia.tolerance > WIDE * inertia.scale:",
+        "if False:",
+        "tests/stability/test_round_off.py",
+    ),
+    "stiffness-that-the-load-takes-away": Fault(
+        f"{CONTINUATION}static_solver.py",
+        'scene.energy_depends_on("s", scene.load)',
+        "scene.depends_on_s()",
+        "tests/continuation/test_convexity.py",
+    ),
     "bar-below-the-location": Fault(
         "rodfem/adaptivity/error_estimate.py", "max(load_error, special.located_to)", "load_error", ERRORS
     ),

@@ -24,6 +24,10 @@ from rodfem.stability.inertia import NULL, ZERO_BAND, Factored, Index
 
 MANY = 100
 """Most eigenvalues in the band that are decided one by one."""
+WIDE = 0.1
+"""Half width of the band, over the lowest bending eigenvalue, above which its edge is far from zero."""
+DECIDED = 1e-3
+"""Relative accuracy of eigenvalues that decide a sign."""
 SPARE = 2
 """Vectors more than there are eigenvalues in the band."""
 
@@ -66,14 +70,33 @@ def decide(found: Factored) -> Decision:
             f"{inside} eigenvalues are within round-off of the count, {inertia.resolution:.2g} in the metric: the mesh "
             "is too fine for this rod; use fewer elements of a higher degree."
         )
-    theta, vectors = found.nearest(inside + SPARE)
-    nearest = np.argsort(abs(theta))[:inside]
-    doubt = np.array([max(quotient_error(found.matrix, vectors[i]), least) for i in nearest])
-    theta = np.array([vectors[i].dot(found.matrix * vectors[i]) for i in nearest]) + found.shift
+    theta, vectors = _inside(found, inside)
+    doubt = np.array([max(quotient_error(found.matrix, v), least) for v in vectors])
     negative = int((theta < -doubt).sum())
     zero = int((abs(theta) <= doubt).sum())
     index = replace(index, negative=index.negative + negative, zero=zero + known)
     return Decision(index, inertia.tolerance, theta, doubt)
+
+
+def _inside(found: Factored, number: int, accuracy: float = DECIDED) -> tuple[np.ndarray, list[PETSc.Vec]]:
+    """Rayleigh quotients and vectors of the ``number`` eigenvalues inside the band of the count, which were counted.
+
+    Its factors, at the edge of the band, lead to the eigenvalues next to that edge: where the band is as wide as the
+    lowest bending eigenvalue, factors next to zero replace them.  Raises :class:`ConvergenceError` where others are
+    found than were counted.
+    """
+    inertia = found.inertia
+    if inertia.tolerance > WIDE * inertia.scale:
+        found.below(ZERO_BAND * inertia.scale)
+    theta, vectors = found.nearest(number + SPARE, accuracy)
+    vectors = [vectors[i] for i in np.argsort(abs(theta))[:number]]
+    theta = np.array([v.dot(found.matrix * v) for v in vectors]) + found.shift
+    if (abs(theta) > 2 * inertia.tolerance).any():
+        raise ConvergenceError(
+            f"{number} eigenvalues are within round-off of the count, {inertia.tolerance:.2g} in the metric, and are "
+            "not told apart: take larger elements, or a lower degree."
+        )
+    return theta, vectors
 
 
 def resolve(found: Factored) -> tuple[int, int]:
@@ -86,10 +109,8 @@ def resolve(found: Factored) -> tuple[int, int]:
     near = index.zero - found.drifts
     if near <= 0:
         return index.negative, index.negative
-    theta, vectors = found.nearest(near + SPARE, NULL)
-    chosen = np.argsort(abs(theta))[:near]
-    doubt = np.array([quotient_error(found.matrix, vectors[i]) for i in chosen])
-    theta = np.array([vectors[i].dot(found.matrix * vectors[i]) for i in chosen]) + found.shift
+    theta, vectors = _inside(found, near, NULL)
+    doubt = np.array([quotient_error(found.matrix, v) for v in vectors])
     return index.negative + int((theta < -doubt).sum()), index.negative + int((theta <= doubt).sum())
 
 
