@@ -130,8 +130,8 @@ class SpecialSearch:
         self._shorten(a, b)
         raise ConvergenceError(
             f"Between loads {a.load:.8g} and {b.load:.8g} the potential energy changes by "
-            f"{b.potential - a.potential:.3g}, which is not the work of the load: these are no states of one branch; "
-            f"{SMALLER_STEPS}."
+            f"{b.potential - a.potential:.3g}, which is not the work of the load: these are no states of one branch, "
+            f"or what the load does has a kink between them (begin beyond it, then); {SMALLER_STEPS}."
         )
 
     @property
