@@ -23,7 +23,7 @@ from rodfem.errors import SceneError
 from rodfem.problem.contribution import Contribution
 from rodfem.problem.kinds import plain
 from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
-from rodfem.problem.local_state import Constants, watched
+from rodfem.problem.local_state import Constants, inside, watched
 from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import LARGEST, TINIEST, check_kinds, check_scene, two_numbers
@@ -301,6 +301,10 @@ class Scene(Contribution):
         a, b = self.interval
         eps = ASIDE * self.length
         return sorted({*np.linspace(a + eps, b - eps, 9).tolist(), *(s + d for s in self.joints for d in (-eps, eps))})
+
+    def loads(self) -> list[float]:
+        """Loads at which all that depends on the load is checked: both ends of the range, then some inside."""
+        return [*self.span, *inside(self.span)]
 
     def varying(self, load: str, span: tuple[float, float], **values: float) -> Scene:
         """Return the same scene with another parameter as its load, over ``span``, and other constants.
