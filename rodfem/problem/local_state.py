@@ -174,6 +174,15 @@ def some_places(
     return place(q, R, s, r, length=length), place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
 
 
+def trials(scene: Scene, function: OfConstants) -> Iterator[Constants]:
+    """Constants at which a function of them is tried: at the loads, and at the arclengths, if it asks for them."""
+    c, asked = watched(scene.constants())
+    function(c)
+    places = scene.samples() if "s" in asked else [None]
+    for load in scene.loads() if scene.load in asked else [None]:
+        yield from (scene.constants(load, s) for s in places)
+
+
 def asked_for(scene: Scene) -> set[str]:
     """Names of the constants that the equations of a scene ask for."""
     c, asked = watched(scene.constants())

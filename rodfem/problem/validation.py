@@ -20,7 +20,16 @@ from rodfem.problem.attachment import Attachment
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End
 from rodfem.problem.kinds import check_scalar, real, reals
-from rodfem.problem.local_state import STATES, asked_for, asks_where, floats, functions_of_places, some_places
+from rodfem.problem.local_state import (
+    STATES,
+    asked_for,
+    asks_where,
+    floats,
+    functions_of_places,
+    some_places,
+    trials,
+    watched,
+)
 from rodfem.problem.results import check_expression, check_results, check_same
 from rodfem.problem.roles import Role, functions_of, is_object
 from rodfem.tolerances import NEGLIGIBLE
@@ -152,9 +161,9 @@ def check_plane(scene: Scene) -> None:
     normal = scene.normal
     if normal is None:
         return
-    for load in scene.span:
+    for load in scene.loads():
         left, right = (end.held(scene.constants(load))[normal] for end in scene.sides)
-        if left is not None and right is not None and float(left) != float(right):
+        if left is not None and right is not None and abs(float(left) - float(right)) > NEGLIGIBLE * scene.length:
             raise SceneError(
                 f"The ends are held at {float(left):g} and {float(right):g} along {scene.planar}, across which the rod "
                 "is planar: hold both at the same, or leave planar out."
@@ -163,8 +172,8 @@ def check_plane(scene: Scene) -> None:
         if role.load is None or role.call != "f(c)":
             continue
         out = [i for i in range(3) if (i == normal) != role.load.moment]
-        for s in scene.samples():
-            values = [float(x) for x in function(scene.constants(max(scene.span, key=abs), s))]
+        for c in trials(scene, function):
+            values = [float(x) for x in function(c)]
             if any(values[i] for i in out):
                 raise SceneError(
                     f"The {what} pushes the rod out of its plane across {scene.planar}, with {values}: "
@@ -361,7 +370,7 @@ def check_balance(scene: Scene) -> None:
     along = [x for x in scene.attachments if x.force]
     if along or scene.distributed is not None or not scene.conservative:
         return
-    for load in scene.span:
+    for load in scene.loads():
         c = scene.constants(load)
         forces = np.array([[float(x) for x in end.force(c)] for end in scene.sides if end.force] or np.zeros((1, 3)))
         total = forces.sum(axis=0)
@@ -376,7 +385,7 @@ def check_reach(scene: Scene) -> None:
     """Raise :class:`SceneError` where the ends of an inextensible rod are farther apart than it is long."""
     if 2 in scene.free_strains or 0 in scene.free_strains:
         return
-    for load in np.linspace(*scene.span, 9):
+    for load in scene.loads():
         left, right = (end.held(scene.constants(load)) for end in scene.sides)
         if None not in left and None not in right:
             distance = sum((float(b) - float(a)) ** 2 for a, b in zip(left, right, strict=True)) ** 0.5

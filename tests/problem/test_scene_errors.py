@@ -35,6 +35,7 @@ from rodfem.problem.ends import (
     hinged,
     integral,
     pinned,
+    sliding,
 )
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 
@@ -151,6 +152,25 @@ def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
     return {"ends": (left or clamped(), right or free())}
 
 
+def hump(c: Any) -> Any:
+    return c.F * (1 - c.F)
+
+
+BEAM = Inertia(rho_A=lambda c: 1.0)
+ACROSS, ABOUT = (lambda c: (0.0, hump(c), 0.0)), (lambda c: (hump(c), 0.0, 0.0))
+TURNED = sliding(lambda c: (0.0, 0.0, None), lambda c: (ufl.cos(hump(c)), ufl.sin(hump(c)), 0.0, 0.0))
+OFF_PLANE: list[tuple[dict, str]] = [
+    (held(right=free(moment=ABOUT)), "moment on the right end pushes the rod out"),
+    (held(right=free(follower_moment=ABOUT)), "follower moment on the right end pushes the rod out"),
+    (held(right=free(follower=ACROSS)) | {"inertia": BEAM}, "follower force on the right end pushes the rod out"),
+    ({"attachments": (Attachment(0.5, follower=ACROSS),), "inertia": BEAM}, "at s = 0.5 pushes the rod out"),
+    ({"follower": ACROSS, "inertia": BEAM}, "distributed follower force pushes the rod out"),
+    ({"distributed": lambda c: (0.0, hump(c) * (c.s - 0.5), 0.0)}, "distributed force pushes the rod out"),
+    (held(right=TURNED), "rotation of the right end leaves the plane"),
+]
+"""Scenes of a rod that is planar across e2 with something off that plane at loads inside of the range alone."""
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -243,6 +263,11 @@ def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
             {"planar": "e2"} | held(right=End(moment=lambda c: (0.0, 1.0, c.F))),
             "moment on the right end pushes the rod out",
         ),
+        # what is zero at both ends of the range, from 0 to 1, and not inside
+        *(({"planar": "e2"} | change, words) for change, words in OFF_PLANE),
+        ({"planar": "e2"} | held(right=clamped(lambda c: (0.0, hump(c), 1.0))), "held at 0 and 0.* along e2"),
+        ({"ends": (free(), free(lambda c: (0.0, 0.0, hump(c))))}, "At F = 0.* add up to .* nothing holds the rod"),
+        (held(right=free(lambda c: (0.0, 0.0, ufl.sqrt(0.1 - hump(c))))), "component 3 of the force on the right end"),
     ],
 )
 def test_mistakes(change: dict, words: str, capfd: pytest.CaptureFixture[str]) -> None:
