@@ -231,24 +231,43 @@ def check_energy(scene: Scene) -> None:
 
 
 def check_inertia(scene: Scene) -> None:
-    """Raise :class:`SceneError` for a negative inertia, or none where stability is a matter of motion."""
-    c = scene.constants()
-    along = [scene.constants(s=s) for s in scene.samples()]
-    masses = [*(float(scene.inertia.rho_A(there)) for there in along)]
-    masses += [float(x.mass(c)) for x in scene.attachments if x.mass]
-    rotary = [float(x) for there in along for x in scene.inertia.rho_I(there)]
-    rotary += [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
-    if min(masses + rotary) < 0:
-        raise SceneError(f"A mass or rotary inertia of {min(masses + rotary):g} is negative: give zero or more.")
-    beyond = [x for x in masses + rotary if x and not TINIEST < x < LARGEST]
-    if beyond:
-        raise SceneError(f"A mass or rotary inertia of {beyond[0]:g} has powers that are no floats: use other units.")
-    given = max(masses + rotary) > 0 and scene.inertia != type(scene.inertia)()
-    if not scene.conservative and max(masses) == 0 and not given:
-        raise SceneError(
-            f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter of "
-            "motion, so give it an inertia, as in inertia=Inertia(rho_A=lambda c: 1.0)."
+    """Raise :class:`SceneError` for a negative inertia, or none where stability is a matter of motion.
+
+    One that depends on the load is checked at several loads of the range.
+    """
+    _, asked = _inertia_at(scene, None)
+    for load in (None, *scene.loads()) if scene.load in asked else (None,):
+        (masses, rotary), _ = _inertia_at(scene, load)
+        at = "" if load is None else f" at {scene.load} = {load:g}"
+        remedy = (
+            "give zero or more" if load is None else f"give zero or more, or a range of {scene.load} in which it is"
         )
+        if min(masses + rotary) < 0:
+            raise SceneError(f"A mass or rotary inertia of {min(masses + rotary):g}{at} is negative: {remedy}.")
+        beyond = [x for x in masses + rotary if x and not TINIEST < x < LARGEST]
+        if beyond:
+            raise SceneError(
+                f"A mass or rotary inertia of {beyond[0]:g}{at} has powers that are no floats: use other units."
+            )
+        given = max(masses + rotary) > 0 and scene.inertia != type(scene.inertia)()
+        if not scene.conservative and max(masses) == 0 and not given:
+            raise SceneError(
+                f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter "
+                f"of motion, so give it an inertia{at}, as in inertia=Inertia(rho_A=lambda c: 1.0)."
+            )
+
+
+def _inertia_at(scene: Scene, load: float | None) -> tuple[tuple[list[float], list[float]], set[str]]:
+    """Masses and rotary inertias of a scene at a ``load``, by default its own, and the constants that they ask for."""
+    c, asked = watched(scene.constants(load))
+    carried = [float(x.mass(c)) for x in scene.attachments if x.mass]
+    turned = [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
+    for function in (scene.inertia.rho_A, scene.inertia.rho_I):
+        function(c)
+    along = [scene.constants(load, s) for s in scene.samples()]
+    carried += [float(scene.inertia.rho_A(there)) for there in along]
+    turned += [float(x) for there in along for x in scene.inertia.rho_I(there)]
+    return (carried, turned), asked
 
 
 def check_scene(scene: Scene) -> None:

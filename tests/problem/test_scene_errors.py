@@ -317,6 +317,16 @@ def turns(s: np.ndarray, count: int) -> np.ndarray:
             held(right=clamped(lambda c: (0, 0, 1))) | {"inertia": Inertia(rho_I=lambda c: (1.0, -2.0, 1.0))},
             "-2 is negative",
         ),
+        ({"inertia": Inertia(rho_A=lambda c: 1 - 2 * c.F)}, "of -1 at F = 1 is negative: .* a range of F"),
+        ({"inertia": Inertia(rho_A=lambda c: 0.2 - hump(c))}, "of -0.0.* at F = 0.* is negative"),
+        ({"inertia": Inertia(rho_A=lambda c: 1 - 1.5 * c.F * c.s)}, "at F = 1 is negative"),
+        ({"inertia": Inertia(rho_I=lambda c: (1.0, 1.0 - 2 * c.F, 1.0))}, "of -1 at F = 1 is negative"),
+        ({"attachments": (Attachment(0.5, mass=lambda c: 1 - 2 * c.F),)}, "of -1 at F = 1 is negative"),
+        ({"attachments": (Attachment(0.5, rotary_inertia=lambda c: (1, 1, 1 - 2 * c.F)),)}, "at F = 1 is negative"),
+        (
+            held(right=free(follower=lambda c: (0, 0, c.F))) | {"inertia": Inertia(rho_A=lambda c: 1 - c.F)},
+            "give it an inertia at F = 1",
+        ),
         (
             {"planar": "e2", "start": lambda s: np.stack([np.cos(s), np.sin(s), 0 * s, 0 * s], axis=1)},
             "leaves the plane",
@@ -329,7 +339,13 @@ def test_inertia_and_plane(change: dict, words: str) -> None:
 
 
 def test_scenes_that_are_no_mistakes() -> None:
-    """Held by a spring only; ends farther apart than a rod that may stretch or shear; closed after two turns."""
+    """Held by a spring only; ends farther apart than a rod that may stretch or shear; closed after two turns.
+
+    An inertia that vanishes at an end of the range; a clamp in its plane but for round-off.
+    """
+    Scene(**(GOOD | {"inertia": Inertia(rho_A=lambda c: 1 - c.F)}))
+    turned = lambda c: (ufl.cos(c.F), 1e-17 * c.F, ufl.sin(c.F), 0.0)  # noqa: E731
+    Scene(**(GOOD | {"planar": "e2"} | held(right=sliding(lambda c: (None, 0.0, None), turned))))
     Scene(**(GOOD | {"ends": (elastic(lambda c: 1.0), free())}))
     for rod in ("flexible", "unshearable", "inextensible"):
         Scene(**(GOOD | {"rod": rod} | held(right=clamped(lambda c: (0, 0, 1.2)))))
