@@ -378,7 +378,10 @@ class Scene(Contribution):
         return Constants(s=sum(self.interval) / 2 if s is None else s, **values)
 
     def check_span(self, span: tuple[float, float]) -> None:
-        """Raise :class:`SceneError` unless both ends of a range of loads are admissible and differ."""
+        """Raise :class:`SceneError` unless both ends of a range of loads are admissible and differ.
+
+        For another range than that of the scene all is checked that the scene is checked for at the loads of its own.
+        """
         for value in span:
             self.parameters[self.load].check(self.load, value)
         if span[0] == span[1]:
@@ -391,6 +394,8 @@ class Scene(Contribution):
                 f"The range of {self.load} from {span[0]:.17g} to {span[1]:.17g} is as narrow as round-off, or beyond "
                 "the range of floats: give loads that differ by more, or choose other units."
             )
+        if tuple(span) != self.span:
+            replace(self, span=span)
 
     @cached_property
     def plain(self) -> tuple[bool, bool]:

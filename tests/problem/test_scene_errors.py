@@ -338,6 +338,32 @@ def test_inertia_and_plane(change: dict, words: str) -> None:
         Scene(**(GOOD | change))
 
 
+def test_a_plan_of_another_range_is_checked_over_it() -> None:
+    """A mass is positive up to F = 2: the scene ends before, a plan after; a force is in the plane up to F = 1."""
+    scene = Scene(**(GOOD | {"inertia": Inertia(rho_A=lambda c: 2 - c.F)}))
+    Plan((0.0, 2.0)).check(scene)
+    with pytest.raises(SceneError, match="of -1 at F = 3 is negative"):
+        Plan((0.0, 3.0)).check(scene)
+    beyond = lambda c: (0.0, ufl.max_value(c.F - 1, 0.0), c.F)  # noqa: E731
+    scene = Scene(**(GOOD | {"planar": "e2"} | held(right=free(force=beyond))))
+    with pytest.raises(SceneError, match="pushes the rod out of its plane"):
+        Plan((0.0, 1.5)).check(scene)
+    scene = Scene(**(GOOD | {"inertia": Inertia(rho_A=lambda c: 2 - c.F)} | {"span": (0.0, 2.0)}))
+    Plan((0.5, 1.0)).check(scene)
+
+
+def test_weights_that_vanish_at_a_place() -> None:
+    """A constraint of the whole rod is one where its weight is zero at an end or half-way; at one place it is none."""
+    weights = (lambda s: s, lambda s: s * (1 - s), lambda s: s - 0.5, lambda s: ufl.conditional(ufl.lt(s, 0.7), 0, 1))
+    for weight in weights:
+        Scene(**(GOOD | {"constraints": (integral(lambda x, c, w=weight: x.r[0] * w(x.s)),)}))
+        Scene(**(GOOD | {"constraints": (integral(lambda x, c, w=weight: x.r[0] * w(c.s)),)}))
+    Scene(**(GOOD | {"constraints": (at(0.5, lambda x, c: x.r[0] * x.s),)}))
+    with pytest.raises(SceneError, match="constraint is 0 whatever the state"):
+        Scene(**(GOOD | {"constraints": (at(0.5, lambda x, c: x.r[0] * (x.s - 0.5)),)}))
+    Scene(**(GOOD | {"potential": lambda x, c: x.r[0] ** 2 * ufl.ln(x.s)}))
+
+
 def test_scenes_that_are_no_mistakes() -> None:
     """Held by a spring only; ends farther apart than a rod that may stretch or shear; closed after two turns.
 
