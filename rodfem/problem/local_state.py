@@ -162,9 +162,10 @@ def functions_of_places(scene: Scene) -> Iterator[tuple[str, OfPlace, Place]]:
 def some_places(
     scene: Scene, state: int = 0, wrap: Callable[[Any], Any] = lambda x: x, s: float | None = None
 ) -> tuple[Place, Place]:
-    """Return a point and a place along the rod, in one of :data:`STATES`; vectors pass through ``wrap``.
+    """Return a point and a place along the rod of a ``scene``; vectors pass through ``wrap``.
 
-    The arclength ``s`` is by default one inside the rod: at an end a factor may vanish, or a logarithm have its pole.
+    The ``state`` is the number of one of :data:`STATES`.  The arclength ``s`` is by default one inside the rod: at an
+    end a factor may vanish, or a logarithm have its pole.
     """
     s, length = inside(scene.interval)[0] if s is None else s, scene.length
     units = (1.0, length, 1.0, 1.0 / length)
