@@ -16,6 +16,7 @@ from rodfem.problem.kinds import check_vector, plain
 from rodfem.problem.load import DEAD_AT_END, FOLLOWER, FOLLOWER_MOMENT, MOMENT, POTENTIAL
 from rodfem.problem.roles import Role, role_field
 from rodfem.problem.setting import AXIS, HELD, TURNS
+from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
     from rodfem.problem.local_state import Constants, OfConstants, OfPlace, Quaternion
@@ -151,7 +152,7 @@ class End(Contribution):
 
     def check(self, side: str, scene: Scene) -> None:
         """Check shapes, and that nothing acts on what is held; raises :class:`SceneError`."""
-        for load in scene.span:
+        for load in scene.loads() if callable(self.rotation) else scene.span[:1]:
             self._check_rotation(side, scene, scene.constants(load))
         if self.hinge is not None:
             if self.rotation is None:
@@ -180,7 +181,9 @@ class End(Contribution):
             return
         check_vector(f"rotation of the {side} end", rotation, 4)
         size = np.linalg.norm(_numbers(f"rotation of the {side} end", rotation))
-        if scene.normal is not None and any(rotation[i + 1] != 0 for i in range(3) if i != scene.normal):
+        if scene.normal is not None and any(
+            abs(rotation[i + 1]) > NEGLIGIBLE * size for i in range(3) if i != scene.normal
+        ):
             raise SceneError(
                 f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about that axis only."
             )

@@ -21,7 +21,7 @@ from ufl.classes import GE, GT, LE, LT
 from ufl.corealg.traversal import unique_pre_traversal
 
 from forms.rotation import rotation
-from rodfem.problem.local_state import STATES, place
+from rodfem.problem.local_state import STATES, inside, place
 from rodfem.problem.roles import functions_of
 from rodfem.roots import zero_between
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE
@@ -72,7 +72,7 @@ def unbroken(scene: Scene, inside: Callable[[float], bool]) -> str:
 
 def along(scene: Scene, s: Any) -> Iterator[tuple[str, list[Any]]]:
     """Functions that hold along the rod, in words, as expressions of the arclength ``s`` at some states."""
-    c = scene.constants(max(scene.span, key=abs), s)  # at no load, where nothing would jump
+    c = scene.constants(max(inside(scene.span), key=abs), s)  # at an end of the range what jumps may be 0
     places = [_place(scene, s, state) for state in STATES]
     yield "stored energy", [ufl.as_ufl(scene.energy(x.v, x.k, c)) for x in places]
     for what, function, role in functions_of(scene):

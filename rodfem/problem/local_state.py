@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from math import sqrt
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,17 @@ from rodfem.problem.roles import NoSuchNameError, functions_of
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
+
+
+FRACTIONS = tuple(sorted(i * (sqrt(5.0) - 1.0) / 2.0 % 1.0 for i in range(1, 8)))
+"""Parts of an interval, multiples of the golden section: a polynomial or a sine with zeros at simple fractions of the
+interval, or of a number near to it, has none there."""
+
+
+def inside(interval: tuple[float, float]) -> list[float]:
+    """Return numbers inside an ``interval`` at which a function that is not zero there is seen not to be."""
+    low, high = interval
+    return [low + part * (high - low) for part in FRACTIONS]
 
 
 class Constants(SimpleNamespace):
@@ -122,7 +134,7 @@ def asks_where(function: OfPlace, c: Constants) -> bool:
     q = ufl.as_vector([ufl.as_ufl(x) for x in IDENTITY])
     strains = {"v": ufl.as_vector(UNDEFORMED), "k": ufl.as_vector([0.0, 0.0, 0.0]), "length": 1.0}
     try:
-        function(place(q, rotation(q), 0.0, **strains), c)
+        function(place(q, rotation(q), c.s, **strains), c)
     except NoCentreline:
         return True
     return False
@@ -147,14 +159,29 @@ def functions_of_places(scene: Scene) -> Iterator[tuple[str, OfPlace, Place]]:
             yield what, function, rod if role.along else point
 
 
-def some_places(scene: Scene, state: int = 0, wrap: Callable[[Any], Any] = lambda x: x) -> tuple[Place, Place]:
-    """Return a point and a place along the rod, in one of :data:`STATES`; vectors pass through ``wrap``."""
-    s, length = scene.interval[0], scene.length
+def some_places(
+    scene: Scene, state: int = 0, wrap: Callable[[Any], Any] = lambda x: x, s: float | None = None
+) -> tuple[Place, Place]:
+    """Return a point and a place along the rod of a ``scene``; vectors pass through ``wrap``.
+
+    The ``state`` is the number of one of :data:`STATES`.  The arclength ``s`` is by default one inside the rod: at an
+    end a factor may vanish, or a logarithm have its pole.
+    """
+    s, length = inside(scene.interval)[0] if s is None else s, scene.length
     units = (1.0, length, 1.0, 1.0 / length)
     numbers = ([float(unit * x) for x in values] for unit, values in zip(units, STATES[state], strict=True))
     q, r, v, k = (wrap(ufl.as_vector(values)) for values in numbers)
     R = rotation(q)
     return place(q, R, s, r, length=length), place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
+
+
+def trials(scene: Scene, function: OfConstants) -> Iterator[Constants]:
+    """Constants at which a function of them is tried: at the loads, and at the arclengths, if it asks for them."""
+    c, asked = watched(scene.constants())
+    function(c)
+    places = scene.samples() if "s" in asked else [None]
+    for load in scene.loads() if scene.load in asked else [None]:
+        yield from (scene.constants(load, s) for s in places)
 
 
 def asked_for(scene: Scene) -> set[str]:

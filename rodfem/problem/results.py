@@ -1,12 +1,13 @@
 """Results of the functions of a scene: of the declared size, finite, real, and the same whenever they are called.
 
-A function of the constants is called at the scene's own load and at both ends of its range, one along the rod at
+A function of the constants is called at the scene's own load and at several of its range, one along the rod at
 several arclengths too; a function of a place at some states, of which it may be undefined at one or another.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
 from math import isfinite, nan
 from reprlib import Repr
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ from ufl.corealg.traversal import unique_pre_traversal
 
 from rodfem.errors import SceneError
 from rodfem.problem.kinds import check_scalar, check_vector, plain
-from rodfem.problem.local_state import STATES, Constants, Place, some_places
+from rodfem.problem.local_state import STATES, Constants, Place, inside, some_places
 from rodfem.problem.roles import Role, functions_of
 from rodfem.tolerances import NEGLIGIBLE
 
@@ -36,17 +37,18 @@ def check_results(scene: Scene) -> None:
     for what, function, role in functions_of(scene):
         if role.call == "f(c)" and role.size is not None:
             for there in _constants(scene, role):
-                values = function(there)
-                _check_numbers(what, role, values)
-                check_same(what, _numbers(role, values), _numbers(role, function(there)))
+                _check_numbers(what, role, function(there))
+            check_same(what, *(_numbers(role, function(there)) for _ in range(2)))
             function(_symbols(scene))
         elif role.call == "f(x, c)":
             check_expression(what, function(some_places(scene, wrap=ufl.variable)[role.along], c))
-            places = [some_places(scene, i)[role.along] for i in range(len(STATES))]
-            numbers = [_at(function, x, c) for x in places]
-            check_same(what, numbers, [_at(function, x, c) for x in places])
+            where = [x.s for x in scene.constraints if x.of is function and x.s is not None] or inside(scene.interval)
+            states = _states_at(scene, role, where[0])
+            numbers = [_at(function, *x) for x in states]
+            check_same(what, numbers, [_at(function, *x) for x in states])
             if role.load is None:
-                _check_equation(what, numbers)
+                others = ([_at(function, *x) for x in _states_at(scene, role, s)] for s in where[1:])
+                _check_equation(what, chain([numbers], others))
     x = some_places(scene)[True]
     check_same("stored energy", *([_number(scene.energy(x.v, x.k, c))] for _ in range(2)))
 
@@ -67,10 +69,10 @@ def check_finite(what: str, value: Any) -> None:
 
 
 def _constants(scene: Scene, role: Role) -> Iterator[Constants]:
-    """Constants at the load of the scene and at the ends of its range, of what acts along the rod at arclengths."""
+    """Constants at the load of the scene, of what acts along the rod at arclengths, and last at loads of its range."""
     yield scene.constants()
-    yield from (scene.constants(load) for load in scene.span)
     yield from (scene.constants(s=s) for s in scene.samples() if role.along)
+    yield from (scene.constants(load) for load in scene.loads())
 
 
 class _Symbol(ufl.classes.Variable):  # type: ignore[misc]
@@ -127,7 +129,18 @@ def check_expression(what: str, expression: Any) -> None:
             raise SceneError(f"The {what} has {part} in it: return an expression of finite real numbers.")
 
 
-def _check_equation(what: str, values: Sequence[float]) -> None:
-    """Raise :class:`SceneError` for an equation that says nothing of the state, by its values at some of them."""
-    if max(values) - min(values) <= NEGLIGIBLE * max(map(abs, values)):
-        raise SceneError(f"The {what} is {values[0]:g} whatever the state: let it depend on x, the place.")
+def _states_at(scene: Scene, role: Role, s: float) -> list[tuple[Place, Constants]]:
+    """Arguments of a function of a place, in all of :data:`STATES`, at an arclength."""
+    return [(some_places(scene, i, s=s)[role.along], scene.constants(s=s)) for i in range(len(STATES))]
+
+
+def _check_equation(what: str, values: Iterable[list[float]]) -> None:
+    """Raise :class:`SceneError` for an equation that says nothing of the state, by its values at several places.
+
+    At one place or another one of the whole rod may say nothing: where a weight is zero.
+    """
+    for here in values:
+        varies = max(here) - min(here) > NEGLIGIBLE * max(map(abs, here))
+        if varies or not all(map(isfinite, here)):  # it says something of a state at which it is not defined
+            return
+    raise SceneError(f"The {what} is {here[0]:g} whatever the state: let it depend on x, the place.")

@@ -23,7 +23,7 @@ from rodfem.errors import SceneError
 from rodfem.problem.contribution import Contribution
 from rodfem.problem.kinds import plain
 from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
-from rodfem.problem.local_state import Constants, watched
+from rodfem.problem.local_state import Constants, inside, watched
 from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import LARGEST, TINIEST, check_kinds, check_scene, two_numbers
@@ -302,6 +302,10 @@ class Scene(Contribution):
         eps = ASIDE * self.length
         return sorted({*np.linspace(a + eps, b - eps, 9).tolist(), *(s + d for s in self.joints for d in (-eps, eps))})
 
+    def loads(self) -> list[float]:
+        """Loads at which all that depends on the load is checked: both ends of the range, then some inside."""
+        return [*self.span, *inside(self.span)]
+
     def varying(self, load: str, span: tuple[float, float], **values: float) -> Scene:
         """Return the same scene with another parameter as its load, over ``span``, and other constants.
 
@@ -374,7 +378,10 @@ class Scene(Contribution):
         return Constants(s=sum(self.interval) / 2 if s is None else s, **values)
 
     def check_span(self, span: tuple[float, float]) -> None:
-        """Raise :class:`SceneError` unless both ends of a range of loads are admissible and differ."""
+        """Raise :class:`SceneError` unless both ends of a range of loads are admissible and differ.
+
+        For another range than that of the scene all is checked that the scene is checked for at the loads of its own.
+        """
         for value in span:
             self.parameters[self.load].check(self.load, value)
         if span[0] == span[1]:
@@ -387,6 +394,8 @@ class Scene(Contribution):
                 f"The range of {self.load} from {span[0]:.17g} to {span[1]:.17g} is as narrow as round-off, or beyond "
                 "the range of floats: give loads that differ by more, or choose other units."
             )
+        if tuple(span) != self.span:
+            replace(self, span=span)
 
     @cached_property
     def plain(self) -> tuple[bool, bool]:

@@ -20,7 +20,16 @@ from rodfem.problem.attachment import Attachment
 from rodfem.problem.constraint import Constraint
 from rodfem.problem.end import SIDES, End
 from rodfem.problem.kinds import check_scalar, real, reals
-from rodfem.problem.local_state import STATES, asked_for, asks_where, floats, functions_of_places, some_places
+from rodfem.problem.local_state import (
+    STATES,
+    asked_for,
+    asks_where,
+    floats,
+    functions_of_places,
+    some_places,
+    trials,
+    watched,
+)
 from rodfem.problem.results import check_expression, check_results, check_same
 from rodfem.problem.roles import Role, functions_of, is_object
 from rodfem.tolerances import NEGLIGIBLE
@@ -152,9 +161,9 @@ def check_plane(scene: Scene) -> None:
     normal = scene.normal
     if normal is None:
         return
-    for load in scene.span:
+    for load in scene.loads():
         left, right = (end.held(scene.constants(load))[normal] for end in scene.sides)
-        if left is not None and right is not None and float(left) != float(right):
+        if left is not None and right is not None and abs(float(left) - float(right)) > NEGLIGIBLE * scene.length:
             raise SceneError(
                 f"The ends are held at {float(left):g} and {float(right):g} along {scene.planar}, across which the rod "
                 "is planar: hold both at the same, or leave planar out."
@@ -163,8 +172,8 @@ def check_plane(scene: Scene) -> None:
         if role.load is None or role.call != "f(c)":
             continue
         out = [i for i in range(3) if (i == normal) != role.load.moment]
-        for s in scene.samples():
-            values = [float(x) for x in function(scene.constants(max(scene.span, key=abs), s))]
+        for c in trials(scene, function):
+            values = [float(x) for x in function(c)]
             if any(values[i] for i in out):
                 raise SceneError(
                     f"The {what} pushes the rod out of its plane across {scene.planar}, with {values}: "
@@ -222,24 +231,43 @@ def check_energy(scene: Scene) -> None:
 
 
 def check_inertia(scene: Scene) -> None:
-    """Raise :class:`SceneError` for a negative inertia, or none where stability is a matter of motion."""
-    c = scene.constants()
-    along = [scene.constants(s=s) for s in scene.samples()]
-    masses = [*(float(scene.inertia.rho_A(there)) for there in along)]
-    masses += [float(x.mass(c)) for x in scene.attachments if x.mass]
-    rotary = [float(x) for there in along for x in scene.inertia.rho_I(there)]
-    rotary += [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
-    if min(masses + rotary) < 0:
-        raise SceneError(f"A mass or rotary inertia of {min(masses + rotary):g} is negative: give zero or more.")
-    beyond = [x for x in masses + rotary if x and not TINIEST < x < LARGEST]
-    if beyond:
-        raise SceneError(f"A mass or rotary inertia of {beyond[0]:g} has powers that are no floats: use other units.")
-    given = max(masses + rotary) > 0 and scene.inertia != type(scene.inertia)()
-    if not scene.conservative and max(masses) == 0 and not given:
-        raise SceneError(
-            f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter of "
-            "motion, so give it an inertia, as in inertia=Inertia(rho_A=lambda c: 1.0)."
+    """Raise :class:`SceneError` for a negative inertia, or none where stability is a matter of motion.
+
+    One that depends on the load is checked at several loads of the range.
+    """
+    _, asked = _inertia_at(scene, None)
+    for load in (None, *scene.loads()) if scene.load in asked else (None,):
+        (masses, rotary), _ = _inertia_at(scene, load)
+        at = "" if load is None else f" at {scene.load} = {load:g}"
+        remedy = (
+            "give zero or more" if load is None else f"give zero or more, or a range of {scene.load} in which it is"
         )
+        if min(masses + rotary) < 0:
+            raise SceneError(f"A mass or rotary inertia of {min(masses + rotary):g}{at} is negative: {remedy}.")
+        beyond = [x for x in masses + rotary if x and not TINIEST < x < LARGEST]
+        if beyond:
+            raise SceneError(
+                f"A mass or rotary inertia of {beyond[0]:g}{at} has powers that are no floats: use other units."
+            )
+        given = max(masses + rotary) > 0 and scene.inertia != type(scene.inertia)()
+        if not scene.conservative and max(masses) == 0 and not given:
+            raise SceneError(
+                f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter "
+                f"of motion, so give it an inertia{at}, as in inertia=Inertia(rho_A=lambda c: 1.0)."
+            )
+
+
+def _inertia_at(scene: Scene, load: float | None) -> tuple[tuple[list[float], list[float]], set[str]]:
+    """Masses and rotary inertias of a scene at a ``load``, by default its own, and the constants that they ask for."""
+    c, asked = watched(scene.constants(load))
+    carried = [float(x.mass(c)) for x in scene.attachments if x.mass]
+    turned = [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
+    for function in (scene.inertia.rho_A, scene.inertia.rho_I):
+        function(c)
+    along = [scene.constants(load, s) for s in scene.samples()]
+    carried += [float(scene.inertia.rho_A(there)) for there in along]
+    turned += [float(x) for there in along for x in scene.inertia.rho_I(there)]
+    return (carried, turned), asked
 
 
 def check_scene(scene: Scene) -> None:
@@ -361,7 +389,7 @@ def check_balance(scene: Scene) -> None:
     along = [x for x in scene.attachments if x.force]
     if along or scene.distributed is not None or not scene.conservative:
         return
-    for load in scene.span:
+    for load in scene.loads():
         c = scene.constants(load)
         forces = np.array([[float(x) for x in end.force(c)] for end in scene.sides if end.force] or np.zeros((1, 3)))
         total = forces.sum(axis=0)
@@ -376,7 +404,7 @@ def check_reach(scene: Scene) -> None:
     """Raise :class:`SceneError` where the ends of an inextensible rod are farther apart than it is long."""
     if 2 in scene.free_strains or 0 in scene.free_strains:
         return
-    for load in np.linspace(*scene.span, 9):
+    for load in scene.loads():
         left, right = (end.held(scene.constants(load)) for end in scene.sides)
         if None not in left and None not in right:
             distance = sum((float(b) - float(a)) ** 2 for a, b in zip(left, right, strict=True)) ** 0.5

@@ -62,4 +62,7 @@ def test_where_functions_jump() -> None:
     assert found["stored energy"] == pytest.approx([1 / 3, 0.5], abs=1e-11)
     assert found["distributed force"] == pytest.approx([0.7], abs=1e-11)
     assert found["potential along the rod"] == pytest.approx([cos(pi / 4)], abs=1e-11)
+    humps = lambda c: (0.0, 0.0, c.P * (1 - c.P) * ufl.sign(c.s - 0.7))  # noqa: E731
+    found = jumps(column("none at an end", SUPPORTS["clamped-free"], (0.0, 1.0), distributed=humps))
+    assert found["distributed force"] == pytest.approx([0.7], abs=1e-11)
     assert jumps(column("none", SUPPORTS["clamped-free"], (0.0, 1.0))) == {}

@@ -45,3 +45,17 @@ def test_an_attachment_knows_its_place() -> None:
     scene = column("half", (clamped(), free()), (0.0, 12.0), attachments=(half,))
     found = trace(scene, Discretization(elements=4, degree=6), Plan(depth=0)).special("branch point")[0]
     assert abs(found.point.load - 9.869604401089358) < found.error_estimate
+
+
+def test_a_weight_that_vanishes_at_an_end() -> None:
+    """Column with ``int r1 s ds = 0``: pi^2/4 and 9 pi^2/4 in the other plane, 25.585755 by Galerkin's method in this.
+
+    The constraint was tried at s = 0 alone, and refused as one that is 0 whatever the state.
+    """
+    kept = integral(lambda x, c: x.r[0] * x.s)
+    scene = column("weight", SUPPORTS["clamped-free"], (0.0, 30.0), constraints=(kept,))
+    found = trace(scene, Discretization(elements=6, degree=6), Plan(depth=0)).special("branch point")
+    assert [(x.negative_before, x.negative_after) for x in found] == [(0, 1), (1, 2), (2, 3)]
+    for special, load in zip(found, (2.4674011003, 22.2066099025, 25.5857551650), strict=True):
+        assert abs(special.point.load - load) < special.error_estimate + 1e-9
+        assert special.error_estimate < 1e-5

@@ -35,6 +35,7 @@ from rodfem.problem.ends import (
     hinged,
     integral,
     pinned,
+    sliding,
 )
 from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 
@@ -151,6 +152,25 @@ def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
     return {"ends": (left or clamped(), right or free())}
 
 
+def hump(c: Any) -> Any:
+    return c.F * (1 - c.F)
+
+
+BEAM = Inertia(rho_A=lambda c: 1.0)
+ACROSS, ABOUT = (lambda c: (0.0, hump(c), 0.0)), (lambda c: (hump(c), 0.0, 0.0))
+TURNED = sliding(lambda c: (0.0, 0.0, None), lambda c: (ufl.cos(hump(c)), ufl.sin(hump(c)), 0.0, 0.0))
+OFF_PLANE: list[tuple[dict, str]] = [
+    (held(right=free(moment=ABOUT)), "moment on the right end pushes the rod out"),
+    (held(right=free(follower_moment=ABOUT)), "follower moment on the right end pushes the rod out"),
+    (held(right=free(follower=ACROSS)) | {"inertia": BEAM}, "follower force on the right end pushes the rod out"),
+    ({"attachments": (Attachment(0.5, follower=ACROSS),), "inertia": BEAM}, "at s = 0.5 pushes the rod out"),
+    ({"follower": ACROSS, "inertia": BEAM}, "distributed follower force pushes the rod out"),
+    ({"distributed": lambda c: (0.0, hump(c) * (c.s - 0.5), 0.0)}, "distributed force pushes the rod out"),
+    (held(right=TURNED), "rotation of the right end leaves the plane"),
+]
+"""Scenes of a rod that is planar across e2 with something off that plane at loads inside of the range alone."""
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -243,6 +263,11 @@ def held(left: End | None = None, right: End | None = None) -> dict[str, Ends]:
             {"planar": "e2"} | held(right=End(moment=lambda c: (0.0, 1.0, c.F))),
             "moment on the right end pushes the rod out",
         ),
+        # what is zero at both ends of the range, from 0 to 1, and not inside
+        *(({"planar": "e2"} | change, words) for change, words in OFF_PLANE),
+        ({"planar": "e2"} | held(right=clamped(lambda c: (0.0, hump(c), 1.0))), "held at 0 and 0.* along e2"),
+        ({"ends": (free(), free(lambda c: (0.0, 0.0, hump(c))))}, "At F = 0.* add up to .* nothing holds the rod"),
+        (held(right=free(lambda c: (0.0, 0.0, ufl.sqrt(0.1 - hump(c))))), "component 3 of the force on the right end"),
     ],
 )
 def test_mistakes(change: dict, words: str, capfd: pytest.CaptureFixture[str]) -> None:
@@ -292,6 +317,16 @@ def turns(s: np.ndarray, count: int) -> np.ndarray:
             held(right=clamped(lambda c: (0, 0, 1))) | {"inertia": Inertia(rho_I=lambda c: (1.0, -2.0, 1.0))},
             "-2 is negative",
         ),
+        ({"inertia": Inertia(rho_A=lambda c: 1 - 2 * c.F)}, "of -1 at F = 1 is negative: .* a range of F"),
+        ({"inertia": Inertia(rho_A=lambda c: 0.2 - hump(c))}, "of -0.0.* at F = 0.* is negative"),
+        ({"inertia": Inertia(rho_A=lambda c: 1 - 1.5 * c.F * c.s)}, "at F = 1 is negative"),
+        ({"inertia": Inertia(rho_I=lambda c: (1.0, 1.0 - 2 * c.F, 1.0))}, "of -1 at F = 1 is negative"),
+        ({"attachments": (Attachment(0.5, mass=lambda c: 1 - 2 * c.F),)}, "of -1 at F = 1 is negative"),
+        ({"attachments": (Attachment(0.5, rotary_inertia=lambda c: (1, 1, 1 - 2 * c.F)),)}, "at F = 1 is negative"),
+        (
+            held(right=free(follower=lambda c: (0, 0, c.F))) | {"inertia": Inertia(rho_A=lambda c: 1 - c.F)},
+            "give it an inertia at F = 1",
+        ),
         (
             {"planar": "e2", "start": lambda s: np.stack([np.cos(s), np.sin(s), 0 * s, 0 * s], axis=1)},
             "leaves the plane",
@@ -303,8 +338,40 @@ def test_inertia_and_plane(change: dict, words: str) -> None:
         Scene(**(GOOD | change))
 
 
+def test_a_plan_of_another_range_is_checked_over_it() -> None:
+    """A mass is positive up to F = 2: the scene ends before, a plan after; a force is in the plane up to F = 1."""
+    scene = Scene(**(GOOD | {"inertia": Inertia(rho_A=lambda c: 2 - c.F)}))
+    Plan((0.0, 2.0)).check(scene)
+    with pytest.raises(SceneError, match="of -1 at F = 3 is negative"):
+        Plan((0.0, 3.0)).check(scene)
+    beyond = lambda c: (0.0, ufl.max_value(c.F - 1, 0.0), c.F)  # noqa: E731
+    scene = Scene(**(GOOD | {"planar": "e2"} | held(right=free(force=beyond))))
+    with pytest.raises(SceneError, match="pushes the rod out of its plane"):
+        Plan((0.0, 1.5)).check(scene)
+    scene = Scene(**(GOOD | {"inertia": Inertia(rho_A=lambda c: 2 - c.F)} | {"span": (0.0, 2.0)}))
+    Plan((0.5, 1.0)).check(scene)
+
+
+def test_weights_that_vanish_at_a_place() -> None:
+    """A constraint of the whole rod is one where its weight is zero at an end or half-way; at one place it is none."""
+    weights = (lambda s: s, lambda s: s * (1 - s), lambda s: s - 0.5, lambda s: ufl.conditional(ufl.lt(s, 0.7), 0, 1))
+    for weight in weights:
+        Scene(**(GOOD | {"constraints": (integral(lambda x, c, w=weight: x.r[0] * w(x.s)),)}))
+        Scene(**(GOOD | {"constraints": (integral(lambda x, c, w=weight: x.r[0] * w(c.s)),)}))
+    Scene(**(GOOD | {"constraints": (at(0.5, lambda x, c: x.r[0] * x.s),)}))
+    with pytest.raises(SceneError, match="constraint is 0 whatever the state"):
+        Scene(**(GOOD | {"constraints": (at(0.5, lambda x, c: x.r[0] * (x.s - 0.5)),)}))
+    Scene(**(GOOD | {"potential": lambda x, c: x.r[0] ** 2 * ufl.ln(x.s)}))
+
+
 def test_scenes_that_are_no_mistakes() -> None:
-    """Held by a spring only; ends farther apart than a rod that may stretch or shear; closed after two turns."""
+    """Held by a spring only; ends farther apart than a rod that may stretch or shear; closed after two turns.
+
+    An inertia that vanishes at an end of the range; a clamp in its plane but for round-off.
+    """
+    Scene(**(GOOD | {"inertia": Inertia(rho_A=lambda c: 1 - c.F)}))
+    turned = lambda c: (ufl.cos(c.F), 1e-17 * c.F, ufl.sin(c.F), 0.0)  # noqa: E731
+    Scene(**(GOOD | {"planar": "e2"} | held(right=sliding(lambda c: (None, 0.0, None), turned))))
     Scene(**(GOOD | {"ends": (elastic(lambda c: 1.0), free())}))
     for rod in ("flexible", "unshearable", "inextensible"):
         Scene(**(GOOD | {"rod": rod} | held(right=clamped(lambda c: (0, 0, 1.2)))))
