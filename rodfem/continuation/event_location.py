@@ -29,7 +29,10 @@ two that follow: of two zeros the nearer one is to be found."""
 
 
 class Found(NamedTuple):
-    """Where an event happens: parameter of the curve, state, and uncertainty of the parameter."""
+    """Where an event happens: parameter ``s`` of the curve, state ``x``, uncertainty ``along`` of the parameter.
+
+    ``touches`` says that the number only touches zero there.
+    """
 
     s: float
     x: PETSc.Vec
@@ -41,7 +44,10 @@ class Solved:
     """The values of an event at equilibria near a curve, each solved for once."""
 
     def __init__(self, solver: BranchSolver, event: Event, curve: Curve, length: float) -> None:
-        """Nothing is solved for yet; the piece of the ``curve`` has this ``length``."""
+        """Nothing is solved for yet of the ``event``; the piece of the ``curve`` has this ``length``.
+
+        ``solver`` has the mesh.
+        """
         self.solver, self.event, self.curve, self.aside = solver, event, curve, ASIDE * length
         self.known: dict[float, float] = {}
 
@@ -64,7 +70,10 @@ class Solved:
         return Found(there, x, ALONG + 2 * abs(there - s))
 
     def lowest(self, low: float, s: float, high: float, sign: float, width: float) -> tuple[float, float]:
-        """Where ``sign`` times the event is lowest between two parameters, or negative, to ``width``; and its value."""
+        """Where ``sign`` times the event is lowest, or negative, to ``width``; and its value.
+
+        It is sought between the parameters ``low`` and ``high``, beginning at ``s``.
+        """
         return lowest_between(lambda t: sign * self(t), low, s, high, width)
 
     def touches(self, s: float, sign: float, width: float) -> bool:
@@ -87,7 +96,7 @@ def noise_of(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:
 
 
 def nearest_event(solver: BranchSolver, event: Event, curve: Curve, reach: float) -> Found:
-    """Where an event happens nearest to the beginning of a curve, within ``reach`` on either side.
+    """Where an ``event`` happens nearest to the beginning of a ``curve``, within ``reach`` on either side.
 
     Raises :class:`ConvergenceError` where it does not happen.  Its function may only touch zero: then it is known to
     the distance at which it has twice its lowest value.  ``solver`` has the mesh.

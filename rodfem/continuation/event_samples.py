@@ -51,7 +51,7 @@ class Samples:
 
 
 def sampled(f: Function, low: float, high: float, ends: tuple[float, float], noise: Callable[[], float]) -> Samples:
-    """Sample ``f`` between two arguments at which it has the values ``ends``.
+    """Sample ``f`` between ``low`` and ``high``, at which it has the values ``ends``.
 
     Extremes that may come near zero are among the samples.  ``noise()`` is the part of a value that is round-off: what
     varies by less is not looked into.

@@ -65,7 +65,7 @@ class Search:
     """The search of one event in one step, from ``a`` to ``b`` on the mesh of a ``solver``."""
 
     def __init__(self, solver: BranchSolver, event: Event, a: Point, b: Point) -> None:
-        """Nothing is sampled yet."""
+        """Nothing of the ``event`` is sampled yet."""
         self.a, self.b, self.length = a, b, b.arclength - a.arclength
         self.margin = INSIDE * self.length
         self.solved = Solved(solver, event, lambda s: between(a, b, s), self.length)
