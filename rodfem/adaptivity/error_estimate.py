@@ -29,7 +29,7 @@ from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
 from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.event_location import locate_event
+from rodfem.continuation.event_location import nearest_event
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.locate import NEAREST, WINDOW, refine
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
@@ -188,11 +188,11 @@ class Enriched:
             law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
 
     def _at_event(self, point: Point, event: Event) -> Again:
-        """The point of the richer discretisation at which an event happens."""
+        """The point of the richer discretisation at which an event happens: the nearest one, of several."""
         assert point.tangent is not None
         x, tangent = self.transfer(point.x, state=True), self.transfer(point.tangent, state=False)
 
-        _, found, along = locate_event(self.solver, event, _straight(x, tangent), -WINDOW, WINDOW)
+        _, found, along, _ = nearest_event(self.solver, event, _straight(x, tangent), WINDOW)
         load, ordinate, units = self.system.scalar(found), self.solver.shape.ordinate(found), self.solver.units
         slope = abs(ordinate_along(self.solver, found, tangent))
         left = (

@@ -2,49 +2,142 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING
+from collections import defaultdict
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.event_location import event_at, locate_event
+from rodfem.continuation.event_location import Found, event_at
+from rodfem.continuation.event_search import Happens, Search, between
 from rodfem.continuation.kinds import EVENT
-from rodfem.continuation.prediction import hermite
 from rodfem.diagram.step import Step
+from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.problem.events import Event
 from rodfem.tolerances import INSIDE, round_off
 
 if TYPE_CHECKING:
+    from rodfem.continuation.observer import Observer
     from rodfem.diagram.plan import Plan
+
+KEPT = 16
+"""States of a step that are kept for further events."""
+MOST = 3
+"""Ranges of loads that are named one by one."""
+Range = tuple[float, float]
 
 
 class Events:
-    """The events of one branch: their values at the last row."""
+    """The events of one branch: their values at the last row, and what is to be said of each.
 
-    at_start = False
+    ``_row`` is that row, ``_values`` are the values there, and ``_zero`` says which are zero to round-off.  ``_open``
+    has the loads at the ends of steps in which zeros of an event may be missing, ``_still`` those of steps on which it
+    is zero, by its name.
+    """
+
+    at_start = True
 
     def __init__(self, plan: Plan) -> None:
         """Nothing is known yet."""
         self.events = tuple(plan.events)
         self._row: Point | None = None
         self._values: list[float] = []
+        self._zero: list[bool] = []
+        self._open: dict[str, list[Range]] = defaultdict(list)
+        self._still: dict[str, list[Range]] = defaultdict(list)
 
     def between(self, step: Step) -> list[SpecialPoint]:
         """Special points of the events that happen in a step."""
         if not self.events:
             return []
         solver, a, b = step.solver, step.a, step.b
-        before = self._values if self._row is a else [event_at(solver, event, a.x) for event in self.events]
-        self._row, self._values = b, [event_at(solver, event, b.x) for event in self.events]
-        changes = zip(self.events, before, self._values, strict=True)
-        return [_special(solver, event, a, b) for event, p, q in changes if p * q < 0]
+        follows = self._row is a
+        before = self._values if follows else [event_at(solver, event, a.x) for event in self.events]
+        known = self._zero if follows else [False] * len(self.events)
+        after = [event_at(solver, event, b.x) for event in self.events]
+        # a branch that leaves another one begins with a state of that one, at which an eigenvalue vanishes
+        first = follows or (step.begins and a.zero <= b.zero)
+        states, out, self._zero = _States(solver, a, b), list[SpecialPoint](), []
+        for event, ends, zero in zip(self.events, zip(before, after, strict=True), known, strict=True):
+            happens = self._in_step(step, event, states, ends, known=zero)
+            self._zero.append(happens.last)
+            out += [_special(solver, event, a, b, found) for found in happens.found]
+            rows = [a] * (happens.first and first) + [b] * (happens.last and not step.closed)
+            out += [_at_row(solver, event, row, INSIDE * (b.arclength - a.arclength)) for row in rows]
+        self._row, self._values = b, after
+        return out
+
+    def finish(self, observer: Observer) -> None:
+        """Say where zeros may be missing on a branch that is complete, and where an event is zero all along."""
+        for name, ranges in self._open.items():
+            observer.warn(
+                f"Zeros of the event {name!r} may be missing between loads {_words(ranges)}, where it varies too fast "
+                f"from state to state, or equilibria were not found: {SMALLER_STEPS}, or a smoother function."
+            )
+        for name, ranges in self._still.items():
+            observer.note(f"  the event {name!r} is zero all along between loads {_words(ranges)}: no special points")
+        self._row = None
+        self._open.clear()
+        self._still.clear()
+
+    def _in_step(self, step: Step, event: Event, states: _States, ends: Range, *, known: bool) -> Happens:
+        """What an event does in a step; what is left open is kept, to be said."""
+        search, loads = Search(step.solver, event, step.a, step.b), (step.a.load, step.b.load)
+        try:
+            happens = search(lambda s: event(states(s)), ends, known=known)
+        except ConvergenceError:
+            self._open[event.name].append(loads)
+            return Happens([], [])
+        if happens.unresolved:
+            self._open[event.name].append(loads)
+        if happens.still:
+            self._still[event.name].append(loads)
+        return happens
 
 
-def _special(solver: BranchSolver, event: Event, a: Point, b: Point) -> SpecialPoint:
-    curve = partial(hermite, a, b)
-    margin = INSIDE * (b.arclength - a.arclength)
-    s, x, along = locate_event(solver, event, curve, a.arclength + margin, b.arclength - margin)
-    tangent = solver.tangent(solver.row(curve(s)[1]), at=x)
-    point = solver.point(x, s, tangent)
-    left = abs(point.slope) * along + round_off(point.load, solver.units.load)
+class _States:
+    """States interpolated in a step, of which all events have those that they have in common."""
+
+    def __init__(self, solver: BranchSolver, a: Point, b: Point) -> None:
+        """No state yet."""
+        self.solver, self.a, self.b = solver, a, b
+        self.known: dict[float, dict[str, Any]] = {}
+
+    def __call__(self, s: float) -> dict[str, Any]:
+        """The arrays of the state at arclength ``s``."""
+        if s in self.known:
+            return self.known[s]
+        state = self.solver.shape.sample(between(self.a, self.b, s)[0])
+        if len(self.known) < KEPT:
+            self.known[s] = state
+        return state
+
+
+def _words(ranges: list[Range]) -> str:
+    """Loads at the ends of some ranges, those that meet as one."""
+    whole: list[list[float]] = []
+    for low, high in sorted((min(r), max(r)) for r in ranges):
+        if whole and low <= whole[-1][1]:
+            whole[-1][1] = max(high, whole[-1][1])
+        else:
+            whole.append([low, high])
+    if len(whole) > MOST:
+        whole = [[whole[0][0], whole[-1][1]]]
+    return ", ".join(f"{low:.8g} and {high:.8g}" for low, high in whole)
+
+
+def _special(solver: BranchSolver, event: Event, a: Point, b: Point, found: Found) -> SpecialPoint:
+    """The special point of an event that was found in a step."""
+    tangent = solver.tangent(solver.row(between(a, b, found.s)[1]), at=found.x)
+    return _named(solver, event, solver.point(found.x, found.s, tangent), found.along)
+
+
+def _at_row(solver: BranchSolver, event: Event, row: Point, along: float) -> SpecialPoint:
+    """The special point of an event that happens at a row, or within the arclength ``along`` of it."""
+    return _named(solver, event, replace(row), along if row.tangent is not None else 0.0)
+
+
+def _named(solver: BranchSolver, event: Event, point: Point, along: float) -> SpecialPoint:
+    """A special point that has the name of its event, at a point whose arclength is known up to ``along``."""
+    left = (abs(point.slope) * along if along else 0.0) + round_off(point.load, solver.units.load)
     return SpecialPoint(EVENT, point, point.negative, point.negative, left, note=event.name, event=event)

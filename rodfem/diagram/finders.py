@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from rodfem.continuation.branch import SpecialPoint
+from rodfem.continuation.observer import Observer
 from rodfem.diagram.events import Events
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.requested_loads import RequestedLoads
@@ -28,6 +29,9 @@ class Finder(Protocol):
 
     def between(self, step: Step) -> list[SpecialPoint]:
         """Special points in a step."""
+
+    def finish(self, observer: Observer) -> None:
+        """Say what is left open of a branch that is complete."""
 
 
 FINDERS: tuple[type[Finder], ...] = (RequestedLoads, Events)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import USER
+from rodfem.continuation.observer import Observer
 from rodfem.continuation.prediction import hermite
 from rodfem.continuation.states_between import solve_at_load
 from rodfem.diagram.step import Step
@@ -34,6 +35,9 @@ class RequestedLoads:
             or (load == p.load and p is a and step.begins)
             or (load == q.load and q is b and not step.closed)
         ]
+
+    def finish(self, observer: Observer) -> None:
+        """Nothing is left open: an equilibrium that is not found ends its branch."""
 
 
 def _point_at(load: float, step: Step, p: Point, q: Point) -> Point:

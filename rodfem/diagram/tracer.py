@@ -328,6 +328,8 @@ class Tracer:
         self.invariants[point.mesh](point)
 
     def _finish(self, branch: Branch) -> None:
+        for finder in self.finders:
+            finder.finish(self.observer)
         branch.renumber()
         explain(branch)
         self._singular_start(branch)

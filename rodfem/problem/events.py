@@ -31,9 +31,9 @@ class Event:
     name
         What happens there, as tables show it.
     of
-        ``of(state)``, a number that changes its sign: ``state.s`` (m,), ``state.r`` (m, 3) and ``state.q`` (m, 4) are
-        arclength, centreline and unit quaternions from left to right, nondimensional or in the units of the scene;
-        multipliers, the load and further fields have their names in ``states.h5``.
+        ``of(state)``, a number that changes its sign or touches zero: ``state.s`` (m,), ``state.r`` (m, 3) and
+        ``state.q`` (m, 4) are arclength, centreline and unit quaternions from left to right, nondimensional or in the
+        units of the scene; multipliers, the load and further fields have their names in ``states.h5``.
     """
 
     name: str
