@@ -93,6 +93,21 @@ FAULTS = {
         "scene.depends_on_s()",
         "tests/continuation/test_convexity.py",
     ),
+    "planes-are-tried-at-the-ends": Fault(
+        "rodfem/problem/local_state.py",
+        "for load in scene.loads() if scene.load in asked",
+        "for load in scene.span if scene.load in asked",
+        "tests/problem/test_scene_errors.py",
+    ),
+    "events-at-rows-alone": Fault(
+        "rodfem/continuation/event_search.py",
+        "> NOISY * self.length",
+        ">= 0.0",
+        "tests/diagram/test_events.py",
+    ),
+    "constraints-are-tried-at-one-place": Fault(
+        "rodfem/problem/results.py", "for s in where[1:])", "for s in where[:0])", "tests/problem/test_one_place.py"
+    ),
     "bar-below-the-location": Fault(
         "rodfem/adaptivity/error_estimate.py", "max(load_error, special.located_to)", "load_error", ERRORS
     ),
