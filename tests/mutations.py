@@ -106,7 +106,10 @@ FAULTS = {
         "tests/diagram/test_events.py",
     ),
     "constraints-are-tried-at-one-place": Fault(
-        "rodfem/problem/results.py", "for s in where[1:])", "for s in where[:0])", "tests/problem/test_one_place.py"
+        "rodfem/problem/results.py",
+        "or inside(scene.interval)",
+        "or [scene.interval[0]]",
+        "tests/problem/test_one_place.py tests/problem/test_scene_errors.py",
     ),
     "bar-below-the-location": Fault(
         "rodfem/adaptivity/error_estimate.py", "max(load_error, special.located_to)", "load_error", ERRORS
