@@ -27,8 +27,8 @@ STILL = 1e-6
 """Damping of Newton's method at a singular first state, over the lowest bending eigenvalue."""
 HOLDS = 1e6
 """Damping that holds a state while the multipliers of its constraints are found, over the lowest bending eigenvalue."""
-AN_EQUILIBRIUM = 0.01
-"""If an equilibrium is nearer than this (metric norm) to the start, the start is one but for its discretisation."""
+NEAR_START = 0.1
+"""An equilibrium nearer than this (metric norm) to the start is the one that is meant."""
 STRAYED = 0.3
 """If Newton's method moves the initial guess farther than this (metric norm), the result is not accepted as the first
 state."""
@@ -111,16 +111,16 @@ class StaticSolver:
     def first(self, load: float) -> tuple[PETSc.Vec, NewtonResult]:
         """First equilibrium at ``load``, from the scene's start: by Newton's method, or else by going downhill.
 
-        Newton's method begins without forces.  Where it strays from a start that is an equilibrium with the forces that
-        balance it best, that is the first one, stable or not.  The way down is also taken where Newton's method ends at
-        an unstable equilibrium that is nowhere near the start.  Of a family of equilibria
-        it is the one next to the start, whatever round-off would make of it.
+        Newton's method begins without forces.  Where it strays from a start that has an equilibrium right beside it,
+        found from the forces that balance the start best, that is the first one, stable or not.  The way down is also
+        taken where Newton's method ends at an unstable equilibrium that is nowhere near the start.  Of a family of
+        equilibria it is the one next to the start, whatever round-off would make of it.
         """
         guess = self.start(load)
         x, outcome = self.at_load(guess, load)
         if not (outcome.converged and self._turned(guess, x) < STRAYED):
             near, found = self.at_load(self._balanced(guess), load)
-            if found.converged and self._turned(guess, near) < AN_EQUILIBRIUM:
+            if found.converged and self._turned(guess, near) < NEAR_START:
                 x, outcome = near, found
         good = outcome.converged and (self._turned(guess, x) < STRAYED or self.is_stable(x))
         if good and not self.may_move(x):

@@ -135,9 +135,8 @@ def struck(kind: str, chance: random.Random, known: Whole, folder: Path) -> Entr
         program.stdout.readline()
         time.sleep(moment)
         processes = children_of(program.pid) if ranks > 1 and program.poll() is None else [program.pid]
-        target = processes[which % len(processes)] if kind == "rank" else program.pid
-        if program.poll() is None:
-            os.kill(target, signal.SIGKILL)
+        if processes and program.poll() is None:  # mpirun outlives its ranks by a moment
+            os.kill(processes[which % len(processes)] if kind == "rank" else program.pid, signal.SIGKILL)
         try:
             program.communicate(timeout=LIMIT)
         finally:
