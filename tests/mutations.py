@@ -172,17 +172,11 @@ FAULTS = {
         "x, tangent = states[0]",
         f"{CORD} {GOLDEN}",
     ),
-    "fold-is-a-branch-point": Fault(
-        f"{CONTINUATION}special_points.py",
-        "kind = FOLD if turning and coupling > COUPLED",
-        "kind = FOLD if turning and coupling < COUPLED",
-        HARD,
-    ),
     "crossing-at-a-fold-counts-twice": Fault(
         f"{CONTINUATION}special_points.py",
-        "if not _explains(found[0], order)]",
-        "if _explains(found[0], order)]",
-        f"{CORD} {GOLDEN}",
+        "return own <= order < own + special.multiplicity",
+        "return False",
+        f"{LOCATE} {CHAIN}",
     ),
     "two-points-are-one": Fault(
         f"{CONTINUATION}special_points.py",
