@@ -18,10 +18,11 @@ from rodfem.errors import ConvergenceError, SceneError
 
 pytestmark = pytest.mark.alone
 
-SCENES = [(1, 9), (1, 21), (1, 37), (1, 50), (1, 57), (4, 55), (7, 110), (12, 253)]
+SCENES = [(1, 9), (1, 21), (1, 37), (1, 50), (1, 57), (4, 55), (7, 110), (12, 253), (15, 73), (17, 431)]
 """Seed and number: a clamp that turns; a thrust, with cosh; a load without a potential; a plane; a logarithm;
 a rod of a millimetre that turns freely; a stretch that vanishes at the very load of a coarser mesh; a curved rod that
-bends further, whose straight start has 36 half-waves at the end of the range."""
+bends further, whose straight start has 36 half-waves at the end of the range; two rings under dead loads, begun at an
+unstable circle or beside one."""
 
 
 @pytest.mark.parametrize(("seed", "number"), SCENES)
