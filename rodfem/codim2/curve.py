@@ -11,6 +11,7 @@ from petsc4py import PETSc
 
 from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent, between, predict
 from rodfem.codim2.singular import Destroyed
+from rodfem.continuation.convexity_between import lost_between
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError
 from rodfem.fem.convexity import Convexity
@@ -91,7 +92,7 @@ class Tracer:
                     half.ended = f"no convergence with steps of {self.steps.smallest:g}: {trouble}"
                     return half
                 continue
-            half.ended = self._lost_convexity(node) or self._between(half, last, node)
+            half.ended = self._lost_convexity(last, node) or self._between(half, last, node)
             if half.ended:
                 return half
             half.nodes.append(node)
@@ -108,18 +109,26 @@ class Tracer:
         half.ended = f"{self.steps.most} points reached"
         return half
 
-    def _lost_convexity(self, node: LocusPoint) -> str:
-        """Why a curve ends before a node at which the stored energy is not convex any more; empty where it is."""
+    def _lost_convexity(self, last: LocusPoint, node: LocusPoint) -> str:
+        """Why a curve ends between two nodes, where the stored energy is not convex any more; empty where it is."""
         if self.convexity is None:
             return ""
+
+        def state(t: float) -> PETSc.Vec:
+            p, x, *_ = between(last, node, last.s + t * (node.s - last.s))
+            system.line = self.plane.along(p, 0)
+            system.set_load(x, float(p[0]))
+            return x
+
         system = self.plane.system
         with self.plane.kept():
-            system.line = self.plane.along(node.p, 0)
-            x = node.x.copy()
-            system.set_load(x, float(node.p[0]))
-            if self.convexity.holds(x):
-                return ""
-        where = ", ".join(f"{name} = {v:.8g}" for name, v in zip(self.plane.names, node.p, strict=True))
+            found = lost_between(self.convexity, state, lambda t: False)
+        if found.resolved and found.lost is None:
+            return ""
+        p, *_ = between(last, node, last.s + (found.lost or 0.0) * (node.s - last.s))
+        where = ", ".join(f"{name} = {v:.8g}" for name, v in zip(self.plane.names, p, strict=True))
+        if found.lost is None:
+            return f"the stored energy varies so fast that it may lose convexity unseen near {where}"
         return f"the stored energy is not convex any more near {where}"
 
     def _next(self, history: list[LocusPoint], step: float) -> tuple[LocusPoint, float, str]:

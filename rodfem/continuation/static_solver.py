@@ -74,8 +74,10 @@ class StaticSolver:
 
     def lost_convexity(self, x: PETSc.Vec) -> str:
         """Why a branch ends at the state ``x``, where the stored energy is not convex any more; empty where it is."""
-        if self.convexity is None or self.convexity.holds(x):
-            return ""
+        return "" if self.convexity is None or self.convexity.holds(x) else self.not_convex(x)
+
+    def not_convex(self, x: PETSc.Vec) -> str:
+        """Why a branch ends at a state ``x`` along which the stored energy is not convex."""
         return f"the stored energy is not convex any more at {self.system.scene.load} = {self.system.scalar(x):.6g}"
 
     def require_convexity(self, x: PETSc.Vec) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint
+from rodfem.continuation.convexity_between import lost_between, unresolved
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
@@ -108,7 +109,7 @@ class Sweep:
         try:
             for load in loads.tolist():
                 state = self._next(load, x)
-                if why := self.solver.lost_convexity(state):
+                if self.latest and (why := self._lost_convexity(self.latest[-1].x, state)):
                     return why
                 self.latest = [*self.latest[1 - ROWS :], self._point(state)]
                 for notice in self.solver.notices():
@@ -127,6 +128,22 @@ class Sweep:
             return at_load(self.solver, self.latest[-1].x, load)
         require_held(self.solver, x)
         return x
+
+    def _lost_convexity(self, a: PETSc.Vec, b: PETSc.Vec) -> str:
+        """Why a sweep ends between the equilibria ``a`` and ``b``; empty where the stored energy stays convex."""
+        solver, name = self.solver, self._load
+
+        def state(t: float) -> PETSc.Vec:
+            return a * (1.0 - t) + b * t
+
+        def holds(t: float) -> bool:
+            x = b if t == 1.0 else at_load(solver, a, solver.system.scalar(state(t)))
+            return not solver.lost_convexity(x)
+
+        found = lost_between(solver.convexity, state, holds)
+        if not found.resolved:
+            self.observer.warn(unresolved(name, *(solver.system.scalar(x) for x in (a, b))))
+        return "" if found.lost is None else solver.not_convex(state(found.lost))
 
     def _take(self, branch: Branch, rows: list[Row]) -> None:
         """Take rows of the grid into a branch, and the special points before each."""

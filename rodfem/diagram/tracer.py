@@ -12,6 +12,7 @@ from rodfem.adaptivity.mesh_sequence import Meshes, TooCoarse
 from rodfem.adaptivity.soft_rows import SoftRows
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.convexity_between import lost_in_step
 from rodfem.continuation.follow import follow
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.invariants import Invariants
@@ -195,7 +196,7 @@ class Tracer:
             self._check_invariants(item)
             self.control.row(item, self.solver)
             self.zeros.check(self.solver, history, item, self.specials.level)
-            if item.stretch > 0 and (why := self.solver.lost_convexity(item.x)):
+            if item.stretch > 0 and (why := lost_in_step(self.solver, previous, item, self.observer.warn)):
                 branch.ended = self._rest(branch) or why
                 return
             try:

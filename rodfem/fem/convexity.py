@@ -75,6 +75,18 @@ class Convexity:
         mine = (values[:, 0] / abs(values).max(axis=1)).min() if len(values) else 1.0
         return float(self.system.comm.allreduce(float(mine), op=MPI.MIN))
 
+    def scales(self, x: PETSc.Vec) -> np.ndarray:
+        """Roots of the diagonals of the second derivative at a state ``x`` where it is positive definite."""
+        return np.sqrt(np.einsum("pii->pi", self._matrices(x)))
+
+    def margin(self, x: PETSc.Vec, scales: np.ndarray) -> float:
+        """Least eigenvalue over the whole rod at the state ``x``, in units of the ``scales`` of a state nearby.
+
+        So stiff strains do not hide bending, as they do from :meth:`lowest`, and it depends smoothly on the state.
+        """
+        values = np.linalg.eigvalsh(self._matrices(x) / scales[:, :, None] / scales[:, None])
+        return float(self.system.comm.allreduce(float(values.min(initial=1.0)), op=MPI.MIN))
+
     def _matrices(self, x: PETSc.Vec) -> np.ndarray:
         """Second derivatives at all places of this rank, symmetric, (places, size, size)."""
         assert self.evaluate is not None

@@ -6,12 +6,14 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+import ufl
 from classics import SUPPORTS, column
 
 from forms.energy import bending_and_twist
 from rodfem import Discretization, Inertia, Plan, Scene, Solver, clamped, free, trace
 from rodfem.codim2.locus import locus
 from rodfem.errors import SceneError
+from rodfem.problem.local_state import Constants
 
 MESH = Discretization("auto", 4, 4)
 Energy = Callable[[Any, Any, Any], Any]
@@ -49,6 +51,34 @@ def test_a_stiffness_that_the_load_takes_away(energy: Energy, until: float) -> N
         Solver(rod(energy), MESH).equilibrium(1.0)
 
 
+def narrow(x: Any, width: float) -> Energy:
+    """Convex but where ``x(c)`` is nearer to zero than the ``width``."""
+    return lambda v, k, c: bending_and_twist(k, (x(c) ** 2 - width**2, 2.0, 1.0))
+
+
+@pytest.mark.parametrize("width", [0.02, 0.003])
+def test_convexity_lost_and_regained_within_one_step(width: float) -> None:
+    (branch,) = trace(rod(narrow(lambda c: 1.0 - c.P, width)), MESH, Plan(depth=0, error_bars=False))
+    assert branch.ended == f"the stored energy is not convex any more at P = {1 - width:.6g}"
+    assert branch.points[-1].load < 1 - width < 1 + width < branch.points[-1].load + 0.15
+
+
+@pytest.mark.parametrize("width", [0.1, 0.01, 0.001])
+def test_a_state_that_passes_a_dent_of_the_energy_within_one_step(width: float) -> None:
+    """A rod under tension, whose stretch jumps: ``W'' = 10 - 11/(1 + x^2)^(3/2)`` with ``x = (v - 1.3)/width``."""
+
+    def dented(v: Any, k: Any, c: Any) -> Any:
+        e = v[2] - 1
+        return bending_and_twist(k, (1.0, 2.0, 1.0)) + 5 * e**2 - 11 * width * ufl.sqrt((e - 0.3) ** 2 + width**2)
+
+    ends = clamped(), free(force=lambda c: (0.0, 0.0, c.P))
+    (branch,) = trace(rod(dented, (0.0, 10.0), ends=ends, rod="unshearable"), MESH, Plan(depth=0, error_bars=False))
+    assert branch.ended.startswith("the stored energy is not convex any more at P = ")
+    v = 1.3 - width * (1.1 ** (2 / 3) - 1) ** 0.5
+    e = v - 1
+    assert branch.points[-1].load < 10 * e - 11 * width * (e - 0.3) / ((e - 0.3) ** 2 + width**2) ** 0.5 + 1e-6
+
+
 def test_an_energy_that_is_quadratic_at_the_first_load_alone() -> None:
     """``k^2/2 - P k^4/4`` under the moment m: convex while ``P < 4/(27 m^2)``."""
     scene = rod(
@@ -61,26 +91,38 @@ def test_an_energy_that_is_quadratic_at_the_first_load_alone() -> None:
     assert 0.5 < branch.points[-1].load < 4 / (27 * 0.25)
 
 
-def test_a_sweep() -> None:
+@pytest.mark.parametrize(
+    ("energy", "until"),
+    [
+        (lambda v, k, c: softening(v, k, Constants(P=c.P / 30)), 30.0),
+        (narrow(lambda c: 1 - c.P / 29.7, 0.003), 29.6109),
+    ],
+)
+def test_a_sweep(energy: Energy, until: float) -> None:
+    """Of a stiffness that vanishes, and of one that is negative between two loads of the sweep only."""
     scene = rod(
-        lambda v, k, c: bending_and_twist(k, (1.0 - c.P / 30, 2.0, 1.0)),
+        energy,
         (0.0, 60.0),
         ends=(clamped(), free(follower=lambda c: (0.0, 0.0, -0.01 * c.P))),
         inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0)),
     )
     (branch,) = trace(scene, MESH, Plan(error_bars=False))
-    assert branch.ended.startswith("the stored energy is not convex any more at P = ")
-    assert branch.points[-1].load < 30
+    assert branch.ended == f"the stored energy is not convex any more at P = {until:g}"
+    assert until - 0.61 < branch.points[-1].load < until
 
 
-def test_a_locus() -> None:
-    """Euler's load ``(b^2 - 1/4) pi^2/4``: the curve ends before b = 1/2, though both bounds of b have convex rods."""
+@pytest.mark.parametrize(
+    ("energy", "until"),
+    [(lambda v, k, c: bending_and_twist(k, (c.b**2 - 0.25, 2.0, 1.0)), 0.5), (narrow(lambda c: c.b - 0.3, 0.02), 0.32)],
+)
+def test_a_locus(energy: Energy, until: float) -> None:
+    """Euler's load ``pi^2/4`` times the stiffness, which is positive at both bounds of b, but not between them."""
     scene = column(
         "locus", SUPPORTS["clamped-free"], (0.0, 4.0), constants={"b": 0.9},
-        energy=lambda v, k, c: bending_and_twist(k, (c.b**2 - 0.25, 2.0, 1.0)),
+        energy=energy,
     )  # fmt: skip
     diagram = trace(scene, MESH, Plan(depth=0, error_bars=False))
     curve = locus(diagram.solvers[0], diagram[0].special[0], "b", ((-4.0, 4.0), (-1.0, 1.0)), error_bars=0)
     assert any(end.startswith("the stored energy is not convex any more near P = ") for end in curve.ended)
-    assert curve.values[:, 1].min() > 0.5
+    assert curve.values[:, 1].min() > until
     assert {tuple(row) for row in curve.index.tolist()} == {(0, 1)}
