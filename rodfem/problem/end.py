@@ -16,7 +16,6 @@ from rodfem.problem.kinds import check_vector, plain
 from rodfem.problem.load import DEAD_AT_END, FOLLOWER, FOLLOWER_MOMENT, MOMENT, POTENTIAL
 from rodfem.problem.roles import Role, role_field
 from rodfem.problem.setting import AXIS, HELD, TURNS
-from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
     from rodfem.problem.local_state import Constants, OfConstants, OfPlace, Quaternion
@@ -181,12 +180,6 @@ class End(Contribution):
             return
         check_vector(f"rotation of the {side} end", rotation, 4)
         size = np.linalg.norm(_numbers(f"rotation of the {side} end", rotation))
-        if scene.normal is not None and any(
-            abs(rotation[i + 1]) > NEGLIGIBLE * size for i in range(3) if i != scene.normal
-        ):
-            raise SceneError(
-                f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about that axis only."
-            )
         if not 0 < size < np.inf:
             words = "the zero quaternion" if size == 0 else f"{rotation}"
             raise SceneError(f"The rotation of the {side} end is {words}: give one of unit norm.")

@@ -6,7 +6,7 @@ several arclengths too; a function of a place at some states, of which it may be
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from itertools import chain
 from math import isfinite, nan
 from reprlib import Repr
@@ -39,7 +39,7 @@ def check_results(scene: Scene) -> None:
             for there in _constants(scene, role):
                 _check_numbers(what, role, function(there))
             check_same(what, *(_numbers(role, function(there)) for _ in range(2)))
-            function(_symbols(scene))
+            function(symbols(scene))
         elif role.call == "f(x, c)":
             check_expression(what, function(some_places(scene, wrap=ufl.variable)[role.along], c))
             where = [x.s for x in scene.constraints if x.of is function and x.s is not None] or inside(scene.interval)
@@ -85,9 +85,12 @@ class _Symbol(ufl.classes.Variable):  # type: ignore[misc]
         raise TypeError("a constant is an expression of UFL")
 
 
-def _symbols(scene: Scene) -> Constants:
-    """Constants as a function of them meets them in the equations."""
-    return Constants(**{name: _Symbol(ufl.as_ufl(value)) for name, value in vars(scene.constants()).items()})
+def symbols(scene: Scene, names: Container[str] | None = None) -> Constants:
+    """Constants as a function of them meets them in the equations: those with the ``names`` (all) as expressions."""
+    values = vars(scene.constants())
+    return Constants(
+        **{n: _Symbol(ufl.as_ufl(value)) if names is None or n in names else value for n, value in values.items()}
+    )
 
 
 def _check_numbers(what: str, role: Role, values: Any) -> None:

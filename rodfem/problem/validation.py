@@ -27,9 +27,9 @@ from rodfem.problem.local_state import (
     floats,
     functions_of_places,
     some_places,
-    trials,
     watched,
 )
+from rodfem.problem.plane import check_plane
 from rodfem.problem.results import check_expression, check_results, check_same
 from rodfem.problem.roles import Role, functions_of, is_object
 from rodfem.tolerances import NEGLIGIBLE
@@ -154,31 +154,6 @@ def check_places_are_numbers(scene: Scene) -> None:
     for what, s in [*places, *(("constraint", x.s) for x in scene.constraints if x.s is not None)]:
         if not isinstance(s, Real) or isinstance(s, bool) or not isfinite(s):
             raise SceneError(f"The {what} is at s = {s!r}: give an arclength, one number.")
-
-
-def check_plane(scene: Scene) -> None:
-    """Raise :class:`SceneError` for ends or forces of a planar rod off its plane, or moments not about its normal."""
-    normal = scene.normal
-    if normal is None:
-        return
-    for load in scene.loads():
-        left, right = (end.held(scene.constants(load))[normal] for end in scene.sides)
-        if left is not None and right is not None and abs(float(left) - float(right)) > NEGLIGIBLE * scene.length:
-            raise SceneError(
-                f"The ends are held at {float(left):g} and {float(right):g} along {scene.planar}, across which the rod "
-                "is planar: hold both at the same, or leave planar out."
-            )
-    for what, function, role in functions_of(scene):
-        if role.load is None or role.call != "f(c)":
-            continue
-        out = [i for i in range(3) if (i == normal) != role.load.moment]
-        for c in trials(scene, function):
-            values = [float(x) for x in function(c)]
-            if any(values[i] for i in out):
-                raise SceneError(
-                    f"The {what} pushes the rod out of its plane across {scene.planar}, with {values}: "
-                    "leave that component out, or planar out of the scene."
-                )
 
 
 def check_load(scene: Scene) -> None:

@@ -1,0 +1,183 @@
+"""The plane of a planar rod: whether all that holds and loads it leaves it there.
+
+Functions of the constants must be zero across the plane as expressions, whatever the load and the arclength: between
+the loads at which a scene is tried a component may be anything.  Of a function of the state, and of the stored energy,
+the first variation out of the plane must vanish at states in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import ufl
+from ufl.classes import Abs, Conditional, Division, Product, ScalarValue, Sqrt, Sum, Zero
+
+from forms.rotation import rotation
+from rodfem.errors import SceneError
+from rodfem.problem.end import SIDES
+from rodfem.problem.kinds import plain
+from rodfem.problem.local_state import STATES, Constants, place, trials, watched
+from rodfem.problem.results import symbols
+from rodfem.problem.roles import functions_of
+from rodfem.tolerances import NEGLIGIBLE
+
+if TYPE_CHECKING:
+    from rodfem.problem.scene import Scene
+
+ASIDE = 1e-3
+"""Displacement over length, strain or rotation out of the plane, to either side, at which energies are tried."""
+PUSHES = 1e-12
+"""Difference between the two sides of the plane, relative to the values there, that is round-off."""
+
+
+def check_plane(scene: Scene) -> None:
+    """Raise :class:`SceneError` for what moves a planar rod out of its plane, or pushes it out."""
+    if scene.normal is None:
+        return
+    anywhere = symbols(scene, {scene.load, "s"})
+    _check_positions(scene, scene.normal, anywhere)
+    _check_rotations(scene, scene.normal, anywhere)
+    _check_loads(scene, scene.normal, anywhere)
+    _check_functions_of_states(scene, scene.normal)
+
+
+def vanishes(expression: Any, small: float = 0.0) -> bool:
+    """Whether an expression is zero whatever the symbols in it are; factors up to ``small`` are zero."""
+    e = ufl.as_ufl(expression)
+    if isinstance(e, (Zero, ScalarValue)):
+        return abs(float(e)) <= small
+    parts = e.ufl_operands
+    if isinstance(e, Product):
+        return any(vanishes(x, small) for x in parts)
+    if isinstance(e, (Sum, Abs, Sqrt)):
+        return all(vanishes(x, small) for x in parts)
+    if isinstance(e, Division):
+        return vanishes(parts[0], small)
+    return isinstance(e, Conditional) and all(vanishes(x, small) for x in parts[1:])
+
+
+def _check_positions(scene: Scene, normal: int, anywhere: Constants) -> None:
+    for load in scene.loads():
+        left, right = (end.held(scene.constants(load))[normal] for end in scene.sides)
+        if left is not None and right is not None and abs(float(left) - float(right)) > NEGLIGIBLE * scene.length:
+            raise SceneError(
+                f"The ends are held at {float(left):g} and {float(right):g} along {scene.planar}, across which the rod "
+                "is planar: hold both at the same, or leave planar out."
+            )
+    left, right = (end.held(anywhere)[normal] for end in scene.sides)
+    if left is None or right is None or ufl.as_ufl(left) == ufl.as_ufl(right):
+        return
+    if not _is_number(left) or not _is_number(right):
+        raise SceneError(
+            f"The ends are held along {scene.planar}, across which the rod is planar, where {scene.load} moves them "
+            "apart: hold both at the same, or leave planar out."
+        )
+
+
+def _check_rotations(scene: Scene, normal: int, anywhere: Constants) -> None:
+    for side, end in zip(SIDES, scene.sides, strict=True):
+        frame = end.frame(anywhere)
+        across = [] if frame is None else [x for i, x in enumerate(frame[1:]) if i != normal]
+        if not all(vanishes(x, NEGLIGIBLE * _size(frame)) for x in across):
+            raise SceneError(
+                f"The rotation of the {side} end leaves the plane across {scene.planar}: turn about that axis only."
+            )
+
+
+def _check_loads(scene: Scene, normal: int, anywhere: Constants) -> None:
+    for what, function, role in functions_of(scene):
+        if role.load is None or role.call != "f(c)":
+            continue
+        out = [i for i in range(3) if (i == normal) != role.load.moment]
+        for c in trials(scene, function):
+            values = [float(x) for x in function(c)]
+            if any(values[i] for i in out):
+                raise SceneError(
+                    f"The {what} pushes the rod out of its plane across {scene.planar}, with {values}: "
+                    "leave that component out, or planar out of the scene."
+                )
+        values = function(anywhere)
+        if not all(vanishes(values[i]) for i in out):
+            raise SceneError(
+                f"The {what} may push the rod out of its plane across {scene.planar} where it was not tried: write 0.0 "
+                "for that component, or leave planar out of the scene."
+            )
+
+
+def _check_functions_of_states(scene: Scene, normal: int) -> None:
+    energies: list[tuple[str, Callable[[Any, Constants], Any], bool]] = [
+        ("stored energy", lambda x, c: scene.energy(x.v, x.k, c), True)
+    ]
+    energies += [(what, f, role.along) for what, f, role in functions_of(scene) if role.load and role.call == "f(x, c)"]
+    for what, function, along in energies:
+        for c in _places(scene, function, along):
+            for sides in _sides(scene, normal, c.s):
+                one, other = (_value(function, x if along else _point(x), c) for x in sides)
+                if abs(one - other) > PUSHES * max(abs(one), abs(other)):
+                    raise SceneError(
+                        f"The {what} pushes the rod out of its plane across {scene.planar}: the two sides of the plane "
+                        "are not alike to it; leave that out, or planar out of the scene."
+                    )
+
+
+def _places(scene: Scene, function: Callable[[Any, Constants], Any], along: bool) -> Iterator[Constants]:
+    """Constants at the loads, and at the arclengths, as far as a function of the state asks for them."""
+    c, asked = watched(scene.constants())
+    x = next(_sides(scene, 0, c.s))[0]
+    function(x if along else _point(x), c)
+    yield scene.constants()
+    yield from (scene.constants(load) for load in scene.loads() if scene.load in asked)
+    yield from (scene.constants(s=s) for s in scene.samples() if "s" in asked)
+
+
+def _sides(scene: Scene, normal: int, s: float) -> Iterator[tuple[Any, Any]]:
+    """Pairs of places that differ from one in the plane by the same motion out of it, to either side."""
+    length, free = scene.length, [i in scene.free_strains for i in range(3)]
+    in_plane = np.arange(3) != normal
+    for q, r, v, k in STATES:
+        quaternion = np.array(q) * np.concatenate([[True], ~in_plane])
+        flat = np.concatenate(
+            [
+                quaternion / np.linalg.norm(quaternion),
+                length * np.array(r) * in_plane,
+                np.where(in_plane & free, v, np.eye(3)[2]),
+                np.where(~in_plane, k, 0.0) / length,
+            ]
+        )
+        units = np.concatenate([[1.0] * 4, [length] * 3, [1.0] * 3, [1 / length] * 3])
+        across = np.concatenate([[False], in_plane, ~in_plane, ~in_plane & free, in_plane])
+        for i in np.flatnonzero(across):
+            aside = ASIDE * units[i] * np.eye(13)[i]
+            one, other = (_place(x, s, length) for x in (flat + aside, flat - aside))
+            yield one, other
+
+
+def _place(numbers: np.ndarray, s: float, length: float) -> Any:
+    q, r, v, k = (ufl.as_vector([float(x) for x in part]) for part in np.split(numbers, [4, 7, 10]))
+    R = rotation(q)
+    return place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
+
+
+def _point(x: Any) -> Any:
+    return place(x.q, x.R, x.s, x.r, length=x.length)
+
+
+def _value(function: Callable[[Any, Constants], Any], x: Any, c: Constants) -> float:
+    """Value of a function of the state, zero where it is undefined: at a state that the rod need not take."""
+    try:
+        value = plain(ufl.as_ufl(function(x, c))(()))
+    except (ArithmeticError, ValueError, TypeError):
+        return 0.0
+    return value if np.isfinite(value) else 0.0
+
+
+def _size(quaternion: Any) -> float:
+    """Largest of its components that are numbers, one where none is."""
+    sizes = [abs(float(ufl.as_ufl(x))) for x in quaternion if _is_number(x)]
+    return max(sizes) or 1.0 if len(sizes) == 4 else 1.0
+
+
+def _is_number(x: Any) -> bool:
+    return isinstance(ufl.as_ufl(x), (Zero, ScalarValue))
