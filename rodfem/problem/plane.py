@@ -110,7 +110,7 @@ def _check_functions_of_states(scene: Scene, normal: int) -> None:
     energies: list[tuple[str, Callable[[Any, Constants], Any], bool]] = [
         ("stored energy", lambda x, c: scene.energy(x.v, x.k, c), True)
     ]
-    energies += [(what, f, role.along) for what, f, role in functions_of(scene) if role.load and role.call == "f(x, c)"]
+    energies += [(what, f, role.along) for what, f, role in functions_of(scene) if role.call == "f(x, c)"]
     for what, function, along in energies:
         for c in _places(scene, function, along):
             for sides in _sides(scene, normal, c.s):

@@ -344,6 +344,16 @@ class Scene(Contribution):
         return self.inertia != Inertia() or any(x.mass or x.rotary_inertia for x in self.attachments)
 
     @cached_property
+    def inertia_depends_on_load(self) -> bool:
+        """Whether a mass or a rotary inertia, along the rod or attached to it, is a function of the load."""
+        c, asked = watched(self.constants())
+        for x in self.attachments:
+            for function in filter(None, (x.mass, x.rotary_inertia)):
+                function(c)
+        self.inertia.rho_A(c), self.inertia.rho_I(c)
+        return self.load in asked
+
+    @cached_property
     def ignored_strains(self) -> tuple[int, ...]:
         """Components of ``v`` that the stored energy depends on, but that the kind of rod keeps undeformed."""
         rng = np.random.default_rng(1)

@@ -27,7 +27,6 @@ from rodfem.problem.local_state import (
     floats,
     functions_of_places,
     some_places,
-    watched,
 )
 from rodfem.problem.plane import check_plane
 from rodfem.problem.results import check_expression, check_results, check_same
@@ -210,39 +209,44 @@ def check_inertia(scene: Scene) -> None:
 
     One that depends on the load is checked at several loads of the range.
     """
-    _, asked = _inertia_at(scene, None)
-    for load in (None, *scene.loads()) if scene.load in asked else (None,):
-        (masses, rotary), _ = _inertia_at(scene, load)
-        at = "" if load is None else f" at {scene.load} = {load:g}"
+    for load in (None, *scene.loads()) if scene.inertia_depends_on_load else (None,):
+        if trouble := trouble_with_inertia(scene, load):
+            raise SceneError(trouble)
+
+
+def trouble_with_inertia(scene: Scene, load: float | None) -> str:
+    """Sentence on a mass or a rotary inertia at a ``load``, None for the scene's own, that cannot be; empty for none.
+
+    A rod under loads without a potential has an inertia.
+    """
+    masses, rotary = _inertia_at(scene, load)
+    at = "" if load is None else f" at {scene.load} = {load:g}"
+    if min(masses + rotary) < 0:
         remedy = (
             "give zero or more" if load is None else f"give zero or more, or a range of {scene.load} in which it is"
         )
-        if min(masses + rotary) < 0:
-            raise SceneError(f"A mass or rotary inertia of {min(masses + rotary):g}{at} is negative: {remedy}.")
-        beyond = [x for x in masses + rotary if x and not TINIEST < x < LARGEST]
-        if beyond:
-            raise SceneError(
-                f"A mass or rotary inertia of {beyond[0]:g}{at} has powers that are no floats: use other units."
-            )
-        given = max(masses + rotary) > 0 and scene.inertia != type(scene.inertia)()
-        if not scene.conservative and max(masses) == 0 and not given:
-            raise SceneError(
-                f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter "
-                f"of motion, so give it an inertia{at}, as in inertia=Inertia(rho_A=lambda c: 1.0)."
-            )
+        return f"A mass or rotary inertia of {min(masses + rotary):g}{at} is negative: {remedy}."
+    beyond = [x for x in masses + rotary if x and not TINIEST < x < LARGEST]
+    if beyond:
+        return f"A mass or rotary inertia of {beyond[0]:g}{at} has powers that are no floats: use other units."
+    given = max(masses + rotary) > 0 and scene.inertia != type(scene.inertia)()
+    if scene.conservative or max(masses) > 0 or given:
+        return ""
+    return (
+        f"The scene has a load without potential ({scene.without_potential()[0]}): its stability is a matter "
+        f"of motion, so give it an inertia{at}, as in inertia=Inertia(rho_A=lambda c: 1.0)."
+    )
 
 
-def _inertia_at(scene: Scene, load: float | None) -> tuple[tuple[list[float], list[float]], set[str]]:
-    """Masses and rotary inertias of a scene at a ``load``, by default its own, and the constants that they ask for."""
-    c, asked = watched(scene.constants(load))
+def _inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[float]]:
+    """Masses and rotary inertias of a scene at a ``load``, by default its own."""
+    c = scene.constants(load)
     carried = [float(x.mass(c)) for x in scene.attachments if x.mass]
     turned = [float(y) for x in scene.attachments if x.rotary_inertia for y in x.rotary_inertia(c)]
-    for function in (scene.inertia.rho_A, scene.inertia.rho_I):
-        function(c)
     along = [scene.constants(load, s) for s in scene.samples()]
     carried += [float(scene.inertia.rho_A(there)) for there in along]
     turned += [float(x) for there in along for x in scene.inertia.rho_I(there)]
-    return (carried, turned), asked
+    return carried, turned
 
 
 def check_scene(scene: Scene) -> None:

@@ -16,11 +16,12 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rodfem.compat import slepc_errors
-from rodfem.errors import SceneError
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors, ordering, preferred
 from rodfem.linalg.orthogonal import combine
+from rodfem.problem.validation import trouble_with_inertia
 
 MASSLESS = 1e-12
 """A symmetry mode with less kinetic energy than this, relative, has none."""
@@ -106,12 +107,15 @@ class StatePencil(Generic[Matrices]):
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> State:
     """Assemble tangent matrix and kinetic metric at the state ``x``, without the symmetries' phase conditions.
 
-    Returns the state.  Raises :class:`SceneError` for a rod without any inertia.
+    Returns the state.  Raises :class:`SceneError` for a rod without any inertia, :class:`ConvergenceError` where one
+    that depends on the load is negative or vanishes.
 
     They are written into ``matrix`` and ``mass``, both of the ``system``.
     """
     if system.equations.massless:
         raise SceneError("A rod without inertia has no eigenvalues mu = omega^2: give it a mass or a rotary inertia.")
+    if system.scene.inertia_depends_on_load and (trouble := trouble_with_inertia(system.scene, system.scalar(x))):
+        raise ConvergenceError(trouble)
     state = system.at(x)
     for target, form in ((matrix, system.equations.jacobian), (mass, system.equations.kinetic)):
         target.zeroEntries()
@@ -121,6 +125,11 @@ def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc
             matrix.setValue(index, index, 1.0, addv=True)
     matrix.assemble()
     mass.assemble()
+    if mass.norm(PETSc.NormType.INFINITY) == 0.0:
+        raise ConvergenceError(
+            f"A rod without inertia has no eigenvalues mu = omega^2, and at {system.scene.load} = "
+            f"{system.scalar(x):g} this one has none: give it more, or another range."
+        )
     return state
 
 
