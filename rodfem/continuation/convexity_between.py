@@ -54,7 +54,7 @@ def lost_between(convexity: Convexity | None, state: State, holds: Callable[[flo
 
 
 def lost_in_step(solver: BranchSolver, a: Point, b: Point, warn: Callable[[str], None]) -> str:
-    """Why a branch ends between two rows on the mesh of a ``solver``; empty where the stored energy stays convex.
+    """Why a branch ends between the rows ``a`` and ``b`` on the mesh of a ``solver``; empty where ``W`` stays convex.
 
     ``warn`` hears of a step in which it varies too fast for the samples.
     """

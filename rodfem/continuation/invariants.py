@@ -1,22 +1,35 @@
-r"""Invariants of a state, checked at every point that a branch accepts: it is an equilibrium, of unit quaternions.
+r"""Invariants of a state, checked at every point that a branch or a sweep accepts.
 
+It is an equilibrium, of unit quaternions.
 Newton's method ends with a small correction.  Here the equations themselves are evaluated at the state of the record:
-balance of forces and moments, tested with every shape function, the constraints, and the phase conditions.  A rigid
-motion that the ends allow is a sum of shape functions, so that the balance of the whole rod is among them; with one
-that they do not allow the equations of clamped nodes, which are none of the unknowns', give the reactions.  What is
-left must be round-off: below :data:`UNBALANCED` in units of the rod's own energy, or below the round-off of the
-product of the second variation with the state.
+balance of forces and moments, tested with every shape function, the constraints, and the phase conditions.  What is
+left must be round-off: below :data:`UNBALANCED` in units of the rod's own energy, or below the round-off of the product
+of the second variation with the state.
+
+So must be what is left of the balance of the whole rod.  Stored energy and the constraint ``r' = R v`` are invariant
+under the rigid motions ``g`` of space, also when discretised: all equations ``F``, those of clamped nodes included,
+which are the reactions ``F_c``, tested with ``g`` are minus the work of the loads.  Reactions of the ends, their
+moments, and loads thus add up to
+
+    sum_c F_c . g + loads . g = -sum_f F_f . g
+
+with the sum over the nodes ``f`` that are free (Antman, Nonlinear Problems of Elasticity, 2005, chapter 8, in weak
+form).  Each term of a fine mesh is as small as its elements; the sum is not.
 """
 
 from __future__ import annotations
+
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
+from rodfem.fem.generators import Generators
+from rodfem.fem.symmetries import elementary_generators, rigid_motions
 
 UNBALANCED = 1e-8
 """Residual of an equilibrium, in units of the rod's own energy."""
@@ -29,15 +42,31 @@ UNIT = 1e-8
 class Invariants:
     """Checks the points of one solver; collective over its ranks."""
 
-    def __init__(self, solver: BranchSolver) -> None:
+    def __init__(self, solver: StaticSolver) -> None:
         """Allocate a vector for the residual."""
         self.solver, self.system = solver, solver.system
         self._equations = solver.system.new_vector()
 
+    @cached_property
+    def _matrix(self) -> PETSc.Mat:
+        """Room for the second variation, which only a residual that is not small needs."""
+        return self.system.state_matrix()
+
+    @cached_property
+    def _rigid(self) -> Generators:
+        """Rigid motions of space of which the rod is capable, rotations by radian, translations by natural length."""
+        motions = rigid_motions(elementary_generators(self.system.fields))
+        return Generators(self.system, [motion for motion in motions.values() if motion.weights.any()])
+
     def __call__(self, point: Point) -> None:
         """Check a point; raises :class:`ConvergenceError` that names the equation, or the norm, that is violated."""
         found = self.solver.checked(point.x)
-        if found is not None and found.residual <= UNBALANCED and found.norm <= UNIT:
+        if (
+            found is not None
+            and found.residual <= UNBALANCED
+            and found.norm <= UNIT
+            and self._small(point, found.total)
+        ):
             return
         self._unit_quaternions(point)
         system, residual = self.system, self._equations
@@ -46,6 +75,41 @@ class Invariants:
         left = system.in_units(residual, 1)
         if left.norm(PETSc.NormType.INFINITY) > UNBALANCED:
             self._unbalanced(point, left)
+        if not self._small(point, left.norm(PETSc.NormType.NORM_1)):
+            self._balance_of_the_rod(point, residual)
+
+    def _small(self, point: Point, total: float) -> bool:
+        """Whether residuals whose sum is ``total``, in natural units, are too small to be felt in any rigid motion.
+
+        None changes an unknown by more than the largest of them, or by one.
+        """
+        largest = self.system.in_units(point.x, -1).norm(PETSc.NormType.INFINITY)
+        return bool(total * max(largest, 1.0) <= UNBALANCED)
+
+    def _balance_of_the_rod(self, point: Point, residual: PETSc.Vec) -> None:
+        """Raise :class:`ConvergenceError` where reactions and loads do not balance each other."""
+        system, motions = self.system, self._rigid.at(self.system.at(point.x))
+        own = residual.array_r.real[: motions.shape[1]]
+        work = motions @ own
+        work = work if system.comm.size == 1 else system.comm.allreduce(work, op=MPI.SUM)
+        work = abs(work) / system.scene.units.energy
+        worst = int(work.argmax()) if work.size else 0
+        if work.size and not work[worst] <= max(UNBALANCED, self._round_off(point)):
+            name = str(self._rigid.motions[worst])
+            what = "moments" if name.startswith("rotation") else "forces"
+            raise ConvergenceError(
+                f"{self._at(point)} reactions and loads do not balance: their {what} add up to {work[worst]:.1e} for a "
+                f"{name}, in units of bending; use smaller steps."
+            )
+
+    def _round_off(self, point: Point) -> float:
+        """Round-off of the product of the second variation with the state, in natural units."""
+        system, matrix = self.system, self._matrix
+        matrix.zeroEntries()
+        system.at(point.x).assemble_into(matrix, system.equations.jacobian)
+        matrix.assemble()
+        size = system.matrix_in_units(matrix).norm(PETSc.NormType.INFINITY)
+        return ROUND_OFF * float(size * system.in_units(point.x, -1).norm(PETSc.NormType.INFINITY))
 
     def _unit_quaternions(self, point: Point) -> None:
         fields = self.system.fields
@@ -62,13 +126,10 @@ class Invariants:
 
     def _unbalanced(self, point: Point, left: PETSc.Vec) -> None:
         """Raise the error on a residual that is no round-off."""
-        system = self.system
-        self.solver.inertia.at(point.x)
-        size = system.matrix_in_units(self.solver.inertia.matrix).norm(PETSc.NormType.INFINITY)
-        size *= system.in_units(point.x, -1).norm(PETSc.NormType.INFINITY)
-        left.abs()
-        number, worst = left.max()
-        if not worst <= max(UNBALANCED, ROUND_OFF * size):
+        sizes = left.copy()
+        sizes.abs()
+        number, worst = sizes.max()
+        if not worst <= max(UNBALANCED, self._round_off(point)):
             raise ConvergenceError(
                 f"{self._at(point)} the state is no equilibrium: the equation of {self._equation(number)} is violated "
                 f"by {worst:.1e}; use smaller steps."

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from math import inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 from petsc4py import PETSc
@@ -22,6 +23,9 @@ from rodfem.fem.system import System
 from rodfem.fem.values import NodalValues
 from rodfem.linalg.factorization import AlongRod, Factors
 from rodfem.problem.units import Units
+
+if TYPE_CHECKING:
+    from rodfem.continuation.compiled_step import Checked
 
 STILL = 1e-6
 """Damping of Newton's method at a singular first state, over the lowest bending eigenvalue."""
@@ -92,6 +96,10 @@ class StaticSolver:
     def units(self) -> Units:
         """Natural sizes of the rod's numbers."""
         return self.system.scene.units
+
+    def checked(self, x: PETSc.Vec) -> Checked | None:
+        """What was checked at the state ``x`` by the computation that led to it; None where nothing was."""
+        return None
 
     def given(self, kind: Kind, point: Point) -> SpecialPoint:
         """Special point at a load that is given."""

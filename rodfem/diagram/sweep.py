@@ -15,6 +15,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.convexity_between import lost_between, unresolved
 from rodfem.continuation.eigenvalue_curves import Curves
+from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.prediction import ROWS, predict_at_load
@@ -53,6 +54,7 @@ class Sweep:
         self.rows = FrequencyRows(self.eigensolver, self.number)
         self.curves = Curves(solver.system.comm)
         self.critical = CriticalLoads(solver, self.eigensolver, self.number, observer.warn)
+        self.invariants = Invariants(solver)
         self.last: Row | None = None
         self.latest: list[Point] = []
         self.branches: list[Branch] = []
@@ -172,9 +174,9 @@ class Sweep:
         return point
 
     def _point(self, x: PETSc.Vec) -> Point:
-        """Evaluate the records of the equilibrium ``x``, but for those of its frequencies."""
+        """Evaluate the records of the equilibrium ``x``, but for those of its frequencies, and check its invariants."""
         solver, load = self.solver, self.solver.system.scalar(x)
-        return Point(
+        point = Point(
             x=x,
             tangent=None,
             arclength=abs(load - self.span[0]),
@@ -188,6 +190,8 @@ class Sweep:
             drift=0.0,
             error=0.0,
         )
+        self.invariants(point)
+        return point
 
     def _record(self, point: Point, found: Frequencies, *, on_the_way: bool) -> None:
         """Record the frequencies ``found`` at a point; a special point is not ``on_the_way`` of the curves."""

@@ -160,6 +160,24 @@ def elementary_generators(fields: Fields) -> tuple[Elementary, ...]:
     return tuple(out)
 
 
+def rigid_motions(parts: tuple[Elementary, ...]) -> dict[str, Symmetry]:
+    """Rotation about, and translation along, each axis of space, by name: sums of elementary generators of all fields.
+
+    Those of which the rod of a plane is not capable are without any part.
+    """
+    out = {}
+    for i, axis in enumerate(AXES, start=1):
+        turn, move = f"rotation about e{i}", f"translation along e{i}"
+        out[turn] = summed(parts, [p.matrix in (left(axis), cross(axis)) or p.name == turn for p in parts])
+        out[move] = summed(parts, [p.name == move for p in parts])
+    return out
+
+
+def summed(parts: tuple[Elementary, ...], chosen: list[bool]) -> Symmetry:
+    """Sum of the ``chosen`` of some elementary generators."""
+    return Symmetry(np.array(chosen, dtype=float), parts)
+
+
 def add_change(state: NodalValues, target: str, matrix: np.ndarray, constant: np.ndarray, out: np.ndarray) -> None:
     """Add ``matrix value + constant`` to ``out`` for one ``target`` of a ``state``, a field or a group of scalars."""
     fields = state.fields

@@ -24,6 +24,7 @@ from rodfem.problem.contribution import Contribution
 from rodfem.problem.kinds import plain
 from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
 from rodfem.problem.local_state import Constants, inside, watched
+from rodfem.problem.plane import check_plane
 from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import LARGEST, TINIEST, check_kinds, check_scene, two_numbers
@@ -260,6 +261,7 @@ class Scene(Contribution):
                 raise SceneError(f"The ordinate's arclength {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
         self.check_span(self.span)
         check_scene(self)
+        check_plane(self)
 
     @property
     def sides(self) -> tuple[End, End]:

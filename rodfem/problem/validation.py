@@ -28,7 +28,6 @@ from rodfem.problem.local_state import (
     functions_of_places,
     some_places,
 )
-from rodfem.problem.plane import check_plane
 from rodfem.problem.results import check_expression, check_results, check_same
 from rodfem.problem.roles import Role, functions_of, is_object
 from rodfem.tolerances import NEGLIGIBLE
@@ -258,7 +257,6 @@ def check_scene(scene: Scene) -> None:
     check_results(scene)
     check_start(scene)
     check_supports(scene)
-    check_plane(scene)
     check_convexity(scene)
     check_inertia(scene)
     check_ordinate(scene)

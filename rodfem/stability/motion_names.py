@@ -15,10 +15,9 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from forms.symmetry import AXES, cross, left
 from rodfem.fem.generators import Generators
 from rodfem.fem.state import State
-from rodfem.fem.symmetries import Elementary, Symmetry, elementary_generators
+from rodfem.fem.symmetries import Symmetry, elementary_generators, rigid_motions, summed
 from rodfem.fem.system import System
 from rodfem.stability import mode_type
 
@@ -39,12 +38,8 @@ class MotionNames:
         """Take the elementary generators together that are one motion of space; the load has no part in ``metric``."""
         self.system, self.metric = system, metric
         parts = elementary_generators(system.fields)
-        self._turning = {p.name: _sum(parts, [p is q for q in parts]) for p in parts if p.name.startswith("turning")}
-        self._rigid = {}
-        for i, axis in enumerate(AXES, start=1):
-            turn, move = f"rotation about e{i}", f"translation along e{i}"
-            self._rigid[turn] = _sum(parts, [p.matrix in (left(axis), cross(axis)) or p.name == turn for p in parts])
-            self._rigid[move] = _sum(parts, [p.name == move for p in parts])
+        self._turning = {p.name: summed(parts, [p is q for q in parts]) for p in parts if p.name.startswith("turning")}
+        self._rigid = rigid_motions(parts)
         self._along = Symmetry(np.zeros(len(parts)), parts, along=1.0)
         sliding = "slipping along itself" if system.scene.closed else "sliding along the rod"
         self._groups = [list(self._turning), list(self._rigid), [sliding]]
@@ -125,8 +120,3 @@ def share(gram: np.ndarray, b: np.ndarray) -> tuple[float, np.ndarray]:
     """
     weights = np.linalg.pinv(gram, rcond=DEPENDENT, hermitian=True) @ b
     return float(weights @ b), weights
-
-
-def _sum(parts: tuple[Elementary, ...], chosen: list[bool]) -> Symmetry:
-    """Sum of some of the elementary generators."""
-    return Symmetry(np.array(chosen, dtype=float), parts)

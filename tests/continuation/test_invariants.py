@@ -78,7 +78,7 @@ def test_reactions_balance_the_load(aside: float) -> None:
 
     Stored energy and constraints are invariant under them, also when discretised.  All rows but those of the clamp
     vanish at an equilibrium, so that these are the reactions: the opposite of the force, and of its moment about the
-    origin.  ``aside`` of the equilibrium all rows together are: why no row of a branch is checked for it.
+    origin.  ``aside`` of the equilibrium all rows together are: what is missing in the balance is in the free ones.
     """
     solver, point = bent("pointwise")
     x = point.x.copy()
@@ -98,6 +98,24 @@ def test_reactions_balance_the_load(aside: float) -> None:
             add_change(state, field, np.array(matrix), (0.0,) * len(matrix), turned)
         for motion, work in ((moved, force[i]), (turned, np.cross(tip, force)[i])):
             assert equations[tested] @ motion[tested] == pytest.approx(-work, abs=1e-9)
+
+
+@pytest.mark.alone
+def test_a_balance_that_no_single_equation_misses() -> None:
+    """A distributed force that is too large by 1e-6: by 1e-9 in each equation of 1000 elements, and by 1e-6 in all."""
+    ends = clamped(), free()
+    scene = column("heavy", ends, (0.0, 4.0), distributed=lambda c: (c.P, 0.0, 0.0))
+    solver = Solver(scene, Discretization("pointwise", 1000, 1))
+    point, equilibria = solver.equilibrium(1.0), solver.equilibria
+    assert isinstance(equilibria, BranchSolver)
+    check = Invariants(equilibria)
+    check(point)
+    equilibria.system.set_load(point.x, 1 + SMALL)
+    residual = equilibria.system.new_vector()
+    equilibria.system.at(point.x).residual(residual)
+    assert residual.norm(PETSc.NormType.INFINITY) < 2e-9
+    with pytest.raises(ConvergenceError, match=r"reactions and loads do not balance: their (forces|moments) add up to"):
+        check(point)
 
 
 @pytest.mark.alone
