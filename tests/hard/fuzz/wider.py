@@ -199,7 +199,7 @@ def moved(draw: Draw, rod: Scene, words: list[str]) -> Scene:
 
 def events(draw: Draw) -> list[Timed]:
     """Events, perhaps; none of them at an end of the range, or beside one."""
-    if not draw.maybe(0.5):
+    if not draw.maybe(0.8):
         return []
     b, height = draw.number(0.07, 0.93), draw.number(-0.95, 0.95)
     kinds = ("sine", "sine", "touch", "pair", "corner", "step", "above")
