@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hard.fuzz import comparison, worker
+from hard.fuzz import comparison, known, wider, worker
 from hard.fuzz.comparison import compared, of_a_sentence
+from hard.fuzz.known import Known
 from hard.fuzz.oracle import Oracle, scaling
 from hard.fuzz.scenes import scene
 from hard.fuzz.summary import in_words
@@ -35,6 +36,49 @@ def test_a_random_scene(seed: int, number: int) -> None:
     assert found.rows > found.unclear
     assert (found.wrong, found.differs, found.refused) == ([], [], [])
     assert not any("symmetry" in sentence for sentence in found.said)
+
+
+WIDE = [(1, 8), (1, 31)]
+"""Seed and number."""
+
+
+@pytest.mark.parametrize(("seed", "number"), WIDE)
+def test_a_scene_of_the_wider_family(seed: int, number: int) -> None:
+    rod, facts = wider.scene(seed, number)
+    found = compared(rod, number, 0, facts)
+    assert found.rows > found.unclear
+    assert (found.wrong, found.differs, found.refused) == ([], [], [])
+
+
+def test_the_wider_family_changes_no_base_scene() -> None:
+    """Its base is the scene of the same number, but for units; the latter draws the same whatever is made before."""
+    before = scene(1, 31)
+    rod, _ = wider.scene(1, 31)
+    assert rod.name.startswith(before.name)
+    assert (scene(1, 31).parameters, scene(1, 31).span) == (before.parameters, before.span)
+
+
+def test_zeros_of_events_are_those_of_arithmetic() -> None:
+    """Each function is zero where it says so, and of other signs or falling to zero beside."""
+    for timed in (known.sine(7, 0.3), known.touching(0.4), known.pair(0.5, 0.1), known.corner(0.2), known.steep(0.6)):
+        assert [timed.of(z) for z in timed.zeros] == pytest.approx([0.0] * len(timed.zeros), abs=1e-13)
+    assert len(known.sine(7, 0.3).zeros) == 8
+    assert len(known.sine(12, -0.3).zeros) == 12
+    assert min(known.above(0.3).of(t) for t in np.linspace(0, 1, 101)) > 0
+
+
+def test_a_missing_or_moved_event_is_seen() -> None:
+    """An event that is taken away, one that is moved by three bars, and a row beyond the loss of convexity."""
+    rod, _ = wider.scene(1, 8)
+    facts = Known(rod.span[1], (known.sine(2, 0.3), known.touching(0.4)))
+    diagram = trace(rod, Discretization("auto", 5, 6), Plan(depth=0, events=facts.events))
+    assert not list(facts.faults(diagram))
+    assert "where the stored energy is not convex" in next(Known(rod.span[1], (), 0.5).faults(diagram))
+    branch = diagram[0]
+    first, second = [s for s in branch.special if s.note == "sine of 2"]
+    first.point.load += 3 * first.error_estimate
+    branch.special.remove(second)
+    assert ["zero is" in sentence or "happens 0 times" in sentence for sentence in facts.faults(diagram)] == [True] * 2
 
 
 def test_sides_that_differ_across_their_plane_are_both_traced() -> None:

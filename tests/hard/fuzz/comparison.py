@@ -8,7 +8,7 @@ points within the sum of their error bars; states at the loads asked for; the nu
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from math import inf, isfinite
 from typing import Any
@@ -17,12 +17,14 @@ import numpy as np
 
 from rodfem import Diagram, Discretization, Plan, Scene, StepControl, trace
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.kinds import EVENT
 from rodfem.diagram.sweep import FREQUENCIES
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.system import System
 from rodfem.problem.units import Units
 from rodfem.tolerances import round_off
 
+from .known import Known
 from .oracle import Oracle
 
 ZERO, NEAR = 1e-7, 1e-4
@@ -40,6 +42,8 @@ ENDED = ("end of range", "closed loop", "meets another branch", "stretch reaches
 """Beginnings of the reasons for which a branch ends, but for those that depend on steps and meshes."""
 AT = (0.37, 0.81)
 """Loads to stop at, as parts of the range."""
+NOTHING = Known()
+"""What is known of most scenes."""
 
 
 @dataclass
@@ -86,15 +90,16 @@ def plans(scene: Scene, depth: int) -> tuple[Plan, Plan]:
     return tuple(Plan(at=at, depth=depth, steps=s, most_branches=MOST_BRANCHES) for s in steps)  # type: ignore[return-value]
 
 
-def compared(scene: Scene, number: int = 0, depth: int = 1) -> Compared:
-    """Trace a scene twice and compare."""
+def compared(scene: Scene, number: int = 0, depth: int = 1, known: Known = NOTHING) -> Compared:
+    """Trace a scene twice and compare, also with what is ``known`` of it."""
     out, diagrams = Compared(scene.name), []
     for mesh, plan, most in zip(meshes(scene, number), plans(scene, depth), ROWS, strict=True):
-        diagram = traced(scene, mesh, plan, out)
+        diagram = traced(scene, mesh, replace(plan, events=known.events if scene.conservative else ()), out)
         if diagram is None:
             continue
         diagrams.append(diagram)
         out.said += open_questions(diagram)
+        out.wrong += known.faults(diagram)
         check_rows(diagram, out, most)
         if scene.conservative:
             for branch in diagram:
@@ -134,7 +139,7 @@ def open_questions(diagram: Diagram) -> list[str]:
     unexplained = [str(u) for b in diagram for u in b.unexplained]
     ended = [f"{b.name} ended: {b.ended}" for b in diagram if not b.ended.startswith(ENDED)]
     points = [s for b in diagram for s in b.special if not s.kind.given]
-    notes = [f"{s!r}: {s.note}" for s in points if s.note]
+    notes = [f"{s!r}: {s.note}" for s in points if s.note and not (s.event and s.note == s.event.name)]
     unresolved = [f"{s!r} is not resolved" for s in points if s.resolved is False]
     return [*diagram.warnings, *(n.strip() for n in diagram.notes if "eigenvalue" in n), *unexplained, *ended, *notes,
             *unresolved]  # fmt: skip
@@ -148,7 +153,7 @@ def check_rows(diagram: Diagram, out: Compared, most: int) -> None:
     system = diagram.solvers[0].system
     oracle = Oracle(system)
     rows = [(b, i, p) for b in diagram for i, p in enumerate(b.points) if p.mesh == 0]
-    special = {id(s.point) for b in diagram for s in b.special if not s.kind.given}
+    special = {id(s.point) for b in diagram for s in singular(b)}
     for j in np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)):
         branch, i, point = rows[j]
         out.rows += 1
@@ -169,7 +174,8 @@ def index_of(oracle: Oracle, system: System, point: Point, special: bool) -> str
     """
     mu = oracle.eigenvalues(point.x)
     near = OF_A_RING if any(s.along for s in system.symmetries) else NEAR
-    if special or oracle.dependent or ((abs(mu) > ZERO) & (abs(mu) < near)).any():
+    unsure = ((abs(mu) > ZERO) & (abs(mu) < near)) | (ZERO < oracle.noise > abs(mu))
+    if special or oracle.dependent or unsure.any():
         return None
     negative, zero = int((mu < -ZERO).sum()), int((abs(mu) <= ZERO).sum())
     if point.negative <= negative <= point.negative + point.undecided and point.zero == zero:
@@ -254,8 +260,8 @@ def whole(branch: Branch) -> bool:
 
 
 def singular(branch: Branch) -> list[SpecialPoint]:
-    """Special points at which something happens."""
-    return [s for s in branch.special if not s.kind.given]
+    """Special points at which something happens to the rod, not to a number of its state alone."""
+    return [s for s in branch.special if not s.kind.given and s.kind != EVENT]
 
 
 def _place(s: SpecialPoint) -> tuple[float, float]:

@@ -22,6 +22,10 @@ NEARLY = 1e-9
 """The same, below which constraints may be dependent: a straight rod that cannot stretch, between ends that stay."""
 STRAINS = 1e-3
 """Weight of strains, which are not in the metric, relative to what is."""
+ROUND_OFF = 1e-14
+"""Error of an eigenvalue, relative to the largest one."""
+FLOOR = 1e-13
+"""Part of the largest entry of the metric that is added where round-off makes it indefinite."""
 SWEEPS = 8
 """Scalings of rows and columns (Ruiz 2001), each of which halves the exponents of what is left."""
 
@@ -31,6 +35,8 @@ class Oracle:
 
     dependent = False
     """Whether the constraints of the last state are nearly dependent."""
+    noise = 0.0
+    """Round-off of the eigenvalues of the last state."""
 
     def __init__(self, system: System) -> None:
         self.system = system
@@ -47,10 +53,16 @@ class Oracle:
     def eigenvalues(self, x: Any) -> np.ndarray:
         """Eigenvalues of ``K`` on the null space of ``C^t`` at the state ``x``, ascending."""
         K, Z, G, _ = self._reduced(x)
-        L = np.linalg.cholesky(Z.T @ G @ Z)
+        inside = Z.T @ G @ Z
+        try:
+            L = np.linalg.cholesky(inside)
+        except np.linalg.LinAlgError:  # of elements of very different sizes; no metric changes a sign
+            L = np.linalg.cholesky(inside + FLOOR * abs(inside).max() * np.eye(len(inside)))
         half = np.linalg.solve(L, Z.T @ (K + K.T) / 2 @ Z)
         full = np.linalg.solve(L, half.T)
-        return np.linalg.eigvalsh((full + full.T) / 2) / self.system.stiffness_scale
+        mu = np.linalg.eigvalsh((full + full.T) / 2) / self.system.stiffness_scale
+        self.noise = float(ROUND_OFF * abs(mu).max())
+        return mu
 
     def squares(self, x: Any) -> np.ndarray:
         """Finite eigenvalues ``omega^2`` of a rod under loads without a potential, by their distance from zero."""
