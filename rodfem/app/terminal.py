@@ -16,7 +16,7 @@ import numpy as np
 from mpi4py import MPI
 
 from forms.kinematics import RODS
-from rodfem.continuation.branch import ORDINATE, Branch, NormalForm, Point, SpecialPoint, not_followed
+from rodfem.continuation.branch import ORDINATE, VERTICAL_BRANCH, Branch, NormalForm, Point, SpecialPoint, not_followed
 from rodfem.continuation.kinds import END, FLUTTER
 from rodfem.continuation.observer import Observer
 from rodfem.errors import Argument
@@ -44,7 +44,7 @@ STRAINS = ("v1 (shear)", "v2 (shear)", "v3 (stretch)")
 
 def _law(law: NormalForm, resolved: bool | None) -> str:
     """Local law of a branch point, whose state the mesh has ``resolved`` or not, in words."""
-    if law.side == 0:
+    if law.kind == VERTICAL_BRANCH:
         return f"{law.kind}: a family of equilibria at one and the same load"
     sign, x = "-" if law.coefficient < 0 else "+", "x" if law.of == ORDINATE else "a"
     x += f"^{law.power}" if law.power > 1 else ""

@@ -124,14 +124,17 @@ class Point:
 
 ORDINATE, DISTANCE = "ordinate", "distance"
 """What a normal form is a function of."""
+VERTICAL_BRANCH = "vertical branch"
+"""Kind of a normal form: all states of the branch are at one load."""
 
 
 @dataclass
 class NormalForm:
     """``load = load_b + coefficient x^power + ...`` at a bifurcation of a ``kind``; the coefficient's ``uncertainty``.
 
-    ``side`` is the sign of the load's change on the bifurcating branch, and ``x`` the change ``of`` the ordinate.
-    Where the ordinate does not change to leading order it is the distance from the branch point, in the metric.
+    ``side`` is the sign of the load's change on the bifurcating branch, zero where there is none or none is known, and
+    ``x`` the change ``of`` the ordinate.  Where the ordinate does not change to leading order it is the distance from
+    the branch point, in the metric.
     """
 
     kind: str
@@ -142,8 +145,11 @@ class NormalForm:
     of: str = ORDINATE
 
     def classify(self, index_below: int, index_above: int) -> None:
-        """Name a pitchfork by the index of the branch that it leaves at loads just below and just above."""
-        if self.kind == "pitchfork":
+        """Name a pitchfork by the index of the branch that it leaves at loads just below and just above.
+
+        One whose side is not determined keeps its name.
+        """
+        if self.kind == "pitchfork" and self.side:
             there, here = (index_above, index_below) if self.side > 0 else (index_below, index_above)
             self.kind = "supercritical pitchfork" if there > here else "subcritical pitchfork"
 

@@ -20,14 +20,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import DISTANCE, ORDINATE, NormalForm, SpecialPoint
+from rodfem.continuation.branch import DISTANCE, ORDINATE, VERTICAL_BRANCH, NormalForm, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.fem.newton import correct
 from rodfem.tolerances import round_off
 
 AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 """Amplitudes, in the metric, at which the branch is solved: the positive half of eight Chebyshev nodes."""
-VERTICAL_BRANCH = "vertical branch"
 SCALES = tuple(4.0**-i for i in range(4))
 """Factors of the amplitudes, of which the first is taken at which the series is resolved, else that of least error."""
 RESOLVED = 1e-3
@@ -135,8 +134,19 @@ def _at_scale(
         return _transcritical(loads, ordinates, amplitudes, origin), uneven, change
     form = _pitchfork(loads[:4], ordinates[:4], amplitudes, origin, solver.units.ordinate)
     form.uncertainty += uneven * abs(form.coefficient)
-    form.side = int(np.sign(plus))
+    form.side = _leading_side(amplitudes, loads[:4], origin.load_left)
     return form, uneven, change
+
+
+def _leading_side(amplitudes: np.ndarray, loads: np.ndarray, left: float) -> int:
+    """Sign of the leading coefficient of the load, uncertain by ``left``, in the amplitude; zero if not determined.
+
+    Nearly degenerate pitchforks turn back in a fold: at the amplitudes the load may have the other sign.
+    """
+    best = _first(amplitudes, loads, False, 4)
+    missed = abs(best - _first(amplitudes, loads, False, 3))
+    missed += sum(abs(_first(amplitudes, loads + left * one, False, 4) - best) for one in np.eye(4))
+    return int(np.sign(best)) if abs(best) > missed else 0
 
 
 def _transcritical(loads: np.ndarray, ordinates: np.ndarray, amplitudes: np.ndarray, origin: Origin) -> NormalForm:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.branch import VERTICAL_BRANCH, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.locate import NEAREST, WINDOW, refine
@@ -197,6 +197,10 @@ def start_branch(
     ):
         amplitude /= 4
         first = leave(solver, special, direction, amplitude) or first
+    if special.law is not None and "pitchfork" in special.law.kind and (first.load - special.point.load) * side < 0:
+        apart = abs(first.load - special.point.load)
+        words = f"a branch that leaves here turns back in a fold, less than {apart:.0e} away in load"
+        special.note = special.note or words
     span = solver.system.scene.span
     vertical = abs(first.slope) < VERTICAL * abs(span[1] - span[0])  # the load changes by round-off
     begins = None if vertical else known(first.load)
@@ -245,7 +249,7 @@ def fold_beside(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Ve
     amplitude is regular at the branch point, and is interpolated about it.  Where the two loads differ by less than
     :data:`SEEN` times their uncertainty a note says so, and by less than that they are one.  ``solver`` has the mesh.
     """
-    if special.test_function != "mu" or (special.law is not None and special.law.kind == "vertical branch"):
+    if special.test_function != "mu" or (special.law is not None and special.law.kind == VERTICAL_BRANCH):
         return None
     loads = []
     for amplitude in (NEAREST, -NEAREST):
@@ -276,7 +280,7 @@ def fold_beside(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Ve
 
 def _changed(special: SpecialPoint, side: float, begins: int | None, first: Point) -> bool:
     """Whether the load has turned back before the point ``first`` of a branch, or its index is another one there."""
-    if special.law is not None and special.law.kind == "vertical branch":
+    if special.law is not None and special.law.kind == VERTICAL_BRANCH:
         return False
     if begins is not None and not first.negative <= begins <= first.negative + first.zero:
         return True

@@ -11,7 +11,7 @@ from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.kinds import END
 from rodfem.continuation.prediction import hermite
-from rodfem.continuation.states_between import solve_at
+from rodfem.continuation.states_between import point_between, solve_at
 from rodfem.diagram.equivalence import near
 from rodfem.errors import ConvergenceError
 from rodfem.roots import zero_between
@@ -23,6 +23,8 @@ ALONG = 1e-11
 """Arclength, in the metric, to which a stretch vanishes."""
 SAME_END = 1e-6
 """A special point nearer to the end of the range than this, in spans, is the last state."""
+ASIDE = 1e-4
+"""Distance before an end at which the stretch vanishes, relative to the step, at which the index is counted."""
 LEAST = 12
 """Points of the shortest closed loop."""
 NEIGHBOUR = 4
@@ -43,6 +45,16 @@ def last_admissible(solver: BranchSolver, a: Point, b: Point) -> Point:
     s = zero_between(stretch, a.arclength + INSIDE * (b.arclength - a.arclength), b.arclength, ALONG)
     row = solver.row(hermite(a, b, s)[1])
     return solver.point(states[s], s, solver.tangent(row, at=states[s]))
+
+
+def before_the_end(solver: BranchSolver, a: Point, last: Point) -> Point | None:
+    """A point right before the ``last`` admissible one if it has another index than the row ``a``; None if not.
+
+    A rod that is squeezed to nothing has no stiffness against some motions: at the very end their eigenvalues are zero,
+    whatever sign they had before.
+    """
+    beside = point_between(solver, a, last, last.arclength - ASIDE * (last.arclength - a.arclength))
+    return None if beside is None or beside.negative == a.negative else beside
 
 
 def end_at_zero_stretch(solver: BranchSolver, last: Point, *, error_bars: bool) -> SpecialPoint:

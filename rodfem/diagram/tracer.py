@@ -20,7 +20,14 @@ from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer, Recorder
 from rodfem.continuation.switching import FIRST
 from rodfem.diagram.bookkeeper import Bookkeeper, Recalled
-from rodfem.diagram.branch_ends import closing, end_at_zero_stretch, last_admissible, meeting, singular_end
+from rodfem.diagram.branch_ends import (
+    before_the_end,
+    closing,
+    end_at_zero_stretch,
+    last_admissible,
+    meeting,
+    singular_end,
+)
 from rodfem.diagram.equivalence import equivalent
 from rodfem.diagram.finders import FINDERS
 from rodfem.diagram.images import image_of
@@ -272,6 +279,14 @@ class Tracer:
     def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> None:
         """Add the last admissible point, where the smallest stretch vanishes, and say so."""
         last = last_admissible(self.solver, a, b)
+        beside = before_the_end(self.solver, a, last)
+        if beside is not None:  # what passes zero before the end is zero there once more
+            self._check_invariants(beside)
+            if reason := self._between(branch, a, beside):
+                branch.ended = reason
+                return
+            branch.points.append(beside)
+            a = beside
         if reason := self._between(branch, a, last):
             branch.ended = reason
             return
