@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rodfem.continuation.branch import FIRST_BRANCH
-from rodfem.output.change_words import FEW, change_in_words, known_digits
+from rodfem.output.change_words import FEW, UNRESOLVED, change_in_words, known_digits
 from rodfem.output.endings import MEETS
 from rodfem.output.intervals import Interval, coexisting, intervals_of, stable_ones, without_stable
 from rodfem.output.plot_pieces import PLANAR, STABLE, UNDECIDED
@@ -44,7 +44,11 @@ def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     parts, told = [], intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
     start, stop = (f"{x:.{FEW}g}" for x in (intervals[0].loads[0], intervals[-1].loads[1]))
     if len(intervals) == 1:
-        parts.append(f"{name} is {_state(told[0], data)} on its whole range, from {load} = {start} to {stop}")
+        coarse = any(special.get("resolved") is False for special in branch["special"])
+        parts.append(
+            f"{name} is {_state(told[0], data)} on its whole range, from {load} = {start} to {stop}"
+            + UNRESOLVED * coarse
+        )
     for number, (one, after) in enumerate(zip(told, intervals[1:], strict=False)):
         where, what = change_in_words(one, after, data["branches"])
         begin = f"{name} is {_state(one, data)} from {load} = {start}" if not number else f"then {_state(one, data)}"

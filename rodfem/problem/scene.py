@@ -26,6 +26,7 @@ from rodfem.problem.load import DEAD, FOLLOWER, POTENTIAL
 from rodfem.problem.local_state import Constants, inside, watched
 from rodfem.problem.plane import check_plane
 from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
+from rodfem.problem.start import check_continuity
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import LARGEST, TINIEST, check_kinds, check_scene, two_numbers
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
@@ -262,6 +263,7 @@ class Scene(Contribution):
         self.check_span(self.span)
         check_scene(self)
         check_plane(self)
+        check_continuity(self)
 
     @property
     def sides(self) -> tuple[End, End]:

@@ -372,6 +372,23 @@ def test_a_plan_of_another_range_is_checked_over_it() -> None:
     Plan((0.5, 1.0)).check(scene)
 
 
+def test_a_start_that_jumps() -> None:
+    """Any mesh makes a twist of it; one that is steep, or changes the signs of quaternions, does not jump."""
+
+    def turned(angle: Any) -> Any:
+        return np.stack([np.cos(angle / 2), np.sin(angle / 2), 0 * angle, 0 * angle], axis=1)
+
+    for start in (lambda s: turned(pi * (s > 0.33)), lambda s: turned(3 * s + 0.4 * (s >= 0.5))):
+        with pytest.raises(SceneError, match=r"start jumps by (3.14|0.4) radian at s = 0\.(33|5)\b"):
+            Scene(**(GOOD | {"start": start}))
+    for start in (
+        lambda s: turned(np.arctan((s - 0.3) / 1e-5)),
+        lambda s: turned(40 * pi * s),
+        lambda s: turned(s) * np.where(s < 0.4, 1.0, -1.0)[:, None],
+    ):
+        Scene(**(GOOD | {"start": start}))
+
+
 def test_weights_that_vanish_at_a_place() -> None:
     """A constraint of the whole rod is one where its weight is zero at an end or half-way; at one place it is none."""
     weights = (lambda s: s, lambda s: s * (1 - s), lambda s: s - 0.5, lambda s: ufl.conditional(ufl.lt(s, 0.7), 0, 1))
