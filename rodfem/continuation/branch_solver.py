@@ -91,7 +91,7 @@ class BranchSolver(StaticSolver):
 
     def is_stable(self, x: PETSc.Vec) -> bool:
         """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
-        return self.inertia.at(x).count().negative == 0
+        return decide(self.inertia.at(x)).index.negative == 0
 
     def off(self, x: PETSc.Vec, start: PETSc.Vec) -> tuple[PETSc.Vec, float]:
         """State beside the saddle ``x``, along its most unstable mode on the side of ``start``.

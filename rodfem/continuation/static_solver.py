@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from math import inf
 from typing import TYPE_CHECKING
@@ -12,7 +13,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.kinds import Kind
-from rodfem.errors import SceneError
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.convexity import Convexity
 from rodfem.fem.fields import LOAD
 from rodfem.fem.newton import NewtonResult, correct, relax
@@ -132,7 +133,10 @@ class StaticSolver:
             near, found = self.at_load(self._balanced(guess), load)
             if found.converged and self._turned(guess, near) < NEAR_START:
                 x, outcome = near, found
-        good = outcome.converged and (self._turned(guess, x) < STRAYED or self.is_stable(x))
+        if outcome.converged and self._turned(guess, x) >= STRAYED:
+            outcome, good = self._examined(x, outcome)
+        else:
+            good = outcome.converged
         if good and not self.may_move(x):
             return x, outcome
         damping, self.system.damping = self.system.damping, STILL * self.system.stiffness_scale
@@ -179,7 +183,8 @@ class StaticSolver:
         first: tuple[PETSc.Vec, NewtonResult] | None = None
         for bent in (0.0, 0.4, 0.8):
             x, outcome = self._relaxed(self.start(load, bent))
-            if outcome.converged and self.is_stable(x):
+            outcome, stable = self._examined(x, outcome)
+            if stable:
                 return x, outcome
             if first is None or (outcome.converged and not first[1].converged):
                 first = x, outcome
@@ -187,8 +192,20 @@ class StaticSolver:
         if not first[1].converged:
             return first
         beside, longest = self.off(first[0], self.start(load))
-        found = self._relaxed(beside, longest, self.is_stable)
+        found = self._relaxed(beside, longest, lambda x: self._examined(x, first[1])[1])
         return found if found[1].converged else first
+
+    def _examined(self, x: PETSc.Vec, outcome: NewtonResult) -> tuple[NewtonResult, bool]:
+        """The iteration that led to ``x``, and whether that is stable.
+
+        It has not converged where eigenvalues cannot be counted: a state so far away that it is round-off is none.
+        """
+        if not outcome.converged:
+            return outcome, False
+        try:
+            return outcome, self.is_stable(x)
+        except ConvergenceError:
+            return replace(outcome, converged=False), False
 
     def _relaxed(
         self, x: PETSc.Vec, longest: float = inf, accepts: Callable[[PETSc.Vec], bool] = lambda x: True
