@@ -51,6 +51,54 @@ RECORDED = "tests/modes/test_recorded.py"
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "convexity-is-looked-at-in-rows-alone": Fault(
+        f"{CONTINUATION}convexity_between.py",
+        "if least > 0.0 or holds(t):",
+        "if least > 0.0 or t < 1.0 or holds(t):",
+        "tests/continuation/test_convexity.py",
+    ),
+    "planes-at-nine-loads": Fault(
+        "rodfem/problem/plane.py",
+        "if not all(vanishes(values[i]) for i in out):",
+        "if not all(vanishes(values[i], 1e9) for i in []):",
+        "tests/problem/test_scene_errors.py",
+    ),
+    "energies-prefer-a-side": Fault(
+        "rodfem/problem/plane.py", "PUSHES = 1e-12", "PUSHES = 1e12", "tests/problem/test_scene_errors.py"
+    ),
+    "no-balance-of-the-rod": Fault(
+        f"{CONTINUATION}invariants.py",
+        "return bool(total * max(largest, 1.0) <= UNBALANCED)",
+        "return bool(total * max(largest, 1.0) <= 1e6 * UNBALANCED)",
+        "tests/continuation/test_invariants.py",
+    ),
+    "pitchforks-by-their-loads": Fault(
+        f"{CONTINUATION}normal_form.py",
+        "form.side = _leading_side(amplitudes, loads[:4], origin.load_left)",
+        "form.side = int(np.sign(plus))",
+        "tests/continuation/test_degenerate_pitchforks.py",
+    ),
+    "no-index-before-zero-stretch": Fault(
+        "rodfem/diagram/branch_ends.py",
+        "return None if beside is None or beside.negative == a.negative else beside",
+        "return None",
+        "tests/adaptivity/test_zero_stretch.py",
+    ),
+    "masses-at-nine-loads": Fault(
+        f"{STABILITY}pencil.py",
+        "raise ConvergenceError(trouble)",
+        "pass",
+        "tests/diagram/test_inertia_of_a_load.py",
+    ),
+    "starts-that-jump": Fault(
+        "rodfem/problem/start.py", "if left > TURNED / 2:", "if left > 9:", "tests/problem/test_scene_errors.py"
+    ),
+    "states-that-cannot-be-counted": Fault(
+        f"{CONTINUATION}static_solver.py",
+        "return replace(outcome, converged=False), False",
+        "return outcome, True",
+        "tests/diagram/test_useless_first_state.py",
+    ),
     "zeros-beyond-a-row": Fault(
         f"{CONTINUATION}special_points.py", "return outside > max(", "return outside > 1e9 + max(", LOCATE
     ),
