@@ -12,7 +12,7 @@ import ufl
 from forms.kinematics import UNDEFORMED
 from forms.rotation import IDENTITY, rotation
 from rodfem.errors import POINTWISE, SceneError
-from rodfem.problem.roles import NoSuchNameError, functions_of
+from rodfem.problem.roles import UnnamedError, functions_of
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
@@ -37,14 +37,14 @@ class Constants(SimpleNamespace):
         if name.startswith("__"):
             raise AttributeError(name)
         known = [f"c.{x}" for x in sorted(vars(self)) if x != "s"]
-        raise NoSuchNameError(
+        raise UnnamedError(
             f"asks for a constant {name!r}: add it to the parameters, or choose one of "
             f"{', '.join([*known, 'c.s (the arclength)'])}."
         )
 
     def __getitem__(self, name: object) -> Any:
         """Say how a constant is written."""
-        raise NoSuchNameError(f"asks for c[{name!r}]: constants are attributes, write c.{str(name).strip()}.")
+        raise UnnamedError(f"asks for c[{name!r}]: constants are attributes, write c.{str(name).strip()}.")
 
 
 def watched(c: Constants) -> tuple[Constants, set[str]]:
@@ -77,7 +77,7 @@ class Known(SimpleNamespace):
         """Say what a place has."""
         if name.startswith("__"):
             raise AttributeError(name)
-        raise NoSuchNameError(
+        raise UnnamedError(
             f"asks for {name!r} of a place: it has r, q, R, d1, d2, d3, s and length, and where it is the "
             "whole rod dr, v and k."
         )

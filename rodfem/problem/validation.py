@@ -30,6 +30,7 @@ from rodfem.problem.local_state import (
 )
 from rodfem.problem.results import check_expression, check_results, check_same
 from rodfem.problem.roles import Role, functions_of, is_object
+from rodfem.problem.symbols import check_expressions
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -255,6 +256,7 @@ def check_scene(scene: Scene) -> None:
     check_energy(scene)
     check_places(scene)
     check_results(scene)
+    check_expressions(scene)
     check_start(scene)
     check_supports(scene)
     check_convexity(scene)
