@@ -256,6 +256,10 @@ OFF_PLANE: list[tuple[dict, str]] = [
         (held(hinged((1.0, 0.0))), "hinge of the left end has 2"),  # type: ignore[arg-type]
         (held(End(position=lambda c: ZERO, hinge=(1.0, 0.0, 0.0))), "a hinge but no rotation"),
         ({"start": lambda s: np.zeros((len(s), 4))}, "no rotation everywhere"),
+        ({"states": "branch 1"}, "the name 'branch 1', which others are given: choose another"),
+        ({"states": "branch 2.13"}, "'branch 2.13', which others are given"),
+        ({"states": "detached 1"}, "'detached 1', which others are given"),
+        ({"states": "found 2 at 3.5"}, "'found 2 at 3.5', which others are given"),
         # loads on what is held
         (held(End(position=lambda c: ZERO, follower=lambda c: ZERO)), "whose position is held"),
         (held(right=End(rotation=(1.0, 0.0, 0.0, 0.0), moment=lambda c: ZERO)), "whose directors are held"),
