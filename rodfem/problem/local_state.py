@@ -107,8 +107,8 @@ def needs_centreline(scene: Scene) -> str:
         return "the mass of a rod under a load without potential"
     if scene.distributed is not None:
         return "a distributed force"
-    c, inner = scene.constants(), scene.joints
-    if any(x.s in inner and (x.force or x.mass) for x in scene.attachments):
+    c, inner = scene.constants(), scene.is_inside
+    if any(inner(x.s) and (x.force or x.mass) for x in scene.attachments):
         return "what is attached along the rod"
     if scene.inertia.rho_A(c) != 0:
         return "the mass of the rod"
@@ -116,8 +116,8 @@ def needs_centreline(scene: Scene) -> str:
         return "a rod that nothing holds, with more than dead forces at its ends,"
     functions = [("the potential along the rod", scene.potential)] if scene.potential else []
     functions += [] if scene.ordinate.places else [("the ordinate", scene.ordinate.of)]
-    functions += [("what is attached along the rod", x.energy) for x in scene.attachments if x.energy and x.s in inner]
-    functions += [("a constraint", x.of) for x in scene.constraints if x.s is None or x.s in inner]
+    functions += [("what is attached along the rod", x.energy) for x in scene.attachments if x.energy and inner(x.s)]
+    functions += [("a constraint", x.of) for x in scene.constraints if x.s is None or inner(x.s)]
     return next((what for what, function in functions if asks_where(function, c)), "")
 
 
