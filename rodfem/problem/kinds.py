@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable, Mapping, Set
-from math import isfinite
+from math import isfinite, nan
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 import ufl
 from ufl.classes import Condition
+from ufl.core.expr import Expr
 
 from rodfem.errors import InputError, SceneError
 
@@ -112,3 +113,11 @@ def plain(value: Any) -> float:
     if isinstance(value, (str, bytes, bool, np.bool_)) or (isinstance(value, np.ndarray) and value.ndim):
         raise TypeError(f"{value!r} is no number")
     return float(value)
+
+
+def number_of(value: Any) -> float:
+    """Number that an expression without unknowns stands for; nan where it has none, or a complex one."""
+    try:
+        return plain(value(()) if isinstance(value, Expr) else value)
+    except Exception:  # of UFL's own, too, which differ from release to release
+        return nan

@@ -12,7 +12,7 @@ import ufl
 from forms.kinematics import UNDEFORMED
 from forms.rotation import IDENTITY, rotation
 from rodfem.errors import POINTWISE, SceneError
-from rodfem.problem.roles import NoSuchNameError, functions_of
+from rodfem.problem.roles import UnnamedError, functions_of
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
@@ -37,14 +37,14 @@ class Constants(SimpleNamespace):
         if name.startswith("__"):
             raise AttributeError(name)
         known = [f"c.{x}" for x in sorted(vars(self)) if x != "s"]
-        raise NoSuchNameError(
+        raise UnnamedError(
             f"asks for a constant {name!r}: add it to the parameters, or choose one of "
             f"{', '.join([*known, 'c.s (the arclength)'])}."
         )
 
     def __getitem__(self, name: object) -> Any:
         """Say how a constant is written."""
-        raise NoSuchNameError(f"asks for c[{name!r}]: constants are attributes, write c.{str(name).strip()}.")
+        raise UnnamedError(f"asks for c[{name!r}]: constants are attributes, write c.{str(name).strip()}.")
 
 
 def watched(c: Constants) -> tuple[Constants, set[str]]:
@@ -77,7 +77,7 @@ class Known(SimpleNamespace):
         """Say what a place has."""
         if name.startswith("__"):
             raise AttributeError(name)
-        raise NoSuchNameError(
+        raise UnnamedError(
             f"asks for {name!r} of a place: it has r, q, R, d1, d2, d3, s and length, and where it is the "
             "whole rod dr, v and k."
         )
@@ -107,8 +107,8 @@ def needs_centreline(scene: Scene) -> str:
         return "the mass of a rod under a load without potential"
     if scene.distributed is not None:
         return "a distributed force"
-    c, inner = scene.constants(), scene.joints
-    if any(x.s in inner and (x.force or x.mass) for x in scene.attachments):
+    c, inner = scene.constants(), scene.is_inside
+    if any(inner(x.s) and (x.force or x.mass) for x in scene.attachments):
         return "what is attached along the rod"
     if scene.inertia.rho_A(c) != 0:
         return "the mass of the rod"
@@ -116,8 +116,8 @@ def needs_centreline(scene: Scene) -> str:
         return "a rod that nothing holds, with more than dead forces at its ends,"
     functions = [("the potential along the rod", scene.potential)] if scene.potential else []
     functions += [] if scene.ordinate.places else [("the ordinate", scene.ordinate.of)]
-    functions += [("what is attached along the rod", x.energy) for x in scene.attachments if x.energy and x.s in inner]
-    functions += [("a constraint", x.of) for x in scene.constraints if x.s is None or x.s in inner]
+    functions += [("what is attached along the rod", x.energy) for x in scene.attachments if x.energy and inner(x.s)]
+    functions += [("a constraint", x.of) for x in scene.constraints if x.s is None or inner(x.s)]
     return next((what for what, function in functions if asks_where(function, c)), "")
 
 

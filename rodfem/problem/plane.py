@@ -19,8 +19,8 @@ from rodfem.errors import SceneError
 from rodfem.problem.end import SIDES
 from rodfem.problem.kinds import plain
 from rodfem.problem.local_state import STATES, Constants, place, trials, watched
-from rodfem.problem.results import symbols
 from rodfem.problem.roles import functions_of
+from rodfem.problem.symbols import symbols
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:

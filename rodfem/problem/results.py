@@ -6,7 +6,7 @@ several arclengths too; a function of a place at some states, of which it may be
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 from math import isfinite, nan
 from reprlib import Repr
@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import ufl
 from ufl.classes import ComplexValue, ScalarValue
-from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_pre_traversal
 
 from rodfem.errors import SceneError
-from rodfem.problem.kinds import check_scalar, check_vector, plain
+from rodfem.problem.kinds import check_scalar, check_vector, number_of
 from rodfem.problem.local_state import STATES, Constants, Place, inside, some_places
 from rodfem.problem.roles import Role, functions_of
 from rodfem.tolerances import NEGLIGIBLE
@@ -39,7 +38,6 @@ def check_results(scene: Scene) -> None:
             for there in _constants(scene, role):
                 _check_numbers(what, role, function(there))
             check_same(what, *(_numbers(role, function(there)) for _ in range(2)))
-            function(symbols(scene))
         elif role.call == "f(x, c)":
             check_expression(what, function(some_places(scene, wrap=ufl.variable)[role.along], c))
             where = [x.s for x in scene.constraints if x.of is function and x.s is not None] or inside(scene.interval)
@@ -50,7 +48,7 @@ def check_results(scene: Scene) -> None:
                 others = ([_at(function, *x) for x in _states_at(scene, role, s)] for s in where[1:])
                 _check_equation(what, chain([numbers], others))
     x = some_places(scene)[True]
-    check_same("stored energy", *([_number(scene.energy(x.v, x.k, c))] for _ in range(2)))
+    check_same("stored energy", *([number_of(scene.energy(x.v, x.k, c))] for _ in range(2)))
 
 
 def check_same(what: str, first: Any, second: Any) -> None:
@@ -64,7 +62,7 @@ def check_same(what: str, first: Any, second: Any) -> None:
 
 def check_finite(what: str, value: Any) -> None:
     """Raise :class:`SceneError` unless a ``value`` of the constants alone is a finite real number."""
-    if not isfinite(_number(value)):
+    if not isfinite(number_of(value)):
         raise SceneError(f"The {what} is {value}: return a finite real number.")
 
 
@@ -73,24 +71,6 @@ def _constants(scene: Scene, role: Role) -> Iterator[Constants]:
     yield scene.constants()
     yield from (scene.constants(s=s) for s in scene.samples() if role.along)
     yield from (scene.constants(load) for load in scene.loads())
-
-
-class _Symbol(ufl.classes.Variable):  # type: ignore[misc]
-    """An expression that stands for no number, as the constants do in the equations: ``math.cos`` refuses it."""
-
-    __slots__ = ()
-
-    def evaluate(self, *_: Any, **__: Any) -> float:
-        """Raise :class:`TypeError`."""
-        raise TypeError("a constant is an expression of UFL")
-
-
-def symbols(scene: Scene, names: Container[str] | None = None) -> Constants:
-    """Constants as a function of them meets them in the equations: those with the ``names`` (all) as expressions."""
-    values = vars(scene.constants())
-    return Constants(
-        **{n: _Symbol(ufl.as_ufl(value)) if names is None or n in names else value for n, value in values.items()}
-    )
 
 
 def _check_numbers(what: str, role: Role, values: Any) -> None:
@@ -105,21 +85,13 @@ def _check_numbers(what: str, role: Role, values: Any) -> None:
 
 
 def _numbers(role: Role, values: Any) -> list[float]:
-    return [nan if x is None else _number(x) for x in (values if role.size else [values])]
-
-
-def _number(value: Any) -> float:
-    """Number that an expression without unknowns stands for; nan where it has none, or a complex one."""
-    try:
-        return plain(value(()) if isinstance(value, Expr) else value)
-    except Exception:  # of UFL's own, too, which differ from release to release
-        return nan
+    return [nan if x is None else number_of(x) for x in (values if role.size else [values])]
 
 
 def _at(function: Callable[..., Any], x: Place, c: Constants) -> float:
     """Value of a function of a place, nan where it is undefined: at a state that the rod need not take."""
     try:
-        return _number(function(x, c))
+        return number_of(function(x, c))
     except SceneError:
         return nan
 

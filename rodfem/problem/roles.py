@@ -30,15 +30,15 @@ MEANINGS = {
     "v": "v[0], v[1], v[2] are the strains",
     "k": "k[0], k[1], k[2] the curvatures and the twist",
     "x": "x has what is known of a place, as x.r",
-    "c": "c has the scene's parameters, as c.P, and the arclength, c.s: plain numbers",
+    "c": "c has the scene's parameters, as c.P, and the arclength, c.s, numbers or expressions of UFL",
     "r": "r[0], r[1], r[2] are the position",
     "q": "q[0] to q[3] the rotation's quaternion",
 }
 """What the arguments of the functions of a scene are."""
 
 
-class NoSuchNameError(SceneError):
-    """A function of a scene asks for a name that there is not; its words lack the subject, which :func:`guarded` has.
+class UnnamedError(SceneError):
+    """What a function of a scene does wrong; its words lack the subject, which :func:`guarded` has.
 
     A person reads ``The stored energy asks for a constant 'G': ...``.
     """
@@ -110,9 +110,9 @@ class Placeless:
         self._constants = c
 
     def __getattr__(self, name: str) -> Any:
-        """Constant of a ``name``; raises :class:`NoSuchNameError` for the arclength."""
+        """Constant of a ``name``; raises :class:`UnnamedError` for the arclength."""
         if name == "s":
-            raise NoSuchNameError("asks for the arclength c.s, but does not vary along the rod: write the number.")
+            raise UnnamedError("asks for the arclength c.s, but does not vary along the rod: write the number.")
         return getattr(self._constants, name)
 
     def __getitem__(self, name: object) -> Any:
@@ -134,7 +134,7 @@ def guarded(what: str, function: Callable[..., Any], role: Role) -> Callable[...
         try:
             value = function(*arguments) if role.placed else function(*map(Placeless, arguments))
             return value if role.returns is None else role.returns(value)
-        except NoSuchNameError as trouble:
+        except UnnamedError as trouble:
             raise SceneError(f"The {what} {trouble}") from None
         except SceneError:
             raise

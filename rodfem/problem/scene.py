@@ -295,10 +295,16 @@ class Scene(Contribution):
 
     @property
     def joints(self) -> tuple[float, ...]:
-        """Arclengths inside the rod that must be element boundaries, in ascending order."""
-        places = {*self.breaks, *(part.s for part in self.parts if part.s is not None)}
+        """Arclengths inside the rod that must be element boundaries, in ascending order; one for what is one place."""
+        places = sorted({*self.breaks, *(part.s for part in self.parts if part.s is not None)})
+        inner = [s for s in places if self.is_inside(s)]
+        apart = [not i or not same_place(inner[i - 1], s, self.length) for i, s in enumerate(inner)]
+        return tuple(s for s, new in zip(inner, apart, strict=True) if new)
+
+    def is_inside(self, s: float) -> bool:
+        """Whether an arclength is inside the rod, not at an end."""
         close = SAME_PLACE * self.length
-        return tuple(sorted(s for s in places if self.interval[0] + close < s < self.interval[1] - close))
+        return self.interval[0] + close < s < self.interval[1] - close
 
     def samples(self) -> list[float]:
         """Arclengths at which the material is checked: nine from end to end, and both sides of all breaks."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields
 from keyword import iskeyword
@@ -30,6 +31,7 @@ from rodfem.problem.local_state import (
 )
 from rodfem.problem.results import check_expression, check_results, check_same
 from rodfem.problem.roles import Role, functions_of, is_object
+from rodfem.problem.symbols import check_expressions
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -43,6 +45,8 @@ EPS, FELT = float(np.finfo(float).eps), 1e-3
 FLEXIBLE = "choose a kind of rod without the stiff strains"
 SOFTEST, STIFFEST = 1e-8, 1e-15
 """Least stiffness over the greatest one, of bending and twist, and of all strains with the rod's length as unit."""
+GIVEN = re.compile(r"branch \d+(\.\d+)*|detached( \d+(\.\d+)*)?|found \d+ at .*")
+"""Names that branches are given as they are found."""
 
 
 def check_kinds(scene: Scene) -> None:
@@ -50,6 +54,11 @@ def check_kinds(scene: Scene) -> None:
     check_file_name("scene", scene.name)
     if scene.states is not None:
         check_file_name("first branch, states,", scene.states)
+        if GIVEN.fullmatch(scene.states):
+            raise SceneError(
+                f"The first branch, states, has the name {scene.states!r}, which others are given: choose another, as "
+                "'straight'."
+            )
     if not isinstance(scene.title, str):
         raise SceneError(f"The title is {scene.title!r}: give a text.")
     if (
@@ -255,6 +264,7 @@ def check_scene(scene: Scene) -> None:
     check_energy(scene)
     check_places(scene)
     check_results(scene)
+    check_expressions(scene)
     check_start(scene)
     check_supports(scene)
     check_convexity(scene)

@@ -59,3 +59,18 @@ def test_a_weight_that_vanishes_at_an_end() -> None:
     for special, load in zip(found, (2.4674011003, 22.2066099025, 25.5857551650), strict=True):
         assert abs(special.point.load - load) < special.error_estimate + 1e-9
         assert special.error_estimate < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("places", "breaks"), [((0.4, 0.4 + 1e-13), ()), ((0.1 + 0.3, 0.4), (0.4 - 1e-13,)), ((0.1 + 0.2,) * 2, (0.3,))]
+)
+def test_what_is_one_place_but_for_round_off(places: tuple[float, float], breaks: tuple[float, ...]) -> None:
+    """Two halves of a thrust, and a break, at one place: Euler's load of the part below.
+
+    An element of the length 1e-13 lay between, with eigenvalues within round-off.
+    """
+    halves = tuple(Attachment(s, force=lambda c: (0.0, 0.0, -c.P / 2)) for s in places)
+    scene = column("one place", (clamped(), free()), (0.0, 30.0), attachments=halves, breaks=breaks)
+    assert len(scene.joints) == 1
+    found = trace(scene, Discretization(elements=4, degree=6), Plan(depth=0)).special("branch point")[0]
+    assert abs(found.point.load - 2.4674011002723395 / places[0] ** 2) < found.error_estimate

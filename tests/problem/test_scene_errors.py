@@ -206,7 +206,7 @@ OFF_PLANE: list[tuple[dict, str]] = [
             r"^The stored energy asks for a constant 'S': .*, or choose one of c\.B, c\.F, c\.s \(the arclength\)",
         ),
         ({"energy": lambda v, k, c: c["B"] * k[0] ** 2}, r"stored energy asks for c\['B'\]: .* write c\.B\."),
-        ({"energy": lambda v, k, c: c.s.x * k[0] ** 2}, r"'x'\\?\".*: v\[0\].* the arclength, c\.s: plain numbers"),
+        ({"energy": lambda v, k, c: c.s.x * k[0] ** 2}, r"'x'\\?\".*: v\[0\].* c\.s, numbers or expressions of UFL"),
         ({"energy": lambda v, k, c, s: (1 - s) * k[0] ** 2}, r"give W\(v, k, c\), where .* the arclength, c\.s"),
         ({"potential": lambda x, c: c.G * x.r[0]}, "asks for a constant 'G'"),
         ({"potential": lambda x, c: x.z}, "potential along the rod asks for 'z' of a place: it has"),
@@ -256,6 +256,10 @@ OFF_PLANE: list[tuple[dict, str]] = [
         (held(hinged((1.0, 0.0))), "hinge of the left end has 2"),  # type: ignore[arg-type]
         (held(End(position=lambda c: ZERO, hinge=(1.0, 0.0, 0.0))), "a hinge but no rotation"),
         ({"start": lambda s: np.zeros((len(s), 4))}, "no rotation everywhere"),
+        ({"states": "branch 1"}, "the name 'branch 1', which others are given: choose another"),
+        ({"states": "branch 2.13"}, "'branch 2.13', which others are given"),
+        ({"states": "detached 1"}, "'detached 1', which others are given"),
+        ({"states": "found 2 at 3.5"}, "'found 2 at 3.5', which others are given"),
         # loads on what is held
         (held(End(position=lambda c: ZERO, follower=lambda c: ZERO)), "whose position is held"),
         (held(right=End(rotation=(1.0, 0.0, 0.0, 0.0), moment=lambda c: ZERO)), "whose directors are held"),
