@@ -88,7 +88,8 @@ def resume(
         if not earlier.complete:
             return carry_out(scene, discretization, terminal, figures, comm)
         diagram = load(folder, scene, comm)
-        check_asked(earlier.asked, asked | {EQUATIONS: fingerprint(diagram.solvers[0].system)}, folder)
+        system = diagram.solvers[0].system
+        check_asked(earlier.asked, asked | {EQUATIONS: fingerprint(system, plan.over(scene))}, folder)
         done = branches_in_words(len(diagram))
         terminal.say(f"The run in {folder}{os.sep} is complete ({done}): nothing is left to compute")
         if figures:

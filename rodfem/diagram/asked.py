@@ -42,7 +42,7 @@ def check_asked(there: dict[str, Any], here: dict[str, Any], folder: Any) -> Non
     if EQUATIONS in there and EQUATIONS in here and not same(there[EQUATIONS], here[EQUATIONS]):
         raise InputError(
             f"{folder} was run with other equations than those of the scene {here['scene']['name']!r} (at one and the "
-            f"same state their residual, energy or ordinate differ): {REMEDY}."
+            f"same state their residual, ordinate, or stored, potential or kinetic energy differ): {REMEDY}."
         )
 
 

@@ -1,0 +1,72 @@
+"""Files of another rod, or of another event: what no number of a scene tells, its equations do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import ufl
+from classics import column
+
+import rodfem
+from rodfem import Attachment, Discretization, Inertia, Plan, Scene, clamped, free
+from rodfem.errors import InputError
+from rodfem.fem.fingerprint import OLDER, fingerprint, same
+from rodfem.fem.system import System
+
+MESH = Discretization("auto", 4, 4)
+
+
+def loaded(mass: float = 1.0, tip: float = 1.0) -> Scene:
+    """Pflueger's column, of a mass along it and one at its tip."""
+    ends = (clamped(), free(follower=lambda c: (0.0, 0.0, -c.P)))
+    carried = (Attachment(1.0, mass=lambda c: tip),)
+    return column("carried", ends, (0.0, 6.0), inertia=Inertia(rho_A=lambda c: mass), attachments=carried)
+
+
+def crooked(e: float) -> Scene:
+    """A cantilever with a force across it that is zero at both ends of its range."""
+    return column("crooked", (clamped(), free(lambda c: (e * c.P * (6.0 - c.P), 0.0, -c.P))), (0.0, 6.0))
+
+
+def beyond(e: float) -> Scene:
+    """A cantilever with a force across it above its own range."""
+    ends = clamped(), free(lambda c: (e * ufl.max_value(c.P - 1.0, 0.0), 0.0, -c.P))
+    return column("beyond", ends, (0.0, 1.0))
+
+
+OTHERS: dict[str, tuple[Callable[[], Scene], Callable[[], Scene], Plan]] = {
+    "mass along it": (loaded, lambda: loaded(mass=1.1), Plan((0.0, 6.0), error_bars=False)),
+    "mass at its tip": (loaded, lambda: loaded(tip=0.1), Plan((0.0, 6.0), error_bars=False)),
+    "between the ends": (lambda: crooked(0.05), lambda: crooked(0.0), Plan((0.0, 6.0), depth=0, error_bars=False)),
+}
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("name", OTHERS)
+def test_files_of_another_rod(folder: Path, name: str) -> None:
+    """Its inertia, and what differs between the ends of the range alone; the rod itself is read."""
+    scene, other, plan = OTHERS[name]
+    rodfem.run(scene(), MESH, plan, folder, figures=False, quiet=True)
+    assert len(rodfem.load(folder, scene())) == 1
+    assert len(rodfem.resume(folder, scene(), quiet=True, figures=False)) == 1
+    for read in (rodfem.load, lambda *a: rodfem.resume(*a, quiet=True, figures=False)):
+        with pytest.raises(InputError, match="was run with other equations than those of the scene"):
+            read(folder, other())
+
+
+def test_a_fingerprint_of_an_older_file() -> None:
+    """It has residual, energy and ordinate at both ends of the range of the scene: these are compared."""
+    numbers = {e: fingerprint(System(crooked(e), MESH), (0.0, 6.0)) for e in (0.0, 0.05)}
+    older = numbers[0.05][: 2 * OLDER]
+    assert same(older, numbers[0.05]) and same(older, numbers[0.0])
+    assert not same(numbers[0.05], numbers[0.0])
+    assert not same([1.01 * x if x is not None else x for x in older], numbers[0.05])
+
+
+def test_loads_beyond_the_range_of_the_scene() -> None:
+    """Of a plan with a wider range that is seen, too."""
+    for high, alike in ((1.0, True), (6.0, False)):
+        first, second = (fingerprint(System(beyond(e), MESH), (0.0, high)) for e in (0.0, 0.05))
+        assert same(first, second) == alike
