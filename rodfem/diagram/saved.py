@@ -105,7 +105,8 @@ def _check_equations(data: dict[str, Any], system: System, folder: Path) -> None
     if before is not None and not same(before, fingerprint(system, tuple(data["range"]))):
         raise InputError(
             f"{folder} was run with other equations than those of the scene {system.scene.name!r} (at one and the "
-            "same state their residual, ordinate, or stored, potential or kinetic energy differ): give the scene that was run."
+            "same state their residual, ordinate, or stored, potential or kinetic energy differ): give the scene that "
+            "was run."
         )
 
 
