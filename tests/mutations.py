@@ -510,6 +510,15 @@ FAULTS = {
         "sys.path.insert(0, str(path.parent))",
         "tests/app/test_run_command.py",
     ),
+    "rods-of-another-inertia-are-one": Fault(
+        "rodfem/fem/fingerprint.py", "(mass * change).dot(change).real / 2", "0.0", "tests/diagram/test_another_rod.py"
+    ),
+    "rods-that-differ-inside-the-range-are-one": Fault(
+        "rodfem/fem/fingerprint.py", ", *inside(own)] + (", "] + (", "tests/diagram/test_another_rod.py"
+    ),
+    "events-of-one-name-are-one": Fault(
+        "rodfem/diagram/asked.py", "if not same_event(before, now):", "if False:", "tests/diagram/test_another_rod.py"
+    ),
     "scene-of-another-name": Fault(
         "rodfem/diagram/saved.py", "if (name, load) != (scene.name, scene.load):", "if load != scene.load:", DIAGRAM
     ),

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from rodfem.app.earlier import earlier_in
 from rodfem.app.run import carry_out, draw
 from rodfem.app.run_terminal import Terminal, branches_in_words
-from rodfem.diagram.asked import EQUATIONS, as_asked, check_asked, plan_of
+from rodfem.diagram.asked import as_asked, check_asked, plan_of, prints
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.journal import discretization_of
 from rodfem.diagram.plan import Plan
@@ -19,7 +19,6 @@ from rodfem.diagram.saved import load
 from rodfem.diagram.solver import MESH, RANKS, SCENE
 from rodfem.diagram.trace import PLAN
 from rodfem.fem.fields import Discretization
-from rodfem.fem.fingerprint import fingerprint
 from rodfem.output.folder import locked
 from rodfem.problem.arguments import checked, function, path, yes_or_no
 from rodfem.problem.scene import Scene
@@ -88,7 +87,7 @@ def resume(
         if not earlier.complete:
             return carry_out(scene, discretization, terminal, figures, comm)
         diagram = load(folder, scene, comm)
-        check_asked(earlier.asked, asked | {EQUATIONS: fingerprint(diagram.solvers[0].system)}, folder)
+        check_asked(earlier.asked, asked | prints(diagram.solvers[0].system, plan), folder)
         done = branches_in_words(len(diagram))
         terminal.say(f"The run in {folder}{os.sep} is complete ({done}): nothing is left to compute")
         if figures:

@@ -11,11 +11,16 @@ from rodfem.diagram.plan import Plan
 from rodfem.errors import InputError
 from rodfem.fem import formulations
 from rodfem.fem.fields import Discretization
-from rodfem.fem.fingerprint import same
+from rodfem.fem.fingerprint import fingerprint, of_events, same, same_event
+from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 
 EQUATIONS = "equations"
 """Entry that has the fingerprint of the equations (:mod:`rodfem.fem.fingerprint`), where it is known."""
+EVENTS = "events"
+"""Entry that has values of the events of the plan at the same states, where there are events."""
+PRINTS = (EQUATIONS, EVENTS)
+"""Entries that tell functions, up to round-off."""
 REMEDY = "give what was run, or choose another folder"
 
 
@@ -32,18 +37,31 @@ def as_asked(scene: Scene, discretization: Discretization, plan: Plan) -> dict[s
     }
 
 
+def prints(system: System, plan: Plan) -> dict[str, Any]:
+    """Entries that tell functions: of the equations of a ``system``, and of the events of a ``plan``; collective."""
+    span = plan.over(system.scene)
+    values = of_events(system, plan.events, span)
+    return {EQUATIONS: fingerprint(system, span)} | ({EVENTS: values} if values else {})
+
+
 def check_asked(there: dict[str, Any], here: dict[str, Any], folder: Any) -> None:
     """Raise :class:`InputError` where a run in a ``folder`` was asked for something else than this one.
 
-    ``there`` and ``here`` are what the two were asked for; the equations are compared where both have them.
+    ``there`` and ``here`` are what the two were asked for; equations and events are compared where both have them.
     """
     for name, before, now in _differences(there, here):
         raise InputError(f"{folder} was run with {name} = {before!r}, not {now!r}: {REMEDY}.")
     if EQUATIONS in there and EQUATIONS in here and not same(there[EQUATIONS], here[EQUATIONS]):
         raise InputError(
             f"{folder} was run with other equations than those of the scene {here['scene']['name']!r} (at one and the "
-            f"same state their residual, energy or ordinate differ): {REMEDY}."
+            f"same state their residual, ordinate, or stored, potential or kinetic energy differ): {REMEDY}."
         )
+    named = zip(here["plan"]["events"], there.get(EVENTS, ()), here.get(EVENTS, ()), strict=False)
+    for name, before, now in named:
+        if not same_event(before, now):
+            raise InputError(
+                f"{folder} was run with another event {name!r} (at one and the same state its values differ): {REMEDY}."
+            )
 
 
 def plan_of(asked: dict[str, Any], folder: Any) -> Plan:
@@ -63,7 +81,7 @@ def _plain(entries: dict[str, Any]) -> dict[str, Any]:
 
 def _differences(there: dict[str, Any], here: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
     """Entries that differ: a name, and both values."""
-    for group in (name for name in here if name != EQUATIONS):
+    for group in (name for name in here if name not in PRINTS):
         before, now = there.get(group, {}), here[group]
         for name in dict.fromkeys([*before, *now]):
             if before.get(name) != now.get(name):

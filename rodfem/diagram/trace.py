@@ -13,7 +13,7 @@ from rodfem.adaptivity.error_estimate import halved
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer, Recorder
-from rodfem.diagram.asked import as_asked
+from rodfem.diagram.asked import as_asked, prints
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.frequency_mesh import frequency_mesh
@@ -25,7 +25,6 @@ from rodfem.diagram.sweep import Sweep
 from rodfem.diagram.waves import check_waves
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
-from rodfem.fem.fingerprint import fingerprint
 from rodfem.fem.system import System
 from rodfem.fem.transfer import compile_richer
 from rodfem.problem.arguments import a, checked
@@ -118,7 +117,7 @@ def traced(
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
             if plan.accuracy is None:
                 check_waves(found, plan.over(scene), recorder.warn)
-        asked = as_asked(scene, discretization, plan) | {"equations": fingerprint(found.system)}
+        asked = as_asked(scene, discretization, plan) | prints(found.system, plan)
         recorder.asked(asked)
         recorder.system(found.system, plan.accuracy)
         if unused := _not_used(discretization, plan):

@@ -1,49 +1,131 @@
 """Numbers that tell whether two scenes state the same rod: files hold no functions.
 
-All equations are evaluated at one smooth state that is no equilibrium, in which every unknown differs from zero.
+All equations, and the kinetic metric, are evaluated at one smooth state that is no equilibrium, in which every unknown
+differs from zero: at both ends of the range of the scene, and at loads inside, where an imperfection that vanishes at
+both ends is seen.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.errors import SceneError
 from rodfem.fem.fields import LOAD
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
+from rodfem.problem.events import Event
+from rodfem.problem.local_state import inside
+from rodfem.tolerances import NEGLIGIBLE
 
 AMPLITUDE = 0.1
 """Size of the waves on top of the undeformed rod, in natural sizes."""
 SAME = 1e-9
 """Relative difference of fingerprints that is round-off."""
+OLDER = 3
+"""Numbers at a load that come first, in a list of those of both ends."""
 
 
-def fingerprint(system: System) -> list[float | None]:
-    """Norm of the residual, stored energy and ordinate at a smooth state, at both ends of the range of the scene.
+def fingerprint(system: System, span: tuple[float, float]) -> list[float | None]:
+    """Numbers of the equations of a ``system`` at a smooth state, at loads of the range of its scene and of a ``span``.
 
-    Not finite ones are None.  Collective.
+    First the norm of the residual, stored energy and ordinate at both ends of the range of the scene, which older files
+    have alone; then kinetic energy and total potential energy there; then all five at loads inside, and at those of the
+    ``span`` if that is another range.  What is not finite, or is not there, is None.  Collective.
     """
-    out: list[float] = []
     system.set_phase(None)
-    shape, residual = Shape(system), system.new_vector()
-    for load in system.scene.span:
-        x = _waves(system, load)
-        state = system.at(x)
-        state.residual(residual)
-        out += [residual.norm(), state.energy(), shape.ordinate(x)]
-    return [float(value) if np.isfinite(value) else None for value in out]
+    shape, mass = Shape(system), system.metric_matrix()
+    found = [_numbers(system, shape, mass, load) for load in _loads(system, span)]
+    ends, others = found[:2], found[2:]
+    out = [values[:OLDER] for values in ends] + [values[OLDER:] for values in ends] + others
+    return [float(value) if np.isfinite(value) else None for values in out for value in values]
+
+
+def of_events(system: System, events: Sequence[Event], span: tuple[float, float]) -> list[list[float | None]]:
+    """Values of each of the ``events`` at the states of a :func:`fingerprint`; None where it has none.  Collective.
+
+    The states are those of a ``system`` for a ``span``.
+    """
+    if not events:
+        return []
+    shape = Shape(system)
+    samples = [shape.sample(_waves(system, load)) for load in _loads(system, span)]
+    return [[_value(event, sample) for sample in samples] for event in events]
+
+
+def same_event(a: list[float | None], b: list[float | None]) -> bool:
+    """Whether values of an event are those of one function, up to round-off, which is absolute where they are zero."""
+    known = _known(a, b)
+    if known is None or not len(known):
+        return known is not None
+    close = max(SAME * abs(known).max(), NEGLIGIBLE)
+    return bool((abs(known[:, 0] - known[:, 1]) <= close).all())
 
 
 def same(a: list[float | None], b: list[float | None]) -> bool:
-    """Whether two fingerprints are those of one scene."""
-    if len(a) != len(b) or any((p is None) != (q is None) for p, q in zip(a, b, strict=True)):
-        return False
-    known = np.array([(p, q) for p, q in zip(a, b, strict=True) if p is not None and q is not None])
-    return bool((abs(known[:, 0] - known[:, 1]) <= SAME * abs(known).max(axis=1)).all())
+    """Whether two fingerprints are those of one scene; of an older file, which has less, what it has is compared."""
+    known = _known(a, b)
+    return known is not None and bool((abs(known[:, 0] - known[:, 1]) <= SAME * abs(known).max(axis=1)).all())
+
+
+def _known(a: list[float | None], b: list[float | None]) -> np.ndarray | None:
+    """Pairs of the numbers that both lists have, (k, 2), as far as the shorter goes; None where one alone has one."""
+    pairs = list(zip(a, b, strict=False))
+    if any((p is None) != (q is None) for p, q in pairs):
+        return None
+    return np.array([(p, q) for p, q in pairs if p is not None and q is not None]).reshape(-1, 2)
+
+
+def _numbers(system: System, shape: Shape, mass: PETSc.Mat, load: float) -> list[float]:
+    """Residual's norm, stored energy, ordinate, kinetic energy and potential at a load; nan where there is none.
+
+    The kinetic metric of the ``system`` is written into ``mass``; ``shape`` evaluates its states.
+    """
+    x, change = _waves(system, load), _changes(system)
+    state, residual = system.at(x), system.new_vector()
+    state.residual(residual)
+    mass.zeroEntries()
+    state.assemble_into(mass, system.equations.kinetic)
+    mass.assemble()
+    kinetic, potential = (mass * change).dot(change).real / 2, system.equations.potential
+    energy = float("nan") if potential is None else state.integral(potential)
+    return [residual.norm(), state.energy(), shape.ordinate(x), kinetic, energy]
+
+
+def _loads(system: System, span: tuple[float, float]) -> list[float]:
+    """Loads of the states: those of the range of the scene of a ``system``, then of the ``span`` if it is another."""
+    own = system.scene.span
+    return [*own, *inside(own)] + ([] if tuple(span) == own else [*span, *inside(span)])
+
+
+def _value(event: Event, sample: dict[str, Any]) -> float | None:
+    """Value of an event at a state, given by its arrays; None where it has none."""
+    try:
+        return event(sample)
+    except SceneError:
+        return None
 
 
 def _waves(system: System, load: float) -> PETSc.Vec:
     """Undeformed rod with a wave in each component of each field, at a load."""
+    fields, scene = system.fields, system.scene
+    start = fields.turning.start(scene.start, fields.coordinates(fields.discretization.degree).ravel(), scene.interval)
+    undeformed = np.array([1.0 if i == 2 else 0.0 for i in scene.free_strains])
+    rest = {fields.turning.name: start.reshape(*fields.coordinates(fields.discretization.degree).shape, -1)}
+    base = fields.filled(rest | {"v": undeformed, LOAD: load})
+    return system.vector(base + AMPLITUDE * fields.sizes * _wave(system))
+
+
+def _changes(system: System) -> PETSc.Vec:
+    """The waves alone, as a change of a state."""
+    return system.vector(system.fields.sizes * _wave(system))
+
+
+def _wave(system: System) -> np.ndarray:
+    """A wave in each component of each field, in natural sizes, zero where the rod is clamped: local values."""
     fields, scene = system.fields, system.scene
     named = {}
     for block in fields.blocks:
@@ -51,8 +133,4 @@ def _waves(system: System, load: float) -> PETSc.Vec:
         number = np.arange(1, block.size + 1)
         named[block.name] = np.sin(number + np.multiply.outer(x, number))
     named |= {name: np.sin(number) for number, name in enumerate(fields.scalars, start=1) if name != LOAD}
-    start = fields.turning.start(scene.start, fields.coordinates(fields.discretization.degree).ravel(), scene.interval)
-    undeformed = np.array([1.0 if i == 2 else 0.0 for i in scene.free_strains])
-    rest = {fields.turning.name: start.reshape(*fields.coordinates(fields.discretization.degree).shape, -1)}
-    base = fields.filled(rest | {"v": undeformed, LOAD: load})
-    return system.vector(base + AMPLITUDE * fields.sizes * np.where(fields.number < 0, 0.0, fields.filled(named)))
+    return np.where(fields.number < 0, 0.0, fields.filled(named))

@@ -73,6 +73,7 @@ def loose() -> Scene:
     return replace(scenes()["euler"], ends=(joint, rodfem.free(page()["push"])), name="loose")
 
 
+FAR = rodfem.Event("far", of=lambda state: state.r[-1, 2] - 9.0)
 QUICK = {"error_bars": False, "depth": 0}
 RUNS: dict[str, tuple[Callable[[], Scene], Discretization, Plan]] = {
     "pinned": (lambda: scenes()["euler"], MESH, Plan((0.0, 12.0), at=(11.0,), depth=1, spectrum=2, modes=2)),
@@ -83,7 +84,7 @@ RUNS: dict[str, tuple[Callable[[], Scene], Discretization, Plan]] = {
     "ring": (lambda: scenes()["ring"], POINTWISE, Plan((0.0, 0.2), **QUICK)),
     "foundation": (lambda: scenes()["winkler"], MESH, Plan((0.0, 1.0), at=(0.5,), modes=1, **QUICK)),
     "stretched": (lambda: scenes()["pressed"], MESH, Plan((1.0, 0.99), at=(0.995,), modes=1, **QUICK)),
-    "held": (held, MESH, Plan((0.0, 0.2), **QUICK)),
+    "held": (held, MESH, Plan((0.0, 0.2), events=(FAR,), **QUICK)),
     "guided": (guided, MESH, Plan((0.0, 0.2), **QUICK)),
     "sprung": (sprung, MESH, Plan((0.0, 0.2), **QUICK)),
     "loose": (loose, MESH, Plan((0.0, 0.2), **QUICK)),
