@@ -482,8 +482,8 @@ FAULTS = {
     ),
     "kinks-beside-the-end-of-a-piece": Fault(
         "rodfem/problem/smoothness.py",
-        "- ends).max() <= ENDS * self.size",
-        "- ends).max() < np.inf",
+        "- values).max() <= ENDS * self.size",
+        "- values).max() < np.inf",
         "tests/problem/test_smoothness.py",
     ),
     "gaps-that-are-jumped-are-forgotten": Fault(

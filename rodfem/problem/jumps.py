@@ -5,54 +5,47 @@ both meshes of an error estimate these agree with each other, and not with the r
 0.43 was given the bar 3e-7 on 14 cubic elements, with an error of 0.09.
 
 The functions of the scene are called with an arclength that has no value yet.  What they compare with it
-(``ufl.conditional``) changes at the zeros of a difference, which are bracketed on a grid; there the
-function is evaluated on either side.
+(``ufl.conditional``) changes at the zeros of a difference.  These are bracketed on a fine grid, two between points of
+it by the lowest value between them; there the function is evaluated on either side.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import pairwise
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
-from ufl.classes import GE, GT, LE, LT
+from ufl.classes import GE, GT, LE, LT, Abs, MaxValue, MinValue
 from ufl.corealg.traversal import unique_pre_traversal
 
 from forms.rotation import rotation
 from rodfem.problem.local_state import STATES, inside, place
 from rodfem.problem.roles import functions_of
-from rodfem.roots import zero_between
+from rodfem.problem.values import Symbol, Values
+from rodfem.roots import lowest_between, zero_between
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
-GRID = 200
-"""Pieces of the rod in each of which one zero is looked for."""
+GRID = 20_000
+"""Pieces of the rod in each of which one zero is looked for, or two where the difference comes near to zero."""
+MOST = 200
+"""Places of a difference that are looked for."""
 BESIDE = 1e-4
 """Part of a piece by which the grid is moved: no simple fraction of the rod is a point of it."""
 JUMP = 1e-9
 """Least jump, relative to the greater of the two values."""
 
 
-class Arclength(ufl.classes.Variable):  # type: ignore[misc]
-    """The arclength, with the value that it is given last."""
-
-    __slots__ = ("value",)
-
-    def evaluate(self, *_: Any, **__: Any) -> float:
-        """Return the value."""
-        return float(self.value)
-
-
 def jumps(scene: Scene) -> dict[str, list[float]]:
     """Arclengths inside the rod at which a function of the scene jumps, by its words, in ascending order."""
-    s = Arclength(ufl.as_ufl(0.0))
+    s = Symbol()
     found: dict[str, list[float]] = {}
     for what, expressions in along(scene, s):
-        places = {x for x in _changes(expressions, s, scene) if _jumps_at(expressions, s, x, scene.length)}
+        places = {x for x in changes(expressions, s, scene) if _jumps_at(expressions, s, x, scene.length)}
         if places:
             found[what] = sorted({*found.get(what, []), *places})
     return found
@@ -90,28 +83,62 @@ def _place(scene: Scene, s: Any, state: Any) -> Any:
     return place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=scene.length)
 
 
-def _changes(expressions: list[Any], s: Arclength, scene: Scene) -> Iterator[float]:
-    """Arclengths inside the rod at which a comparison with the arclength changes."""
+def grid(scene: Scene) -> np.ndarray:
+    """Arclengths from one end to the other, of which no inner one is a simple fraction of the rod."""
     a, b = scene.interval
     inner = np.linspace(a, b, GRID + 1)[1:-1] + BESIDE * scene.length / GRID
-    grid = np.concatenate([[a], inner, [b]])
-    parts = {part for e in expressions for part in unique_pre_traversal(e) if isinstance(part, LT | GT | LE | GE)}
+    return np.concatenate([[a], inner, [b]])
+
+
+def changes(expressions: list[Any], s: Symbol, scene: Scene, *, kinks: bool = False) -> Iterator[float]:
+    """Arclengths inside the rod at which a comparison with the arclength changes, or what has ``kinks`` may have one.
+
+    Parameters
+    ----------
+    expressions, s
+        Expressions of the arclength ``s``.
+    scene
+        The rod.
+    kinks
+        Whether absolute values, and larger or smaller ones of two, are comparisons, too.
+    """
+    a, b = scene.interval
+    kinds = (LT, GT, LE, GE, *((Abs, MaxValue, MinValue) if kinks else ()))
+    parts = {part for e in expressions for part in unique_pre_traversal(e) if isinstance(part, kinds)}
     for part in (part for part in parts if s in unique_pre_traversal(part)):
-        left, right = part.ufl_operands
-
-        def difference(x: float, left: Any = left, right: Any = right) -> float:
-            s.value = x
-            return float(left(())) - float(right(()))
-
-        values = [difference(x) for x in grid]
-        for (x, y), (f, g) in zip(pairwise(grid), pairwise(values), strict=True):
-            if f * g < 0:
-                at = zero_between(difference, x, y, NEGLIGIBLE * scene.length)
-                if a + SAME_PLACE * scene.length < at < b - SAME_PLACE * scene.length:
-                    yield round(at, 14 - int(np.ceil(np.log10(scene.length))))
+        for at in islice(_zeros(Values(difference(part)), s, scene), MOST):
+            if a + SAME_PLACE * scene.length < at < b - SAME_PLACE * scene.length:
+                yield round(at, 14 - int(np.ceil(np.log10(scene.length))))
 
 
-def _jumps_at(expressions: list[Any], s: Arclength, x: float, length: float) -> bool:
+def difference(part: Any) -> Any:
+    """What is zero where a comparison changes, or where an absolute value or the larger of two has a kink."""
+    return part.ufl_operands[0] - (0.0 if isinstance(part, Abs) else part.ufl_operands[1])
+
+
+def _zeros(f: Values, s: Symbol, scene: Scene) -> Iterator[float]:
+    """Where a function changes its sign, also between two points of the grid."""
+    places, within = grid(scene), NEGLIGIBLE * scene.length
+
+    def at(x: float, sign: float = 1.0) -> float:
+        return sign * float(f({s: np.array([x])})[0])
+
+    y = f({s: places})
+    sign, size, steps = np.sign(y), abs(y), abs(np.diff(y))
+    for i in np.flatnonzero(sign[1:] * sign[:-1] < 0):
+        yield zero_between(at, float(places[i]), float(places[i + 1]), within)
+    zero = sign == 0.0
+    yield from places[1:-1][zero[1:-1] & ~(zero[:-2] & zero[2:])].tolist()
+    near = (size[1:-1] <= steps[1:] + steps[:-1]) & (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
+    near &= (sign[:-2] == sign[1:-1]) & (sign[2:] == sign[1:-1])
+    for i in np.flatnonzero(near)[:MOST]:
+        low, middle, high = places[i : i + 3].tolist()
+        lowest, least = lowest_between(lambda x, i=i: at(x, sign[i + 1]), low, middle, high, within)  # type: ignore[misc]
+        if least < 0:
+            yield from (zero_between(at, end, lowest, within) for end in (low, high))
+
+
+def _jumps_at(expressions: list[Any], s: Symbol, x: float, length: float) -> bool:
     """Whether one of the expressions jumps at an arclength."""
     for expression in expressions:
         sides = []

@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 from rodfem import Discretization, Plan, Scene, trace
 from rodfem.problem.jumps import jumps
+from rodfem.problem.values import Symbol, Values
 
 K, END = 500.0, 0.43
 
@@ -66,3 +67,34 @@ def test_where_functions_jump() -> None:
     found = jumps(column("none at an end", SUPPORTS["clamped-free"], (0.0, 1.0), distributed=humps))
     assert found["distributed force"] == pytest.approx([0.7], abs=1e-11)
     assert jumps(column("none", SUPPORTS["clamped-free"], (0.0, 1.0))) == {}
+
+
+@pytest.mark.parametrize("width", [4e-4, 1e-5, 1e-7])
+@pytest.mark.parametrize(
+    "notch",
+    [
+        lambda s, a, w: ufl.lt(abs(s - a), w),
+        lambda s, a, w: ufl.lt((s - a - w) * (s - a + w), 0),
+        lambda s, a, w: ufl.And(ufl.gt(s, a - w), ufl.lt(s, a + w)),
+    ],
+)
+def test_a_narrow_notch(notch: Any, width: float) -> None:
+    """A difference that changes its sign twice between two places is followed to its lowest value between them."""
+    soft = lambda v, k, c: ufl.conditional(notch(c.s, 0.3015, width), 1e-3, 1.0) * ufl.dot(k, k)  # noqa: E731
+    found = jumps(column("notch", SUPPORTS["clamped-free"], (0.0, 1.0), energy=soft))
+    assert found["stored energy"] == pytest.approx([0.3015 - width, 0.3015 + width], abs=1e-11)
+
+
+def test_values_at_many_places() -> None:
+    """Arrays give what UFL gives at each place, for all functions that it has."""
+    s, t = Symbol(), Symbol()
+    names = ("sqrt", "exp", "ln", "cos", "sin", "tan", "cosh", "sinh", "tanh", "acos", "asin", "atan", "erf")
+    terms = [getattr(ufl, name)(s) for name in names] + [ufl.bessel_J(1, s), ufl.bessel_K(0, s), ufl.sign(s - t) * s]
+    terms += [ufl.max_value(s, t), ufl.min_value(s, t), abs(s - t), s**t / (s + 2), ufl.atan_2(s, t)]
+    terms += [ufl.conditional(ufl.Or(ufl.Not(ufl.ge(s, t)), ufl.And(ufl.gt(s, 0.5), ufl.le(s, 0.7))), s, 2.0)]
+    terms += [ufl.dot(ufl.as_vector([s, t]), ufl.as_vector([t, 3.0]))]
+    x = np.linspace(0.05, 0.95, 7)
+    for term in terms:
+        many = Values(term)({s: x, t: 1.2 * x[::-1]})
+        for i, (s.value, t.value) in enumerate(zip(x, 1.2 * x[::-1], strict=True)):
+            assert many[i] == pytest.approx(float(term(())), rel=1e-13)

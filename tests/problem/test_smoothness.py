@@ -75,6 +75,10 @@ def test_a_steep_stiffness() -> None:
         (lambda s: ufl.conditional(ufl.lt(s, STEEP), 1.0, 2.0), 8, False),  # a jump, said otherwise
         (lambda s: 1 + abs(s - STEEP), 8, True),
         (lambda s: 1 + 0 * abs(s - STEEP) + s**2, 8, False),
+        (lambda s: 1 / (1 + 999 * ufl.exp(-(((s - STEEP) / 2e-4) ** 2))), 8, True),  # a notch beside all points
+        (lambda s: 1 + ufl.exp(-(((s - STEEP) / 2e-5) ** 2)), 8, True),
+        (lambda s: 1 + ufl.max_value(0, 1 - abs(s - STEEP) / 1e-6), 8, True),
+        (lambda s: ufl.conditional(ufl.lt(abs(s - STEEP), 1e-4), 1e-3, 1.0), 8, False),  # jumps, said otherwise
         (lambda s: 1 + 0.5 * ufl.tanh((s - STEEP) / 1e-3) * ufl.conditional(ufl.lt(s, 0.7), 1.0, 0.9), 8, True),
     ],
 )  # fmt: skip

@@ -1,0 +1,121 @@
+"""Values of expressions of UFL at many places at once.
+
+UFL evaluates an expression at one place, node by node.  Here the nodes that a scalar expression is made of are listed
+once, without indices, and each is evaluated for an array of places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import erf
+from typing import Any
+
+import numpy as np
+import ufl
+from ufl import classes
+from ufl.algorithms import expand_indices
+from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+from ufl.corealg.traversal import unique_post_traversal
+
+OTHER_NAMES: dict[str, Any] = {
+    "ln": np.log,
+    "acos": np.arccos,
+    "asin": np.arcsin,
+    "atan": np.arctan,
+    "erf": np.vectorize(erf, [float]),
+}
+"""Functions that numpy knows by another name than UFL, or not."""
+OPERATIONS: dict[Any, Callable[..., Any]] = {
+    classes.Sum: np.add,
+    classes.Product: np.multiply,
+    classes.Division: np.divide,
+    classes.Power: np.power,
+    classes.Abs: np.abs,
+    classes.MinValue: np.minimum,
+    classes.MaxValue: np.maximum,
+    classes.Conditional: np.where,
+    classes.LT: np.less,
+    classes.GT: np.greater,
+    classes.LE: np.less_equal,
+    classes.GE: np.greater_equal,
+    classes.EQ: np.equal,
+    classes.NE: np.not_equal,
+    classes.AndCondition: np.logical_and,
+    classes.OrCondition: np.logical_or,
+    classes.NotCondition: np.logical_not,
+    classes.Atan2: np.arctan2,
+}
+BESSEL = {classes.BesselJ: "jv", classes.BesselY: "yv", classes.BesselI: "iv", classes.BesselK: "kv"}
+
+
+class Symbol(classes.Variable):  # type: ignore[misc]
+    """A number of a place, with the value that it is given last: the arclength, or a component of the state."""
+
+    __slots__ = ("value",)
+
+    def __init__(self, value: float = 0.0) -> None:
+        """Be a symbol of its own, with a ``value``."""
+        super().__init__(ufl.as_ufl(0.0))
+        self.value = value
+
+    def evaluate(self, *_: Any, **__: Any) -> float:
+        """Return the value."""
+        return float(self.value)
+
+
+class Values:
+    """A scalar ``expression`` of symbols as a function of their values."""
+
+    def __init__(self, expression: Any) -> None:
+        """List the nodes of the expression."""
+        self.expression = scalar(expression)
+        self._nodes = list(unique_post_traversal(self.expression))
+        self.symbols = [node for node in self._nodes if isinstance(node, Symbol)]
+
+    def __call__(self, places: dict[Symbol, np.ndarray]) -> np.ndarray:
+        """Values at places, each given by the arrays of its symbols: all of one length; nan where there is none."""
+        size, known = len(next(iter(places.values()))), dict[Any, Any](places)
+        try:
+            with np.errstate(all="ignore"):
+                for node in self._nodes:
+                    if node not in known:
+                        known[node] = _value(node, known)
+            return np.broadcast_to(np.asarray(known[self.expression], dtype=float), (size,))
+        except NotImplementedError:  # a function that is evaluated at one place at a time
+            return np.array([self._at({symbol: float(x[i]) for symbol, x in places.items()}) for i in range(size)])
+
+    def _at(self, place: dict[Symbol, float]) -> float:
+        for symbol, value in place.items():
+            symbol.value = value
+        try:
+            return float(self.expression(()))
+        except (ArithmeticError, ValueError):
+            return float("nan")
+
+
+def scalar(expression: Any) -> Any:
+    """Return a scalar expression without indices, made of scalars alone."""
+    return expand_indices(apply_algebra_lowering(ufl.as_ufl(expression)))
+
+
+def _value(node: Any, known: dict[Any, Any]) -> Any:
+    kind = type(node)
+    if kind in OPERATIONS:
+        return OPERATIONS[kind](*(known[x] for x in node.ufl_operands))
+    if kind in BESSEL:
+        from scipy import special  # takes a tenth of a second to load
+
+        return getattr(special, BESSEL[kind])(*(known[x] for x in node.ufl_operands))
+    if isinstance(node, classes.MathFunction):
+        name = node._name
+        function = OTHER_NAMES[name] if name in OTHER_NAMES else getattr(np, name)
+        return function(known[node.ufl_operands[0]])
+    if isinstance(node, classes.ScalarValue):
+        return float(node)
+    if isinstance(node, classes.Zero):
+        return 0.0
+    if isinstance(node, classes.Variable):
+        return known[node.ufl_operands[0]]
+    if isinstance(node, classes.Label):
+        return None
+    raise NotImplementedError(kind.__name__)
