@@ -84,40 +84,69 @@ class Search:
         if min(map(abs, values)) <= SMALL * largest:
             if largest == 0.0 or largest <= self.noise():
                 return Happens([], [], still=True)
-            first = known or self._zero(ends[0], lambda: f(low + self.margin), largest)
-            last = self._zero(ends[1], lambda: f(high - self.margin), largest)
+            first = known or self._zero(f, low, self.margin, ends[0], largest)
+            last = self._zero(f, high, -self.margin, ends[1], largest)
         rows = {s for s, zero in ((low, first), (high, last)) if zero}
         if sum(q - p for p, q in samples.unresolved) > NOISY * self.length:
             inside = [(s, y) for s, y in zip((low, high), ends, strict=True) if y and s not in rows]
         else:
             inside = [(s, y) for s, y in samples.in_order() if y and s not in rows]
+        # a corner may be so close beside a row that no sample is between the two
+        for row, s, y in ((low, low + self.margin, ends[0]), (high, high - self.margin, ends[1])):
+            if row not in rows and abs(y) <= SMALL * largest and s not in samples.values and (z := f(s)):
+                inside = sorted([*inside, (s, z)])
         near, touching = self._near_zero(inside, max(values) - min(values))
         peaks, more = self._peaks(sorted(inside + near))
         crossing = [self._crossing(p.s, q.s) for p, q in pairwise(peaks) if p.sign != q.sign]
         found = _distinct([*touching, *more, *crossing], TOUCHES * self.length)
         return Happens(found, samples.unresolved, first and not known, last)
 
-    def _zero(self, here: float, beside: Callable[[], float], largest: float) -> bool:
-        """Whether the event is zero at a row, to round-off or within the margin beside it."""
+    def _zero(self, f: Callable[[float], float], row: float, margin: float, here: float, largest: float) -> bool:
+        """Whether the event is zero at a row, to round-off or within the margin beside it, where it may turn."""
         if here == 0.0 or abs(here) > SMALL * largest:
             return here == 0.0
-        return abs(here) <= max(self.noise(), abs(beside() - here))
+        beside, beyond = f(row + margin), f(row + 2 * margin)
+        return abs(here) <= max(self.noise(), abs(beside - here), abs(beyond - beside))
 
     def _near_zero(
         self, known: list[tuple[float, float]], spread: float
     ) -> tuple[list[tuple[float, float]], list[Found]]:
         """Lowest values around samples of one sign near zero: those of the other sign, and what touches zero."""
-        beyond, touching = [], []
-        for (p, y), (s, z), (q, w) in zip(known, known[1:], known[2:], strict=False):
+        beyond, touching, places = [], [], [s for s, _ in known]
+        for i, ((_, y), (_, z), (_, w)) in enumerate(zip(known, known[1:], known[2:], strict=False), 1):
             if not (y * z > 0 < z * w and abs(z) <= min(abs(y), abs(w)) and abs(z) < NEAR * spread):
                 continue
             sign = copysign(1.0, z)
-            there, low = self.solved.lowest(p, s, q, sign, self.margin)
+            there, low = self.solved.lowest(*self._bracket(places, i, sign), sign, self.margin)
             if low < 0:
                 beyond.append((there, sign * low))
             elif self.solved.touches(there, sign, TOUCHES * self.length):
                 touching.append(self._touch(there))
         return beyond, touching
+
+    def _bracket(self, places: list[float], i: int, sign: float) -> tuple[float, float, float]:
+        """Samples about the one of number ``i`` between which ``sign`` times the event is lowest at equilibria.
+
+        The samples beside a corner are nearer to each other than interpolated states are to equilibria: the lowest
+        value of these may be beyond them.  The ``places`` are the parameters of all samples, and the way leads
+        downhill, from one to another at least twice as far.
+        """
+        low, high = self.a.arclength + self.margin, self.b.arclength - self.margin
+
+        def value(s: float) -> float:
+            return sign * self.solved(min(max(s, low), high))
+
+        p, s, q = places[i - 1 : i + 2]
+        while value(s) >= 0.0:
+            if value(p) < value(s):
+                p, s, q = max((t for t in places if s - t >= 2 * (q - p)), default=places[0]), p, s
+            elif value(q) < value(s):
+                p, s, q = s, q, min((t for t in places if t - s >= 2 * (q - p)), default=places[-1])
+            else:
+                break
+            if s in (p, q):
+                break
+        return p, s, q
 
     def _touch(self, s: float) -> Found:
         x, there = self.solved.at(s)

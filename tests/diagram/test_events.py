@@ -113,6 +113,33 @@ def test_zeros_without_a_change_of_sign(of: Callable[[float], float], exact: lis
     assert not found.warnings
 
 
+@pytest.mark.parametrize("largest", [0.3, 0.11])
+def test_corners_on_a_curved_branch(largest: float) -> None:
+    """Each is found where interpolated states are not equilibria, and beside a row, where no sample is between."""
+    rod = rodfem.Scene(
+        name="imperfect column",
+        interval=(0.0, 1.0),
+        rod="unshearable",
+        energy=lambda v, k, c: 50 * (v[2] - 1) ** 2 + bending_and_twist(k, (1.0, 2.0, 1.0)),
+        parameters={"P": 0.0},
+        load="P",
+        ends=(clamped(), rodfem.free(force=lambda c: (0.3, 0.0, -c.P))),
+        ordinate=rodfem.Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
+        span=(0.0, 4.0),
+        planar="e2",
+    )
+    mesh, steps = Discretization("auto", 5, 6), rodfem.StepControl(first=0.05, largest=largest)
+    plan = Plan(depth=0, error_bars=False, steps=steps)
+    rows = [row.load for row in rodfem.trace(rod, mesh, plan)[0].points[1:-1]]
+    exact = [*np.random.default_rng(1).uniform(0.05, 3.95, 40)]
+    exact += [load + off for load in rows for off in (-1e-4, -1e-8, -1e-10, 0.0, 1e-10, 1e-8, 1e-4)]
+    events = tuple(Event(f"{i}", of=lambda state, b=b: abs(state.load - b)) for i, b in enumerate(exact))
+    found = rodfem.trace(rod, mesh, replace(plan, events=events))
+    loads = {s.note: s.point.load for s in found.special("event")}
+    assert [loads.get(event.name) for event in events] == pytest.approx(exact, rel=0, abs=1e-8)
+    assert not found.warnings
+
+
 def test_an_event_that_is_zero_all_along_is_said_to_be() -> None:
     """Of a straight branch the deflection is zero; where the buckled branch leaves it, that is no event of its own."""
     rod = classics.column("pinned", classics.SUPPORTS["pinned-pinned"], (0.0, 12.0), planar="e1")
