@@ -66,13 +66,24 @@ def check_asked(there: dict[str, Any], here: dict[str, Any], folder: Any) -> Non
 
 def plan_of(asked: dict[str, Any], folder: Any) -> Plan:
     """Plan that a run in a ``folder`` was asked for; :class:`InputError` where files cannot hold it."""
-    entries = asked["plan"]
-    if entries["events"] or entries["steps"] != repr(StepControl()):
-        what = "events" if entries["events"] else "steps"
+    if what := not_held(asked):
         raise InputError(f"The plan of the run in {folder} has {what} of its own, which no file holds: give the plan.")
-    named: dict[str, Any] = {n: tuple(entry) if isinstance(entry, list) else entry for n, entry in entries.items()}
-    named |= {"steps": StepControl(), "events": ()}
-    return Plan(**named)
+    return plan_without(asked)
+
+
+def not_held(asked: dict[str, Any]) -> str:
+    """What of a plan that was ``asked`` for no file holds: ``events`` or ``steps``; empty if all of it is there."""
+    entries = asked["plan"]
+    return "events" if entries["events"] else "steps" if entries["steps"] != repr(StepControl()) else ""
+
+
+def plan_without(asked: dict[str, Any]) -> Plan:
+    """Plan that was ``asked`` for, without what no file holds."""
+    known = {f.name for f in fields(Plan)} - {"steps", "events"}
+    given = {n: x for n, x in asked["plan"].items() if n in known}
+    entries: dict[str, Any] = {n: tuple(x) if isinstance(x, list) else x for n, x in given.items()}
+    return Plan(**entries)
+
 
 
 def _plain(entries: dict[str, Any]) -> dict[str, Any]:

@@ -63,6 +63,8 @@ class Diagram:
         Command, date and versions of its libraries.
     asked
         Scene, discretisation and plan in numbers, as they were traced; None: unknown.
+    lacks
+        What its plan had and the file that it was read from does not hold: ``events`` or ``steps``.
     complete
         Whether all that was asked for has been done.
     """
@@ -75,6 +77,7 @@ class Diagram:
         self.run = uuid4().hex
         self.origin = origin()
         self.asked: dict[str, Any] | None = None
+        self.lacks = ""
         self.complete = False
         self._asked: dict[int, Solver] = {}
 
@@ -221,6 +224,11 @@ class Diagram:
                 f"A plan has no {unknown[0]!r}: choose one of {', '.join(known)}, or give a Discretization first."
             )
         system = self.solvers[0].system
+        if self.lacks and self.lacks not in changes:
+            raise InputError(
+                f"The plan of this diagram had {self.lacks} of its own, which no file holds: give them, as in "
+                f"again({self.lacks}=...)."
+            )
         mesh, plan = discretization or system.fields.discretization, replace(self.plan, **changes)
         if discretization is None and plan.accuracy is not None and mesh.vertices is None:
             mesh = Discretization(mesh.formulation, factors=mesh.factors)

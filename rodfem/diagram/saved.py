@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from rodfem.continuation.branch import Branch, NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import KINDS
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.asked import EQUATIONS
+from rodfem.diagram.asked import EQUATIONS, not_held, plan_without
 from rodfem.diagram.diagram import Diagram
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import RANKS, SCENE, Solver
@@ -63,10 +63,12 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
     solvers = [_solver(scene, data["discretization"]["formulation"], mesh, comm) for mesh in data["meshes"]]
     _check_equations(data, solvers[0].system, folder)
     branches = [_branch(entry, solvers, folder / "states.h5") for entry in data["branches"]]
-    plan = Plan(tuple(data["range"]), accuracy=data["accuracy"])
+    asked, span = data.get("asked"), tuple(data["range"])
+    plan = replace(Plan() if asked is None else plan_without(asked), span=span, accuracy=data["accuracy"])
     diagram = Diagram(scene, plan, branches, solvers)
     diagram.notes.append(f"read from {folder}")
-    diagram.asked, diagram.complete = data.get("asked"), data.get("complete", True)
+    diagram.lacks = "" if asked is None else not_held(asked)
+    diagram.asked, diagram.complete = asked, data.get("complete", True)
     return diagram
 
 

@@ -152,6 +152,19 @@ def real_array(values: Any) -> np.ndarray:
     return np.asarray(values, dtype=float)
 
 
+def rotations(values: Any) -> np.ndarray:
+    """Quaternions of unit norm, along the last axis, of an array; those that are so but for round-off stay as they are.
+
+    Zero quaternions, and those that are not finite, stay for the check of the start.
+    """
+    q = real_array(values)
+    if q.ndim != 2:
+        return q
+    norm = np.linalg.norm(q, axis=1)
+    other = np.isfinite(norm) & (norm > 0) & (abs(norm - 1) > NEGLIGIBLE)
+    return np.where(other[:, None], q / np.where(other, norm, 1.0)[:, None], q)
+
+
 START = "it receives an array of arclengths (m,), and returns one (m, 4)"
 
 
@@ -228,7 +241,7 @@ class Scene(Contribution):
     breaks: tuple[float, ...] = ()
     planar: str | None = None
     start: Callable[[np.ndarray], np.ndarray] | None = role_field(
-        Role("start", "start(s)", hint=START, returns=real_array)
+        Role("start", "start(s)", hint=START, returns=rotations)
     )
     states: str | None = None
 

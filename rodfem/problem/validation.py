@@ -200,7 +200,7 @@ def check_start(scene: Scene) -> None:
     check_same("start", q, scene.start(s))
     if q.shape != (5, 4):
         raise SceneError(f"The start has the shape {q.shape} at 5 arclengths: return a quaternion for each, (5, 4).")
-    if not (np.linalg.norm(q, axis=1) > 0).all():
+    if not (np.isfinite(q).all() and (np.linalg.norm(q, axis=1) > 0).all()):
         raise SceneError("The start is no rotation everywhere: return quaternions of unit norm.")
     if scene.normal is not None and abs(np.delete(q[:, 1:], scene.normal, axis=1)).max() > NEGLIGIBLE:
         raise SceneError(f"The start leaves the plane across {scene.planar}: turn about that axis only.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from classics import column
 
 import rodfem
 from rodfem import Attachment, Discretization, Event, Inertia, Plan, Scene, clamped, free
+from rodfem.continuation.kinds import EVENT
 from rodfem.errors import InputError
 from rodfem.fem.fingerprint import OLDER, fingerprint, same, same_event
 from rodfem.fem.system import System
@@ -113,3 +115,19 @@ def test_values_of_events() -> None:
         ([1.0], [1.0, 2.0], True),
     ):
         assert same_event(first, second) == same_event(second, first) == alike
+
+
+@pytest.mark.alone
+def test_a_diagram_that_is_read_keeps_its_plan(folder: Path) -> None:
+    """Depth, loads asked for, and what else a file holds; of steps and events it says that it has them not."""
+    plan = Plan((0.0, 6.0), at=(1.0,), depth=0, error_bars=False)
+    rodfem.run(crooked(0.0), MESH, plan, folder, figures=False, quiet=True)
+    read = rodfem.load(folder, crooked(0.0))
+    assert read.plan == plan
+    assert [b.name for b in read.again()] == ["straight"]
+    tip = Event("tip", of=lambda s: s.r[-1, 0] - 0.1)
+    rodfem.run(crooked(0.05), MESH, replace(plan, events=(tip,)), folder, figures=False, quiet=True)
+    read = rodfem.load(folder, crooked(0.05))
+    with pytest.raises(InputError, match="had events of its own, which no file holds"):
+        read.again()
+    assert read.again(events=(tip,)).special(EVENT)

@@ -393,6 +393,20 @@ def test_a_start_that_jumps() -> None:
         Scene(**(GOOD | {"start": start}))
 
 
+@pytest.mark.parametrize("size", [1.0, 1e9, 1e-9])
+def test_a_start_of_any_size_is_a_rotation(size: float) -> None:
+    scene = Scene(**(GOOD | {"start": lambda s: size * turns(s, 1)}))
+    assert scene.start is not None
+    s = np.linspace(0, 1, 5)
+    assert scene.start(s) == pytest.approx(turns(s, 1), abs=1e-15)
+
+
+@pytest.mark.parametrize("value", [0.0, np.inf, np.nan])
+def test_a_start_that_is_no_rotation(value: float) -> None:
+    with pytest.raises(SceneError, match="no rotation everywhere"):
+        Scene(**(GOOD | {"start": lambda s: value * np.ones((len(s), 4))}))
+
+
 def test_weights_that_vanish_at_a_place() -> None:
     """A constraint of the whole rod is one where its weight is zero at an end or half-way; at one place it is none."""
     weights = (lambda s: s, lambda s: s * (1 - s), lambda s: s - 0.5, lambda s: ufl.conditional(ufl.lt(s, 0.7), 0, 1))
