@@ -32,6 +32,7 @@ from rodfem.diagram.equivalence import equivalent
 from rodfem.diagram.finders import FINDERS
 from rodfem.diagram.images import image_of
 from rodfem.diagram.journal import Journal
+from rodfem.diagram.kinks import Kinks
 from rodfem.diagram.persistent_zeros import PersistentZeros
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.special_search import SpecialSearch, Unresolved
@@ -78,6 +79,7 @@ class Tracer:
         self.finders = [finder(plan) for finder in FINDERS]
         self.invariants: dict[int, Invariants] = {}
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
+        self.kinks = Kinks(self.meshes, observer, self.scene.load)
         said = observer if isinstance(observer, Recorder) else None
         self.book = Bookkeeper(journal or Journal(), self.meshes, self.gaps, self.branches, plan.events, said)
 
@@ -360,6 +362,7 @@ class Tracer:
             self._error_bars(branch)
             merge_doubles(branch)
         self._soft_modes(branch)
+        self.kinks.index(branch)
         branch.image = image_of(branch, self.solver)
         for unexplained in branch.unexplained:
             self.observer.warn(str(unexplained))
@@ -407,3 +410,4 @@ class Tracer:
                     with self.without(f"No error was estimated at {self.scene.load} = {special.point.load:.8g}"):
                         self.meshes.richer(special.point.mesh).estimate(special)
                 self.control.label(special)
+            self.kinks.error_bars(branch)

@@ -1,0 +1,154 @@
+"""Kinks of the energies of a scene in the state: where what they compare with the state changes.
+
+A foundation that only pushes, ``conditional(gt(x.r[0], 0), ...)``, or a material with ``abs(k[0])`` has a first
+derivative, and a second one on either side of a surface in the space of states at a place.  The surface is where the
+difference of what is compared is zero.  Whether the function has a kink there is told by its one-sided derivatives
+across it: ``abs(k[0])**2`` has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import ufl
+from ufl.classes import GE, GT, LE, LT, Abs, MaxValue, MinValue
+from ufl.corealg.traversal import unique_pre_traversal
+
+from forms.kinematics import curvature, strain
+from forms.rotation import rotation
+from rodfem.problem.jumps import difference
+from rodfem.problem.local_state import place
+from rodfem.problem.roles import functions_of
+from rodfem.problem.values import Symbol, Values, scalar
+
+if TYPE_CHECKING:
+    from rodfem.problem.scene import Scene
+
+STEPS = {2: 1e-4, 3: 1e-3}
+"""Steps of the differences of second and third order by which one-sided derivatives are told, in units of the state."""
+STENCILS = {2: np.array([1.0, -2.0, 1.0, 0.0]), 3: np.array([-1.0, 3.0, -3.0, 1.0])}
+"""Weights of those differences, at one to four steps."""
+SHORTER, STAYS = 0.25, 0.5
+"""With steps so many times shorter the jump of a derivative that is continuous falls to that part: a kink's stays."""
+NOISE = 1e3 * float(np.finfo(float).eps)
+"""Round-off of a difference, relative to the values."""
+SMALL = 1e-6
+"""Step of the derivatives of a difference, in units of the state."""
+Places = dict[Symbol, np.ndarray]
+
+
+class LocalState:
+    """Symbols of a state at a place: quaternion ``q`` and its slope ``dq``, ``r``, free strains ``v``, ``s``, ``load``.
+
+    ``units`` has the units of those that are the state's.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        """Make symbols for a place of a ``scene``."""
+        self.q, self.dq, self.r = ([Symbol() for _ in range(n)] for n in (4, 4, 3))
+        self.v, self.s, self.load = [Symbol() for _ in scene.free_strains], Symbol(), Symbol()
+        length = scene.length
+        self.units = dict.fromkeys([*self.q, *self.v], 1.0) | dict.fromkeys(self.r, length)
+        self.units |= dict.fromkeys(self.dq, 1.0 / length)
+
+
+@dataclass(frozen=True)
+class Kink:
+    """What a function ``what`` of a place may have a kink at: the zeros of a ``value``.
+
+    The ``function`` holds all along the rod, or at the arclength ``s``; ``units`` are those of a :class:`LocalState`.
+    """
+
+    what: str
+    s: float | None
+    function: Values
+    value: Values
+    units: dict[Symbol, float]
+
+    def slopes(self, places: Places) -> np.ndarray:
+        """Derivatives of the value with respect to the state, in its units: (symbols, places)."""
+        return np.array([self._slope(symbol, places) for symbol in self.units])
+
+    def order(self, at: Places) -> int:
+        """Lowest order, 2 or 3, of a derivative that jumps at a place ``at`` the surface; 0 where none does.
+
+        A jump of the first derivative is one of the second, too.
+        """
+        ways = self.slopes(at)[:, 0]
+        size = float(np.linalg.norm(ways))
+        if size < SMALL:  # the difference is a square, say
+            directions = list(np.eye(len(ways)))
+        else:
+            directions = [ways / size]
+            at = self._moved(at, directions[0], np.array([-float(self.value(at)[0]) / size]))
+        for order in STEPS:
+            if any(self._jumps(at, way, order) for way in directions):
+                return order
+        return 0
+
+    def _slope(self, symbol: Symbol, places: Places) -> np.ndarray:
+        if symbol not in self.value.symbols:
+            return np.zeros(len(places[symbol]))
+        low, high = (
+            self.value(places | {symbol: places[symbol] + h}) for h in np.array([-1, 1]) * SMALL * self._unit(symbol)
+        )
+        return np.asarray((high - low) / (2 * SMALL))
+
+    def _unit(self, symbol: Symbol) -> float:
+        return self.units[symbol]
+
+    def _moved(self, at: Places, way: np.ndarray, steps: np.ndarray) -> Places:
+        moved = {symbol: np.repeat(x, len(steps)) for symbol, x in at.items()}
+        for (symbol, unit), part in zip(self.units.items(), way, strict=True):
+            moved[symbol] = moved[symbol] + unit * part * steps
+        return moved
+
+    def _jumps(self, at: Places, way: np.ndarray, order: int) -> bool:
+        jumps = []
+        for h in (STEPS[order], SHORTER * STEPS[order]):
+            sides = [self.function(self._moved(at, way, side * h * np.arange(1, 5))) for side in (-1, 1)]
+            left, right = (float(STENCILS[order] @ y) for y in sides)
+            noise = NOISE * max(float(abs(y).max()) for y in sides)
+            jump = abs(right - (-1) ** order * left)
+            if jump <= noise:
+                return False
+            jumps.append(jump / h**order)
+        return jumps[1] > STAYS * jumps[0]
+
+
+def kinks(scene: Scene) -> tuple[LocalState, list[Kink]]:
+    """Kinks that the energies, potentials and constraints of a ``scene`` may have, as functions of a local state."""
+    at, found = LocalState(scene), []
+    for what, s, function in _functions(scene, at):
+        whole = scalar(function)
+        parts = {x for x in unique_pre_traversal(whole) if isinstance(x, LT | GT | LE | GE | Abs | MaxValue | MinValue)}
+        for value in {difference(part) for part in parts}:
+            if any(symbol in unique_pre_traversal(value) for symbol in at.units):
+                found.append(Kink(what, s, Values(whole), Values(value), at.units))
+    return at, found
+
+
+def _functions(scene: Scene, at: LocalState) -> Iterator[tuple[str, float | None, Any]]:
+    """Scalar functions of a place in the equations: words, arclength, expression."""
+    c = scene.constants(at.load, at.s)  # type: ignore[arg-type]
+    q, dq, r = (ufl.as_vector(x) for x in (at.q, at.dq, at.r))
+    v, k, R = strain(scene.free_strains, at.v), curvature(q, dq), rotation(q)
+    yield "stored energy", None, scene.energy(v, k, c)
+    for part in scene.parts:
+        x = place(q, R, at.s, r, length=scene.length)
+        if part.s is None:
+            x = place(q, R, at.s, r, dr=ufl.dot(R, v), v=v, k=k, length=scene.length)
+        for what, function, role in functions_of(part.of, nested=False):
+            if role.call == "f(x, c)":
+                value = function(x, c)
+                for component in value if isinstance(value, list | tuple) else [value]:
+                    yield _named(scene, part, what), part.s, component
+
+
+def _named(scene: Scene, part: Any, what: str) -> str:
+    """Words for a function of a ``part``: an end is named by its side."""
+    sides = [side for side, end in zip(("left", "right"), scene.sides, strict=True) if end is part.of]
+    return what.replace("of the  end", f"of the {sides[0]} end").format(sides[0]) if sides else what

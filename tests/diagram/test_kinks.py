@@ -1,0 +1,53 @@
+"""Kinks of an energy in the state: no error bar where one is inside of the rod, no index where the state is on one."""
+
+from __future__ import annotations
+
+from math import isfinite, isnan
+from typing import Any
+
+import ufl
+
+from forms.energy import bending_and_twist
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, clamped, free, trace
+
+
+def bent(energy: Any, at: tuple[float, ...]) -> Diagram:
+    """A cantilever under a force across, of bending energy ``energy(k)`` about one axis."""
+    rod = Scene(
+        "bent", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: energy(k[0]) + 5 * k[1] ** 2 + k[2] ** 2,
+        {"P": 0.0}, "P", (clamped(), free(lambda c: (0.0, c.P, 0.0))), Ordinate("y", s=1.0, of=lambda r, q: r[1]),
+        (0.0, 3.0),
+    )  # fmt: skip
+    return trace(rod, Discretization(elements=6, degree=4), Plan(depth=0, at=at))
+
+
+def test_a_bilinear_material_has_no_bar_where_it_is_beyond_its_kink() -> None:
+    """``M = k`` up to 1, ``0.8 + 0.2 k`` beyond: by shooting, bars were up to 2e5 times too small."""
+    soft = lambda k: ufl.conditional(ufl.lt(abs(k), 1.0), 0.5 * k**2, 0.1 * k**2 + 0.8 * abs(k) - 0.4)  # noqa: E731
+    found = bent(soft, (0.5, 2.0))
+    below, beyond = (next(s for s in found[0].special if s.point.load == load) for load in (0.5, 2.0))
+    assert isfinite(below.ordinate_error) and below.note == ""  # the moment P(1 - ..) is below 1 everywhere
+    assert isnan(beyond.ordinate_error) and isnan(beyond.error_estimate) and "not estimated" in beyond.note
+    assert any("stored energy has a kink in the state inside of the rod" in said for said in found.warnings)
+
+
+def test_a_condition_without_a_kink_keeps_its_bars() -> None:
+    """Two sides of a comparison that are one function."""
+    same = lambda k: ufl.conditional(ufl.lt(k, -0.5), 0.4 * k**2, 0.4 * k * k) + 0.1 * k**2  # noqa: E731
+    found = bent(same, (2.0,))
+    assert found.warnings == []
+    assert all(isfinite(s.ordinate_error) for s in found[0].special)
+
+
+def test_a_spring_at_the_tip_on_one_side() -> None:
+    """The column is on the kink at all loads; to the free side it falls at 2 pi^2/4: it was called stable to 15."""
+    spring = lambda x, c: ufl.conditional(ufl.ge(x.r[0], 0.0), 20 * x.r[0] ** 2, 0.0)  # noqa: E731
+    rod = Scene(
+        "one-sided", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (20.0, 2.0, 1.0)),
+        {"P": 0.0}, "P", (clamped(), free(lambda c: (0.0, 0.0, -c.P), energy=spring)),
+        Ordinate("x", s=1.0, of=lambda r, q: r[0]), (0.0, 15.0),
+    )  # fmt: skip
+    found = trace(rod, Discretization(elements=3, degree=4), Plan(depth=0))
+    said = [x for x in found.warnings if "has a kink at the very state at P = 0 to 15" in x]
+    assert len(said) == 1 and "energy of the right end" in said[0] and "undecided" in said[0]
+    assert all(point.stable is not True for point in found[0].points)
