@@ -39,6 +39,7 @@ from rodfem.diagram.special_search import SpecialSearch, Unresolved
 from rodfem.diagram.step import Step
 from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without
+from rodfem.problem.fast_load import FastLoad
 from rodfem.tolerances import DRIFT
 
 NO_CONVERGENCE = "no convergence"
@@ -76,6 +77,9 @@ class Tracer:
         self.gaps = Gaps(self.meshes)
         self.zeros = PersistentZeros(observer, self.high - self.low)
         self.specials = SpecialSearch(self.meshes, self.gaps, observer)
+        self.fast = FastLoad(self.scene, self.span)
+        if self.fast.doubt:
+            observer.warn(self.fast.doubt)
         self.finders = [finder(plan) for finder in FINDERS]
         self.invariants: dict[int, Invariants] = {}
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
@@ -191,7 +195,7 @@ class Tracer:
     def _advance(self, branch: Branch, history: list[Point]) -> None:
         """Append points until the branch ends, which :attr:`Branch.ended` then says."""
         self.specials.resume(history)
-        for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self.specials.reach):
+        for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self._reach):
             if isinstance(item, str):
                 branch.ended = self._rest(branch) or item
                 if branch.ended.startswith(NO_CONVERGENCE):
@@ -226,6 +230,10 @@ class Tracer:
             if last:
                 branch.ended = self._rest(branch) or "closed loop"
                 return
+
+    def _reach(self, point: Point) -> float:
+        """Largest step from a point: by what is known of the branch, and by how fast the load acts."""
+        return min(self.specials.reach(point), self.fast.reach(point))
 
     @staticmethod
     def _own(branch: Branch, rows: Sequence[Point]) -> list[Point]:

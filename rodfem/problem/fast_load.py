@@ -1,0 +1,135 @@
+"""How fast the functions of a scene change with the load: ranges of it in which a cubic tells each of them.
+
+Along a branch that does not move the steps are as long as the states allow, and pass whole periods of a force that is a
+sine of the load.  A range in which one of the functions is not the cubic through four of its values is halved; a step
+is to be no longer than the ranges that it leads into.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from math import isfinite
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rodfem.errors import SceneError
+from rodfem.problem.kinds import plain
+from rodfem.problem.local_state import Constants, functions_of_places, some_places, watched
+from rodfem.problem.roles import functions_of
+
+if TYPE_CHECKING:
+    from rodfem.continuation.branch import Point
+    from rodfem.problem.scene import Scene
+
+KNOWN = np.array([0.0, 0.27, 0.71, 1.0])
+"""Where in a range the cubic is that of the function."""
+ASKED = np.array([0.113, 0.382, 0.487, 0.618, 0.873])
+"""Where in a range the two are compared."""
+POLYNOMIAL = 1e-9
+"""Difference, relative to the variation over the whole range, up to which a function is a cubic."""
+CLOSE = 0.02
+"""The same, up to which a cubic tells it."""
+PIECES = 4
+"""Ranges to begin with where a function is no cubic."""
+DEEPEST = 10
+"""How many times each of them is halved: beyond that it is said that a function is not followed."""
+Numbers = Callable[[float], list[float]]
+
+
+class FastLoad:
+    """Ranges of the load, and by how much it may change in a step.
+
+    ``low`` and ``high`` are the ends of the ranges, none where every function is a cubic; ``doubt`` says where one is
+    not even on the smallest, and is empty where all are.
+    """
+
+    def __init__(self, scene: Scene, span: tuple[float, float]) -> None:
+        """Sample the functions of a ``scene`` that depend on its load, over a ``span``."""
+        first, last = sorted(span)
+        self.doubt, ends = "", {first, last}
+        for what, function in _numbers(scene):
+            worst = _halved(function, first, last, ends)
+            if worst and not self.doubt:
+                self.doubt = (
+                    f"The {what} changes too fast with {scene.load} about {scene.load} = {worst[0]:.6g} to be followed "
+                    "in steps, or jumps there: special points may be missing; let the range end before it."
+                )
+        loads = np.array(sorted(ends) if len(ends) > 2 else [])
+        self.low, self.high = loads[:-1], loads[1:]
+
+    def reach(self, point: Point) -> float:
+        """Largest step from a ``point`` of a branch, by the slope of the load there."""
+        rate = abs(point.slope)
+        if not len(self.low) or not isfinite(rate) or rate == 0.0:
+            return float("inf")
+        # the same whichever way the branch goes: ranges are told by their distance and their length
+        away = np.maximum(0.0, np.maximum(self.low - point.load, point.load - self.high))
+        return float((away + self.high - self.low).min() / rate)
+
+
+def _halved(function: Numbers, first: float, last: float, ends: set[float]) -> list[float]:
+    """Add the ends of ranges in which cubics tell a ``function``; return loads about which they do not."""
+    size, off = _told(function, first, last)
+    if not np.any(off > POLYNOMIAL * size):  # nor where it is not defined, nan
+        return []
+    edges = np.linspace(first, last, PIECES + 1).tolist()
+    size = np.maximum(size, np.ptp([function(load) for load in edges], axis=0))
+    todo = [(low, high, 0) for low, high in pairwise(edges)]
+    left = []
+    ends |= set(edges)
+    while todo:
+        low, high, depth = todo.pop()
+        _, off = _told(function, low, high)
+        if not np.any(off > CLOSE * size):
+            continue
+        if depth == DEEPEST:
+            left.append((low + high) / 2)
+        else:
+            middle = (low + high) / 2
+            ends.add(middle)
+            todo += [(low, middle, depth + 1), (middle, high, depth + 1)]
+    return sorted(left)
+
+
+def _told(function: Numbers, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+    """How much a ``function`` varies between two loads, and how far it is from a cubic, component by component."""
+    known, asked = (np.array([function(low + t * (high - low)) for t in places]) for places in (KNOWN, ASKED))
+    cubic = np.vander(ASKED, len(KNOWN)) @ np.linalg.solve(np.vander(KNOWN), known)
+    return np.ptp(np.vstack([known, asked]), axis=0), abs(cubic - asked).max(axis=0)
+
+
+def _numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
+    """Functions that depend on the load, in words, each as the numbers that it returns at a load."""
+    point, rod = some_places(scene)
+    found: list[tuple[str, Callable[[Constants], object]]] = [
+        (what, function) for what, function, role in functions_of(scene) if role.call == "f(c)"
+    ]
+    for what, function, known in functions_of_places(scene):
+        found.append((what, lambda c, f=function, x=known: f(x, c)))
+    found.append(("stored energy", lambda c: scene.energy(rod.v, rod.k, c)))
+    for what, function in found:
+        c, names = watched(scene.constants(s=point.s))
+        try:
+            function(c)
+        except SceneError:
+            continue
+        if scene.load in names:
+            yield what, lambda load, f=function: _values(f, scene.constants(load, s=point.s))
+
+
+def _values(function: Callable[[Constants], object], c: Constants) -> list[float]:
+    """Numbers that a ``function`` of the constants ``c`` returns; nan for what it does not."""
+    try:
+        values = function(c)
+    except SceneError:
+        return [float("nan")]
+    return [_number(x) for x in (values if isinstance(values, (tuple, list)) else [values])]
+
+
+def _number(value: object) -> float:
+    try:
+        return plain(value(()) if callable(value) else value)
+    except Exception:  # of UFL's own, too
+        return float("nan")

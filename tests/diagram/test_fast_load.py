@@ -1,0 +1,52 @@
+"""A load that varies fast with the parameter is followed along a branch that does not move, or it is said."""
+
+from __future__ import annotations
+
+from math import asin, pi
+
+import numpy as np
+import pytest
+import ufl
+
+import rodfem
+from forms.energy import bending_and_twist
+from rodfem import Ordinate, Plan, Scene, clamped, free
+from rodfem.problem.fast_load import FastLoad
+
+
+def column(thrust: rodfem.problem.local_state.OfConstants, span: tuple[float, float] = (0.0, 1.0)) -> Scene:
+    """Straight inextensible column under a force at its free end."""
+    return Scene(
+        name="fast",
+        interval=(0.0, 1.0),
+        rod="unshearable and inextensible",
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)),
+        parameters={"P": 0.0},
+        load="P",
+        ends=(clamped(), free(force=thrust)),
+        ordinate=Ordinate("x", s=1.0, of=lambda r, q: r[0]),
+        span=span,
+    )
+
+
+@pytest.mark.parametrize("rate", [70.0, 200.0])
+def test_a_thrust_that_is_a_fast_sine(rate: float) -> None:
+    """It passes the critical one, ``pi^2/4``, twice in each of many periods."""
+    once = asin(pi**2 / 12)
+    exact = [(x + 2 * pi * j) / rate for j in range(40) for x in (once, pi - once)]
+    found = rodfem.trace(column(lambda c: (0.0, 0.0, -3 * ufl.sin(rate * c.P))), None, Plan(depth=0))
+    loads = [s.point.load for s in found.special("branch point")]
+    np.testing.assert_allclose(loads, [x for x in exact if x < 1], rtol=0, atol=1e-7)
+    assert not found.warnings
+
+
+def test_what_is_faster_than_any_step_is_said() -> None:
+    fast = FastLoad(column(lambda c: (0.0, 0.0, -3 * ufl.sin(1e5 * c.P))), (0.0, 1.0))
+    assert fast.doubt.startswith("The force on the right end changes too fast with P about P = ")
+
+
+def test_ordinary_functions_bound_no_step() -> None:
+    for power in (1, 2, 3):
+        fast = FastLoad(column(lambda c, n=power: (0.0, 0.0, -(c.P**n))), (0.0, 1.0))
+        assert not fast.doubt
+        assert not len(fast.low)
