@@ -85,7 +85,6 @@ def plan_without(asked: dict[str, Any]) -> Plan:
     return Plan(**entries)
 
 
-
 def _plain(entries: dict[str, Any]) -> dict[str, Any]:
     return {name: list(entry) if isinstance(entry, tuple) else entry for name, entry in entries.items()}
 

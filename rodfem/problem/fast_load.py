@@ -8,6 +8,7 @@ is to be no longer than the ranges that it leads into.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ import numpy as np
 
 from rodfem.errors import SceneError
 from rodfem.problem.kinds import plain
-from rodfem.problem.local_state import Constants, functions_of_places, some_places, watched
+from rodfem.problem.local_state import OfConstants, functions_of_places, some_places, watched
 from rodfem.problem.roles import functions_of
 
 if TYPE_CHECKING:
@@ -103,12 +104,9 @@ def _told(function: Numbers, low: float, high: float) -> tuple[np.ndarray, np.nd
 def _numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
     """Functions that depend on the load, in words, each as the numbers that it returns at a load."""
     point, rod = some_places(scene)
-    found: list[tuple[str, Callable[[Constants], object]]] = [
-        (what, function) for what, function, role in functions_of(scene) if role.call == "f(c)"
-    ]
-    for what, function, known in functions_of_places(scene):
-        found.append((what, lambda c, f=function, x=known: f(x, c)))
-    found.append(("stored energy", lambda c: scene.energy(rod.v, rod.k, c)))
+    found: list[tuple[str, OfConstants]] = [(what, f) for what, f, role in functions_of(scene) if role.call == "f(c)"]
+    found += [(what, partial(f, x)) for what, f, x in functions_of_places(scene)]
+    found.append(("stored energy", partial(scene.energy, rod.v, rod.k)))
     for what, function in found:
         c, names = watched(scene.constants(s=point.s))
         try:
@@ -116,13 +114,13 @@ def _numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
         except SceneError:
             continue
         if scene.load in names:
-            yield what, lambda load, f=function: _values(f, scene.constants(load, s=point.s))
+            yield what, partial(_values, function, scene, point.s)
 
 
-def _values(function: Callable[[Constants], object], c: Constants) -> list[float]:
-    """Numbers that a ``function`` of the constants ``c`` returns; nan for what it does not."""
+def _values(function: OfConstants, scene: Scene, s: float, load: float) -> list[float]:
+    """Numbers that a ``function`` of a scene's constants returns at a ``load`` and ``s``; nan for what it does not."""
     try:
-        values = function(c)
+        values = function(scene.constants(load, s=s))
     except SceneError:
         return [float("nan")]
     return [_number(x) for x in (values if isinstance(values, (tuple, list)) else [values])]
