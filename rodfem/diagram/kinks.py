@@ -62,9 +62,9 @@ class Kinks:
 def no_bars(name: str, words: Sequence[str]) -> str:
     """Sentence on the functions, in ``words``, whose kinks leave special points of a branch ``name`` without bars."""
     return (
-        f"{name}: the {_listed([words])} has a kink in the state inside of the rod, with which convergence is algebraic "
-        "and two meshes may err alike: no error is estimated where that is, and no accuracy is certain; compare meshes "
-        "of many elements."
+        f"{name}: the {_listed([words])} has a kink in the state inside of the rod, with which convergence is "
+        "algebraic and two meshes may err alike: no error is estimated where that is, and no accuracy is certain; "
+        "compare meshes of many elements."
     )
 
 

@@ -19,6 +19,7 @@ from rodfem.errors import SceneError
 from rodfem.problem.kinds import plain
 from rodfem.problem.local_state import OfConstants, functions_of_places, some_places, watched
 from rodfem.problem.roles import functions_of
+from rodfem.tolerances import ROUND_OFF
 
 if TYPE_CHECKING:
     from rodfem.continuation.branch import Point
@@ -95,10 +96,11 @@ def _halved(function: Numbers, first: float, last: float, ends: set[float]) -> l
 
 
 def _told(function: Numbers, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
-    """How much a ``function`` varies between two loads, and how far it is from a cubic, component by component."""
+    """How much a ``function`` varies between two loads, and how far from a cubic, beyond round-off, by component."""
     known, asked = (np.array([function(low + t * (high - low)) for t in places]) for places in (KNOWN, ASKED))
     cubic = np.vander(ASKED, len(KNOWN)) @ np.linalg.solve(np.vander(KNOWN), known)
-    return np.ptp(np.vstack([known, asked]), axis=0), abs(cubic - asked).max(axis=0)
+    values, off = np.vstack([known, asked]), abs(cubic - asked).max(axis=0)
+    return np.ptp(values, axis=0), np.maximum(off - ROUND_OFF * abs(values).max(axis=0), 0.0)
 
 
 def _numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:

@@ -47,6 +47,6 @@ def test_what_is_faster_than_any_step_is_said() -> None:
 
 def test_ordinary_functions_bound_no_step() -> None:
     for power in (1, 2, 3):
-        fast = FastLoad(column(lambda c, n=power: (0.0, 0.0, -(c.P**n))), (0.0, 1.0))
+        fast = FastLoad(column(lambda c, n=power: (1e-13, 2e-4, -(c.P**n))), (0.0, 4.0))
         assert not fast.doubt
         assert not len(fast.low)
