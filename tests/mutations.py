@@ -51,6 +51,30 @@ RECORDED = "tests/modes/test_recorded.py"
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "constants-are-compared": Fault(
+        "rodfem/problem/symbols.py",
+        "if _is_a_persons(3):",
+        "if _is_a_persons(3) and False:",
+        "tests/problem/test_symbols.py",
+    ),
+    "loads-as-fast-as-they-like": Fault(
+        "rodfem/diagram/tracer.py",
+        "return min(self.specials.reach(point), self.fast.reach(point))",
+        "return self.specials.reach(point)",
+        "tests/diagram/test_fast_load.py",
+    ),
+    "corners-where-interpolated-states-have-them": Fault(
+        f"{CONTINUATION}event_search.py",
+        "self.solved.lowest(*self._bracket(places, i, sign), sign, self.margin)",
+        "self.solved.lowest(*places[i - 1 : i + 2], sign, self.margin)",
+        "tests/diagram/test_events.py",
+    ),
+    "a-read-diagram-forgets-its-plan": Fault(
+        "rodfem/diagram/saved.py",
+        "Plan() if asked is None else plan_without(asked)",
+        "Plan()",
+        "tests/diagram/test_another_rod.py",
+    ),
     "convexity-is-looked-at-in-rows-alone": Fault(
         f"{CONTINUATION}convexity_between.py",
         "if least > 0.0 or holds(t):",
