@@ -33,6 +33,8 @@ OF_A_RING = 1e-2
 """The second where a closed rod may move along itself: the mesh's eigenvalue of that motion."""
 SQUARE = 1e-5
 """Relative difference of two values of omega^2 that are one: double ones have half of the digits."""
+SURE = 0.1
+"""Part of that which may be round-off of the dense eigenvalues."""
 STORED = 1e-6
 """Relative difference of two stored energies that are one."""
 ROWS = 40, 12
@@ -198,8 +200,8 @@ def frequencies_of(oracle: Oracle, point: Point) -> str | None:
     dense = dense[abs(dense) > NEAR * one]
     close = [abs(a - b) < 1e-3 * max(abs(a), one) for a, b in pairwise(sorted(dense[:FREQUENCIES], key=abs))]
     if apart.max() > SQUARE:
-        worst = int(apart.argmax())
-        return None if any(close) else f"omega^2 = {mine[worst]:.8g} is none of {dense[:FREQUENCIES]}"
+        worst, unsure = int(apart.argmax()), oracle.noise > SURE * SQUARE
+        return None if unsure or any(close) else f"omega^2 = {mine[worst]:.8g} is none of {dense[:FREQUENCIES]}"
     return ""
 
 

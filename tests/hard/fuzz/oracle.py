@@ -24,6 +24,8 @@ STRAINS = 1e-3
 """Weight of strains, which are not in the metric, relative to what is."""
 ROUND_OFF = 1e-14
 """Error of an eigenvalue, relative to the largest one."""
+FEW = 6
+"""Eigenvalues ``omega^2`` whose round-off is measured."""
 FLOOR = 1e-13
 """Part of the largest entry of the metric that is added where round-off makes it indefinite."""
 SWEEPS = 8
@@ -65,13 +67,21 @@ class Oracle:
         return mu
 
     def squares(self, x: Any) -> np.ndarray:
-        """Finite eigenvalues ``omega^2`` of a rod under loads without a potential, by their distance from zero."""
+        """Finite eigenvalues ``omega^2`` of a rod under loads without a potential, by their distance from zero.
+
+        ``noise`` is the largest difference, relative to it or to one unit, of one of the first few with another shift.
+        """
         K, Z, _, M = self._reduced(x)
-        one = 10.0 * self.system.scene.units.omega2
-        inverse = np.linalg.eigvals(np.linalg.solve(Z.T @ (K + one * M) @ Z, Z.T @ M @ Z))
-        finite = inverse[abs(inverse) > 1e-9 * abs(inverse).max()]
-        values = 1.0 / finite - one
-        return values[np.argsort(abs(values))]
+        unit = self.system.scene.units.omega2
+        found = []
+        for shift in (10.0 * unit, 7.0 * unit):
+            inverse = np.linalg.eigvals(np.linalg.solve(Z.T @ (K + shift * M) @ Z, Z.T @ M @ Z))
+            values = 1.0 / inverse[abs(inverse) > 1e-9 * abs(inverse).max()] - shift
+            found.append(values[np.argsort(abs(values))])
+        first, other = found
+        few = first[:FEW]
+        self.noise = float((abs(few[:, None] - other).min(axis=1) / np.maximum(abs(few), unit)).max(initial=0.0))
+        return first
 
     def _reduced(self, x: Any) -> tuple[np.ndarray, ...]:
         """Scaled ``K``, ``Z``, metric with a part of the strains, and kinetic metric."""
