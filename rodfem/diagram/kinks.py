@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.observer import Observer
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.fem.kinks_at import KinksAt, Met
 
 NO_BAR = "not estimated: a kink in the state"
@@ -19,11 +19,11 @@ NO_BAR = "not estimated: a kink in the state"
 
 
 class Kinks:
-    """Examines branches on several ``meshes``, and tells an ``observer`` in a sentence what is left open."""
+    """Examines branches on the meshes of several ``solvers``, and tells an ``observer`` what is left open."""
 
-    def __init__(self, meshes: Meshes, observer: Observer, load: str) -> None:
+    def __init__(self, solvers: Sequence[StaticSolver], observer: Observer, load: str) -> None:
         """Examine nothing yet; ``load`` is the name of the load."""
-        self.meshes, self.observer, self.load = meshes, observer, load
+        self.solvers, self.observer, self.load = solvers, observer, load
         self._by_mesh: dict[int, KinksAt] = {}
 
     def error_bars(self, branch: Branch) -> None:
@@ -32,6 +32,7 @@ class Kinks:
         for special in branch.special:
             if inside := self._met(special.point).inside:
                 special.error_estimate = special.ordinate_error = special.point.estimate = float("nan")
+                special.omega2_error = float("nan")
                 special.resolved = None
                 special.note = "; ".join(filter(None, (special.note, NO_BAR)))
                 words += inside
@@ -55,7 +56,7 @@ class Kinks:
 
     def _met(self, point: Point) -> Met:
         if point.mesh not in self._by_mesh:
-            self._by_mesh[point.mesh] = KinksAt(self.meshes.solvers[point.mesh].shape)
+            self._by_mesh[point.mesh] = KinksAt(self.solvers[point.mesh].shape)
         return self._by_mesh[point.mesh](point.x)
 
 

@@ -24,10 +24,12 @@ from rodfem.diagram.critical_loads import CriticalLoads
 from rodfem.diagram.first_name import name_of_first
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, FrequencyRows, Row, leftmost
 from rodfem.diagram.held import at_load, require_held
+from rodfem.diagram.kinks import Kinks
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep_errors import SweepErrors
 from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without
+from rodfem.problem.fast_load import FastLoad
 from rodfem.stability.cluster import Cluster
 from rodfem.stability.frequencies import REAL, Frequencies
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
@@ -36,6 +38,8 @@ from rodfem.tolerances import unit
 
 LOADS = 101
 """Number of loads at which a range is sampled."""
+FAST = 4
+"""Number of loads in each range in which a cubic tells what the load does, where that changes fast."""
 
 
 class Sweep:
@@ -80,9 +84,11 @@ class Sweep:
         last = branch.points[-1]
         branch.special.append(self.solver.given(END, last))
         branch.renumber()
-        warn = self.observer.warn
+        warn, kinks = self.observer.warn, Kinks([self.solver], self.observer, self._load)
+        kinks.index(branch)
         if self.plan.error_bars:
             self._error_bars(branch)
+            kinks.error_bars(branch)
         self.observer.finished(branch)
         with without("The asymmetry of the tangent matrix was not measured", comm, warn):
             self._asymmetry(last)
@@ -92,7 +98,11 @@ class Sweep:
     def _sweep(self, branch: Branch) -> str:
         """Compute the points of a branch, load by load, and the special points between them; why it ends early."""
         a, b = self.span
-        loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at])
+        fast = FastLoad(self.solver.system.scene, self.span)
+        if fast.doubt:
+            self.observer.warn(fast.doubt)
+        between = np.linspace(fast.low, fast.high, FAST, endpoint=False).ravel()
+        loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at, *between])
         loads = loads if a < b else loads[::-1]
         x, _ = self.solver.first(a)
         branch.name = name_of_first(self.solver.shape, [x, self.solver.at_load(x, float(loads[1]))[0]])

@@ -83,7 +83,7 @@ class Tracer:
         self.finders = [finder(plan) for finder in FINDERS]
         self.invariants: dict[int, Invariants] = {}
         self.soft = SoftRows(self.meshes, error_bars=bool(plan.error_bars or plan.accuracy))
-        self.kinks = Kinks(self.meshes, observer, self.scene.load)
+        self.kinks = Kinks(self.meshes.solvers, observer, self.scene.load)
         said = observer if isinstance(observer, Recorder) else None
         self.book = Bookkeeper(journal or Journal(), self.meshes, self.gaps, self.branches, plan.events, said)
 

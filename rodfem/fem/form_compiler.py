@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 from rodfem import code_cache, compat
 from rodfem.beside import Job
-from rodfem.errors import SetupError
+from rodfem.errors import SceneError, SetupError
 
 _COMPILE = jit._compile_objects
 """What FFCx calls for objects that its cache lacks, once it has locked their place in it."""
@@ -157,7 +157,10 @@ class _Begun(BaseException):
 
 @contextmanager
 def _from_cache() -> Iterator[None]:
-    """Raise :class:`SetupError` where the folder of compiled code is locked, or cannot be written."""
+    """Raise :class:`SetupError` where the folder of compiled code is locked, or cannot be written.
+
+    Raises :class:`SceneError` for a function that the compiler cannot take.
+    """
     try:
         yield
     except TimeoutError as locked:
@@ -167,6 +170,13 @@ def _from_cache() -> Iterator[None]:
         ) from locked
     except OSError as error:
         raise SetupError(code_cache.refused(error)) from error
+    except AttributeError as trouble:
+        if "LiteralFloat" not in str(trouble):  # FFCx takes a product of nothing but numbers for one with arguments
+            raise
+        raise SceneError(
+            "The equations cannot be compiled: in a function of the scene terms cancel each other, as in x**2 - x**2; "
+            "leave them out."
+        ) from trouble
 
 
 def compile_forms(forms: Sequence[Any]) -> list[Any]:

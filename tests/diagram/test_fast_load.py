@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from math import asin, pi
 
+import classics
 import numpy as np
 import pytest
 import ufl
 
 import rodfem
 from forms.energy import bending_and_twist
-from rodfem import Ordinate, Plan, Scene, clamped, free
+from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, clamped, free
+from rodfem.continuation.kinds import FLUTTER
 from rodfem.problem.fast_load import FastLoad
 
 
@@ -50,3 +52,15 @@ def test_ordinary_functions_bound_no_step() -> None:
         fast = FastLoad(column(lambda c, n=power: (1e-13, 2e-4, -(c.P**n))), (0.0, 4.0))
         assert not fast.doubt
         assert not len(fast.low)
+
+
+def test_a_sweep_of_a_fast_sine() -> None:
+    """A follower thrust 25 sin(200 P): it flutters where that passes Beck's load, twice in each of 31 periods."""
+    ends = clamped(), free(follower=lambda c: (0.0, 0.0, -25 * ufl.sin(200 * c.P)))
+    mass = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0))
+    rod = classics.column("sweep", ends, (0.0, 1.0), inertia=mass)
+    (branch,) = rodfem.trace(rod, Discretization("auto", 6, 4), Plan(error_bars=False))
+    found = [s.point.load for s in branch.special if s.kind == FLUTTER]
+    beck = asin(20.0509536 / 25)
+    true = [(2 * pi * i + x) / 200 for i in range(32) for x in (beck, pi - beck)]
+    assert found == pytest.approx([x for x in true if x < 1], abs=1e-8)

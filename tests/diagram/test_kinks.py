@@ -5,10 +5,13 @@ from __future__ import annotations
 from math import isfinite, isnan
 from typing import Any
 
+import pytest
 import ufl
+from classics import column
 
 from forms.energy import bending_and_twist
-from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, clamped, free, trace
+from rodfem import Diagram, Discretization, End, Inertia, Ordinate, Plan, Scene, clamped, free, trace
+from rodfem.errors import SceneError
 
 
 def bent(energy: Any, at: tuple[float, ...]) -> Diagram:
@@ -51,3 +54,22 @@ def test_a_spring_at_the_tip_on_one_side() -> None:
     said = [x for x in found.warnings if "has a kink at the very state at P = 0 to 15" in x]
     assert len(said) == 1 and "energy of the right end" in said[0] and "undecided" in said[0]
     assert all(point.stable is not True for point in found[0].points)
+
+
+def test_a_sweep_has_no_bar_beyond_a_kink() -> None:
+    soft = lambda k: ufl.conditional(ufl.lt(abs(k), 1.0), 0.5 * k**2, 0.1 * k**2 + 0.8 * abs(k) - 0.4)  # noqa: E731
+    rod = column(
+        "follower", (clamped(), free(follower=lambda c: (0.0, -c.P, 0.0))), (0.0, 2.0),
+        energy=lambda v, k, c: soft(k[0]) + k[1] ** 2 + k[2] ** 2, inertia=Inertia(rho_A=lambda c: 1.0),
+    )  # fmt: skip
+    found = trace(rod, Discretization("auto", 6, 4))
+    assert isnan(found[0].special[-1].ordinate_error)
+    assert any("stored energy has a kink in the state inside of the rod" in said for said in found.warnings)
+
+
+def test_terms_that_cancel_are_named() -> None:
+    """FFCx cannot take a form of such terms: its traceback was all that was said."""
+    cancels = lambda x, c: c.P * x.r[2] + 3 * x.r[2] ** 2 - 3 * x.r[2] ** 2  # noqa: E731
+    rod = column("cancels", (clamped(), End(energy=cancels)), (0.0, 3.0))
+    with pytest.raises(SceneError, match="terms cancel each other"):
+        trace(rod, Discretization("auto", 4, 4), Plan(depth=0))
