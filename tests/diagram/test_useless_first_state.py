@@ -19,6 +19,7 @@ def energy(v: Any, k: Any, c: Any) -> Any:
     return 0.5 * quadratic + 20 * (v[2] - 1) ** 2 + 0.707 * sum(ufl.cosh(0.7 * x) - 1 for x in strains)
 
 
+@pytest.mark.alone  # with the factors of several ranks Newton's method ends elsewhere, at an equilibrium
 @pytest.mark.parametrize(
     "mesh", [Discretization("auto", 5, 6), Discretization("pointwise", 7, 5), Discretization("pointwise", 10, 6)]
 )
