@@ -36,7 +36,7 @@ from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordin
 from rodfem.continuation.states_between import Curve
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
-from rodfem.fem.transfer import Transfer, richer_system
+from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.problem.events import Event
 from rodfem.tolerances import ROUND_OFF, round_off
 
@@ -52,11 +52,6 @@ NARROW = 1 / 128
 """Part of the usual window on which a special point is located again."""
 STEADY = 3.0
 """Uncertainty of a result, in units of its change by one more step of Newton's method."""
-
-
-def halved(degree: int) -> float:
-    """Largest part of the error of a smooth state on elements of ``degree`` that remains on halved elements."""
-    return float(0.5 ** (degree + 1))
 
 
 def bound(value: complex, richer: complex, left: float, rho: float, about: float = 0.0) -> float:

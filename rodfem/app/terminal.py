@@ -368,6 +368,8 @@ class Report(Observer):
             number = f"{value.real:.10g}" if value.imag == 0 else f"{complex(value):.9g}"
             known = f"residual {residual:.0e}" if isfinite(residual) else ""
             self.say(f"    mu = {number + doubt:<28} {known:<15} {motion}".rstrip())
+        if modes is not None and modes.note:
+            self.say(f"    {modes.note}")
         proof = ", counts prove that none is missing" if found.certified and len(found.values) else ""
         took = f"{found.factorisations} factorisation{'s'[: found.factorisations != 1]}, {1e3 * found.seconds:.1f} ms"
         self.say(f"    {found.method} ({found.reason}){proof}; {took}")

@@ -32,6 +32,7 @@ from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, K
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.errors import ConvergenceError, InputError
+from rodfem.fem.nonsmooth import Nonsmooth, Reasons
 from rodfem.fem.transfer import Transfer, richer_system
 from rodfem.file_format import LOCUS, read_json
 from rodfem.output.digits import number
@@ -49,7 +50,7 @@ BESIDE = 1e-3
 CUSP = 1e-3
 """Part of the tangent in the plane, as a share of the bounds, below which a node is at a cusp."""
 
-AS_THEY_ARE = ("scene", "title", "kind", "ordinate_name", "start", "lower", "constants", "discretization")
+AS_THEY_ARE = ("scene", "title", "kind", "ordinate_name", "start", "lower", "constants", "discretization", "note")
 """Entries of a file that are attributes of a locus."""
 
 
@@ -107,6 +108,8 @@ class Locus:
         What the two parameters are, for the axes of pictures; empty where the scene does not say it.
     units
         Names of their units; empty where they have none.
+    note
+        Why errors that were asked for are not estimated; empty where they are.
     """
 
     scene: str
@@ -132,6 +135,7 @@ class Locus:
     crossings: list[tuple[float, float]] = field(default_factory=list)
     words: tuple[str, str] = ("", "")
     units: tuple[str, str] = ("", "")
+    note: str = ""
 
     def passes(self, special: SpecialPoint) -> bool:
         """Whether the curve passes the line of its start again at another special point of that scene."""
@@ -171,7 +175,7 @@ class Locus:
         }
         tables["error"][data["without_estimate"]] = np.inf
         return cls(
-            **{name: data[name] for name in AS_THEY_ARE},
+            **{name: data[name] for name in AS_THEY_ARE if name in data},
             names=(first, second),
             labels=tuple(data["labels"]),
             words=tuple(data.get("words", ("", ""))),
@@ -211,7 +215,8 @@ class Locus:
             index = f"{self.index[i, 0]}|{self.index[i, 1]}" if self.index[i, 0] >= 0 else ""
             note = "start" if i == self.start else marks.get(i, "")
             lines.append(f"  {pair[0]:<24} {pair[1]:<24} {self.ordinate[i] + 0.0:<14.8f} {index:<6} {note}".rstrip())
-        return "\n".join([*lines, f"  {n} points; ends: {self.ended[0]}; {self.ended[1]}"])
+        lines.append(f"  {n} points; ends: {self.ended[0]}; {self.ended[1]}")
+        return "\n".join([*lines, *filter(None, [self.note])])
 
 
 class Curve(NamedTuple):
@@ -273,7 +278,10 @@ def locus(
         crossings = _crossings(tracer, found, first, float(p[1]))
         error = _errors(solver, special.kind, plane, found, error_bars)
         lower = _lower_side(solver, plane, special, first)
-    return _locus(solver, special, (plane.names, bounds), found, crossings, error, lower)
+        reasons = _not_estimated(solver, plane, found.nodes, error)
+    located = _locus(solver, special, (plane.names, bounds), found, crossings, error, lower)
+    located.note = f"Locus of the {special.kind}: {reasons.sentence}" if reasons else ""
+    return located
 
 
 def _locus(
@@ -333,6 +341,17 @@ def _errors(solver: StaticSolver, kind: str, plane: Plane, found: Curve, error_b
         rows = np.linspace(0, len(found.nodes) - 1, error_bars).round().astype(int).tolist()
         _estimate(solver, kind, plane, found.nodes, sorted({*rows, *found.marks}), error)
     return error
+
+
+def _not_estimated(solver: StaticSolver, plane: Plane, nodes: Sequence[LocusPoint], error: np.ndarray) -> Reasons:
+    """Take the errors of points in whose states an energy is not smooth within elements away, and say why."""
+    nonsmooth, reasons = Nonsmooth(solver.shape), Reasons([], [])
+    for row in np.flatnonzero(np.isfinite(error[:, 0])):
+        solver.system.line = plane.along(nodes[row].p, 0)
+        if here := nonsmooth(nodes[row].x):
+            error[row] = np.nan
+            reasons += here
+    return reasons
 
 
 def _both_sides(tracer: Tracer, first: LocusPoint) -> Curve:

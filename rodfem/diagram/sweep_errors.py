@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import bound, halved
+from rodfem.adaptivity.error_estimate import bound
 from rodfem.adaptivity.inside import Inside
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.critical_loads import Mean, Measuring, located_flutter, zero_near
 from rodfem.diagram.held import at_load
-from rodfem.fem.transfer import Transfer, richer_system
+from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, round_off

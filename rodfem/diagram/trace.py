@@ -9,7 +9,6 @@ import numpy as np
 from mpi4py import MPI
 
 from rodfem import compat
-from rodfem.adaptivity.error_estimate import halved
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer, Recorder
@@ -26,7 +25,7 @@ from rodfem.diagram.waves import check_waves
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
-from rodfem.fem.transfer import compile_richer
+from rodfem.fem.transfer import compile_richer, halved
 from rodfem.problem.arguments import a, checked
 from rodfem.problem.jumps import unbroken
 from rodfem.problem.scene import Scene

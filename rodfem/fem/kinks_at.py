@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import legendre
 from petsc4py import PETSc
 
-from rodfem import compat
-from rodfem.fem.fields import LOAD
 from rodfem.fem.shape import Shape
-from rodfem.problem.kinks import Kink, Places, kinks
+from rodfem.fem.state_along import StateAlong
+from rodfem.problem.kinks import Kink, kinks
+from rodfem.problem.pointwise import Places
 
 FINE = 4
 """Places of an element where the state is looked at, over its degree."""
@@ -43,7 +42,8 @@ class KinksAt:
         met = Met([], [])
         if not self.kinks:
             return met
-        places = self._places(x)
+        along = StateAlong(self.shape, x, self.symbols)
+        places = along(np.linspace(0.0, 1.0, FINE * along.degree + 1))
         for kink in self.kinks:
             if kink.s is None:
                 self._along(kink, places, met)
@@ -72,36 +72,6 @@ class KinksAt:
         for group in (crossed, touched):
             if any(kink.order(_only(places, int(off[i]))) for i in group[:: max(1, len(group) // MOST)]):
                 met.inside.append(kink.what)
-
-    def _places(self, x: PETSc.Vec) -> Places:
-        """The state at places from left to right, ends of elements included."""
-        sample, at = self.shape.sample(x), self.symbols
-        elements = sample["elements"]
-        degree = (len(sample["s"]) - 1) // elements
-        t = np.linspace(0.0, 1.0, FINE * degree + 1)
-        cells = np.arange(elements)[:, None] * degree + np.arange(degree + 1)
-        ends = sample["s"][::degree]
-        size = np.diff(ends)[:, None]
-        values, slopes = _basis(degree, t)
-        q = np.asarray(sample["q"])[cells]
-        out = {at.s: (ends[:-1, None] + size * t).ravel()}
-        out[at.load] = np.full(len(out[at.s]), float(sample[LOAD]))
-        out |= dict(zip(at.q, np.einsum("tn,eni->iet", values, q).reshape(4, -1), strict=True))
-        out |= dict(zip(at.dq, (np.einsum("tn,eni->iet", slopes, q) / size).reshape(4, -1), strict=True))
-        r = np.asarray(sample["r"])[cells]
-        out |= dict(zip(at.r, np.einsum("tn,eni->iet", values, r).reshape(3, -1), strict=True))
-        if at.v:
-            v = np.asarray(sample["v"])
-            strains, _ = _basis(degree - 1, t)
-            out |= dict(zip(at.v, np.einsum("tn,eni->iet", strains, v).reshape(len(at.v), -1), strict=True))
-        return out
-
-
-def _basis(degree: int, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values and slopes of the polynomials of the nodes, from left to right, at places of an element: (t, nodes)."""
-    powers = np.linalg.inv(legendre.legvander(2 * np.sort(compat.nodes(degree)) - 1, degree))
-    slopes = 2 * legendre.legder(powers, axis=0) if degree else np.zeros_like(powers)
-    return legendre.legval(2 * t - 1, powers).T, legendre.legval(2 * t - 1, slopes).T
 
 
 def _only(places: Places, i: int) -> Places:

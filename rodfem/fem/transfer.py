@@ -13,6 +13,11 @@ from rodfem.fem.fields import HIGHEST, Discretization, Fields
 from rodfem.fem.system import System
 
 
+def halved(degree: int) -> float:
+    """Largest part of the error of a smooth state on elements of ``degree`` that remains on halved elements."""
+    return float(0.5 ** (degree + 1))
+
+
 def richer(system: System) -> Discretization:
     """Halves of the elements of a system, of one degree more (but of the highest one)."""
     d = system.fields.discretization

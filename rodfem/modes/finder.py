@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import bound, halved
+from rodfem.adaptivity.error_estimate import bound
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import InputError
-from rodfem.fem.transfer import Transfer, richer_system
+from rodfem.fem.nonsmooth import Nonsmooth, Reasons
+from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.modes.eigenmotions import Eigenmotions, stack
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
 from rodfem.stability.assessment import Assessor, Verdict
@@ -27,6 +28,7 @@ class ModeFinder(Eigenmotions):
         """Keep the solver of the equilibria; ``error_bars`` are from a second, richer discretisation."""
         super().__init__(solver)
         self.error_bars = error_bars
+        self._nonsmooth = Nonsmooth(solver.shape) if error_bars else None
         self._richer: tuple[StaticSolver, Assessor, Transfer] | None = None
 
     def __call__(self, x: PETSc.Vec, number: int, method: str = "auto") -> tuple[Verdict, Modes]:
@@ -34,13 +36,15 @@ class ModeFinder(Eigenmotions):
         verdict = self.assessor(x, method, number)
         sample = self.motions.sample(x)
         found = self._conservative(x, verdict) if self.assessor.conservative else self._pairs(x, number)
-        errors = np.full(len(found["value"]), np.nan)
+        errors, reasons = np.full(len(found["value"]), np.nan), Reasons([], [])
         values = found["value"][: len(found["value"]) - found["motion"].count(SYMMETRY)]
-        if self.error_bars:
+        if self._nonsmooth is not None:
+            reasons = self._nonsmooth(x)
+        if self.error_bars and not reasons:
             errors[: len(values)] = self._errors(x, values)
         unit = sample["q"] / np.linalg.norm(sample["q"], axis=1, keepdims=True)
         state = {"load": self.system.scalar(x), "s": sample["s"], "r": sample["r"], "q": unit}
-        return verdict, Modes(**state, error=errors, **found)
+        return verdict, Modes(**state, error=errors, note=reasons.sentence if reasons else "", **found)
 
     def _conservative(self, x: PETSc.Vec, verdict: Verdict) -> dict[str, Any]:
         """Modes from the vectors of a verdict, orthonormal in the mass, and the symmetries'."""

@@ -64,6 +64,8 @@ class Modes:
         In the space frame, (K, m, 3).
     left_displacement, left_rotation, weight_displacement, weight_rotation
         What takes forces to the mode's amplitude, and motions to it, (K, m, 3).
+    note
+        Why errors that were asked for are not estimated; empty where they are.
     """
 
     load: float
@@ -80,6 +82,7 @@ class Modes:
     left_rotation: np.ndarray
     weight_displacement: np.ndarray
     weight_rotation: np.ndarray
+    note: str = ""
 
     def __repr__(self) -> str:
         """Load, and each eigenvalue with its motion."""
@@ -129,6 +132,7 @@ def save_modes(
         group = file.create_group(f"branches/{branch}/{row}")
         for name in ("load", "s", "r", "q", *FIELDS, *LEFT):
             group[name] = getattr(modes, name)
+        group.attrs["note"] = modes.note
         group["motion"] = np.array(modes.motion, dtype=h5py.string_dtype())
         if scene is not None:
             from rodfem.problem.supports import write, write_section  # they need UFL, which pictures do not
@@ -147,21 +151,22 @@ def load_modes(path: Path | str, branch: str, row: int) -> Modes:
         with h5py.File(path, "r") as file:
             MODES.check_hdf5(file, ("branches",))
             group = file[f"branches/{branch}/{row}"]
-            missing = [name for name in Modes.__dataclass_fields__ if name not in group]
+            names = [name for name in Modes.__dataclass_fields__ if name != "note"]
+            missing = [name for name in names if name not in group]
             if missing:
                 raise InputError(
                     f"{path} has modes of row {row} of the branch {branch!r} without {', '.join(missing)}: another "
                     "version of rodfem wrote it; run the scene again."
                 )
-            arrays = {name: group[name][()] for name in Modes.__dataclass_fields__ if name != "motion"}
-            motion = tuple(group["motion"].asstr()[()])
+            arrays = {name: group[name][()] for name in names if name != "motion"}
+            motion, note = tuple(group["motion"].asstr()[()]), str(group.attrs.get("note", ""))
     except UNREADABLE as trouble:
         if isinstance(trouble, InputError):
             raise
         raise InputError(f"{path} has no modes of row {row} of a branch {branch!r}: {_contents(path)}.") from trouble
     _check_arrays(arrays, motion, path)
     arrays["load"] = float(arrays["load"])
-    return Modes(motion=motion, **arrays)
+    return Modes(motion=motion, note=note, **arrays)
 
 
 def _check_arrays(arrays: Mapping[str, Any], motion: tuple[str, ...], path: Path | str) -> None:

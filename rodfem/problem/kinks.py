@@ -13,15 +13,26 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import ufl
-from ufl.classes import GE, GT, LE, LT, Abs, MaxValue, MinValue
+from ufl.classes import (
+    GE,
+    GT,
+    LE,
+    LT,
+    Abs,
+    Acos,
+    Asin,
+    Atan2,
+    Ln,
+    MaxValue,
+    MinValue,
+    Power,
+    ScalarValue,
+    Sqrt,
+)
 from ufl.corealg.traversal import unique_pre_traversal
 
-from forms.kinematics import curvature, strain
-from forms.rotation import rotation
 from rodfem.problem.jumps import difference
-from rodfem.problem.local_state import place
-from rodfem.problem.roles import functions_of
+from rodfem.problem.pointwise import LocalState, Places, pointwise
 from rodfem.problem.values import Symbol, Values, scalar
 
 if TYPE_CHECKING:
@@ -37,22 +48,6 @@ NOISE = 1e3 * float(np.finfo(float).eps)
 """Round-off of a difference, relative to the values."""
 SMALL = 1e-6
 """Step of the derivatives of a difference, in units of the state."""
-Places = dict[Symbol, np.ndarray]
-
-
-class LocalState:
-    """Symbols of a state at a place: quaternion ``q`` and its slope ``dq``, ``r``, free strains ``v``, ``s``, ``load``.
-
-    ``units`` has the units of those that are the state's.
-    """
-
-    def __init__(self, scene: Scene) -> None:
-        """Make symbols for a place of a ``scene``."""
-        self.q, self.dq, self.r = ([Symbol() for _ in range(n)] for n in (4, 4, 3))
-        self.v, self.s, self.load = [Symbol() for _ in scene.free_strains], Symbol(), Symbol()
-        length = scene.length
-        self.units = dict.fromkeys([*self.q, *self.v], 1.0) | dict.fromkeys(self.r, length)
-        self.units |= dict.fromkeys(self.dq, 1.0 / length)
 
 
 @dataclass(frozen=True)
@@ -122,33 +117,25 @@ class Kink:
 def kinks(scene: Scene) -> tuple[LocalState, list[Kink]]:
     """Kinks that the energies, potentials and constraints of a ``scene`` may have, as functions of a local state."""
     at, found = LocalState(scene), []
-    for what, s, function in _functions(scene, at):
-        whole = scalar(function)
-        parts = {x for x in unique_pre_traversal(whole) if isinstance(x, LT | GT | LE | GE | Abs | MaxValue | MinValue)}
-        for value in {difference(part) for part in parts}:
+    for place in pointwise(scene, at):
+        whole = scalar(place.function)
+        for value in {value for part in unique_pre_traversal(whole) for value in _may_be_singular(part)}:
             if any(symbol in unique_pre_traversal(value) for symbol in at.units):
-                found.append(Kink(what, s, Values(whole), Values(value), at.units))
+                found.append(Kink(place.what, place.s, Values(whole), Values(value), at.units))
     return at, found
 
 
-def _functions(scene: Scene, at: LocalState) -> Iterator[tuple[str, float | None, Any]]:
-    """Scalar functions of a place in the equations: words, arclength, expression."""
-    c = scene.constants(at.load, at.s)  # type: ignore[arg-type]
-    q, dq, r = (ufl.as_vector(x) for x in (at.q, at.dq, at.r))
-    v, k, R = strain(scene.free_strains, at.v), curvature(q, dq), rotation(q)
-    yield "stored energy", None, scene.energy(v, k, c)
-    for part in scene.parts:
-        x = place(q, R, at.s, r, length=scene.length)
-        if part.s is None:
-            x = place(q, R, at.s, r, dr=ufl.dot(R, v), v=v, k=k, length=scene.length)
-        for what, function, role in functions_of(part.of, nested=False):
-            if role.call == "f(x, c)":
-                value = function(x, c)
-                for component in value if isinstance(value, list | tuple) else [value]:
-                    yield _named(scene, part, what), part.s, component
+def _may_be_singular(part: Any) -> Iterator[Any]:
+    """Expressions at whose zeros a node of UFL has no derivative of every order."""
+    if isinstance(part, LT | GT | LE | GE | Abs | MaxValue | MinValue):
+        yield difference(part)
+    elif isinstance(part, Sqrt | Ln | Atan2):
+        yield part.ufl_operands[0]  # of atan2(y, x) the cut y = 0, x < 0
+    elif isinstance(part, Acos | Asin):
+        yield 1.0 - part.ufl_operands[0] ** 2
+    elif isinstance(part, Power) and not _whole(part.ufl_operands[1]):
+        yield part.ufl_operands[0]
 
 
-def _named(scene: Scene, part: Any, what: str) -> str:
-    """Words for a function of a ``part``: an end is named by its side."""
-    sides = [side for side, end in zip(("left", "right"), scene.sides, strict=True) if end is part.of]
-    return what.replace("of the  end", f"of the {sides[0]} end").format(sides[0]) if sides else what
+def _whole(exponent: Any) -> bool:
+    return isinstance(exponent, ScalarValue) and float(exponent).is_integer()

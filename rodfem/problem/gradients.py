@@ -1,0 +1,72 @@
+"""Resultants of the energies of a scene: first derivatives with respect to the state at a place."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import ufl
+from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+from ufl.algorithms.apply_derivatives import apply_derivatives
+from ufl.algorithms.remove_complex_nodes import remove_complex_nodes
+from ufl.classes import Power, Product, ScalarValue, Sum, Variable, Zero
+from ufl.corealg.traversal import unique_pre_traversal
+
+from rodfem.problem.pointwise import LocalState, Places, pointwise
+from rodfem.problem.values import Symbol, Values, scalar
+
+if TYPE_CHECKING:
+    from rodfem.problem.scene import Scene
+
+
+class Gradient:
+    """Derivatives of a ``function`` of a place, in words ``what``, with respect to a state of these ``units``."""
+
+    def __init__(self, what: str, function: Any, units: dict[Symbol, float]) -> None:
+        """Differentiate."""
+        self.what = what
+        symbols = [symbol for symbol in units if symbol in unique_pre_traversal(function)]
+        self._parts = [(units[symbol], Values(_derivative(function, symbol))) for symbol in symbols]
+
+    def __call__(self, places: Places) -> np.ndarray:
+        """Derivatives times the units of what they are with respect to, all in those of the function: (n, places)."""
+        return np.array([unit * of(places) for unit, of in self._parts])
+
+
+def gradients(scene: Scene) -> tuple[LocalState, list[Gradient]]:
+    """Resultants along the rod, of the energies, potentials and constraints of a ``scene`` that are no polynomials.
+
+    A polynomial in the state, as a quadratic energy, changes as slowly as the state does.
+    """
+    at, found = LocalState(scene), []
+    for place in pointwise(scene, at):
+        whole = scalar(place.function)
+        if place.s is None and not _polynomial(whole, at):
+            found.append(Gradient(place.what, whole, at.units))
+    return at, found
+
+
+def _derivative(function: Any, symbol: Symbol) -> Any:
+    return remove_complex_nodes(apply_derivatives(apply_algebra_lowering(ufl.diff(function, symbol))))
+
+
+def _polynomial(function: Any, at: LocalState) -> bool:
+    """Whether a function is a polynomial in the state, by the nodes of UFL between it and the state's symbols."""
+    of_state: dict[Any, bool] = {}
+
+    def knows(node: Any) -> bool:
+        if node not in of_state:
+            of_state[node] = node in at.units or any(knows(x) for x in node.ufl_operands)
+        return of_state[node]
+
+    kinds = Sum | Product | Power | Variable
+    return all(
+        isinstance(node, kinds) and (not isinstance(node, Power) or _exponent(node.ufl_operands[1]))
+        for node in unique_pre_traversal(function)
+        if knows(node)
+    )
+
+
+def _exponent(power: Any) -> bool:
+    """Whether a power is that of a polynomial."""
+    return isinstance(power, ScalarValue | Zero) and float(power) >= 0 and float(power).is_integer()
