@@ -26,7 +26,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
-from rodfem.adaptivity.inside import Inside
+from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_location import nearest_event
@@ -54,23 +54,13 @@ STEADY = 3.0
 """Uncertainty of a result, in units of its change by one more step of Newton's method."""
 
 
-def bound(value: complex, richer: complex, left: float, rho: float, about: float = 0.0) -> float:
-    """Bound of the error of a value of which ``rho`` is left in the ``richer`` one, itself uncertain by ``left``.
-
-    Both results ``value`` and ``richer`` are loads, ordinates or coefficients, and ``left`` is in their unit, as is the
-    largest change ``about`` such a value: by accident the value itself may change by less.
-    """
-    change = abs(richer - value)
-    return change + rho / (1 - rho) * max(change, about) + left
-
-
 @dataclass(frozen=True)
 class Again:
     """A point computed again: state ``x``, ``load``, ``ordinate``, and uncertainties of the two by location, round-off.
 
-    These are ``load_left`` and ``ordinate_left``.  ``rho`` is the part of the first errors that is left,
-    ``changed`` the relative change of the strains of the state or of its null vector, the larger one, and ``about`` the
-    largest change of the ordinate over the element inside of which it is taken.
+    These are ``load_left`` and ``ordinate_left``.  ``ordinate_error`` bounds the error of the first ordinate, ``rho``
+    is the part of the first errors that is left, and ``changed`` the relative change of the strains of the state or of
+    its null vector, the larger one.
     """
 
     x: PETSc.Vec
@@ -78,9 +68,9 @@ class Again:
     ordinate: float
     load_left: float
     ordinate_left: float
+    ordinate_error: float
     rho: float
     changed: float
-    about: float
 
     @property
     def resolved(self) -> bool:
@@ -89,8 +79,7 @@ class Again:
 
     def errors(self, point: Point) -> tuple[float, float]:
         """Bounds of the errors in load and ordinate of the point as first computed."""
-        load = bound(point.load, self.load, self.load_left, self.rho)
-        return load, bound(point.ordinate, self.ordinate, self.ordinate_left, self.rho, self.about)
+        return bound(point.load, self.load, self.load_left, self.rho), self.ordinate_error
 
 
 class Enriched:
@@ -106,7 +95,7 @@ class Enriched:
         self.solver = BranchSolver(self.system)
         self.transfer = Transfer(solver.system, self.system)
         self.origins: list[tuple[SpecialPoint, Origin, float]] = []
-        self._inside = Inside(solver.shape, self.solver.shape)
+        self._ordinate = OrdinateBound(solver.shape, self.solver.shape)
         weights = weights_of(self.system.scene)
         self._indicators = SmoothnessIndicator(solver, weights), SmoothnessIndicator(self.solver, weights)
 
@@ -167,8 +156,9 @@ class Enriched:
         moved = np.abs(np.subtract(last, (load, ordinate)))
         left = STEADY * moved + ROUND_OFF * np.maximum((units.load, units.ordinate), np.abs(last))
         changed = self._indicators[1].changed(first, x, state=True)
-        rho, about = self.rho([point.x], [x]), self._inside.change(point.x, x)
-        return Again(x, *last, float(left[0]), float(left[1]), rho, changed, about)
+        rho = self.rho([point.x], [x])
+        ordinate_error = self._ordinate(point.x, x, float(left[1]), rho)
+        return Again(x, *last, float(left[0]), float(left[1]), ordinate_error, rho, changed)
 
     def law(self, special: SpecialPoint, direction: PETSc.Vec, law: NormalForm) -> None:
         """Set the uncertainty of a law of the first discretisation: that of the rod's law, infinite without another."""
@@ -195,8 +185,8 @@ class Enriched:
             slope * along + round_off(ordinate, units.ordinate),
         )
         changed = self._indicators[1].changed(x, found, state=True)
-        rho, about = self.rho([point.x], [found]), self._inside.change(point.x, found)
-        return Again(found, load, ordinate, *left, rho, changed, about)
+        rho = self.rho([point.x], [found])
+        return Again(found, load, ordinate, *left, self._ordinate(point.x, found, left[1], rho), rho, changed)
 
     def _located(self, special: SpecialPoint) -> Again:
         """The fold or branch point on the richer discretisation, and its ordinate."""
@@ -224,8 +214,8 @@ class Enriched:
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(indicator.changed(x, found.x, state=True), indicator.changed(mode, sharp, state=False))
         self.origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
-        about = self._inside.change(point.x, found.x)
-        return Again(found.x, found.load, ordinate, found.uncertainty, left, rho, changed, about)
+        ordinate_error = self._ordinate(point.x, found.x, left, rho)
+        return Again(found.x, found.load, ordinate, found.uncertainty, left, ordinate_error, rho, changed)
 
 
 def _straight(x: PETSc.Vec, tangent: PETSc.Vec) -> Curve:

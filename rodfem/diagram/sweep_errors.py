@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import bound
-from rodfem.adaptivity.inside import Inside
+from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.continuation.static_solver import StaticSolver
@@ -34,7 +33,7 @@ class SweepErrors:
         self.eigensolver = NonsymmetricSolver(self.richer.system)
         self.transfer = Transfer(system, self.richer.system)
         self.rho = halved(system.fields.discretization.degree)
-        self.inside = Inside(solver.shape, self.richer.shape)
+        self.ordinate = OrdinateBound(solver.shape, self.richer.shape)
 
     def estimate(self, s: SpecialPoint) -> None:
         """Set the error bars of a special point: of its load, its ordinate, and of the eigenvalues that collide."""
@@ -42,8 +41,7 @@ class SweepErrors:
         guess = self.transfer(point.x, state=True)
         x = at_load(richer, guess, point.load)
         left = round_off(point.ordinate, self.units.ordinate)
-        again, about = richer.shape.ordinate(x), self.inside.change(point.x, x)
-        s.ordinate_error = s.error_estimate = bound(point.ordinate, again, left, rho, about)
+        s.ordinate_error = s.error_estimate = self.ordinate(point.x, x, left, rho)
         if s.kind == FLUTTER:
             load, left, mu, doubt = self._flutter(guess, s)
             s.error_estimate = max(bound(point.load, load, left, rho), s.located_to)

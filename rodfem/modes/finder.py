@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import bound
+from rodfem.adaptivity.ordinate_bound import bound
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import InputError
 from rodfem.fem.nonsmooth import Nonsmooth, Reasons

@@ -41,7 +41,7 @@ def gradients(scene: Scene) -> tuple[LocalState, list[Gradient]]:
     at, found = LocalState(scene), []
     for place in pointwise(scene, at):
         whole = scalar(place.function)
-        if place.s is None and not _polynomial(whole, at):
+        if place.s is None and not is_polynomial(whole, at):
             found.append(Gradient(place.what, whole, at.units))
     return at, found
 
@@ -50,8 +50,8 @@ def _derivative(function: Any, symbol: Symbol) -> Any:
     return remove_complex_nodes(apply_derivatives(apply_algebra_lowering(ufl.diff(function, symbol))))
 
 
-def _polynomial(function: Any, at: LocalState) -> bool:
-    """Whether a function is a polynomial in the state, by the nodes of UFL between it and the state's symbols."""
+def is_polynomial(function: Any, at: LocalState) -> bool:
+    """Whether a ``function`` is a polynomial in the symbols ``at`` a place, by the nodes of UFL between them and it."""
     of_state: dict[Any, bool] = {}
 
     def knows(node: Any) -> bool:

@@ -46,6 +46,8 @@ SHORTER, STAYS = 0.25, 0.5
 """With steps so many times shorter the jump of a derivative that is continuous falls to that part: a kink's stays."""
 NOISE = 1e3 * float(np.finfo(float).eps)
 """Round-off of a difference, relative to the values."""
+NEWTON = 6
+"""Steps of Newton's method from a place near a surface to it."""
 SMALL = 1e-6
 """Step of the derivatives of a difference, in units of the state."""
 
@@ -72,17 +74,30 @@ class Kink:
 
         A jump of the first derivative is one of the second, too.
         """
-        ways = self.slopes(at)[:, 0]
+        at, ways = self._on_surface(at)
         size = float(np.linalg.norm(ways))
-        if size < SMALL:  # the difference is a square, say
-            directions = list(np.eye(len(ways)))
-        else:
-            directions = [ways / size]
-            at = self._moved(at, directions[0], np.array([-float(self.value(at)[0]) / size]))
+        # the value of a square, say, has no slope on the surface, and tells no direction across it
+        directions = list(np.eye(len(ways))) if size < SMALL else [ways / size]
         for order in STEPS:
             if any(self._jumps(at, way, order) for way in directions):
                 return order
         return 0
+
+    def _on_surface(self, at: Places) -> tuple[Places, np.ndarray]:
+        """The place moved to where the value is zero, and the slopes there.
+
+        By Newton's method along the slope, with twice the step where this leads nearer: to a double zero.
+        """
+        ways = self.slopes(at)[:, 0]
+        for _ in range(NEWTON):
+            size, value = float(np.linalg.norm(ways)), float(self.value(at)[0])
+            if size < SMALL or value == 0.0:
+                break
+            steps = -np.array([1.0, 2.0]) * value / size
+            left = abs(self.value(self._moved(at, ways / size, steps)))
+            at = self._moved(at, ways / size, steps[[int(np.argmin(left))]])
+            ways = self.slopes(at)[:, 0]
+        return at, ways
 
     def _slope(self, symbol: Symbol, places: Places) -> np.ndarray:
         if symbol not in self.value.symbols:

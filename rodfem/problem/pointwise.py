@@ -11,7 +11,7 @@ import ufl
 
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
-from rodfem.problem.local_state import Constants, place
+from rodfem.problem.local_state import Constants, Place, place
 from rodfem.problem.roles import functions_of
 from rodfem.problem.values import Symbol, Values
 
@@ -54,16 +54,19 @@ class Pointwise:
     function: Any
 
 
-def pointwise(scene: Scene, at: LocalState) -> Iterator[Pointwise]:
-    """Stored energy, potentials and constraints of a ``scene`` as functions of the symbols ``at`` a place."""
-    c = Constants(s=at.s, **at.parameters)
+def along_rod(scene: Scene, at: LocalState) -> Place:
+    """Place of the whole rod, of the symbols ``at`` it."""
     q, r, k = (ufl.as_vector(x) for x in (at.q, at.r, at.k))
     v, R = strain(scene.free_strains, at.v), rotation(q)
-    yield Pointwise("stored energy", None, scene.energy(v, k, c))
+    return place(q, R, at.s, r, dr=ufl.dot(R, v), v=v, k=k, length=scene.length)
+
+
+def pointwise(scene: Scene, at: LocalState) -> Iterator[Pointwise]:
+    """Stored energy, potentials and constraints of a ``scene`` as functions of the symbols ``at`` a place."""
+    c, along = Constants(s=at.s, **at.parameters), along_rod(scene, at)
+    yield Pointwise("stored energy", None, scene.energy(along.v, along.k, c))
     for part in scene.parts:
-        x = place(q, R, at.s, r, length=scene.length)
-        if part.s is None:
-            x = place(q, R, at.s, r, dr=ufl.dot(R, v), v=v, k=k, length=scene.length)
+        x = along if part.s is None else place(along.q, along.R, at.s, along.r, length=scene.length)
         for what, function, role in functions_of(part.of, nested=False):
             if role.call == "f(x, c)":
                 value = function(x, c)
