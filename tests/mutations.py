@@ -552,6 +552,12 @@ FAULTS = {
         "        return here.left",
         "tests/diagram/test_sharp_in_state.py",
     ),
+    "branches-that-attract-alone": Fault(
+        "rodfem/continuation/reduced.py",
+        "        if max(abs(values[i : i + 2])) > felt:",
+        "        if False:",
+        "tests/continuation/test_reduced.py",
+    ),
     "gaps-that-are-jumped-are-forgotten": Fault(
         "rodfem/diagram/special_search.py",
         "                self._jumped(p, q)\n",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +15,7 @@ from rodfem.continuation.special_points import LEVEL, special_at
 from rodfem.continuation.states_between import solve_at_load
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
-from rodfem.linalg.orthogonal import combine, project_out
+from rodfem.linalg.orthogonal import project_out
 from rodfem.tolerances import TINY
 
 FIRST = 0.05
@@ -27,10 +26,6 @@ SEEN = 100
 """Ratio of the distance of a fold from a branch point, in load, to the uncertainty of that, for which it is located."""
 CLOSE, STEEP = 2.0, 50.0
 """How far from its prediction the first point of a branch may lie, in amplitudes: usually, and at most."""
-AROUND = 12
-"""Directions that are tried in the plane of two null vectors; in a space of more of them as many for each but one."""
-ALIGNED = 0.999
-"""Cosine of the angle between directions above which they are those of one branch."""
 FIXED = 1e-6
 """Norm of a unit direction's image by a symmetry below which it moves nothing."""
 SHIFT = 1e-6
@@ -78,40 +73,6 @@ def _load_response(solver: BranchSolver, special: SpecialPoint) -> PETSc.Vec:
     system.solve(solver.axis, out)
     project_out(out, special.null_vectors, system.metric)
     return out
-
-
-def lines(solver: BranchSolver, special: SpecialPoint, ways: Sequence[PETSc.Vec]) -> list[PETSc.Vec]:
-    """Unit directions in which branches do leave a branch point with several null vectors of different motions.
-
-    In the space of null vectors the reduced equations select a few lines, and a null vector of the eigensolver is on
-    one by chance only.  Newton's method is started in directions all around, and once more in that in which what it
-    finds is seen from the branch point.  Nearer to that any direction is an equilibrium to round-off.  ``solver`` has
-    the mesh; ``ways`` are those of :func:`directions`, which are returned where nothing is found.  Of motions that a
-    continuous symmetry turns, each in its own circle, only the relative phase that the ways have is tried.
-    """
-    system, n = solver.system, len(ways)
-    if n == 2:
-        angles = np.pi * np.arange(AROUND) / AROUND
-        tried = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    else:
-        rng = np.random.default_rng(n)
-        tried = np.concatenate([np.eye(n), rng.normal(size=(AROUND * (n - 1), n))])
-    weighed = [system.metric * way for way in ways]
-    found: list[np.ndarray] = []
-    for weights in tried:
-        seen = weights / np.linalg.norm(weights)
-        for _ in range(2):
-            direction = combine(list(ways), seen)
-            x = special.point.x + direction * FIRST
-            if not correct(system, x, solver.row(direction), reach=CLOSE * FIRST).converged:
-                break
-            away = x - special.point.x
-            seen = np.array([away.dot(image) for image in weighed])
-            seen /= np.linalg.norm(seen)
-        else:
-            if all(abs(seen @ known) < ALIGNED for known in found):
-                found.append(seen)
-    return [combine(list(ways), weights) for weights in found] or list(ways)
 
 
 def leave(

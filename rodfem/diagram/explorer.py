@@ -14,8 +14,9 @@ from rodfem.adaptivity.gaps import Gap, arms
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
+from rodfem.continuation.reduced import lines
 from rodfem.continuation.special_points import COUPLED, coupling_of
-from rodfem.continuation.switching import between, directions, lines, start_branch
+from rodfem.continuation.switching import between, directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
 from rodfem.diagram.equivalence import SAME_DETERMINANT, equally_stable, equivalent, near
@@ -253,6 +254,11 @@ class Explorer(Tracer):
             return list(ways)
         with self.solver.system.clock.scope("location"):
             found = lines(self.solver, special, ways)
+            if len(ways) > 2:
+                self.observer.note(
+                    f"  {len(ways)} null vectors at {self.scene.load} = {special.point.load:.8g}: directions in which "
+                    "branches leave are sought at random there, and some may be missing."
+                )
             forms = [normal_form_of(self.solver, origin_of(self.solver, special), way) for way in found]
         kinds = []
         for form in forms:

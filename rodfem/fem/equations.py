@@ -53,6 +53,9 @@ class Equations:
     potential
         The Lagrangian without the constraints at nodes: at an equilibrium, where constraints are fulfilled, the total
         potential energy.  None where a load has no potential.
+    loads
+        What acts on the rod in the potential, without the rod: loads, springs and foundations, and constraints that are
+        no ones at nodes.  None where there is nothing, or no potential.
     ordinate
         Ordinate of the scene where that is an integral over the rod, else None.
     line
@@ -75,6 +78,7 @@ class Equations:
         self._assemblers = list(assemblers.values())
         self.jacobian, self.residual, self.energy, self.metric, self.kinetic = self._assemblers[:5]
         self.potential, self.ordinate = assemblers.get("potential"), assemblers.get("ordinate")
+        self.loads = assemblers.get("loads")
         self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
 
     @cached_property
@@ -112,11 +116,11 @@ class Equations:
         sites = [(part.of, *self.site(part, f, (a, b), along)) for part in scene.parts]
         inside = [(of, site) for of, site, measure in sites if measure is None and not of.nodal]
         rod = fields.formulation.integrand(self, f, c, W, along)
-        L = (rod + sum(term for of, site in inside for term in of.lagrangian(site))) * dx
+        loads = [term * dx for of, site in inside for term in of.lagrangian(site)]
         for of, site, measure in sites:
             if measure is not None and not of.nodal:
-                L += sum(term * measure for term in of.lagrangian(site))
-        potential = L
+                loads += [term * measure for term in of.lagrangian(site)]
+        L = potential = rod * dx + sum(loads)
         # constraints at nodes, zero at an equilibrium.  The potential does not have them: in a functional FFCx 0.5
         # takes, beside a rule of the same degree, the points of that rule for both
         if f.eta is not None:
@@ -141,6 +145,8 @@ class Equations:
         others = {"energy": W * dx, "metric": metric * dx, "kinetic": kinetic}
         if scene.conservative:
             others["potential"] = potential
+            if loads:
+                others["loads"] = sum(loads)
         if not scene.ordinate.places:
             others["ordinate"] = (0.0 * c.s + scene.ordinate.of(along, c)) * dx
         return {"jacobian": second, "residual": first} | {name: with_constants(x, mesh) for name, x in others.items()}

@@ -9,6 +9,9 @@ equilibrium are equivariant, so that it carries equilibria into equilibria, for 
 for all ``x``; and where it moves nothing that an end holds.  The space of such ``a`` is the null space of a matrix with
 rows for each of a number of generic states.
 
+What acts on the rod, with a potential, has to be invariant by itself: beside a rod a thousand million times as stiff as
+the spring that holds it, the spring is round-off in ``L``.
+
 The motion of a closed rod along itself is a symmetry where no equation has the arclength in it.  Where one has, it may
 still be one together with a rotation (a ring under a dead radial load): the same condition, ``g`` with the state's
 derivative in it, is asked on a fine mesh, which has such a symmetry up to its small error.
@@ -24,7 +27,7 @@ from mpi4py import MPI
 from rodfem.fem.fields import LOAD, Fields
 from rodfem.fem.state import Evaluation
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
-from rodfem.problem.contribution import Block
+from rodfem.problem.contribution import Block, Motion
 from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:
@@ -32,6 +35,8 @@ if TYPE_CHECKING:
 
 EXACT = 1e-10
 """Round-off of the change of the functional, relative to the sum of magnitudes of its terms."""
+STEP, LOADS = 1e-3, 1e-8
+"""Step of differences of what acts on the rod, in units of the state, and their round-off, relative to its size."""
 SLIDING = 1e-8
 """The same for the motion of a closed rod along itself: the error of a fine mesh."""
 SIMPLE = 1e-9
@@ -79,8 +84,49 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
     null = np.linalg.qr(null)[0]
     scale = np.diag(moved).max(initial=TINY)
     squares, combinations = np.linalg.eigh(null.T @ (moved / scale) @ null)
-    basis = simplest(null @ combinations[:, squares > EXACT])
+    null = null @ combinations[:, squares > EXACT]
+    basis = simplest(null @ _keeping_loads(equations, [Symmetry(w, parts) for w in null.T]))
     return [Symmetry(w, parts) for w in basis.T]
+
+
+def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
+    """Combinations (found, number) of symmetries that were ``found`` by which what acts on the rod does not change.
+
+    Multipliers are zero, as they are as large as the forces of the rod.
+    """
+    if not found or equations.loads is None:
+        return np.eye(len(found))
+    rows, sizes = [], []
+    for seed in range(len(found) + STATES):
+        state = generic_state(equations, seed, rod_alone=True)
+        changes = np.array([s.change(state) for s in found])
+        row, size = _change_of_loads(state, changes)
+        rows.append(row)
+        sizes.append(size)
+    size = max(sizes)
+    return _null_space(np.array(rows) / size, LOADS) if size > 0.0 else np.eye(len(found))
+
+
+def _change_of_loads(state: Evaluation, changes: np.ndarray) -> tuple[np.ndarray, float]:
+    """Derivatives of the potential of what acts on the rod along ``changes`` (m, local size), and its size.
+
+    By central differences of fourth order.
+    """
+    equations, fields, loads = state.equations, state.fields, state.equations.loads
+    assert loads is not None
+    size = abs(state.integral(loads))
+
+    def value(change: np.ndarray, step: float) -> float:
+        return Evaluation(equations, state.local + step * change, state.line).integral(loads)
+
+    out = []
+    for change in changes:
+        largest = float(fields.comm.allreduce(float(abs(change / fields.sizes).max(initial=0.0)), op=MPI.MAX))
+        step = STEP / (largest or 1.0)
+        values = [value(change, side * step) for side in (-2, -1, 1, 2)]
+        size = max(size, *map(abs, values))
+        out.append(float(np.dot([1.0, -8.0, 8.0, -1.0], values)) / (12 * STEP))
+    return np.array(out), size
 
 
 def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
@@ -112,13 +158,13 @@ def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
     return Symmetry(np.where(abs(weights) > SLIDING, weights, 0.0), parts, along=1.0)
 
 
-def _null_space(rows: np.ndarray) -> np.ndarray:
+def _null_space(rows: np.ndarray, exact: float = EXACT) -> np.ndarray:
     """Orthonormal null vectors of conditions (..., m) of size one, (m, number)."""
     if rows.shape[1] == 0:
         return np.zeros((0, 0))
     # the small factor R has the null space of all rows; zero rows below it make the decomposition a full one
     _, singular, vectors = np.linalg.svd(np.linalg.qr(np.vstack([rows, np.zeros((rows.shape[1],) * 2)]), mode="r"))
-    return np.asarray(vectors[singular < EXACT * max(singular[0], 1.0)].T)
+    return np.asarray(vectors[singular < exact * max(singular[0], 1.0)].T)
 
 
 def _change_of_functional(
@@ -180,8 +226,10 @@ def _held(fields: Fields) -> np.ndarray:
     return used[fields.number[used] < 0]
 
 
-def generic_state(equations: Equations, seed: int, decay: float = DECAY) -> Evaluation:
+def generic_state(equations: Equations, seed: int, decay: float = DECAY, *, rod_alone: bool = False) -> Evaluation:
     """Generic state with a random load: the same on any number of ranks, ends held.
+
+    With ``rod_alone`` all multipliers are zero.
 
     Values are functions of the place along the rod, not of the numbering, with all Fourier coefficients: whatever
     function of the arclength a load is, it does work.  Those of a ring are closed: whether a pressure is felt by a
@@ -193,6 +241,10 @@ def generic_state(equations: Equations, seed: int, decay: float = DECAY) -> Eval
         x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
         named[block.name] = scene.units.of_field(block) * _generic(fields, block, x[..., None], rng, decay)
     named |= {unknown.name: rng.normal() * scene.units.of_scalar(unknown) for unknown in fields.unknown_scalars}
+    if rod_alone:
+        multipliers = [block.name for block in fields.blocks if block.multiplier]
+        multipliers += [x.name for x in fields.unknown_scalars if x.group.motion is not Motion.POSITION]
+        named |= {name: 0.0 * named[name] for name in multipliers}
     low, high = sorted(scene.span)
     named[LOAD] = low + (high - low) * rng.uniform(0.1, 0.9)
     return Evaluation(equations, fields.filled(named), equations.line)
