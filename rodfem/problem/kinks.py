@@ -38,9 +38,9 @@ from rodfem.problem.values import Symbol, Values, scalar
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
 
-STEPS = {2: 1e-4, 3: 1e-3}
-"""Steps of the differences of second and third order by which one-sided derivatives are told, in units of the state."""
-STENCILS = {2: np.array([1.0, -2.0, 1.0, 0.0]), 3: np.array([-1.0, 3.0, -3.0, 1.0])}
+STEPS = {1: 1e-5, 2: 1e-4, 3: 1e-3}
+"""Steps of the differences of first to third order by which one-sided derivatives are told, in units of the state."""
+STENCILS = {1: np.array([-1.0, 1.0, 0.0, 0.0]), 2: np.array([1.0, -2.0, 1.0, 0.0]), 3: np.array([-1.0, 3.0, -3.0, 1.0])}
 """Weights of those differences, at one to four steps."""
 SHORTER, STAYS = 0.25, 0.5
 """With steps so many times shorter the jump of a derivative that is continuous falls to that part: a kink's stays."""
@@ -70,9 +70,9 @@ class Kink:
         return np.array([self._slope(symbol, places) for symbol in self.units])
 
     def order(self, at: Places) -> int:
-        """Lowest order, 2 or 3, of a derivative that jumps at a place ``at`` the surface; 0 where none does.
+        """Lowest order, 2 or 3, of a derivative that is not continuous ``at`` a place near the surface; 0: all are.
 
-        A jump of the first derivative is one of the second, too.
+        Where the first one jumps the second one does not exist.
         """
         at, ways = self._on_surface(at)
         size = float(np.linalg.norm(ways))
@@ -80,7 +80,7 @@ class Kink:
         directions = list(np.eye(len(ways))) if size < SMALL else [ways / size]
         for order in STEPS:
             if any(self._jumps(at, way, order) for way in directions):
-                return order
+                return max(order, 2)
         return 0
 
     def _on_surface(self, at: Places) -> tuple[Places, np.ndarray]:

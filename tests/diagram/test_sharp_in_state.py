@@ -152,3 +152,15 @@ def _integral(integrand: Any, s: np.ndarray, y: np.ndarray) -> float:
     """By the trapezoidal rule, and a spline through fine states."""
     fine = np.linspace(s[0], s[-1], 2_000_001)
     return float(trapezoid(integrand(CubicSpline(s, y)(fine)), fine))
+
+
+def test_a_foundation_of_constant_force_has_a_kink() -> None:
+    """``|y|``: its second derivative is zero on either side, and the first one jumps where the rod is straight."""
+    rod = Scene(
+        "friction", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: ufl.dot(k, k) / 2, {"P": 0.0}, "P",
+        (clamped(), free(lambda c: (0.0, 0.0, -c.P))), Ordinate("y", s=1.0, of=lambda r, q: r[1]), (0.0, 3.0),
+        potential=lambda x, c: 0.1 * abs(x.r[1]),
+    )  # fmt: skip
+    found = trace(rod, Discretization(elements=4, degree=4), Plan(depth=0))
+    assert any("has a kink at the very state" in said for said in found.warnings)
+    assert all(point.stable is not True for point in found[0].points)
