@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 EXACT = 1e-10
 """Round-off of the change of the functional, relative to the sum of magnitudes of its terms."""
+NEARLY = 1e-6
+"""The same of motions of which those are chosen that do not change what acts on the rod."""
 STEP, LOADS = 1e-3, 1e-8
 """Step of differences of what acts on the rod, in units of the state, and their round-off, relative to its size."""
 SLIDING = 1e-8
@@ -74,19 +76,29 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
     free = _null_space(np.vstack(fields.comm.allgather(np.linalg.qr(np.vstack(held), mode="r"))))
     greatest = np.nan_to_num(np.max(sizes, axis=1), nan=np.inf)
     asked_at = np.flatnonzero(greatest <= WILD * greatest.min())
-    # the null space is relative to the magnitudes of the terms that cancel in each combination
-    terms = abs(free.T) @ np.max([sizes[i] for i in asked_at], axis=0)
-    terms = np.where(terms > 0, terms, terms.max(initial=0.0) or 1.0)
-    null = free @ (_null_space(np.vstack([rows[i] for i in asked_at]) @ free / terms) / terms[:, None])
-    if null.shape[1] == 0:
-        return []
-    # combinations that change no free unknown are no symmetries
-    null = np.linalg.qr(null)[0]
+    conditions, magnitudes = np.vstack([rows[i] for i in asked_at]), np.max([sizes[i] for i in asked_at], axis=0)
+    moving = _moving(_kept(free, conditions, magnitudes, NEARLY), moved)
+    keeping = moving @ _keeping_loads(equations, [Symmetry(w, parts) for w in moving.T])
+    basis = _kept(keeping, conditions, magnitudes, EXACT)
+    return [Symmetry(w, parts) for w in simplest(np.linalg.qr(basis)[0]).T] if basis.shape[1] else []
+
+
+def _moving(motions: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """Combinations of ``motions`` (m, n) that change free unknowns, whose changes have products ``moved`` (m, m)."""
+    motions = np.linalg.qr(motions)[0]
     scale = np.diag(moved).max(initial=TINY)
-    squares, combinations = np.linalg.eigh(null.T @ (moved / scale) @ null)
-    null = null @ combinations[:, squares > EXACT]
-    basis = simplest(null @ _keeping_loads(equations, [Symmetry(w, parts) for w in null.T]))
-    return [Symmetry(w, parts) for w in basis.T]
+    squares, combinations = np.linalg.eigh(motions.T @ (moved / scale) @ motions)
+    return np.asarray(motions @ combinations[:, squares > EXACT])
+
+
+def _kept(motions: np.ndarray, conditions: np.ndarray, magnitudes: np.ndarray, exact: float) -> np.ndarray:
+    """Combinations of ``motions`` (m, n) that fulfil ``conditions`` (..., m), of terms of these ``magnitudes`` (m,).
+
+    They do so ``exact`` to that, relative to the magnitudes of the terms that cancel in each.
+    """
+    terms = abs(motions.T) @ magnitudes
+    terms = np.where(terms > 0, terms, terms.max(initial=0.0) or 1.0)
+    return np.asarray(motions @ (_null_space(conditions @ motions / terms, exact) / terms[:, None]))
 
 
 def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
@@ -96,37 +108,31 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
     """
     if not found or equations.loads is None:
         return np.eye(len(found))
-    rows, sizes = [], []
-    for seed in range(len(found) + STATES):
-        state = generic_state(equations, seed, rod_alone=True)
-        changes = np.array([s.change(state) for s in found])
-        row, size = _change_of_loads(state, changes)
-        rows.append(row)
-        sizes.append(size)
-    size = max(sizes)
-    return _null_space(np.array(rows) / size, LOADS) if size > 0.0 else np.eye(len(found))
+    states = [generic_state(equations, seed, rod_alone=True) for seed in range(len(found) + STATES)]
+    changes = np.array([[symmetry.change(state) for symmetry in found] for state in states])
+    comm, sizes = equations.fields.comm, equations.fields.sizes
+    lengths = comm.allreduce(abs(changes / sizes).max(axis=(0, 2)), op=MPI.MAX)
+    lengths = np.where(lengths > 0, lengths, 1.0)
+    along = [_along(state, change / lengths[:, None]) for state, change in zip(states, changes, strict=True)]
+    size = max(largest for _, largest in along)
+    if size == 0.0:
+        return np.eye(len(found))
+    return np.asarray(_null_space(np.array([row for row, _ in along]) / size, LOADS) / lengths[:, None])
 
 
-def _change_of_loads(state: Evaluation, changes: np.ndarray) -> tuple[np.ndarray, float]:
-    """Derivatives of the potential of what acts on the rod along ``changes`` (m, local size), and its size.
+def _along(state: Evaluation, changes: np.ndarray) -> tuple[np.ndarray, float]:
+    """Derivatives of the potential of what acts on the rod along ``changes`` (m, local size), and its largest value.
 
     By central differences of fourth order.
     """
-    equations, fields, loads = state.equations, state.fields, state.equations.loads
+    equations, loads = state.equations, state.equations.loads
     assert loads is not None
-    size = abs(state.integral(loads))
 
     def value(change: np.ndarray, step: float) -> float:
         return Evaluation(equations, state.local + step * change, state.line).integral(loads)
 
-    out = []
-    for change in changes:
-        largest = float(fields.comm.allreduce(float(abs(change / fields.sizes).max(initial=0.0)), op=MPI.MAX))
-        step = STEP / (largest or 1.0)
-        values = [value(change, side * step) for side in (-2, -1, 1, 2)]
-        size = max(size, *map(abs, values))
-        out.append(float(np.dot([1.0, -8.0, 8.0, -1.0], values)) / (12 * STEP))
-    return np.array(out), size
+    values = np.array([[value(change, side * STEP) for side in (-2, -1, 1, 2)] for change in changes])
+    return values @ [1.0, -8.0, 8.0, -1.0] / (12 * STEP), float(abs(values).max())
 
 
 def find_motion_along(fields: Fields, equations: Equations) -> Symmetry | None:
