@@ -46,7 +46,7 @@ SHORTER, STAYS = 0.25, 0.5
 """With steps so many times shorter the jump of a derivative that is continuous falls to that part: a kink's stays."""
 NOISE = 1e3 * float(np.finfo(float).eps)
 """Round-off of a difference, relative to the values."""
-NEWTON = 6
+NEWTON = 3
 """Steps of Newton's method from a place near a surface to it."""
 SMALL = 1e-6
 """Step of the derivatives of a difference, in units of the state."""

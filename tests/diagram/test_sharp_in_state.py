@@ -64,10 +64,10 @@ def ordinates(found: Diagram) -> list[tuple[float, float, float]]:
 
 def test_bars_hold_or_there_are_none() -> None:
     """Of 128 ordinates 25 were above their bars at the width 1e-4, up to 37 times, without a warning."""
-    told = {width: {load: deflection(load, width) for load in LOADS} for width in (1e-3, 1e-1)}
-    for width, mesh in ((1e-3, (7, 4)), (1e-3, (8, 6)), (1e-1, (7, 4)), (1e-1, (8, 6))):
+    told = {width: {load: deflection(load, width) for load in LOADS} for width in (3e-3, 1e-1)}
+    for width, mesh in ((3e-3, (7, 4)), (3e-3, (8, 6)), (1e-1, (7, 4)), (1e-1, (8, 6))):
         found = bent(layer(width), mesh)
-        said = [x for x in found.warnings if "changes in the state within an element too sharply" in x]
+        said = [x for x in found.warnings if "too sharply" in x or "has a kink" in x]
         assert len(said) == (width < 1e-2), found.warnings
         for load, ordinate, bar in ordinates(found):
             assert isnan(bar) if width < 1e-2 else abs(ordinate - told[width][load]) <= bar < 1e-4
