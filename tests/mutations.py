@@ -171,6 +171,18 @@ FAULTS = {
         "for load in scene.span if scene.load in asked",
         "tests/problem/test_scene_errors.py",
     ),
+    "events-at-nodes-alone": Fault(
+        "rodfem/adaptivity/error_estimate.py",
+        "found, along = sampled[-1].x, max(each.along for each in sampled)",
+        "sampled = sampled[:1]; found, along = sampled[-1].x, nearest.along",
+        "tests/adaptivity/test_event_sampling.py",
+    ),
+    "events-in-jumps-have-bars": Fault(
+        "rodfem/adaptivity/event_sampling.py",
+        "if near > max(far / 2, noise)",
+        "if near > 2 * far + noise",
+        "tests/adaptivity/test_event_sampling.py",
+    ),
     "events-at-rows-alone": Fault(
         "rodfem/continuation/event_search.py",
         "> NOISY * self.length",

@@ -12,7 +12,8 @@ small, and a single value may agree on two meshes by accident, where what it has
 cancel.  Where the strains of the state, or of its null vector, differ between the two meshes by more than
 :data:`RESOLVED_TO` of themselves, the first mesh does not resolve the state, and ``d`` is no bound but what its error
 may well exceed.  Of an ordinate that is taken inside of an element ``rho`` is of the largest change over that element,
-in which its error oscillates (:mod:`rodfem.adaptivity.inside`).
+in which its error oscillates (:mod:`rodfem.adaptivity.inside`).  Of an event ``d`` is to where its function has the
+same state at more places (:mod:`rodfem.adaptivity.event_sampling`).
 
 The state, its tangent and the null vector are interpolated, so that this costs a few solves.
 """
@@ -25,11 +26,12 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.adaptivity.event_sampling import BESIDE, LEFT, refuse_jump, where_places_matter
 from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
 from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.event_location import nearest_event
+from rodfem.continuation.event_location import Found, nearest_event, noise_of
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.locate import NEAREST, WINDOW, refine
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
@@ -50,6 +52,8 @@ RESOLVED = 1e-9
 """Last coefficients smaller than this, of all or of one radian along the rod, are round-off."""
 NARROW = 1 / 128
 """Part of the usual window on which a special point is located again."""
+REACH = 0.2
+"""Distance along the branch, in the metric, to which an event is sought whose function receives more places."""
 STEADY = 3.0
 """Uncertainty of a result, in units of its change by one more step of Newton's method."""
 
@@ -173,20 +177,44 @@ class Enriched:
             law.uncertainty = bound(law.coefficient, again.coefficient, again.uncertainty, rho)
 
     def _at_event(self, point: Point, event: Event) -> Again:
-        """The point of the richer discretisation at which an event happens: the nearest one, of several."""
+        """The point of the richer discretisation at which an event happens: the nearest one, of several.
+
+        Its function has the state at as many places as make it certain; what those differ by is left.
+        """
         assert point.tangent is not None
+        noise = _noise_beside(self.coarse, event, point.x, point.tangent)
+        refuse_jump(self.coarse.shape, event, point.x, point.tangent, noise)
         x, tangent = self.transfer(point.x, state=True), self.transfer(point.tangent, state=False)
 
-        _, found, along, _ = nearest_event(self.solver, event, _straight(x, tangent), WINDOW)
-        load, ordinate, units = self.system.scalar(found), self.solver.shape.ordinate(found), self.solver.units
+        nearest = nearest_event(self.solver, event, _straight(x, tangent), WINDOW)
+        sampled = self._sampled_finer(event, nearest, tangent)
+        found, along = sampled[-1].x, max(each.along for each in sampled)
+        loads, ordinates = np.array([(self.system.scalar(y.x), self.solver.shape.ordinate(y.x)) for y in sampled]).T
+        load, ordinate, units = float(loads[-1]), float(ordinates[-1]), self.solver.units
         slope = abs(ordinate_along(self.solver, found, tangent))
         left = (
-            abs(point.slope) * along + round_off(load, units.load),
-            slope * along + round_off(ordinate, units.ordinate),
+            abs(point.slope) * along + round_off(load, units.load) + float(np.ptp(loads)),
+            slope * along + round_off(ordinate, units.ordinate) + float(np.ptp(ordinates)),
         )
         changed = self._indicators[1].changed(x, found, state=True)
         rho = self.rho([point.x], [found])
+        if len(sampled) > 1:
+            rho = max(rho, LEFT)
         return Again(found, load, ordinate, *left, self._ordinate(point.x, found, left[1], rho), rho, changed)
+
+    def _sampled_finer(self, event: Event, found: Found, tangent: PETSc.Vec) -> list[Found]:
+        """Where an event happens by its function's values at more and more places, first where it was ``found``.
+
+        There it happens by the values at nodes.  It is the only one where more places make no difference.
+        """
+        noise = _noise_beside(self.solver, event, found.x, tangent)
+        finer = where_places_matter(self.solver.shape, event, found.x, noise)
+        try:
+            return [found, *(nearest_event(self.solver, more, _straight(found.x, tangent), REACH) for more in finer)]
+        except ConvergenceError as trouble:
+            raise ConvergenceError(
+                f"the event {event.name!r} does not happen nearby where its function receives the states at more places"
+            ) from trouble
 
     def _located(self, special: SpecialPoint) -> Again:
         """The fold or branch point on the richer discretisation, and its ordinate."""
@@ -216,6 +244,11 @@ class Enriched:
         self.origins.append((special, Origin(found.x, found.load, ordinate, found.uncertainty, left), rho))
         ordinate_error = self._ordinate(point.x, found.x, left, rho)
         return Again(found.x, found.load, ordinate, found.uncertainty, left, ordinate_error, rho, changed)
+
+
+def _noise_beside(solver: BranchSolver, event: Event, x: PETSc.Vec, tangent: PETSc.Vec) -> float:
+    """Round-off of an event's values near a state, beside a jump that may be there."""
+    return min(noise_of(solver, event, x + tangent * d) for d in (-BESIDE[1], BESIDE[1]))
 
 
 def _straight(x: PETSc.Vec, tangent: PETSc.Vec) -> Curve:

@@ -124,7 +124,8 @@ class Diagram:
         events = {*(e.name for e in self.plan.events), *(s.note for s in every if s.kind == EVENT)}
         if kind not in KINDS and kind not in events:
             raise InputError(f"There is no kind {kind!r}: choose one of {', '.join([*KINDS, *sorted(events)])}.")
-        return [s for s in every if kind == s.kind or (s.kind == EVENT and kind == s.note)]
+        named = [(s, s.event.name if s.event is not None else s.note) for s in every]  # notes may say more
+        return [s for s, name in named if kind == s.kind or (s.kind == EVENT and kind == name)]
 
     @checked(load=number(1.0))
     def at(self, load: float) -> list[Point]:

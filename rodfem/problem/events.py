@@ -34,6 +34,11 @@ class Event:
         ``of(state)``, a number that changes its sign or touches zero: ``state.s`` (m,), ``state.r`` (m, 3) and
         ``state.q`` (m, 4) are arclength, centreline and unit quaternions from left to right, nondimensional or in the
         units of the scene; multipliers, the load and further fields have their names in ``states.h5``.
+
+    The function receives the nodes, the ends of the rod among them: ``state.r[:, 0].max()`` is that of the highest
+    node, and ``numpy.interp`` or a sum is taken over nodes.  What this misses of the rod is in the error bar of the
+    special point, for which the function receives states at more places, too (another ``m``).  A function that jumps from
+    node to node, as the place of the highest one, has no error bar: interpolate.
     """
 
     name: str
