@@ -235,7 +235,8 @@ def _held(fields: Fields) -> np.ndarray:
 def generic_state(equations: Equations, seed: int, decay: float = DECAY, *, rod_alone: bool = False) -> Evaluation:
     """Generic state with a random load: the same on any number of ranks, ends held.
 
-    With ``rod_alone`` all multipliers are zero.
+    ``equations`` are those of the rod, ``seed`` that of the random numbers, and ``decay`` the ratio of one Fourier
+    coefficient to the next.  With ``rod_alone`` all multipliers are zero.
 
     Values are functions of the place along the rod, not of the numbering, with all Fourier coefficients: whatever
     function of the arclength a load is, it does work.  Those of a ring are closed: whether a pressure is felt by a
