@@ -354,7 +354,8 @@ class Report(Observer):
         if self.count == UNSTABLE:
             unstable = f"unstable, {index} eigenvalue{many} negative or complex"
         if found.stable is None:
-            unstable = f"undecided, {INDEX} {index}"
+            unstable = f"undecided, {self.count} {index_range(found.negative, found.undecided, found.kink)}"
+            unstable += f" of the {found.kink}" if found.kink else ""
         unstable = "stable" if found.stable else unstable
         zero = f", {found.zero} zero" if found.zero else ""
         self.say(f"  {name}, {load}: {unstable}{zero}")

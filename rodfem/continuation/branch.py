@@ -47,6 +47,9 @@ class Point:
     undecided
         Number of eigenvalues whose sign is not decided: they are not among the negative ones, and the index is between
         ``negative`` and ``negative + undecided``.  Symmetries, and what vanishes at a special point, are decided.
+    kink
+        Names of the functions on a kink of which the state is: there ``negative`` is the index on one side only, and
+        stability is undecided.  Empty where it is on none.
     slope
         The load's component of the tangent.
     drift, error
@@ -96,6 +99,7 @@ class Point:
     nearest: float = 0.0
     potential: float = float("nan")
     conjugate: float = float("nan")
+    kink: str = ""
 
     @property
     def index(self) -> int:
@@ -104,11 +108,11 @@ class Point:
 
     @property
     def stable(self) -> bool | None:
-        """Whether no eigenvalue is negative; None where :attr:`undecided` ones may be, and no other is.
+        """Whether no eigenvalue is negative; None where :attr:`undecided` ones may be, and no other is, or on a kink.
 
         Zero ones, which :attr:`zero` counts, are those of symmetries, or leave it undecided beyond that.
         """
-        return is_stable(self.negative, self.undecided)
+        return is_stable(self.negative, self.undecided, self.kink)
 
     def backwards(self, total: float) -> Point:
         """The same equilibrium on the branch of length ``total`` followed the other way."""
@@ -118,7 +122,8 @@ class Point:
     def __repr__(self) -> str:
         """Load, ordinate and stability."""
         words = {True: "stable", None: "undecided", False: "unstable"}[self.stable]
-        word = words if self.stable else f"{words}, index {index_range(self.negative, self.undecided)}"
+        word = words if self.stable else f"{words}, index {index_range(self.negative, self.undecided, self.kink)}"
+        word += f" of the {self.kink}" if self.kink else ""
         return f"<Point at load {self.load:.10g}: ordinate {self.ordinate:.6g}, {word}>"
 
 

@@ -40,9 +40,8 @@ class Kinks:
         met = [(point, words) for point in branch.points if (words := self._nonsmooth(point).kinks(point.x).on)]
         if not met:
             return
-        if len(met) > 1:
-            for point, _ in met:
-                point.undecided = max(point.undecided, 1)
+        for point, words in met:
+            point.kink = listed(words)
         loads = [f"{point.load:.6g}" for point, _ in (met[0], met[-1])]
         where = f"at {self.load} = {loads[0]}" + (f" to {loads[1]}" if loads[1] != loads[0] else "")
         functions = listed(word for _, words in met for word in words)

@@ -24,7 +24,7 @@ from rodfem.fem.fingerprint import fingerprint, same
 from rodfem.fem.system import System
 from rodfem.file_format import DIAGRAM
 from rodfem.output.contents import check_run
-from rodfem.output.files import COLUMNS, OPTIONAL, SOFT, SPECIAL, UNDECIDED, load_json, load_state
+from rodfem.output.files import COLUMNS, KINK, OPTIONAL, SOFT, SPECIAL, UNDECIDED, load_json, load_state
 from rodfem.problem.arguments import checked, path
 from rodfem.problem.scene import Scene
 from rodfem.stability.soft_mode import SoftMode
@@ -139,6 +139,7 @@ def _point(columns: dict[str, Any], row: int, branch: str, solvers: Sequence[Sta
     given = {name: columns[name][row] for name in OPTIONAL if name in columns}
     values |= {name: value for name, value in given.items() if value is not None}
     values[UNDECIDED] = columns[UNDECIDED][row] if UNDECIDED in columns else 0
+    values[KINK] = columns[KINK][row] if KINK in columns else ""
     soft = zip(*(columns[name][row] if name in columns else [] for name in SOFT), strict=True)
     values["soft"] = [SoftMode(name, mu, inf if bar is None else bar) for name, mu, bar in soft]
     solver = solvers[values["mesh"]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from rodfem.diagram.sweep import Sweep
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
 from rodfem.fem import assembly, compiled_newton, compiled_shape, form_compiler
 from rodfem.fem.fields import Discretization
+from rodfem.fem.kinks_at import KinksAt
 from rodfem.fem.system import System
 from rodfem.linalg import chain
 from rodfem.linalg.compiled import compile_ahead
@@ -153,6 +155,10 @@ class Solver:
         assert isinstance(solver, BranchSolver)
         return SoftStates(solver, lambda: Enriched(solver))
 
+    @cached_property
+    def _kinks(self) -> KinksAt:
+        return KinksAt(self.equilibria.shape)
+
     _independent = False
     """Whether the constraints of the scene are known to be so: of others a matrix tells nothing but round-off."""
 
@@ -171,11 +177,12 @@ class Solver:
     def point(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of the equilibrium ``x``: ordinate, energy, index; frequencies without a potential."""
         if not isinstance(self.equilibria, BranchSolver):
-            return self._sweep.at(x)
+            return replace(self._sweep.at(x), kink=self._kinks(x).kink)
         return self.examined(self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True)))
 
     def examined(self, point: Point, *, compare: bool = False) -> Point:
-        """Record the soft modes of a ``point`` of this mesh: see :meth:`SoftStates.examine`; returns the point."""
+        """Record kink and soft modes of a ``point`` of this mesh: see :meth:`SoftStates.examine`; returns the point."""
+        point.kink = self._kinks(point.x).kink
         if isinstance(self.equilibria, BranchSolver):
             # by itself a state is on no branch: a tangent at a singular one is any null vector
             tangent, point.tangent = point.tangent, None
@@ -240,7 +247,7 @@ class Solver:
         x = self._state(point)
         verdict = assess(self.equilibria, x, method, number)
         if not isinstance(self.equilibria, BranchSolver):
-            return verdict
+            return replace(verdict, kink=self._kinks(x).kink)
         return verdict.at(self.examined(self.equilibria.point(x, 0.0, None), compare=True))
 
     @checked(point=STATE, number=count(3, 1), method=METHOD)

@@ -28,6 +28,11 @@ class Met(NamedTuple):
     inside: list[str]
     on: list[str]
 
+    @property
+    def kink(self) -> str:
+        """Names of the functions of which the state is on a kink; empty where it is on none."""
+        return " and the ".join(self.on)
+
 
 class KinksAt:
     """Tells which kinks the states of one system meet; collective over its ranks."""

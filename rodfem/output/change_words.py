@@ -38,6 +38,8 @@ def change_in_words(one: Interval, after: Interval, branches: Branches) -> tuple
     where = f"some load between {column[segment]:.{FEW}g} and {column[segment + 1]:.{FEW}g}"
     if any(change["row"] == segment for change in branch.get("unexplained") or ()):
         return where, "changes its index without a special point that says why"
+    if one.kink or after.kink:
+        return where, f"comes to a kink of the {after.kink}" if after.kink else f"leaves a kink of the {one.kink}"
     if UNDECIDED in (one.kind, after.kind):
         return where, "has an eigenvalue that is not told from zero on one side"
     if one.kind == STABLE:

@@ -95,6 +95,7 @@ COLUMN: Kinds = {
     **dict.fromkeys(("negative", "zero", "mesh", "unstable"), COUNT),
     "load": NUMBER,
     "undecided": COUNT,
+    "kink": TEXT,
     "soft": (_all(_is_text), "a list of texts"),
     "soft_value": (_all(_is_number), "a list of numbers"),
     "soft_uncertainty": (_all(_or_none(_is_number)), "a list of numbers or null"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import ceil, floor, isfinite, log10
 from typing import TYPE_CHECKING
 
-from rodfem.stability.soft_mode import index_range
+from rodfem.stability.soft_mode import ONE_SIDE, index_range
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ def index_in_words(special: SpecialPoint) -> str:
     before, after = special.negative_before, special.negative_after
     point = special.point
     index = f"{before}->{after}" if before != after else index_range(point.negative, point.undecided)
+    index += f" {ONE_SIDE}" if point.kink else ""
     space = point.negative_in_space
     return index if space is None else f"{index} (in space {space})"
 

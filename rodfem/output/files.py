@@ -55,6 +55,7 @@ MEANING = {
     "error": "size of the last Newton correction",
     "mesh": "number of the discretisation in meshes",
     "undecided": "number of eigenvalues whose sign is not decided: the index is negative, or greater by up to so many",
+    "kink": "functions on a kink of which the state is: the index is that of one side, stability is undecided",
     "soft": "eigenvalues near zero by name: what moves",
     "soft_value": "their values, in the metric",
     "soft_uncertainty": "bounds of the errors of these by round-off, and by the mesh where there are error bars",
@@ -64,6 +65,8 @@ OPTIONAL = ("potential", "conjugate", "estimate", "spectrum", "negative_in_space
 """Columns that a branch has where one of its rows has an entry."""
 UNDECIDED = "undecided"
 """Column that a branch has where one of its rows has undecided eigenvalues."""
+KINK = "kink"
+"""Column that a branch has where one of its rows is on a kink."""
 SOFT = {"soft": "name", "soft_value": "value", "soft_uncertainty": "uncertainty"}
 """Columns that a branch has where one of its rows has soft modes, and what they hold of each of them."""
 ALIKE = ("row", "negative_before", "negative_after", "located_to", "error_estimate", "coupling", "omega2", "unfolding")
@@ -148,6 +151,8 @@ def _branch_data(branch: Branch) -> dict[str, Any]:
             columns[name] = column
     if any(p.undecided for p in branch.points):
         columns[UNDECIDED] = [p.undecided for p in branch.points]
+    if any(p.kink for p in branch.points):
+        columns[KINK] = [p.kink for p in branch.points]
     if any(p.soft for p in branch.points):
         for name, attribute in SOFT.items():
             columns[name] = [[_plain(getattr(mode, attribute)) for mode in p.soft] for p in branch.points]

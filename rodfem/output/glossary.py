@@ -75,6 +75,10 @@ ENTRIES = {
         "Eigenvalues so near to zero that the error of the mesh, or round-off, leaves their sign open: the index lies "
         "between its first value and that plus their number."
     ),
+    "on one side of a kink | kink": (
+        "The state is where the second derivative of an energy jumps: the second variation, and its index, depend on "
+        "the side, and stability is undecided. The functions are named."
+    ),
     "soft mode | soft | soft_value | soft_uncertainty": (
         "An eigenvalue near zero with the name of what moves, its value in the metric, and a bound of its error: "
         "sliding along the rod, turning of an end, slipping of a ring along itself."

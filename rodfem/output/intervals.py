@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rodfem.output.plot_pieces import STABLE, STYLES, pieces_of
+from rodfem.stability.soft_mode import on_kink
 from rodfem.tolerances import SAME_SPECIAL
 
 SHARES = (0.5, 0.31)
@@ -23,7 +24,8 @@ class Interval:
     """Consecutive rows of a ``branch`` of ``diagram.json`` with one ``kind`` of stability, from ``first`` to ``last``.
 
     ``least`` and ``most`` bound the index, ``in_space`` the index among all perturbations of a planar rod (None where
-    it is not known).
+    it is not known).  Stability is undecided on a ``kink``, of the functions of that name, and where eigenvalues are
+    too near zero (``soft``).
     """
 
     branch: Mapping[str, Any]
@@ -33,6 +35,14 @@ class Interval:
     least: int
     most: int
     in_space: int | None
+    kink: str = ""
+    soft: bool = False
+
+    @property
+    def why(self) -> str:
+        """Why stability is undecided, in clauses."""
+        soft = "an eigenvalue is too near zero for its sign to be known on this mesh"
+        return "; ".join([on_kink(self.kink)] * bool(self.kink) + [soft] * self.soft)
 
     @property
     def rank(self) -> int:
@@ -67,7 +77,9 @@ def intervals_of(branch: Mapping[str, Any]) -> list[Interval]:
         last = row + sum(len(piece.curve) - 1 for piece in pieces)
         indices, space = [piece.negative for piece in pieces], [piece.in_space for piece in pieces]
         known = None if None in space else max(i for i in space if i is not None)
-        out.append(Interval(branch, kind, row, last, min(indices), max(indices), known))
+        kink = " and the ".join(dict.fromkeys(piece.kink for piece in pieces if piece.kink))
+        soft = any(piece.undecided for piece in pieces)
+        out.append(Interval(branch, kind, row, last, min(indices), max(indices), known, kink, soft))
         row = last
     return out
 

@@ -37,7 +37,7 @@ class Piece(NamedTuple):
 
     ``curve`` (k, 2) has loads and ordinates, ``negative`` is the index, of a planar rod in its plane, ``in_space`` that
     among all perturbations (None where it is not known), ``undecided`` the number of eigenvalues that may be negative
-    besides.
+    besides; ``kink`` names functions on a kink of which the states are, where the index is that of one side.
     """
 
     branch: str
@@ -46,10 +46,13 @@ class Piece(NamedTuple):
     negative: int
     in_space: int | None
     undecided: int = 0
+    kink: str = ""
 
     @property
     def kind(self) -> str:
         """:data:`STABLE`, :data:`PLANAR`, :data:`UNDECIDED` or :data:`UNSTABLE`."""
+        if self.kink:
+            return UNDECIDED
         if self.negative:
             return UNSTABLE
         if self.undecided:
@@ -59,7 +62,7 @@ class Piece(NamedTuple):
     @property
     def label(self) -> str:
         """The index, or its least and greatest value, followed by the index in space in parentheses."""
-        index = index_range(self.negative, self.undecided)
+        index = index_range(self.negative, self.undecided, self.kink)
         return index if self.in_space is None else f"{index} ({self.in_space})"
 
 
@@ -70,13 +73,27 @@ def pieces_of(branch: Mapping[str, Any], colour: str) -> Iterator[Piece]:
         raise ValueError(f"columns of branch {name!r} differ in length: try to compute the diagram anew")
     curve = np.column_stack([np.asarray(columns[key], dtype=float) for key in ("load", "ordinate")])
     special = [*special, *_coinciding(curve[:, 0], special), *_at_the_origin(branch)]
-    indices, undecided = segment_ranges(columns["negative"], columns.get("undecided"), special)
+    kinks, negative = _kinks(columns)
+    ranges = (segment_ranges(x, columns.get("undecided"), special) for x in (columns["negative"], negative))
+    indices, undecided = (np.where(kinks != "", on, off) for on, off in zip(*ranges, strict=True))
     space = _in_space(columns.get("negative_in_space"), indices, special)
-    changes = np.flatnonzero(np.diff(indices) | np.diff(space) | np.diff(undecided)) + 1
+    changes = np.flatnonzero(np.diff(indices) | np.diff(space) | np.diff(undecided) | (kinks[1:] != kinks[:-1])) + 1
     for a, b in pairwise([0, *changes, indices.size]):
         if b > a:
             in_space = int(space[a]) if space[a] >= 0 else None
-            yield Piece(name, colour, curve[a : b + 1], int(indices[a]), in_space, int(undecided[a]))
+            yield Piece(name, colour, curve[a : b + 1], int(indices[a]), in_space, int(undecided[a]), kinks[a])
+
+
+def _kinks(columns: Mapping[str, Any]) -> tuple[NDArray[np.str_], list[int]]:
+    """Functions on a kink of which states between rows (n - 1,) are, those of both rows; and the index in each row.
+
+    That of a row on a kink, which is the index of one side, is that of the row beside it that is off the kink.
+    """
+    negative, kink = list(columns["negative"]), list(columns.get("kink") or [""] * len(columns["negative"]))
+    for a, b in (*pairwise(range(len(kink))), *pairwise(reversed(range(len(kink))))):
+        if kink[a] and not kink[b]:
+            negative[a] = negative[b]
+    return np.array([a if a and b else "" for a, b in pairwise(kink)], dtype=str), negative
 
 
 def _coinciding(loads: Floats, special: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:

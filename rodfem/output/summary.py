@@ -99,7 +99,7 @@ def _state(interval: Interval, data: Mapping[str, Any]) -> str:
             return "stable in its plane (not examined in space)"
         return "stable"
     if interval.kind == UNDECIDED:
-        return "of undecided stability (an eigenvalue is too near zero for its sign to be known on this mesh)"
+        return f"of undecided stability ({interval.why})"
     if interval.kind == PLANAR:
         return f"stable in its plane but not in space (index {interval.in_space} at most)"
     index = f"{interval.least}" if interval.least == interval.most else f"{interval.least} to {interval.most}"

@@ -19,8 +19,8 @@ class Stretch:
     """Consecutive rows of a branch that have one index, away from special points: places and numbers of the rows.
 
     ``branch`` is its name, which ``is_first`` or ``leaves_first``; ``negative`` and ``in_space`` are the index in the
-    plane and in space, ``undecided`` eigenvalues may be negative besides; ``places`` (n,) are arclengths of the branch,
-    ``rows`` (n,) numbers.
+    plane and in space, ``undecided`` eigenvalues may be negative besides, ``kink`` names functions on a kink of
+    which the states are; ``places`` (n,) are arclengths of the branch, ``rows`` (n,) numbers.
     """
 
     branch: str
@@ -29,6 +29,7 @@ class Stretch:
     negative: int
     in_space: int
     undecided: int
+    kink: str
     places: tuple[float, ...]
     rows: tuple[int, ...]
 
@@ -46,7 +47,7 @@ class Stretch:
     @property
     def rank(self) -> tuple[bool, bool, int, int, float]:
         """The greatest is drawn: stable, then on a branch that leaves the first one, then of least index, then long."""
-        stable = not (self.negative or self.in_space or self.undecided)
+        stable = not (self.negative or self.in_space or self.undecided or self.kink)
         return stable and not self.is_first, self.leaves_first, -self.negative, -self.in_space, self.length
 
 
@@ -63,11 +64,11 @@ def typical_state(data: Mapping[str, Any]) -> tuple[str, int, str]:
         raise InputError("The diagram has no states to draw.")
     best = max(found, key=lambda stretch: stretch.rank)
     columns = next(b["columns"] for b in data["branches"] if b["name"] == best.branch)
-    index = index_range(best.negative, best.undecided)
+    index = index_range(best.negative, best.undecided, best.kink)
     words = {True: "stable", None: f"stability undecided, index {index}", False: f"unstable, index {index}"}[
-        is_stable(best.negative, best.undecided)
+        is_stable(best.negative, best.undecided, best.kink)
     ]
-    if best.negative + best.undecided == 0 and best.in_space:
+    if best.negative + best.undecided == 0 and best.in_space and not best.kink:
         words = f"stable in the plane, unstable in space, index {best.in_space}"
     return best.branch, best.row, f"{columns['load'][best.row]:.4g}, {words}"
 
@@ -79,17 +80,19 @@ def _stretches(branch: Mapping[str, Any], first: str) -> Iterator[Stretch]:
     space = columns.get("negative_in_space") or [None] * len(rows)
     undecided = columns.get("undecided") or [0] * len(rows)
 
-    def known(row: int) -> tuple[int, int, int]:
-        return columns["negative"][row], space[row] or 0, undecided[row]
+    kink = columns.get("kink") or [""] * len(rows)
 
-    def index(row: int) -> tuple[int, int, int] | None:
+    def known(row: int) -> tuple[int, int, int, str]:
+        return columns["negative"][row], space[row] or 0, undecided[row], kink[row]
+
+    def index(row: int) -> tuple[int, int, int, str] | None:
         return None if row in singular else known(row)
 
     for key, group in groupby(rows, index):
         inside = tuple(group)
         if key is None and len(singular) < len(rows):
             continue
-        negative, in_space, open_signs = key or known(inside[0])
+        negative, in_space, open_signs, at_kink = key or known(inside[0])
         yield Stretch(
             branch=branch["name"],
             leaves_first=branch["parent"] is not None and branch["parent"][0] == first,
@@ -97,6 +100,7 @@ def _stretches(branch: Mapping[str, Any], first: str) -> Iterator[Stretch]:
             negative=negative,
             in_space=in_space,
             undecided=open_signs,
+            kink=at_kink,
             places=tuple(columns["arclength"][row] for row in inside),
             rows=inside,
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rodfem.continuation.kinds import KINDS
-from rodfem.stability.soft_mode import index_range
+from rodfem.stability.soft_mode import ONE_SIDE, index_range, on_kink
 
 STABLE, PLANAR, UNSTABLE, CRITICAL, UNDECIDED = "stable", "planar", "unstable", "critical", "undecided"
 
@@ -42,16 +42,18 @@ def _verdict(columns: Mapping[str, Sequence[Any]], row: int, specials: Sequence[
         change = f"{before}→{after}" if before != after else str(before)
         number = _many(crossing.get("multiplicity") or 0, "eigenvalue")
         what = f": {number} at zero" if crossing.get("multiplicity") else ""
+        change += f" {ONE_SIDE}" if columns.get("kink", {row: ""})[row] else ""
         return Words(CRITICAL, change, f"{crossing['kind'].capitalize()}{what}; index {change} along the branch.")
+    if kink := (columns.get("kink") or {row: ""})[row]:
+        return _on_kink(columns, row, kink)
     if "omega2" in columns:
         return _of_frequencies(columns["negative"][row], columns["omega2"][row])
     negative, space = columns["negative"][row], (columns.get("negative_in_space") or {row: None})[row]
     zero = columns["zero"][row]
     neutral = f" {_many(zero, 'eigenvalue')} {'is' if zero == 1 else 'are'} zero." if zero else ""
     if undecided := (columns.get("undecided") or {row: 0})[row]:
-        found = f"{_many(undecided, 'eigenvalue')} too near zero for {'its' if undecided == 1 else 'their'} sign"
         verdict = f"Unstable: {_many(negative, 'negative eigenvalue')}, and" if negative else "Stability undecided:"
-        sentence = f"{verdict} {found} to be known on this mesh.{neutral}"
+        sentence = f"{verdict} {_too_near_zero(undecided)}.{neutral}"
         return Words(UNSTABLE if negative else UNDECIDED, index_range(negative, undecided), sentence)
     if negative:
         return Words(UNSTABLE, _pair(negative, space), f"Unstable: {_many(negative, 'negative eigenvalue')}.{neutral}")
@@ -59,6 +61,19 @@ def _verdict(columns: Mapping[str, Sequence[Any]], row: int, specials: Sequence[
         sentence = f"Stable in the plane, unstable in space: {_many(space, 'negative eigenvalue')} there.{neutral}"
         return Words(PLANAR, _pair(0, space), sentence)
     return Words(STABLE, _pair(0, space), f"Stable: no negative eigenvalue of the second variation.{neutral}")
+
+
+def _on_kink(columns: Mapping[str, Sequence[Any]], row: int, kink: str) -> Words:
+    """Words for a state on a ``kink`` of the functions of that name."""
+    negative, undecided = columns["negative"][row], (columns.get("undecided") or {row: 0})[row]
+    sentence = f"Stability undecided: {on_kink(kink)}; {_many(negative, 'negative eigenvalue')} on one side"
+    more = f", and {_too_near_zero(undecided)}" if undecided else ""
+    return Words(UNDECIDED, index_range(negative, undecided, kink), f"{sentence}{more}.")
+
+
+def _too_near_zero(undecided: int) -> str:
+    sign = "its" if undecided == 1 else "their"
+    return f"{_many(undecided, 'eigenvalue')} too near zero for {sign} sign to be known on this mesh"
 
 
 def _pair(negative: int, space: int | None) -> str:

@@ -19,7 +19,7 @@ from rodfem.stability.method import Found, Method
 from rodfem.stability.methods import AUTO, METHODS, find
 from rodfem.stability.rank import rank_of
 from rodfem.stability.round_off import Decision, decide
-from rodfem.stability.soft_mode import SoftMode, is_stable
+from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, is_stable
 from rodfem.stability.workspace import Workspace
 
 SMALL = 12
@@ -54,6 +54,9 @@ class Verdict:
         How it was done, and why so.
     soft
         Eigenvalues near zero in the metric, by name: those of :meth:`rodfem.Solver.assess`.
+    kink
+        Names of the functions on a kink of which the state is, by :meth:`rodfem.Solver.assess`: the numbers are those
+        of one side, and stability is undecided.
     """
 
     negative: int
@@ -71,17 +74,19 @@ class Verdict:
     reason: str
     undecided: int = 0
     soft: tuple[SoftMode, ...] = ()
+    kink: str = ""
 
     @property
     def stable(self) -> bool | None:
         """Whether no direction is unstable; None where that is not decided."""
-        return is_stable(self.negative, self.undecided)
+        return is_stable(self.negative, self.undecided, self.kink)
 
     def at(self, point: Any) -> Verdict:
-        """The same with the soft modes of a ``point`` of a branch, and the index as far as they are decided."""
+        """The same with kink and soft modes of a ``point`` of a branch, and the index as far as they are decided."""
+        here = replace(self, kink=point.kink)
         if not point.soft:
-            return self
-        counts = replace(self, negative=point.negative, zero=point.zero, undecided=point.undecided)
+            return here
+        counts = replace(here, negative=point.negative, zero=point.zero, undecided=point.undecided)
         return replace(counts, soft=tuple(point.soft))
 
     def __str__(self) -> str:
@@ -90,6 +95,7 @@ class Verdict:
         proof = ", none missing" if self.certified and len(self.values) else ""
         inside = f"; {len(self.inside)} inside the band {self.band:.1e} of the count" if len(self.inside) else ""
         undecided = f", {self.undecided} undecided" if self.undecided else ""
+        undecided += f", {ONE_SIDE} of the {self.kink}" if self.kink else ""
         return (
             f"{self.negative} negative, {self.zero} zero{undecided}{inside}; left-most: {values}{proof} "
             f"({self.method}: {self.reason}; {self.factorisations} factorisations, {1e3 * self.seconds:.1f} ms)"

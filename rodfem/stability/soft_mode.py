@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+ONE_SIDE = "on one side of a kink"
+
 
 @dataclass(frozen=True)
 class SoftMode:
@@ -41,12 +43,21 @@ class Judgement:
     soft: tuple[SoftMode, ...]
 
 
-def is_stable(negative: int, undecided: int) -> bool | None:
-    """Whether a state with so many eigenvalues is stable; None where that is not decided."""
-    return False if negative else None if undecided else True
+def is_stable(negative: int, undecided: int, kink: str = "") -> bool | None:
+    """Whether a state with so many eigenvalues is stable; None where that is not decided, as on a ``kink``."""
+    return None if kink else False if negative else None if undecided else True
 
 
-def index_range(negative: int, undecided: int) -> str:
-    """Index in words, of which some eigenvalues may be undecided: ``2``, ``0 or 1``, ``0 to 2``."""
+def index_range(negative: int, undecided: int, kink: str = "") -> str:
+    """Index in words, of which some eigenvalues may be undecided: ``2``, ``0 or 1``, ``0 to 2``.
+
+    On a ``kink`` of the functions of that name it is that of one side.
+    """
     words = {0: "", 1: f" or {negative + 1}"}
-    return f"{negative}" + words.get(undecided, f" to {negative + undecided}")
+    index = f"{negative}" + words.get(undecided, f" to {negative + undecided}")
+    return f"{index} {ONE_SIDE}" if kink else index
+
+
+def on_kink(kink: str) -> str:
+    """Why stability is undecided on a ``kink``, in a clause."""
+    return f"the state is on a kink of the {kink}: the second variation depends on the side"

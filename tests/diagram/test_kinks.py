@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from io import StringIO
 from math import isfinite, isnan, pi
+from pathlib import Path
 from typing import Any
 
 import pytest
 import ufl
 from classics import column
+from mpi4py import MPI
 
 from forms.energy import bending_and_twist
-from rodfem import Diagram, Discretization, End, Inertia, Ordinate, Plan, Scene, clamped, free, trace
+from rodfem import Diagram, Discretization, End, Inertia, Ordinate, Plan, Scene, clamped, free, load, trace
+from rodfem.app.terminal import Report
 from rodfem.errors import SceneError
+from rodfem.output.plot_pieces import pieces_of
+from rodfem.output.typical import typical_state
+from rodfem.report.words import words_of
 
 
 def bent(energy: Any, at: tuple[float, ...]) -> Diagram:
@@ -28,7 +35,7 @@ def test_a_bilinear_material_has_no_bar_where_it_is_beyond_its_kink() -> None:
     """``M = k`` up to 1, ``0.8 + 0.2 k`` beyond: by shooting, bars were up to 2e5 times too small."""
     soft = lambda k: ufl.conditional(ufl.lt(abs(k), 1.0), 0.5 * k**2, 0.1 * k**2 + 0.8 * abs(k) - 0.4)  # noqa: E731
     found = bent(soft, (0.5, 2.0))
-    below, beyond = (next(s for s in found[0].special if s.point.load == load) for load in (0.5, 2.0))
+    below, beyond = (next(s for s in found[0].special if s.point.load == P) for P in (0.5, 2.0))
     assert isfinite(below.ordinate_error) and below.note == ""  # the moment P(1 - ..) is below 1 everywhere
     assert isnan(beyond.ordinate_error) and isnan(beyond.error_estimate) and "not estimated" in beyond.note
     assert any("stored energy has a kink in the state inside of the rod" in said for said in found.warnings)
@@ -42,18 +49,55 @@ def test_a_condition_without_a_kink_keeps_its_bars() -> None:
     assert all(isfinite(s.ordinate_error) for s in found[0].special)
 
 
-def test_a_spring_at_the_tip_on_one_side() -> None:
-    """The column is on the kink at all loads; to the free side it falls at 2 pi^2/4: it was called stable to 15."""
+def one_sided() -> Diagram:
+    """A column with a spring at its tip, on one side."""
     spring = lambda x, c: ufl.conditional(ufl.ge(x.r[0], 0.0), 20 * x.r[0] ** 2, 0.0)  # noqa: E731
     rod = Scene(
         "one-sided", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (20.0, 2.0, 1.0)),
         {"P": 0.0}, "P", (clamped(), free(lambda c: (0.0, 0.0, -c.P), energy=spring)),
         Ordinate("x", s=1.0, of=lambda r, q: r[0]), (0.0, 15.0),
     )  # fmt: skip
-    found = trace(rod, Discretization(elements=3, degree=4), Plan(depth=0))
+    return trace(rod, Discretization(elements=3, degree=4), Plan(depth=0, at=(6.0,)))
+
+
+def test_a_spring_at_the_tip_on_one_side() -> None:
+    """The column is on the kink at all loads; to the free side it falls at 2 pi^2/4: it was called stable to 15."""
+    found = one_sided()
     said = [x for x in found.warnings if "has a kink at the very state at P = 0 to 15" in x]
     assert len(said) == 1 and "energy of the right end" in said[0] and "undecided" in said[0]
-    assert all(point.stable is not True for point in found[0].points)
+    assert all(point.stable is None for point in found[0].points)
+
+
+@pytest.mark.alone
+def test_the_reason_is_the_kink_wherever_one_reads_it(tmp_path: Path) -> None:
+    """No eigenvalue is near zero at P = 6: the least one is that of a load 9 or 1 below a critical one."""
+    found = one_sided()
+    at = "a kink of the energy of the right end"
+    (state,) = (s.point for s in found[0].special if s.point.load == 6.0)
+    verdict = found.assess(state, number=1)
+    assert verdict.stable is None and abs(verdict.values[0]) > 1.0 and at in str(verdict)
+    again = load(found.save(tmp_path), found.scene)
+    words = [
+        words_of(found.data["branches"][0])[row].sentence
+        for row in (0, next(s.row for s in found[0].special if s.point is state))
+    ]
+    stream = StringIO()
+    Report(MPI.COMM_SELF, stream).verdict("straight", "P = 6", verdict)
+    (asked,) = found.at(6.5)
+    told = [repr(state), repr(again[0].points[0]), repr(asked), found.in_words(), stream.getvalue(), *words]
+    assert "undecided" in typical_state(found.data)[2] and "side of a kink" in typical_state(found.data)[2]
+    for text in told:
+        assert at in text and "undecided" in text and "near zero" not in text, text
+    assert {p.undecided for p in found[0].points} == {0} and "undecided" not in found.data["branches"][0]["columns"]
+    assert {x.verdict for x in words_of(found.data["branches"][0])} <= {"undecided", "critical"}
+    assert {p.kind for p in pieces_of(found.data["branches"][0], "black")} == {"stability undecided"}
+
+
+def test_one_row_on_a_kink_says_nothing_of_those_beside_it() -> None:
+    columns = {"load": [0.0, 1.0, 2.0], "ordinate": [0.0] * 3, "negative": [1, 0, 0], "kink": ["stored energy", "", ""]}
+    branch = {"name": "a", "parent": None, "columns": columns | {"zero": [0] * 3}, "special": []}
+    assert [p.kind for p in pieces_of(branch, "black")] == ["stable"]
+    assert [x.verdict for x in words_of(branch)] == ["undecided", "stable", "stable"]
 
 
 def test_a_sweep_has_no_bar_beyond_a_kink() -> None:
