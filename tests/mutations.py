@@ -51,6 +51,27 @@ RECORDED = "tests/modes/test_recorded.py"
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "mirror-images-by-what-richer-meshes-decide": Fault(
+        "rodfem/diagram/explorer.py",
+        "firsts.append(replace(first))",
+        "firsts.append(first)",
+        "tests/continuation/test_degenerate_pitchforks.py",
+    ),
+    "damped-beside-a-fold": Fault(
+        "rodfem/diagram/persistent_zeros.py",
+        "solver.damp(_still(solver, (point,), extra) if stay else 0)",
+        "solver.damp(extra if stay else 0)",
+        "tests/continuation/test_degenerate_pitchforks.py",
+    ),
+    "reasons-of-kinks-are-lost": Fault(
+        "rodfem/report/words.py",
+        'if kink := (columns.get("kink") or {row: ""})[row]:',
+        'if kink := "":',
+        "tests/diagram/test_kinks.py",
+    ),
+    "kinks-are-stable": Fault(
+        "rodfem/stability/soft_mode.py", "return None if kink else False", "return False", "tests/diagram/test_kinks.py"
+    ),
     "constants-are-compared": Fault(
         "rodfem/problem/symbols.py",
         "if _is_a_persons(3):",

@@ -8,18 +8,20 @@ special point that a richer mesh does not have, indices are besides compared wit
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from math import inf
 
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.adaptivity.soft_states import SoftStates
-from rodfem.continuation.branch import Branch, Point
-from rodfem.continuation.kinds import EVENT
+from rodfem.continuation.branch import Branch, Point, SpecialPoint
+from rodfem.continuation.kinds import EVENT, FOLD
 from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.soft_mode import index_range
 
 FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
+FLAT = 1e-6
+"""Slope of the load, in spans, below which all along a branch this is a family of equilibria at one load."""
 CLEARLY = 10.0
 """Times the uncertainty by round-off above which one is that of the mesh."""
 
@@ -39,17 +41,25 @@ class SoftRows:
         given = [s for s in branch.special if (s.kind.given or s.kind == EVENT) and id(s.point) not in singular]
         first = {id(branch.points[0])} if branch.parent else set()  # the branch point that it leaves
         doubtful = any(s.kind.singular and s.error_estimate == inf for s in branch.special)
+        family = self._is_family(branch)
         for s in given:
             fixed = s.kind.given
             before = s.point.negative
-            self._of(s.point).examine(s.point, fixed_load=fixed, compare=self.error_bars)
+            self._of(s.point).examine(s.point, fixed_load=fixed, compare=self.error_bars, family=family)
             doubtful |= s.point.undecided > 0
             if s.negative_before == s.negative_after == before:
                 s.negative_before = s.negative_after = s.point.negative
         for point in branch.points:
             if id(point) not in special and id(point) not in first:
-                self._of(point).examine(point, fixed_load=False, compare=self.error_bars and doubtful)
+                compare = self.error_bars and doubtful
+                self._of(point).examine(point, fixed_load=False, compare=compare, family=family)
         self._count_at_special_points(branch)
+
+    def _is_family(self, branch: Branch) -> bool:
+        """Whether a branch is a family of equilibria at one load; the slope is small beside a fold, too."""
+        span = self.meshes.solvers[0].system.scene.span
+        rows = branch.points[1:] if branch.parent else branch.points  # a pitchfork begins without a slope
+        return all(abs(p.slope) < FLAT * abs(span[1] - span[0]) for p in rows)
 
     def _count_at_special_points(self, branch: Branch) -> None:
         """Count at special points, too, the soft modes that the rows on either side of them have as negative.
@@ -68,6 +78,8 @@ class SoftRows:
             beside = [(groups[i - 1][1][-1], specials[0].negative_before)] if i else []
             beside += [(group[0], specials[-1].negative_after) for _, group in groups[i + 1 : i + 2]]
             more = {point.negative - index for point, index in beside}
+            if len(specials) == 1 and i:
+                self._change_at_fold(specials[0], groups[i - 1][1][::-1], *(rows for _, rows in groups[i + 1 : i + 2]))
             number = more.pop() if len(more) == 1 else 0
             settled = all(not p.undecided and sum(m.value < 0 for m in p.soft) >= number for p, _ in beside)
             if number <= 0 or not settled:
@@ -79,6 +91,15 @@ class SoftRows:
                 s.negative_before, s.negative_after = s.negative_before + number, s.negative_after + number
                 s.point.negative, s.point.zero = s.point.negative + number, s.point.zero - number
                 s.point.soft = negative[:number]
+
+    @staticmethod
+    def _change_at_fold(fold: SpecialPoint, before: Sequence[Point], after: Sequence[Point] = ()) -> None:
+        """Give a fold, where a count has one index on both sides, those of the nearest rows that are decided."""
+        if fold.kind != FOLD or fold.multiplicity != 1 or fold.negative_before != fold.negative_after:
+            return
+        left, right = (next((p.negative for p in rows if not p.undecided), None) for rows in (before, after))
+        if left is not None and right is not None and abs(left - right) == 1:
+            fold.negative_before, fold.negative_after = left, right
 
     def undecided(self, branch: Branch) -> Iterator[str]:
         """Yield a sentence on each piece of a branch whose index is not decided."""

@@ -32,8 +32,6 @@ REFINEMENTS = 2
 """Meshes that are tried beyond that of a state until the signs of its soft modes are decided."""
 SURE = 0.1
 """Part of the estimated distance of the nearest eigenvalue from zero within which there is none."""
-FLAT = 1e-6
-"""Slope of the load along a branch, in spans, below which the branch is a family of equilibria at one load."""
 
 
 class SoftStates:
@@ -49,11 +47,12 @@ class SoftStates:
         self._richer = [richer] if richer is not None else []
         self._companions: list[Enriched] = []
 
-    def examine(self, point: Point, *, fixed_load: bool, compare: bool = False) -> bool:
+    def examine(self, point: Point, *, fixed_load: bool, compare: bool = False, family: bool = False) -> bool:
         """Record the soft modes of a point, and its index as far as they are decided; whether there are any.
 
         On a richer mesh the point is at the same load (``fixed_load``), or on the plane across the branch.  With
-        ``compare`` the index there is asked for; eigenvalues that have another sign are soft, too.  Raises
+        ``compare`` the index there is asked for; eigenvalues that have another sign are soft, too.  Along a ``family``
+        of equilibria at one load that of the branch itself is zero.  Raises
         :class:`ConvergenceError` where constraints that depend on each other leave less than no negative eigenvalue.
         """
         inertia, nearest = self.solver.inertia, self._nearest(point)
@@ -64,7 +63,7 @@ class SoftStates:
             return False
         least = max(differing, sliding + 1 if sliding else 0)  # another eigenvalue may be nearer to zero
         near = self._with_the_mesh(point, near_zero(inertia.at(point.x), least=least), differing)
-        found = self.judgement(point, near, fixed_load=fixed_load)
+        found = self.judgement(point, near, fixed_load=fixed_load, family=family)
         if found.negative < 0:
             raise ConvergenceError(
                 f"The count of negative eigenvalues at load {point.load:.8g} gave {found.negative}: the constraints "
@@ -119,9 +118,9 @@ class SoftStates:
         own = point.zero - self.solver.system.active_drifts(point.x)
         return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
 
-    def judgement(self, point: Point, near: NearZero, *, fixed_load: bool) -> Judgement:
-        """Decide on the eigenvalues ``near`` zero of a point as far as can be; ``fixed_load`` as above."""
-        every, near = len(near.values), self._across_the_branch(point, near)
+    def judgement(self, point: Point, near: NearZero, *, fixed_load: bool, family: bool) -> Judgement:
+        """Decide on eigenvalues ``near`` zero of a point as far as can be; ``fixed_load`` and ``family`` as above."""
+        every, near = len(near.values), self._across_the_branch(point, near) if family else near
         names = self.names(point.x, near.vectors)
         modes = [SoftMode(*m) for m in zip(names, near.values.tolist(), near.uncertainty.tolist(), strict=True)]
         if modes and self._richer:
@@ -130,12 +129,10 @@ class SoftStates:
         return judge(near, modes, self.solver.inertia.tolerance, refined=bool(self._richer))
 
     def _across_the_branch(self, point: Point, near: NearZero) -> NearZero:
-        """Eigenvalues without that of the branch itself, where it is a family of equilibria at one load."""
-        system, tangent = self.solver.system, point.tangent
-        span = abs(system.scene.span[1] - system.scene.span[0])
-        if tangent is None or not abs(point.slope) < FLAT * span:
+        """Eigenvalues without that of the branch itself, a family of equilibria at one load."""
+        if point.tangent is None:
             return near
-        image = self.solver.inertia.metric * tangent
+        image = self.solver.inertia.metric * point.tangent
         own = [i for i, v in enumerate(near.vectors) if v.dot(image).real ** 2 > SHARE]
         kept = [i for i in range(len(near.vectors)) if i not in own]
         vectors = [near.vectors[i] for i in kept]

@@ -237,7 +237,7 @@ class Explorer(Tracer):
                 first = branch.points[1]
                 if any(self._mirrored(special, known, first) for known in firsts):
                     continue  # the mirror image of a branch just traced
-                firsts.append(first)
+                firsts.append(replace(first))  # as it is now: once it is traced richer meshes have decided its index
                 if special.connects_to is None and self._traced_already(branch, special):
                     continue
                 if self._came_from(parent, special, first):

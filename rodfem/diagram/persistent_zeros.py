@@ -26,26 +26,31 @@ class PersistentZeros:
         vertical = abs(point.slope) < VERTICAL * self.width  # the branch itself is a family at one load
         return point.zero - solver.system.active_drifts(point.x) - vertical
 
+    def damp(self, solver: BranchSolver, point: Point) -> None:
+        """Damp Newton's method of a ``solver`` where those of a ``point`` are zero, to round-off."""
+        extra = self.extra(solver, point)
+        solver.damp(_still(solver, (point,), extra) if extra > 0 else 0)
+
     def check(self, solver: BranchSolver, history: Sequence[Point], point: Point, level: int) -> None:
         """Damp Newton's method where eigenvalues stay zero, and say so once.
+
+        With damping the tangent is one of other equations, by the tolerance of a count over the least eigenvalue: of
+        one that is not zero but within that tolerance, beside a fold, the load's part of it has no digit.
 
         ``history`` has the rows of a ``solver`` before the ``point``; a branch has had ``level`` zeros all along.
         """
         extra = self.extra(solver, point)
         recent = [p for p in history[-ROWS:] if p.arclength > 0.0]  # a branch point has zeros of its own
         stay = extra > 0 and bool(recent) and all(p.zero == point.zero for p in recent)
-        solver.damp(extra if stay else 0)
+        if not (stay and solver.system.damping):
+            solver.damp(_still(solver, (point,), extra) if stay else 0)
         if stay and len(recent) == ROWS and point.zero <= level and not self.said:
             self.said = True
             self._say(solver, recent[0], point, extra)
 
     def _say(self, solver: BranchSolver, before: Point, point: Point, extra: int) -> None:
         """Report eigenvalues that count as zero at two rows: within round-off, or persistently zero."""
-        system, inertia, still = solver.system, solver.inertia, 0
-        own = point.zero - system.active_drifts(point.x) - extra
-        for p in (before, point):
-            low, high = resolve(inertia.at(p.x))
-            still = min(max(still, high - low - own), extra)
+        system, inertia, still = solver.system, solver.inertia, _still(solver, (before, point), extra)
         if still:
             self.observer.note(
                 f"  {still} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
@@ -57,3 +62,13 @@ class PersistentZeros:
                 "to the lowest bending eigenvalue, without being zero: a critical load is close to "
                 f"{system.scene.load} = {before.load:.8g}"
             )
+
+
+def _still(solver: BranchSolver, points: Sequence[Point], extra: int) -> int:
+    """How many of so many ``extra`` eigenvalues, counted as zero at ``points``, are zero to round-off at one of them."""
+    still, last = 0, points[-1]
+    own = last.zero - solver.system.active_drifts(last.x) - extra
+    for point in points:
+        low, high = resolve(solver.inertia.at(point.x))
+        still = min(max(still, high - low - own), extra)
+    return still

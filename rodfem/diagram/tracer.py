@@ -111,7 +111,9 @@ class Tracer:
             self.observer.branch(branch)
         self.use(branch.points[-1].mesh)
         self.control = AccuracyControl(self.meshes, (self.low, self.high))
-        self.solver.damp(self.zeros.extra(self.solver, branch.points[-1]) if branch.parent else 0)
+        self.solver.damp(0)
+        if branch.parent:
+            self.zeros.damp(self.solver, branch.points[-1])
         self._attempt(branch)
         self._finish(branch)
 
