@@ -48,7 +48,7 @@ class SoftStates:
         self._companions: list[Enriched] = []
 
     def examine(self, point: Point, *, fixed_load: bool, compare: bool = False, family: bool = False) -> bool:
-        """Record the soft modes of a point, and its index as far as they are decided; whether there are any.
+        """Record the soft modes of a ``point``, and its index as far as they are decided; whether there are any.
 
         On a richer mesh the point is at the same load (``fixed_load``), or on the plane across the branch.  With
         ``compare`` the index there is asked for; eigenvalues that have another sign are soft, too.  Along a ``family``

@@ -65,7 +65,7 @@ class PersistentZeros:
 
 
 def _still(solver: BranchSolver, points: Sequence[Point], extra: int) -> int:
-    """How many of so many ``extra`` eigenvalues, counted as zero at ``points``, are zero to round-off at one of them."""
+    """How many ``extra`` eigenvalues, counted as zero at ``points``, are zero to round-off at one of them."""
     still, last = 0, points[-1]
     own = last.zero - solver.system.active_drifts(last.x) - extra
     for point in points:
