@@ -73,7 +73,7 @@ class Equations:
         forms = self._derive(fields)
         self._taken: Line | None = None
         self.cells = Cells.of(fields)
-        compiled = form_compiler.compile_forms(list(forms.values()))
+        compiled = form_compiler.compile_forms(list(forms.values()), fields.mesh.comm)
         assemblers = {name: Assembler(form, self.cells) for name, form in zip(forms, compiled, strict=True)}
         self._assemblers = list(assemblers.values())
         self.jacobian, self.residual, self.energy, self.metric, self.kinetic = self._assemblers[:5]

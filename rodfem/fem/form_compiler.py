@@ -30,6 +30,8 @@ _SEARCH = jit.get_cached_module
 """How FFCx looks for a module in its cache: it lists that folder, which takes 10 ms where it has thousands of files."""
 PATIENCE = 60.0
 """Seconds after which a module that another program than rodfem has locked, and not written to, counts as abandoned."""
+TOGETHER = "Failed just-in-time compilation"
+"""How the error begins that dolfinx raises on all of several ranks."""
 PAUSE = 0.05
 """Seconds between looks at what another process compiles."""
 _CLAIMS: dict[str, int] = {}
@@ -156,10 +158,11 @@ class _Begun(BaseException):
 
 
 @contextmanager
-def _from_cache() -> Iterator[None]:
+def _from_cache(comm: MPI.Comm) -> Iterator[None]:
     """Raise :class:`SetupError` where the folder of compiled code is locked, or cannot be written.
 
-    Raises :class:`SceneError` for a function that the compiler cannot take.
+    Raises :class:`SceneError` for a function that the compiler cannot take.  Of several ranks the first of ``comm``
+    compiles; all fail together, and the first alone knows why.
     """
     try:
         yield
@@ -170,8 +173,10 @@ def _from_cache() -> Iterator[None]:
         ) from locked
     except OSError as error:
         raise SetupError(code_cache.refused(error)) from error
-    except AttributeError as trouble:
-        if "LiteralFloat" not in str(trouble):  # FFCx takes a product of nothing but numbers for one with arguments
+    except (AttributeError, RuntimeError) as trouble:
+        together = isinstance(trouble, RuntimeError) and TOGETHER in str(trouble)
+        why = comm.bcast(str(trouble)) if together else str(trouble)
+        if "LiteralFloat" not in why:  # FFCx takes a product of nothing but numbers for one with arguments
             raise
         raise SceneError(
             "The equations cannot be compiled: in a function of the scene terms cancel each other, as in x**2 - x**2; "
@@ -179,12 +184,12 @@ def _from_cache() -> Iterator[None]:
         ) from trouble
 
 
-def compile_forms(forms: Sequence[Any]) -> list[Any]:
-    """Compile UFL forms: the first, which takes the longest, and all others together, at once.
+def compile_forms(forms: Sequence[Any], comm: MPI.Comm = MPI.COMM_SELF) -> list[Any]:
+    """Compile UFL ``forms`` on meshes of ``comm``: the first, which takes the longest, and all others, at once.
 
     Raises :class:`SetupError` where the cache is locked by a killed run, or cannot be written.
     """
-    with _from_cache():
+    with _from_cache(comm):
         compiled = compile_ahead(forms)
         _wait()
         with compat.quiet():
@@ -197,7 +202,7 @@ def expression(form: Any, points: np.ndarray, mesh: Any, cells: int) -> Callable
     ``form`` is the vector, on cells of ``mesh``, of which the first ``cells`` are evaluated.  Raises as
     :func:`compile_forms` does.
     """
-    with _from_cache(), compat.quiet():
+    with _from_cache(mesh.comm), compat.quiet():
         compiled = fem.Expression(form, points, dtype=compat.REAL)
     chosen = np.arange(cells, dtype=np.int32)
     takes_mesh = "mesh" in inspect.signature(compiled.eval).parameters

@@ -111,7 +111,7 @@ def test_a_sweep_has_no_bar_beyond_a_kink() -> None:
     assert any("stored energy has a kink in the state inside of the rod" in said for said in found.warnings)
 
 
-@pytest.mark.alone  # on several ranks dolfinx hides what the compiler raises
+@pytest.mark.short
 def test_terms_that_cancel_are_named() -> None:
     """FFCx 0.5 cannot take a form of such terms: its traceback was all that was said.  Later ones can: Euler's load."""
     cancels = lambda x, c: c.P * x.r[2] + 3 * x.r[2] ** 2 - 3 * x.r[2] ** 2  # noqa: E731
