@@ -42,10 +42,11 @@ def writing(folder: Path) -> Iterator[None]:
 def draft_of(path: Path) -> Iterator[Path]:
     """Yield the path of a draft, which takes the place of ``path`` at the end, and goes where the block fails.
 
-    Raises :class:`InputError` where it cannot be written.
+    Folders on the way are made.  Raises :class:`InputError` where it cannot be written.
     """
     draft = path.with_name(f".{path.stem}.part{path.suffix}")
     with writing(path.parent):
+        path.parent.mkdir(parents=True, exist_ok=True)
         try:
             yield draft
             os.replace(draft, path)

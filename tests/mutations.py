@@ -51,6 +51,24 @@ RECORDED = "tests/modes/test_recorded.py"
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "names-twice": Fault(
+        "rodfem/diagram/explorer.py",
+        '(name := f"{before}{number}{after}") in names',
+        '(name := f"{before}{number}{after}") in ()',
+        "tests/diagram/test_first_name.py",
+    ),
+    "more-modes-than-there-are": Fault(
+        "rodfem/fem/fields.py",
+        "if number > (most := most_eigenvalues(scene, discretization)):",
+        "if number > 10**9 * (most := most_eigenvalues(scene, discretization)):",
+        "tests/stability/test_assessment.py",
+    ),
+    "no-new-folders": Fault(
+        "rodfem/whole_files.py",
+        "        path.parent.mkdir(parents=True, exist_ok=True)\n",
+        "",
+        "tests/codim2/test_locus.py",
+    ),
     "mirror-images-by-what-richer-meshes-decide": Fault(
         "rodfem/diagram/explorer.py",
         "firsts.append(replace(first))",

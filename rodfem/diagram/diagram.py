@@ -278,7 +278,8 @@ class Diagram:
     def plot(self, path: Path | str | None = None) -> Figure:
         """Draw the diagram with stability and special points; also into a file, if a ``path`` is given.
 
-        Raises :class:`~rodfem.errors.InputError` where that cannot be written, or has a suffix of no picture.
+        As all that is written it may be in a new folder.  Raises :class:`~rodfem.errors.InputError` where that cannot
+        be written, or has a suffix of no picture.
         """
         self._can_write(path, PICTURES)
         if self.scene.conservative:

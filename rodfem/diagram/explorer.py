@@ -61,7 +61,7 @@ class Explorer(Tracer):
         found, before = self._found(load), len(self.branches)
         for i, point in enumerate(found):
             if not self._on_branch(point, before):
-                self.trace_whole(point, f"found {i + 1} at {load:g}", 0)
+                self.trace_whole(point, self._unused("found ", f" at {load:g}", i + 1), 0)
         self._branch_off(before)
 
     def _found(self, load: float) -> list[Point]:
@@ -305,8 +305,14 @@ class Explorer(Tracer):
             self.observer.law(special)
 
     def _name(self, parent: Branch) -> str:
-        siblings = sum(b.parent is not None and b.parent[0] == parent.name for b in self.branches)
-        return f"{parent.name + '.' if parent.depth else 'branch '}{siblings + 1}"
+        return self._unused(f"{parent.name}." if parent.depth else "branch ")
+
+    def _unused(self, before: str, after: str = "", number: int = 1) -> str:
+        """Name with the least ``number`` from this one on that no branch has: of a file, a name is one branch's."""
+        names = {branch.name for branch in self.branches}
+        while (name := f"{before}{number}{after}") in names:
+            number += 1
+        return name
 
     def _mirrored(self, special: SpecialPoint, a: Point, b: Point) -> bool:
         """Whether first points of the two branches that leave in opposite ways are of mirror images, at one load.

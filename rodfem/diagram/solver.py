@@ -23,7 +23,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
 from rodfem.fem import assembly, compiled_newton, compiled_shape, form_compiler
-from rodfem.fem.fields import Discretization
+from rodfem.fem.fields import Discretization, check_number
 from rodfem.fem.kinks_at import KinksAt
 from rodfem.fem.system import System
 from rodfem.linalg import chain
@@ -241,10 +241,11 @@ class Solver:
         number
             How many eigenvalues are computed.
 
-        Raises :class:`~rodfem.errors.InputError` for a method that does not exist or apply, and
-        :class:`~rodfem.errors.ConvergenceError` where an eigensolver fails.
+        Raises :class:`~rodfem.errors.InputError` for a method that does not exist or apply and for more eigenvalues
+        than the mesh has, and :class:`~rodfem.errors.ConvergenceError` where an eigensolver fails.
         """
         x = self._state(point)
+        self._check_number(number)
         verdict = assess(self.equilibria, x, method, number)
         if not isinstance(self.equilibria, BranchSolver):
             return replace(verdict, kink=self._kinks(x).kink)
@@ -254,9 +255,15 @@ class Solver:
     def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
         """Left-most modes of an equilibrium on this mesh, each with its value, motion and error.
 
-        There are ``number`` of them.  Raises :class:`~rodfem.errors.InputError` for fewer than one.
+        There are ``number`` of them.  Raises :class:`~rodfem.errors.InputError` for fewer than one, and for more than
+        the mesh has.
         """
+        self._check_number(number)
         return self._finder(self._state(point), number, method)[1]
+
+    def _check_number(self, number: int) -> None:
+        fields = self.equilibria.system.fields
+        check_number(self.scene, fields.discretization, number)
 
     @checked(states=path("results/column/states.h5"), branch=text("branch 1"), row=count(0))
     def restore(self, states: Path | str, branch: str, row: int) -> Point:

@@ -147,6 +147,15 @@ def most_eigenvalues(scene: Scene, discretization: Discretization) -> int:
     return at_a_node * (discretization.elements * discretization.degree + 1)
 
 
+def check_number(scene: Scene, discretization: Discretization, number: int) -> None:
+    """Raise :class:`InputError` where a ``scene`` has fewer than so many eigenvalues on a ``discretization``."""
+    if number > (most := most_eigenvalues(scene, discretization)):
+        raise InputError(
+            f"The mesh has no more than {most} eigenvalues, not {number}: give number={most} or less, or use more "
+            "elements."
+        )
+
+
 class Fields:
     """Mesh, mixed space, the unknown ``u`` of all forms as a dolfinx Function, and the numbering of free unknowns.
 

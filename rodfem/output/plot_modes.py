@@ -83,7 +83,6 @@ def draw_modes(path: Path, branch: str, row: int, output: Path, chosen: Sequence
     columns = min(COLUMNS, len(numbers)) if len(numbers) != 4 else 2
     rows = ceil(len(numbers) / columns)
     moving = output.suffix.lower() == ".gif"
-    output.parent.mkdir(parents=True, exist_ok=True)
     with rc_context(STYLE | {"axes.grid": False}), draft_of(output) as draft:
         figure = Figure(figsize=(columns * PANEL[0], rows * PANEL[1] + 0.5), dpi=2 * DPI // 3 if moving else DPI)
         FigureCanvasAgg(figure)

@@ -142,7 +142,6 @@ def _write(plotter: Any, labels: Sequence[Label], size: tuple[int, int]) -> None
 def _shoot(plotter: Any, path: Path) -> Path:
     """Write the picture, and close the plotter; raises RuntimeError for a blank one."""
     plotter.enable_anti_aliasing("ssaa")
-    path.parent.mkdir(parents=True, exist_ok=True)
     with draft_of(path) as draft:
         picture = plotter.screenshot(str(draft), return_img=True)
     plotter.close()

@@ -35,7 +35,6 @@ HALO = [withStroke(linewidth=3.2, foreground="white")]
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure; the suffix decides the format, and the folder is created where it is missing."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     with matplotlib.rc_context(STYLE), draft_of(path) as draft:
         figure.savefig(draft, dpi=DPI, format=path.suffix[1:] or "png")
     return path

@@ -156,6 +156,18 @@ def test_reference_values(method: str) -> None:
     np.testing.assert_allclose(assessor(x, method, 3).values, REFERENCE, rtol=1e-9)
 
 
+def test_no_more_eigenvalues_than_a_mesh_has() -> None:
+    """Ten nodes that turn have 30 at most, which is told of any state before anything is computed."""
+    solver = Solver(
+        classics.column("ten nodes", (classics.clamped(), classics.free(lambda c: (0.0, 0.0, -c.P))), (0.0, 1.0)),
+        Discretization("reduced", 3, 3),
+    )
+    at = solver.equilibria.system.new_vector()  # no equilibrium
+    for ask in (solver.modes, solver.assess):
+        with pytest.raises(InputError, match="no more than 30 eigenvalues, not 1000000: give number=30 or less"):
+            ask(at, number=10**6)
+
+
 def test_a_method_is_a_module() -> None:
     """Names are those of the files; the README says what each does."""
     folder = Path(methods.__file__ or "").parent
