@@ -21,11 +21,11 @@ from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
 from rodfem.diagram.equivalence import SAME_DETERMINANT, equally_stable, equivalent, near
 from rodfem.diagram.first_name import ahead, name_of_first
+from rodfem.diagram.first_state import first_state
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
 from rodfem.stability.bordered import Bordered
-from rodfem.stability.rank import require_independent_constraints
 from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import SAME_SPECIAL, SAME_STATE
 
@@ -118,15 +118,8 @@ class Explorer(Tracer):
         return 0 < self.plan.most_branches <= len(self.branches)
 
     def _primary(self) -> Branch:
-        """First branch: its first state.  Constraints that repeat each other are named."""
-        start = self.span[0]
-        try:
-            point = self._first()
-        except ConvergenceError:
-            require_independent_constraints(self.solver.system, self.solver.start(start))
-            raise
-        if self.scene.constraints:  # of those that follow from others a matrix tells nothing: its factors are round-off
-            require_independent_constraints(self.solver.system, point.x, self.solver.start(start))
+        """First branch: its first state."""
+        point, start = self._first(), self.span[0]
         if point.stretch < COLLAPSED:
             raise SceneError(
                 f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
@@ -147,7 +140,7 @@ class Explorer(Tracer):
     def _first(self) -> Point:
         start, stop = self.span
         solver = self.solver
-        x, outcome = solver.first(start)
+        x, outcome = first_state(solver, start)
         if not outcome.converged:
             raise ConvergenceError(
                 f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: start at another "
