@@ -31,8 +31,6 @@ from rodfem.tolerances import SAME_SPECIAL, SAME_STATE
 
 TAIL = 8
 """Rows before the end of a side branch among which its mirror image is recognised."""
-TAUT = 1e8
-"""Forces of a first state above this, over bending stiffness by length squared, may be those of no rod."""
 COLLAPSED = 1e-6
 """A first state whose smallest stretch is below this is no rod."""
 
@@ -150,7 +148,6 @@ class Explorer(Tracer):
         solver.require_convexity(x)
         point = solver.point(x, 0.0, solver.load_tangent(x, stop > start), outcome)
         self._check_arithmetic()
-        self._check_forces(point)
         family = point.zero - solver.system.active_drifts(x)
         if family > 0:
             self._leave_family(point, family, stop > start)
@@ -163,22 +160,6 @@ class Explorer(Tracer):
             self.observer.warn(
                 f"The arithmetic of this mesh leaves the sign of eigenvalues up to {inertia.resolution:.2g} open, and "
                 f"the lowest bending one is {inertia.scale:.2g}: take larger elements, or a lower degree."
-            )
-
-    def _check_forces(self, point: Point) -> None:
-        """Warn where the forces of the first state may be round-off alone: a rod as long as its ends are apart is taut.
-
-        Its constraints leave it no freedom, and no force in it is determined: Newton's method converges by round-off.
-        """
-        system = self.solver.system
-        sizes = system.in_units(point.x, -1).copy()
-        system.set_load(sizes, 0.0)
-        most = sizes.norm(PETSc.NormType.INFINITY)
-        if most > TAUT:
-            self.observer.warn(
-                f"At {self.scene.load} = {point.load:g} the forces in the first state are {most:.1e} times bending "
-                "stiffness over length squared: if the rod is as long as its ends are apart they are not determined, "
-                "and the first rows are not resolved; begin the range where the rod is slack."
             )
 
     def _leave_family(self, point: Point, freedoms: int, increasing: bool) -> None:

@@ -24,9 +24,9 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
+from rodfem.errors import SceneError
 from rodfem.fem.newton import STALLED
 from rodfem.fem.shape import Shape
-from rodfem.fem.system import System
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.blocks import Blocks, Pencil
 from rodfem.stability.rank import REMEDY, dependent, greatest, norms, rank_of, smallest_singular, units
@@ -37,7 +37,7 @@ ROUND = 1e-9
 """Distance from the scene's start, in the metric, below which a state is that start: Newton's tolerance."""
 TAUT = 1e-9
 """Slack over length below which a rod may be taut, and the part of a direction that counts as none."""
-SLACKEN = "the rod cannot stretch and is taut, so that any tension balances it; begin where it is slack, or let it stretch."
+SLACKEN = "the rod cannot stretch and is taut, any tension balances it; begin where it is slack, or let it stretch."
 """What to do about a taut rod."""
 
 
@@ -60,7 +60,7 @@ def require_independent_constraints(shape: Shape, x: PETSc.Vec, start: PETSc.Vec
         return
     for w in _doubtful(pencil, system.scene.length):
         if _distance(blocks, x, pencil, w) < STALLED:
-            raise dependent(pencil, words, w, sigma, remedy)
+            raise SceneError(dependent(pencil, words, w, sigma, remedy))
 
 
 def may_depend(shape: Shape, x: PETSc.Vec) -> bool:
@@ -80,7 +80,7 @@ def taut(shape: Shape, x: PETSc.Vec) -> bool:
     if scene.closed or 2 in scene.free_strains:
         return False
     state = shape.system.at(x)
-    left, right = (shape.place(state, s)[0] for s in scene.interval)
+    left, right = (shape.place(state, s, shape.weights(s))[0] for s in scene.interval)
     chord = (right - left) / scene.length
     held = [float(((end.fixed(state.constants()) @ chord) ** 2).sum()) for end in scene.sides]
     return min(held) > 1.0 - TAUT
@@ -110,7 +110,7 @@ def _distance(blocks: Blocks, x: PETSc.Vec, pencil: Pencil, w: np.ndarray) -> fl
     It is the root mean square over the unknowns, positions over the rod's length; ``pencil`` is that of the state, made
     by ``blocks``.
     """
-    system, length = blocks.system, blocks.system.scene.length
+    length = blocks.system.scene.length
     multipliers, change = pencil.C.createVecs()
     first, last = multipliers.getOwnershipRange()
     multipliers.array[:] = w[first:last]
@@ -128,4 +128,7 @@ def _distance(blocks: Blocks, x: PETSc.Vec, pencil: Pencil, w: np.ndarray) -> fl
     pencil.K.mult(change, before)
     slope.axpy(-1.0, before)
     slope.array[:] *= unit / many
-    return sigma / (slope.norm() or 1.0) / float(np.sqrt(change.size))
+    steepness = float(slope.norm() * np.sqrt(change.size))
+    if not steepness:
+        return np.inf if sigma else 0.0
+    return sigma / steepness

@@ -133,12 +133,10 @@ def rank_of(pencil: Pencil, scalars: Sequence[str] = (), length: float = 1.0, re
     least, vector = smallest_singular(equal)
     if least > DEPENDENT * greatest(equal, 0):
         return sigma
-    raise dependent(pencil, scalars, vector, sigma, remedy)
+    raise SceneError(dependent(pencil, scalars, vector, sigma, remedy))
 
 
-def dependent(
-    pencil: Pencil, scalars: Sequence[str], vector: np.ndarray, sigma: float, remedy: str = REMEDY
-) -> SceneError:
+def dependent(pencil: Pencil, scalars: Sequence[str], vector: np.ndarray, sigma: float, remedy: str) -> str:
     """Sentence on constraints whose gradients cancel.
 
     Parameters
@@ -169,6 +167,4 @@ def dependent(
         else:
             place = pencil.place[columns[np.argmax(abs(vector[columns]))]] if len(columns) else np.nan
             words.append(f"{NAMES[name]} (most of all at s = {place:.4g})")
-    return SceneError(
-        f"Constraints depend on one another ({' and '.join(words)}; smallest singular value {sigma:.1e}): {remedy}"
-    )
+    return f"Constraints depend on one another ({' and '.join(words)}; smallest singular value {sigma:.1e}): {remedy}"
