@@ -28,7 +28,7 @@ from rodfem.stability.blocks import Blocks
 from rodfem.stability.dependence import _distance, require_independent_constraints
 from rodfem.stability.rank import smallest_singular
 
-MESHES = [(1, 3), (2, 2), (4, 3), (7, 5), (24, 1), (30, 4)]
+MESHES = [(3, 3), (2, 2), (4, 3), (7, 5), (24, 1), (30, 4)]
 PLAN = Plan(depth=0, steps=StepControl(most=3), error_bars=False)
 
 
