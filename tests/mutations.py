@@ -594,6 +594,18 @@ FAULTS = {
         "_equilibrated(C)",
         "tests/stability/test_assessment.py",
     ),
+    "ways-down-that-go-uphill": Fault(
+        "rodfem/fem/newton.py",
+        "if isfinite(longest) and along(system, equations, step) < 0:",
+        "if False:",
+        "tests/hard/test_fuzz.py",
+    ),
+    "constraints-count-as-uphill": Fault(
+        "rodfem/fem/newton.py",
+        "- first] = -1.0",
+        "- first] = 1.0",
+        "tests/fem/test_way_down.py",
+    ),
     "dependent-only-where-sigma-is-zero": Fault(
         f"{STABILITY}dependence.py",
         "if _distance(blocks, x, pencil, w) < STALLED:",

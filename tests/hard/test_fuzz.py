@@ -109,6 +109,21 @@ def test_the_way_down_leaves_a_saddle() -> None:
     assert [point.negative for point in found] == [0, 0]
 
 
+def test_the_way_down_from_a_saddle_does_not_turn_back() -> None:
+    """Its unstable eigenvalue grows on the way: steps that were uphill led back, round and round on some meshes.
+
+    The first state was the saddle on three of these meshes, and the equilibrium below it on the other.
+    """
+    energies = []
+    for mesh in ((5, 6), (7, 5), (8, 6), (20, 3)):
+        solver = Solver(wider.scene(3, 144)[0], Discretization("pointwise", *mesh))
+        point = solver.equilibrium(solver.scene.span[0])
+        assert point.negative == 0
+        assert Oracle(solver.equilibria.system).eigenvalues(point.x).min() > 0
+        energies.append(point.potential)
+    assert energies == pytest.approx([energies[-1]] * len(energies), abs=1e-7)
+
+
 @pytest.mark.parametrize(
     ("seed", "number", "ended"),
     [(15, 177, "stretch reaches zero"), (15, 400, "meets branch 1"), (16, 159, "120 points reached")],
