@@ -21,18 +21,16 @@ from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
 from rodfem.diagram.equivalence import SAME_DETERMINANT, equally_stable, equivalent, near
 from rodfem.diagram.first_name import ahead, name_of_first
+from rodfem.diagram.first_state import first_state
 from rodfem.diagram.tracer import Tracer
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
 from rodfem.stability.bordered import Bordered
-from rodfem.stability.rank import require_independent_constraints
 from rodfem.stability.soft_mode import index_range
 from rodfem.tolerances import SAME_SPECIAL, SAME_STATE
 
 TAIL = 8
 """Rows before the end of a side branch among which its mirror image is recognised."""
-TAUT = 1e8
-"""Forces of a first state above this, over bending stiffness by length squared, may be those of no rod."""
 COLLAPSED = 1e-6
 """A first state whose smallest stretch is below this is no rod."""
 
@@ -118,15 +116,8 @@ class Explorer(Tracer):
         return 0 < self.plan.most_branches <= len(self.branches)
 
     def _primary(self) -> Branch:
-        """First branch: its first state.  Constraints that repeat each other are named."""
-        start = self.span[0]
-        try:
-            point = self._first()
-        except ConvergenceError:
-            require_independent_constraints(self.solver.system, self.solver.start(start))
-            raise
-        if self.scene.constraints:  # of those that follow from others a matrix tells nothing: its factors are round-off
-            require_independent_constraints(self.solver.system, point.x, self.solver.start(start))
+        """First branch: its first state."""
+        point, start = self._first(), self.span[0]
         if point.stretch < COLLAPSED:
             raise SceneError(
                 f"The rod is squeezed to a stretch of {point.stretch:.2g} in the first state, at {self.scene.load} = "
@@ -147,7 +138,7 @@ class Explorer(Tracer):
     def _first(self) -> Point:
         start, stop = self.span
         solver = self.solver
-        x, outcome = solver.first(start)
+        x, outcome = first_state(solver, start)
         if not outcome.converged:
             raise ConvergenceError(
                 f"No equilibrium was found at {self.scene.load} = {start:g} from the scene's start: start at another "
@@ -157,7 +148,6 @@ class Explorer(Tracer):
         solver.require_convexity(x)
         point = solver.point(x, 0.0, solver.load_tangent(x, stop > start), outcome)
         self._check_arithmetic()
-        self._check_forces(point)
         family = point.zero - solver.system.active_drifts(x)
         if family > 0:
             self._leave_family(point, family, stop > start)
@@ -170,22 +160,6 @@ class Explorer(Tracer):
             self.observer.warn(
                 f"The arithmetic of this mesh leaves the sign of eigenvalues up to {inertia.resolution:.2g} open, and "
                 f"the lowest bending one is {inertia.scale:.2g}: take larger elements, or a lower degree."
-            )
-
-    def _check_forces(self, point: Point) -> None:
-        """Warn where the forces of the first state may be round-off alone: a rod as long as its ends are apart is taut.
-
-        Its constraints leave it no freedom, and no force in it is determined: Newton's method converges by round-off.
-        """
-        system = self.solver.system
-        sizes = system.in_units(point.x, -1).copy()
-        system.set_load(sizes, 0.0)
-        most = sizes.norm(PETSc.NormType.INFINITY)
-        if most > TAUT:
-            self.observer.warn(
-                f"At {self.scene.load} = {point.load:g} the forces in the first state are {most:.1e} times bending "
-                "stiffness over length squared: if the rod is as long as its ends are apart they are not determined, "
-                "and the first rows are not resolved; begin the range where the rod is slack."
             )
 
     def _leave_family(self, point: Point, freedoms: int, increasing: bool) -> None:

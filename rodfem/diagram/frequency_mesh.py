@@ -16,6 +16,7 @@ from mpi4py import MPI
 
 from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.static_solver import StaticSolver
+from rodfem.diagram.first_state import first_state
 from rodfem.diagram.held import at_load
 from rodfem.errors import Argument, ConvergenceError, Remedy
 from rodfem.fem.fields import Discretization
@@ -66,7 +67,7 @@ def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndar
     """Eigenvalues mu nearest the origin at each of the loads, two more than ``number``."""
     solver = StaticSolver(system)
     eigensolver = NonsymmetricSolver(solver.system)
-    x, _ = solver.first(float(loads[0]))
+    x, _ = first_state(solver, float(loads[0]))
     found = []
     for load in loads:
         x = at_load(solver, x, float(load))

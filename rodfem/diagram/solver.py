@@ -19,6 +19,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.deflation.search import find_equilibria
+from rodfem.diagram.first_state import first_state
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import Argument, ConvergenceError, InputError, Remedy
@@ -35,7 +36,7 @@ from rodfem.problem.arguments import Check, a, checked, count, each, number, pat
 from rodfem.problem.scene import Scene
 from rodfem.stability import subspaces
 from rodfem.stability.assessment import Verdict, assess
-from rodfem.stability.rank import require_independent_constraints
+from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.timing import Clock
 
 
@@ -159,9 +160,6 @@ class Solver:
     def _kinks(self) -> KinksAt:
         return KinksAt(self.equilibria.shape)
 
-    _independent = False
-    """Whether the constraints of the scene are known to be so: of others a matrix tells nothing but round-off."""
-
     @cached_property
     def _sweep(self) -> Sweep:
         return Sweep(self.equilibria, Plan(self.scene.span), Observer(), lambda: None)
@@ -209,7 +207,7 @@ class Solver:
         scene, found = self.scene, self.equilibria
         scene.parameters[scene.load].check(scene.load, load)
         if guess is None:
-            x, outcome = found.first(load)
+            x, outcome = first_state(found, load)
         else:
             x, outcome = found.at_load(self._state(guess), load)
         if not outcome.converged:
@@ -218,9 +216,8 @@ class Solver:
                 "state before."
             )
         found.require_convexity(x)
-        if scene.constraints and not self._independent:
-            require_independent_constraints(found.system, x, found.start(load))
-            self._independent = True
+        if guess is not None and may_depend(found.shape, x):
+            require_independent_constraints(found.shape, x, found.start(load))
         point, mesh = self.point(x), self.equilibria.system.fields.discretization
         if isinstance(found, BranchSolver):
             check_index(scene, load, point.index, mesh.elements * mesh.degree)

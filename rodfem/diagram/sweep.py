@@ -22,6 +22,7 @@ from rodfem.continuation.prediction import ROWS, predict_at_load
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.critical_loads import CriticalLoads
 from rodfem.diagram.first_name import name_of_first
+from rodfem.diagram.first_state import first_state
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, FrequencyRows, Row, leftmost
 from rodfem.diagram.held import at_load, require_held
 from rodfem.diagram.kinks import Kinks
@@ -33,7 +34,6 @@ from rodfem.problem.fast_load import FastLoad
 from rodfem.stability.cluster import Cluster
 from rodfem.stability.frequencies import REAL, Frequencies
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-from rodfem.stability.rank import require_independent_constraints
 from rodfem.tolerances import unit
 
 LOADS = 101
@@ -104,11 +104,9 @@ class Sweep:
         between = np.linspace(fast.low, fast.high, FAST, endpoint=False).ravel()
         loads = np.unique([*np.linspace(a, b, LOADS), *self.plan.at, *between])
         loads = loads if a < b else loads[::-1]
-        x, _ = self.solver.first(a)
+        x, _ = first_state(self.solver, a)
         branch.name = name_of_first(self.solver.shape, [x, self.solver.at_load(x, float(loads[1]))[0]])
         self.observer.branch(branch)
-        if self.solver.system.scene.constraints:  # others are independent
-            require_independent_constraints(self.solver.system, x)
         x = at_load(self.solver, x, float(loads[0]))
         self.solver.require_convexity(x)
         if words := self.rows.first(x):

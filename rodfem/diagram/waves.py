@@ -16,8 +16,10 @@ import numpy as np
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.solver import Solver, check_index
+from rodfem.errors import ConvergenceError
 from rodfem.problem.roles import functions_of
 from rodfem.problem.scene import Scene
+from rodfem.stability.dependence import require_independent_constraints
 
 FEW = 4
 """Nodes for each half-wave below which the index is counted."""
@@ -68,10 +70,20 @@ def _bends(solver: BranchSolver, load: float) -> bool:
 
 
 def _index(solver: StaticSolver, load: float) -> int | None:
-    """Index of the scene's start at a load; None where that leads to no equilibrium."""
+    """Index of the scene's start at a load; None where that leads to no equilibrium.
+
+    Where the count breaks down constraints that depend on one another are named.
+    """
     assert isinstance(solver, BranchSolver)
-    x, outcome = solver.at_load(solver.start(load), load)
-    return solver.inertia.at(x).count().negative if outcome.converged else None
+    start = solver.start(load)
+    x, outcome = solver.at_load(start, load)
+    if not outcome.converged:
+        return None
+    try:
+        return solver.inertia.at(x).count().negative
+    except ConvergenceError:
+        require_independent_constraints(solver.shape, x, start)
+        raise
 
 
 def half_waves(scene: Scene, load: float) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 
+import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.compiled_newton import BROKEN, CONVERGED, Ended, Limits
@@ -152,7 +153,7 @@ def relax(
 
     Implicit steps longer than ``1/|mu|`` go uphill along a mode of a negative eigenvalue ``mu``, to a saddle.  Steps at
     most as long as ``longest`` lead away from one, and the way goes on while ``accepts`` denies what Newton's method
-    finds.
+    finds.  As ``mu`` grows on the way a step that is uphill, ``dx.(K + M/tau) dx < 0``, is made again, half as long.
 
     ``system`` has the equations, ``row`` (n,) is the last row of the bordered matrix, and at most ``most`` steps are
     taken.
@@ -169,6 +170,9 @@ def relax(
         size = system.norm(step)
         if not isfinite(size):
             break
+        if isfinite(longest) and along(system, equations, step) < 0:
+            tau *= 0.5
+            continue
         x.axpy(-(1.0 if size < LARGEST else LARGEST / size), step)  # constraints are mended in one step, however long
         # switched evolution: longer time steps while the motion is slow, shorter where it is fast
         tau = min(tau * (2.0 if size < 0.2 else 0.5 if size > LARGEST else 1.0), longest)
@@ -179,3 +183,17 @@ def relax(
                 trial.copy(x)
                 return outcome
     return NewtonResult(False, most, float("inf"), float("inf"))
+
+
+def along(system: System, equations: PETSc.Vec, step: PETSc.Vec) -> float:
+    """``dx.(K + M/tau) dx`` of a damped step (dx, dy) that solves ``(K + M/tau, C; C^t, 0) (dx, dy) = (F, c)``.
+
+    It is ``dx.F - dy.c``, of the ``equations`` (F, c) and the ``step`` of the ``system``.
+    """
+    fields, sign = system.fields, np.ones(step.local_size)
+    dual = [fields.number[fields.dofs[b.name]].ravel() for b in fields.blocks if b.multiplier]
+    moving = {x.name for x in fields.unknown_scalars if not x.multiplier}
+    dual.append(np.array([n for name, n in system.scalars.items() if name not in moving], dtype=int))
+    numbers, (first, last) = np.concatenate(dual), step.getOwnershipRange()
+    sign[numbers[(first <= numbers) & (numbers < last)] - first] = -1.0
+    return float(system.comm.allreduce(float(equations.array_r @ (sign * step.array_r))))

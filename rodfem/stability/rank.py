@@ -19,25 +19,23 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
-from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.fem.system import System
 from rodfem.linalg.matrices import gathered
 from rodfem.linalg.orthogonal import generic
-from rodfem.stability.blocks import Blocks, Pencil
+from rodfem.stability.blocks import Pencil
 from rodfem.stability.projection import factored
 
 DEPENDENT = 1e-12
 """A singular value below this, relative to the greatest column of ``C``, is zero."""
-ROUND = 1e-9
-"""Distance from the scene's start, in the metric, below which a state is that start: Newton's tolerance."""
 DIRECTION = 1e-6
 """Relative tolerance of ARPACK for the vector of the least singular value."""
 PASSES = 8
 """Number of times that rows and columns are scaled by the roots of their norms: each halves what is left in digits."""
 SMALL = 300
 """Number of columns up to which the singular values are computed by LAPACK."""
+REMEDY = "remove those that follow from the others."
+"""What to do about constraints that depend on one another."""
 NAMES = {"eta": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
 
 
@@ -46,7 +44,7 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     C = sp.csr_matrix(C)
     m, p = C.shape
     if p <= SMALL or p > m:
-        _, s, vt = np.linalg.svd(C.toarray())
+        _, s, vt = np.linalg.svd(C.toarray(), full_matrices=p > m)
         return (float(s[-1]) if p <= m else 0.0), vt[-1]
     size = float(np.sqrt(np.asarray(C.multiply(C).sum(axis=0)).max()))
     try:
@@ -68,22 +66,31 @@ def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
     return float(np.linalg.norm(C @ vector)), vector
 
 
-def _norms(C: sp.spmatrix, axis: int) -> np.ndarray:
+def norms(C: sp.spmatrix, axis: int) -> np.ndarray:
     """Norms of columns (``axis`` 0) or rows; one for those that are zero."""
     squares = np.asarray(C.multiply(C).sum(axis=axis)).ravel()
     return np.asarray(np.sqrt(np.where(squares > 0, squares, 1.0)))
 
 
-def _greatest(C: sp.spmatrix, axis: int) -> float:
-    return float(_norms(C, axis).max())
+def greatest(C: sp.spmatrix, axis: int) -> float:
+    """Greatest norm of columns (``axis`` 0) or rows."""
+    return float(norms(C, axis).max())
 
 
 def _equilibrated(C: sp.spmatrix) -> sp.spmatrix:
     """Matrix of the same rank whose rows and columns have norms near one (D. Ruiz, RAL-TR-2001-034)."""
     for _ in range(PASSES):
-        rows, columns = (1 / np.sqrt(_norms(C, axis)) for axis in (1, 0))
+        rows, columns = (1 / np.sqrt(norms(C, axis)) for axis in (1, 0))
         C = sp.diags(rows) @ C @ sp.diags(columns)
     return C
+
+
+def units(pencil: Pencil, length: float) -> np.ndarray:
+    """Natural size of each row (m,) of a pencil: that of a position is the ``length`` of the rod."""
+    comm, found = pencil.K.comm.tompi4py(), np.ones(pencil.C.size[0])
+    for name in ("r", "ends"):
+        found[np.concatenate(comm.allgather(pencil.where.get(name, np.zeros(0, dtype=int)))).astype(int)] = length
+    return found
 
 
 def _without_noise(pencil: Pencil, C: sp.spmatrix, length: float) -> sp.spmatrix:
@@ -92,17 +99,14 @@ def _without_noise(pencil: Pencil, C: sp.spmatrix, length: float) -> sp.spmatrix
     A row of nothing else would be one of norm one when it is equilibrated.  Derivatives in a position are those in
     ``length``, so that none of the two kinds of entries is small for its unit.
     """
-    comm, units = pencil.K.comm.tompi4py(), np.ones(C.shape[0])
-    for name in ("r", "ends"):
-        units[np.concatenate(comm.allgather(pencil.where.get(name, np.zeros(0, dtype=int)))).astype(int)] = length
-    C = sp.csc_matrix(sp.diags(units) @ C)
+    C = sp.csc_matrix(sp.diags(units(pencil, length)) @ C)
     largest = np.asarray(abs(C).max(axis=0).todense()).ravel()
     C.data[abs(C.data) <= DEPENDENT * np.repeat(largest, np.diff(C.indptr))] = 0.0
     C.eliminate_zeros()
     return C
 
 
-def rank_of(pencil: Pencil, scalars: Sequence[str] = (), length: float = 1.0) -> float:
+def rank_of(pencil: Pencil, scalars: Sequence[str] = (), length: float = 1.0, remedy: str = REMEDY) -> float:
     """``sigma_min(C)`` of a pencil; infinite without constraints.
 
     Parameters
@@ -113,6 +117,8 @@ def rank_of(pencil: Pencil, scalars: Sequence[str] = (), length: float = 1.0) ->
         Words for its scalar multipliers.
     length
         Of the rod: positions are measured by it where units must not count.
+    remedy
+        What to do about constraints that depend on one another.
 
     Raises :class:`SceneError` that names the constraints which depend on one another.
     """
@@ -120,14 +126,33 @@ def rank_of(pencil: Pencil, scalars: Sequence[str] = (), length: float = 1.0) ->
     if not C.shape[1]:
         return np.inf
     sigma, vector = smallest_singular(C)
-    if sigma > DEPENDENT * _greatest(C, 0):
+    if sigma > DEPENDENT * greatest(C, 0):
         return sigma
     # in metres and newtons of a molecule, say, columns are of very different sizes
     equal = _equilibrated(_without_noise(pencil, C, length))
     least, vector = smallest_singular(equal)
-    if least > DEPENDENT * _greatest(equal, 0):
+    if least > DEPENDENT * greatest(equal, 0):
         return sigma
-    comm = pencil.K.comm.tompi4py()
+    raise SceneError(dependent(pencil, scalars, vector, sigma, remedy))
+
+
+def dependent(pencil: Pencil, scalars: Sequence[str], vector: np.ndarray, sigma: float, remedy: str) -> str:
+    """Sentence on constraints whose gradients cancel.
+
+    Parameters
+    ----------
+    pencil
+        Blocks of the state.
+    scalars
+        Words for its scalar multipliers.
+    vector
+        Multipliers (p,) with which they cancel.
+    sigma
+        Smallest singular value of ``C``.
+    remedy
+        What to do about them.
+    """
+    comm, vector = pencil.K.comm.tompi4py(), vector / np.linalg.norm(vector)
     shares = {}
     for name in NAMES:
         columns = np.concatenate(comm.allgather(pencil.where.get(name, np.zeros(0, dtype=int)))).astype(int)
@@ -142,19 +167,4 @@ def rank_of(pencil: Pencil, scalars: Sequence[str] = (), length: float = 1.0) ->
         else:
             place = pencil.place[columns[np.argmax(abs(vector[columns]))]] if len(columns) else np.nan
             words.append(f"{NAMES[name]} (most of all at s = {place:.4g})")
-    raise SceneError(
-        f"Constraints depend on one another ({' and '.join(words)}; smallest singular value {sigma:.1e}): "
-        "remove those that follow from the others."
-    )
-
-
-def require_independent_constraints(system: System, x: PETSc.Vec, start: PETSc.Vec | None = None) -> None:
-    """Raise :class:`SceneError` that names the constraints, if some at the state ``x`` follow from others.
-
-    Where ``x`` is the scene's ``start`` but for round-off they are taken there, where gradients that vanish are zero.
-    """
-    if start is not None and system.norm(start - x) < ROUND:
-        x = start
-    scalars = [u for u in system.fields.unknown_scalars if u.multiplier]
-    words = [u.group.equation.format(u.component + 1) for u in scalars]
-    rank_of(Blocks(system, "full").assemble(x), words, system.scene.length)
+    return f"Constraints depend on one another ({' and '.join(words)}; smallest singular value {sigma:.1e}): {remedy}"

@@ -1,0 +1,39 @@
+"""The way down from a saddle: what a damped step does along itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hard.fuzz import wider
+
+from rodfem import Discretization, Solver
+from rodfem.fem.newton import along
+from rodfem.stability.blocks import Blocks
+
+
+@pytest.mark.parametrize("times", [1, 4, 8, 100])
+def test_a_step_is_uphill_where_it_is_too_long(times: float) -> None:
+    """``dx.(K + M/tau) dx`` by the blocks of the state; past the growth of the unstable mode it is negative."""
+    solver = Solver(wider.scene(3, 144)[0], Discretization("pointwise", 5, 6))
+    e, load = solver.equilibria, solver.scene.span[0]
+    saddle, _ = e.at_load(e.start(load), load)
+    x, half = e.off(saddle, e.start(load))
+    equations, step, weighed = (e.system.new_vector() for _ in range(3))
+    state = e.system.at(x)
+    state.residual(equations)
+    state.factor(e.axis, damping=1.0 / (times * half))
+    assert e.system.solve(equations, step)
+    blocks = Blocks(e.system, "full")
+    K = blocks.assemble(x).K
+    own = blocks.rows - step.getOwnershipRange()[0]
+    moved, pulled = K.createVecs()
+    moved.array[:] = step.array_r[own]
+    K.mult(moved, pulled)
+    dual = np.ones(step.local_size, dtype=bool)
+    dual[own] = False
+    motion = step.copy()
+    motion.array[dual] = 0.0
+    e.system.metric.mult(motion, weighed)
+    found = along(e.system, equations, step)
+    assert found == pytest.approx(moved.dot(pulled) + weighed.dot(motion) / (times * half), rel=1e-9)
+    assert (found > 0) is (times < 6)

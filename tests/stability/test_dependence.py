@@ -1,0 +1,133 @@
+"""Constraints that depend on one another at a state that is not known to all digits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rodfem import (
+    Discretization,
+    Ordinate,
+    Plan,
+    Scene,
+    Solver,
+    StepControl,
+    at,
+    clamped,
+    everywhere,
+    pinned,
+    sliding,
+    trace,
+)
+from rodfem.continuation.static_solver import StaticSolver
+from rodfem.errors import SceneError
+from rodfem.linalg.matrices import gathered
+from rodfem.stability.blocks import Blocks
+from rodfem.stability.dependence import _distance, require_independent_constraints
+from rodfem.stability.rank import smallest_singular
+
+MESHES = [(3, 3), (2, 2), (4, 3), (7, 5), (24, 1), (30, 4)]
+PLAN = Plan(depth=0, steps=StepControl(most=3), error_bars=False)
+
+
+def shortened(far: Any = clamped, near: Any = clamped, rod: str = "unshearable and inextensible", **more: Any) -> Scene:
+    """A straight column whose far end comes nearer by P."""
+
+    def energy(v: Any, k: Any, c: Any) -> Any:
+        bent = 0.5 * (k[0] ** 2 + 1.2 * k[1] ** 2 + k[2] ** 2)
+        return bent + 30 * (v[0] ** 2 + v[1] ** 2) if rod == "inextensible" else bent
+
+    ends = near(), far(lambda c: (0.0, 0.0, 1 - c.P))
+    middle = Ordinate("middle", s=0.5, of=lambda r, q: float(np.hypot(r[0], r[1])))
+    return Scene("shortened", (0.0, 1.0), rod, energy, {"P": 0.0}, "P", ends, middle, **({"span": (0.0, 0.3)} | more))
+
+
+def solver_of(scene: Scene, formulation: str, mesh: tuple[int, int], factors: str = "chain") -> StaticSolver:
+    """Solver on a mesh of so many elements of that degree."""
+    return Solver(scene, Discretization(formulation, *mesh, factors=factors)).equilibria
+
+
+@pytest.mark.parametrize("factors", ["chain", "petsc"])
+@pytest.mark.parametrize("formulation", ["pointwise", "reduced"])
+@pytest.mark.parametrize("mesh", MESHES)
+def test_a_taut_rod_is_refused_on_any_mesh(formulation: str, mesh: tuple[int, int], factors: str) -> None:
+    """Any tension balances it: by round-off Newton's method found one of its buckling thrusts, or nothing."""
+    for scene in (shortened(), shortened(pinned, pinned, planar="e2")):
+        with pytest.raises(SceneError, match=r"depend on one another .*is taut.*begin where it is slack.*\.$"):
+            trace(scene, Discretization(formulation, *mesh, factors=factors), PLAN)
+
+
+@pytest.mark.parametrize("mesh", [(5, 4), (9, 2)])
+def test_so_is_one_that_may_shear(mesh: tuple[int, int]) -> None:
+    """To first order shear does not lengthen a straight rod either."""
+    with pytest.raises(SceneError, match="is taut"):
+        trace(shortened(rod="inextensible"), Discretization("pointwise", *mesh), PLAN)
+
+
+@pytest.mark.parametrize("formulation", ["pointwise", "reduced"])
+@pytest.mark.parametrize("mesh", [(4, 3), (7, 5), (40, 2)])
+@pytest.mark.parametrize("slack", [1e-8, 1e-4])
+def test_the_distance_of_a_slack_rod_from_the_taut_one(formulation: str, mesh: tuple[int, int], slack: float) -> None:
+    """Its turning in closed form, ``2 sqrt(P) sin(2 pi s)``: a bound that neither the mesh nor its degree changes."""
+    solver = solver_of(shortened(planar="e2"), formulation, mesh)
+    x, _ = solver.first(1e-3)
+    for load in 10.0 ** np.arange(-4, np.log10(slack) - 0.5, -1):
+        x, outcome = solver.at_load(x, load)
+        assert outcome.converged
+    blocks = Blocks(solver.system, "full")
+    pencil = blocks.assemble(x)
+    s = solver.shape.sample(x)["s"][1:-1]
+    turning = float(np.linalg.norm(2 * np.sqrt(slack) * np.sin(2 * np.pi * s))) / np.sqrt(pencil.K.size[0])
+    _, w = smallest_singular(gathered(pencil.C))
+    assert 0.6 * turning < _distance(blocks, x, pencil, w) < 1.01 * turning
+    require_independent_constraints(solver.shape, x)
+
+
+def test_a_state_given_is_looked_at_as_well() -> None:
+    """At P = 0 each thrust of a buckled rod is that of a state."""
+    solver = Solver(shortened(), Discretization("pointwise", 6, 4))
+    point = solver.equilibrium(1e-3)
+    for load in 10.0 ** np.arange(-4, -11, -1):
+        point = solver.equilibrium(float(load), point)
+    with pytest.raises(SceneError, match="is taut"):
+        solver.equilibrium(0.0, point)
+
+
+@pytest.mark.parametrize("factors", ["chain", "petsc"])
+@pytest.mark.parametrize("mesh", [(4, 3), (5, 6), (7, 5)])
+def test_a_rod_that_is_held_twice_is_refused_on_any_mesh(mesh: tuple[int, int], factors: str) -> None:
+    """Straight, clamped at both ends and bent about d2 alone: ``k1 = 0`` says already how the one is turned about d1.
+
+    One of these meshes was traced, for Newton's method ended 1e-8 beside the straight state.
+    """
+
+    def energy(v: Any, k: Any, c: Any) -> Any:
+        return 0.5 * (1.3 * k[0] ** 2 + (k[1] - 0.4) ** 2 + 1.5 * k[2] ** 2) + 200 * (v[2] - 1) ** 2
+
+    held = everywhere(lambda x, c: x.k[0], strain=True)
+    ends = clamped(), sliding(lambda c: (None, None, None), force=lambda c: (0.05 * c.P, 0.0, -c.P))
+    tip = Ordinate("tip", s=1.0, of=lambda r, q: r[0])
+    rod = Scene("twice", (0.0, 1.0), "unshearable", energy, {"P": 0.0}, "P", ends, tip, (0.0, 1.0), constraints=(held,))
+    with pytest.raises(SceneError, match=r"depend on one another.*remove"):
+        trace(rod, Discretization("pointwise", *mesh, factors=factors), PLAN)
+    bent = rod.varying("P", (5.0, 6.0))  # bent about d2 the turn about d1 is no integral of k1 alone
+    assert trace(bent, Discretization("pointwise", *mesh, factors=factors), PLAN)[0].points[0].negative == 0
+
+
+def test_neither_units_nor_small_numbers_make_constraints_depend() -> None:
+    """Of a rod a nanometre long, in metres, and of a constraint that is multiplied by 1e-9."""
+    for length, small in ((1e-9, 1.0), (1.0, 1e-9), (1e6, 1e-9)):
+
+        def kept(x: Any, c: Any, small: float = small) -> Any:
+            return small * x.r[0]
+
+        scene = Scene(
+            "small", (0.0, length), "unshearable and inextensible",
+            lambda v, k, c, length=length: 0.5 * length * (k[0] ** 2 + 1.2 * k[1] ** 2 + k[2] ** 2), {"P": 0.0}, "P",
+            (clamped(), sliding(lambda c: (None, None, None), force=lambda c: (0.0, 0.0, -c.P))),
+            Ordinate("tip", s=length, of=lambda r, q: r[0]), (0.0, 1.0 / length),
+            constraints=(at(0.5 * length, kept),),
+        )  # fmt: skip
+        assert Solver(scene, Discretization("pointwise", 4, 4)).equilibrium(0.0).negative == 0
