@@ -23,6 +23,8 @@ ALONG = 1e-13
 TOUCHES = 1e-7
 """Distance to which it is known where a function touches zero, relative to the piece: of its lowest value, which is
 quadratic there, the square is round-off."""
+TRIED = 4
+"""Number of states, each with another round-off, whose values are compared."""
 NEAREST, WIDER = 1e-5, 10.0
 """Half length of the first piece on which an event is sought near a state, relative to the last one; and the ratio of
 two that follow: of two zeros the nearer one is to be found."""
@@ -90,9 +92,12 @@ def event_at(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:
 def noise_of(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:
     """How much the value of an event varies with the round-off of a state; collective."""
     first, last = x.getOwnershipRange()
-    other = x.copy()
-    other.array[:] += ROUND_OFF * generic(np.arange(first, last))
-    return abs(event_at(solver, event, other) - event_at(solver, event, x))
+    here, most = event_at(solver, event, x), 0.0
+    for which in range(TRIED):
+        other = x.copy()
+        other.array[:] += ROUND_OFF * generic(np.arange(first, last), which)
+        most = max(most, abs(event_at(solver, event, other) - here))
+    return most
 
 
 def nearest_event(solver: BranchSolver, event: Event, curve: Curve, reach: float) -> Found:

@@ -19,6 +19,8 @@ MIDDLE = 0.46
 """Place of the middle of a piece, relative to it."""
 NODES = np.array([0.0, MIDDLE**2, MIDDLE, MIDDLE + (1 - MIDDLE) * MIDDLE, 1.0])
 """Nodes of a piece: its ends, its middle, and those of its halves."""
+INNER = [float(t) for t in NODES[1:-1]]
+"""Those between its ends."""
 POWERS = np.linalg.inv(np.vander(NODES, increasing=True))
 """Coefficients of the quartic through five values, by rising powers."""
 CLOSE = 0.03
@@ -36,6 +38,7 @@ DEEPEST = 7
 MOST = 400
 """Samples of an interval."""
 Function = Callable[[float], float]
+Piece = tuple[float, float]
 
 
 @dataclass
@@ -43,55 +46,61 @@ class Samples:
     """Values of a function by its arguments, and the ``unresolved`` pieces on which they do not explain it."""
 
     values: dict[float, float]
-    unresolved: list[tuple[float, float]] = field(default_factory=list)
+    unresolved: list[Piece] = field(default_factory=list)
 
     def in_order(self) -> list[tuple[float, float]]:
         """Arguments and values, by rising arguments."""
         return sorted(self.values.items())
 
 
-def sampled(f: Function, low: float, high: float, ends: tuple[float, float], noise: Callable[[], float]) -> Samples:
+def sampled(f: Function, low: float, high: float, ends: tuple[float, float], noise: Function) -> Samples:
     """Sample ``f`` between ``low`` and ``high``, at which it has the values ``ends``.
 
-    Extremes that may come near zero are among the samples.  ``noise()`` is the part of a value that is round-off: what
-    varies by less is not looked into.
+    Extremes that may come near zero are among the samples.  ``noise(s)`` is the part of a value that is round-off:
+    what varies by less is not looked into.
     """
     out = Samples({low: ends[0], high: ends[1]})
+    more(f, out, (low, high), noise)
+    return out
+
+
+def more(f: Function, out: Samples, piece: Piece, noise: Function) -> None:
+    """Add samples of a ``piece`` to ``out``, as :func:`sampled` takes them."""
+    before = len(out.values)
 
     def at(s: float) -> float:
         if s not in out.values:
             out.values[s] = f(s)
         return out.values[s]
 
-    pieces = deque([(low, high, 0)])
+    pieces = deque([(*piece, 0)])
     while pieces:
         p, q, depth = pieces.popleft()
-        s = [p, *(p + (q - p) * NODES[1:-1]).tolist(), q]
+        s = [p, *(p + (q - p) * t for t in INNER), q]
         y = [at(node) for node in s]
         spread, least = max(y) - min(y), min(map(abs, y))
         error = _misfit(y)
         if least > FAR * spread:
             continue
         one_sign = all(y[0] * value > 0 for value in y)
-        if (error <= CLOSE * spread and not (one_sign and least < SAFE * error)) or error <= noise():
+        if (error <= CLOSE * spread and not (one_sign and least < SAFE * error)) or error <= noise(s[2]):
             if least < LOW * spread:
                 for node in _extremes(y):
                     at(p + (q - p) * node)
-        elif depth == DEEPEST or len(out.values) >= MOST:
+        elif depth == DEEPEST or len(out.values) - before >= MOST:
             if depth < DEEPEST or _turns(y) > 1:
                 out.unresolved.append((p, q))
             elif one_sign:  # a corner, of a least distance say
                 lowest_between(lambda t: abs(at(t)), p, s[2], q, CORNER * (q - p))
         else:
             pieces += [(p, s[2], depth + 1), (s[2], q, depth + 1)]
-    return out
 
 
 def _misfit(y: list[float]) -> float:
     """Error of the parabola through the first, the third and the last value at the other two."""
     first = (y[2] - y[0]) / MIDDLE
     second = (y[4] - y[0] - first) / (1 - MIDDLE)
-    told = (y[0] + t * (first + second * (t - MIDDLE)) for t in (float(NODES[1]), float(NODES[3])))
+    told = (y[0] + t * (first + second * (t - MIDDLE)) for t in (INNER[0], INNER[2]))
     return max(abs(value - y[i]) for value, i in zip(told, (1, 3), strict=True))
 
 
