@@ -33,6 +33,11 @@ FAR = 10.0
 """A function this many times farther from zero than its samples vary has no zero between them."""
 LOW = 0.2
 """Least value on a piece, relative to how much the samples vary, above which no extreme between them is looked for."""
+NEARER, NARROW = 0.7, 1e-6
+"""A sample between two that are farther from zero is looked at below this part of the largest one, if these two are not
+nearer to each other than this part of the interval."""
+BESIDE = 1e-9
+"""Distance from an end, relative to the interval, at which a sample shows whether the function comes nearer to zero."""
 DEEPEST = 7
 """How many times a piece is divided."""
 MOST = 400
@@ -52,6 +57,15 @@ class Samples:
         """Arguments and values, by rising arguments."""
         return sorted(self.values.items())
 
+    def lowest(self) -> list[tuple[float, Piece]]:
+        """Samples of one sign between two that are farther from zero, each with these two."""
+        known, low = self.in_order(), NEARER * max(map(abs, self.values.values()))
+        return [
+            (s, (p, q))
+            for (p, x), (s, y), (q, z) in zip(known, known[1:], known[2:], strict=False)
+            if abs(y) < low and x * y > 0 < y * z and abs(y) <= min(abs(x), abs(z))
+        ]
+
 
 def sampled(f: Function, low: float, high: float, ends: tuple[float, float], noise: Function) -> Samples:
     """Sample ``f`` between ``low`` and ``high``, at which it has the values ``ends``.
@@ -59,8 +73,16 @@ def sampled(f: Function, low: float, high: float, ends: tuple[float, float], noi
     Extremes that may come near zero are among the samples.  ``noise(s)`` is the part of a value that is round-off:
     what varies by less is not looked into.
     """
-    out = Samples({low: ends[0], high: ends[1]})
+    out, seen = Samples({low: ends[0], high: ends[1]}), set[float]()
     more(f, out, (low, high), noise)
+    for s, y, way in ((low, ends[0], BESIDE), (high, ends[1], -BESIDE)):
+        if abs(y) < NEARER * max(map(abs, out.values.values())):
+            out.values[s + way * (high - low)] = f(s + way * (high - low))
+    while new := [(s, piece) for s, piece in out.lowest() if s not in seen]:
+        for s, (p, q) in new:  # where two pieces meet there may be a root, of which each has one side
+            seen.add(s)
+            if q - p > NARROW * (high - low):
+                more(f, out, (p, q), noise)
     return out
 
 
