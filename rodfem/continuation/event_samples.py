@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rodfem.roots import lowest_between
+from rodfem.roots import ROUND_OFF, lowest_between
 
 MIDDLE = 0.46
 """Place of the middle of a piece, relative to it."""
@@ -54,8 +54,12 @@ class Samples:
     unresolved: list[Piece] = field(default_factory=list)
 
     def in_order(self) -> list[tuple[float, float]]:
-        """Arguments and values, by rising arguments."""
-        return sorted(self.values.items())
+        """Arguments and values, by rising arguments: of two that are one to round-off the first."""
+        out: list[tuple[float, float]] = []
+        for s, y in sorted(self.values.items()):
+            if not out or s - out[-1][0] > ROUND_OFF * max(abs(s), abs(out[-1][0])):
+                out.append((s, y))
+        return out
 
     def lowest(self) -> list[tuple[float, Piece]]:
         """Samples of one sign between two that are farther from zero, each with these two."""

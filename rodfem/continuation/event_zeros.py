@@ -15,6 +15,8 @@ from rodfem.roots import lowest_between, zero_between
 
 NEAR = 0.1
 """A lowest value below this part of how much the samples vary may be zero."""
+NEARLY = 1e-2
+"""A lowest value below this part of the largest sample may have zeros beside it that are no farther apart."""
 EXACT = 1e-13
 """Distance to which a change of sign is located."""
 FINE = 1e-11
@@ -70,14 +72,19 @@ class Zeros:
     def look_around(self) -> None:
         """Sample the function at all distances from its zeros, and from those that come out, and locate what is there."""
         done: set[Zero] = set()
-        while new := [zero for zero in self.found if zero not in done]:
-            done |= set(new)
-            ends = [self.low, *(0.5 * (p.high + q.low) for p, q in pairwise(self.found)), self.high]
-            for zero, low, high in zip(self.found, ends, ends[1:], strict=False):
-                if zero in new:
-                    self._graded(zero.low, low)
-                    self._graded(zero.high, high)
+        while new := set(middles := self._middles()) - done:
+            done |= new
+            ends = [self.low, *(0.5 * (p.high + q.low) for p, q in pairwise(middles)), self.high]
+            for middle, low, high in zip(middles, ends, ends[1:], strict=False):
+                if middle in new:
+                    self._graded(middle.low, low)
+                    self._graded(middle.high, high)
             self.locate()
+
+    def _middles(self) -> list[Zero]:
+        """Zeros, and lowest values that are nearly zero, around which others may be."""
+        low = NEARLY * max(map(abs, self.samples.values.values()))
+        return sorted([*self.found, *(Zero(s, s, s) for s in self.above if abs(self.f(s)) < low)])
 
     def add(self, s: float, width: float = EXACT) -> None:
         """Take ``s`` for a zero, known to ``width``: what is zero to round-off around it is the same one."""
@@ -133,6 +140,9 @@ class Zeros:
             beside = [s - width, s + width]
         else:
             low, beside = abs(self.f(s)), [s + width if s == self.low else s - width]
+            if 0.0 <= sign * self.f(beside[0]) < low:  # it is lowest inside
+                self.samples.values[beside[0]] = self.f(beside[0])
+                return []
         if low <= max(self._level(s), SURE * (min(abs(self.f(t)) for t in beside) - low)):
             return [(s, width)]
         self.above.append(s)
