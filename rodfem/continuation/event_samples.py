@@ -41,7 +41,7 @@ BESIDE = 1e-9
 DEEPEST = 7
 """How many times a piece is divided."""
 MOST = 400
-"""Samples of an interval."""
+"""Samples of an interval, but for those around lowest values: as many."""
 Function = Callable[[float], float]
 Piece = tuple[float, float]
 
@@ -85,7 +85,9 @@ def sampled(f: Function, low: float, high: float, ends: tuple[float, float], noi
     while new := [(s, piece) for s, piece in out.lowest() if s not in seen]:
         for s, (p, q) in new:  # where two pieces meet there may be a root, of which each has one side
             seen.add(s)
-            if q - p > NARROW * (high - low):
+            if len(out.values) >= 2 * MOST:
+                out.unresolved.append((p, q))
+            elif q - p > NARROW * (high - low):
                 more(f, out, (p, q), noise)
     return out
 

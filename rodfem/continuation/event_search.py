@@ -66,29 +66,27 @@ class Search:
         Raises :class:`ConvergenceError` where an equilibrium is not found.
         """
         a, b = self.a.arclength, self.b.arclength
-        self.ends = {a: ends[0], b: ends[1]}
-        around = False
+        self.ends = dict(zip((a, b), ends, strict=True))
         for _ in range(ROUNDS):
             self.known = self.ends.copy()
             samples = sampled(self._value if self.curve.solved else f, a, b, ends, lambda s: self.rough())
-            largest = max(map(abs, samples.values.values()))
-            if min(map(abs, samples.values.values())) == 0.0 and largest <= self.rough():
+            sizes = [abs(y) for y in samples.values.values()]
+            if min(sizes) == 0.0 and max(sizes) <= self.rough():
                 return Happens([], [], still=[(a, b)])
-            if sum(q - p for p, q in samples.unresolved) > NOISY * self.length:
+            noisy = sum(q - p for p, q in samples.unresolved) > NOISY * self.length
+            if noisy:
                 samples = Samples(self.ends.copy(), samples.unresolved)
             self.known |= samples.values
             zeros = Zeros(self._value, samples, self._noise)
             if a - last <= INSIDE * self.length:
                 zeros.add(a)
             zeros.locate()
-            if around:
+            if not (places := self._open(zeros)) and not noisy:
                 zeros.look_around()
-            open_ = self._open(zeros)
-            if not open_:
-                if around or not (zeros.found or zeros.above):
-                    return self._happens(zeros, last)
-                around = True
-            for s in open_:
+                places = self._open(zeros)
+            if not places:
+                return self._happens(zeros, last)
+            for s in places:
                 self.curve.solve(s)
         raise ConvergenceError(f"The zeros of the event {self.event.name!r} change with the states that are solved for.")
 

@@ -29,6 +29,8 @@ BESIDE = 1e-10
 """Distance from a zero, relative to the interval, at which the round-off of values is looked at."""
 WIDER, GRADE = 4.0, 8.0
 """Ratios of two distances from a zero: of those that are tried for its interval, and of the ends of a piece."""
+POWER = 0.05
+"""Relative difference of two ratios of values at such distances that are those of a power of the distance."""
 MOST = 6000
 """Samples of an interval, with those around zeros."""
 
@@ -76,7 +78,7 @@ class Zeros:
             done |= new
             ends = [self.low, *(0.5 * (p.high + q.low) for p, q in pairwise(middles)), self.high]
             for middle, low, high in zip(middles, ends, ends[1:], strict=False):
-                if middle in new:
+                if middle in new and len(self.samples.values) <= MOST:
                     self._graded(middle.low, low)
                     self._graded(middle.high, high)
             self.locate()
@@ -149,11 +151,21 @@ class Zeros:
         return []
 
     def _graded(self, near: float, far: float) -> None:
-        """Sample the function from beside a zero to a place that is ``far`` from it."""
-        way, distance = (1.0 if far > near else -1.0), RISES * FINE * self.length
+        """Sample the function from beside a zero to a place that is ``far`` from it.
+
+        Where it does not grow there as a power of the distance there is more to be seen.
+        """
+        way, whole, distance = (1.0 if far > near else -1.0), abs(far - near), RISES * FINE * self.length
         self.samples.unresolved = [(p, q) for p, q in self.samples.unresolved if not p <= near <= q]
-        while near != far and distance < abs(far - near):
-            ahead = min(GRADE * distance, abs(far - near))
-            p, q = sorted((near + way * distance, near + way * ahead))
-            more(self.f, self.samples, (p, q), self.noise)
-            distance = ahead
+        places, values = [near], [self.f(near)]
+        while distance < whole:
+            places.append(near + way * distance)
+            values.append(self.f(places[-1]))
+            distance *= GRADE
+        places, values = [*places, far], [*values, self.f(far)]
+        for i in range(1, len(places) - 1):
+            x, y, z = values[i - 1 : i + 2]
+            if i > 2 and i < len(places) - 2 and min(x * y, y * z) > 0 and abs(y * y / (x * z) - 1.0) < POWER:
+                continue
+            for p, q in pairwise(places[i - 1 : i + 2]):
+                more(self.f, self.samples, (min(p, q), max(p, q)), self.noise)
