@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.prediction import Knot, between
-from rodfem.continuation.states_between import solve_beside
+from rodfem.continuation.states_between import Curve, solve_beside
 from rodfem.errors import ConvergenceError
 
 ASIDE = 1e-6
@@ -49,23 +49,30 @@ class EventCurve:
 
     def solve(self, s: float) -> None:
         """Lead the curve through the equilibrium at ``s``; raises :class:`ConvergenceError`."""
-        solver = self.solver
-        x, there = solve_beside(solver, self, s, ASIDE * self.length)
-        direction = self(there)[1]
-        row = solver.row(direction)
-        try:
-            tangent = solver.tangent(row, at=x)
-            slope = float(row.dot(tangent))
-        except ConvergenceError:
-            slope = 0.0
-        if slope < ALONG:  # at a singular state the curve knows the direction better
-            tangent = direction
-        else:
-            tangent.scale(solver.system.norm(direction) / slope)
-        others = (other for other in self.solved if abs(other.arclength - there) > APART * self.length)
-        self.solved = sorted([*others, Solved(s, there, x, tangent)], key=lambda knot: knot.arclength)
+        knot = solved_on(self.solver, self, s, ASIDE * self.length)
+        others = (other for other in self.solved if abs(other.arclength - knot.arclength) > APART * self.length)
+        self.solved = sorted([*others, knot], key=lambda knot: knot.arclength)
         self._knots = [self.ends[0], *self.solved, self.ends[1]]
 
-    def nearest(self, s: float) -> Solved | None:
+    def nearest(self, s: float) -> Solved:
         """The equilibrium that was solved for nearest to ``s``."""
-        return min(self.solved, key=lambda node: abs(node.s - s), default=None)
+        return min(self.solved, key=lambda knot: abs(knot.s - s))
+
+
+def solved_on(solver: BranchSolver, curve: Curve, s: float, aside: float) -> Solved:
+    """The equilibrium across a ``curve`` at ``s``, or ``aside`` of it; raises :class:`ConvergenceError`.
+
+    ``solver`` has the mesh.
+    """
+    x, there = solve_beside(solver, curve, s, aside)
+    direction = curve(there)[1]
+    row = solver.row(direction)
+    try:
+        tangent = solver.tangent(row, at=x)
+        slope = float(row.dot(tangent))
+    except ConvergenceError:  # a singular state
+        slope = 0.0
+    if slope < ALONG:  # the curve knows the direction better
+        return Solved(s, there, x, direction)
+    tangent.scale(solver.system.norm(direction) / slope)
+    return Solved(s, there, x, tangent)

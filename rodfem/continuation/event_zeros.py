@@ -56,6 +56,7 @@ class Zeros:
         self.f, self.samples, self.noise = f, samples, noise
         self.low, self.high = min(samples.values), max(samples.values)
         self.length = self.high - self.low
+        self.fine = max(FINE * self.length, EXACT)
         self.found: list[Zero] = []
         self.above: list[float] = []
 
@@ -107,7 +108,7 @@ class Zeros:
 
     def _level(self, s: float) -> float:
         """Size of a value near ``s`` up to which it may be zero."""
-        beside = BESIDE * self.length  # at a corner, a root or a jump itself a value varies with the place, too
+        beside = max(BESIDE * self.length, RISES * self.fine)  # at a corner, a root or a jump itself a value varies with the place, too
         return SURE * min(self.noise(s - beside), self.noise(s + beside))
 
     def _segments(self) -> list[list[tuple[float, float]]]:
@@ -131,7 +132,7 @@ class Zeros:
 
     def _lowest(self, around: list[float], s: float, sign: float) -> list[tuple[float, float]]:
         """Look for the lowest value between the places ``around`` one, or at an end; return it if it is a zero."""
-        width = RISES * FINE * self.length
+        width = RISES * self.fine
         if any(abs(s - place) < width for place in self.above):
             return []
         if len(around) == 3:
@@ -155,7 +156,7 @@ class Zeros:
 
         Where it does not grow there as a power of the distance there is more to be seen.
         """
-        way, whole, distance = (1.0 if far > near else -1.0), abs(far - near), RISES * FINE * self.length
+        way, whole, distance = (1.0 if far > near else -1.0), abs(far - near), RISES * self.fine
         self.samples.unresolved = [(p, q) for p, q in self.samples.unresolved if not p <= near <= q]
         places, values = [near], [self.f(near)]
         while distance < whole:

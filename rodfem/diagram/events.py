@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_location import Found, event_at
-from rodfem.continuation.event_search import Happens, Search
+from rodfem.continuation.event_search import Happens, search
 from rodfem.continuation.prediction import between
 from rodfem.continuation.kinds import EVENT
 from rodfem.diagram.step import Step
@@ -86,7 +86,7 @@ class Events:
         """What an event does in a step, the last zero before at arclength ``last``; what is left open is kept."""
         solver, a, b = step.solver, step.a, step.b
         try:
-            happens = Search(solver, event, a, b)(lambda s: event(states(s)), ends, last)
+            happens = search(solver, event, (a, b), lambda s: event(states(s)), ends, last)
         except ConvergenceError:
             self._open[event.name].append((a.load, b.load))
             return Happens([], [])
