@@ -65,14 +65,14 @@ class OnCurve:
     def zeros(self, first: Callable[[float], float], ends: tuple[float, float], *, known: bool) -> Zeros | None:
         """Zeros at equilibria, and lowest values; None where the event is zero all along.
 
-        ``first(s)`` is the value at the state of the first curve, ``ends`` are those at its ends, of which the first one
-        may be ``known`` to be zero.  Raises :class:`ConvergenceError` where equilibria are not found.
+        ``first(s)`` is the value on the curve as it is now, ``ends`` are those at its ends, of which the first one may
+        be ``known`` to be zero.  Raises :class:`ConvergenceError` where equilibria are not found.
         """
         at_ends = dict(zip(self.places, ends, strict=True))
         for _ in range(ROUNDS):
             self.known = at_ends.copy()
             f = self if self.curve.solved else first
-            samples = sampled(f, *self.places, ends, lambda _: self.rough)
+            samples = sampled(f, self.places[0], self.places[-1], ends, lambda _: self.rough)
             sizes = [abs(y) for y in samples.values.values()]
             if min(sizes) == 0.0 and max(sizes) <= self.rough:
                 return None
@@ -91,7 +91,9 @@ class OnCurve:
                 return zeros
             for s in more:
                 self.curve.solve(s)
-        raise ConvergenceError(f"The zeros of the event {self.event.name!r} change with the states that are solved for.")
+        raise ConvergenceError(
+            f"The zeros of the event {self.event.name!r} change with the states that are solved for."
+        )
 
     def found(self, zero: Zero) -> Found:
         """A zero that is inside."""

@@ -45,4 +45,3 @@ def nearest_event(solver: BranchSolver, event: Event, curve: Curve, reach: float
                 return Found(lowest, x, along)
             along *= WIDER
     raise ConvergenceError(f"The event {event.name!r} does not happen near there.")
-

@@ -67,7 +67,7 @@ class Samples:
         return [
             (s, (p, q))
             for (p, x), (s, y), (q, z) in zip(known, known[1:], known[2:], strict=False)
-            if abs(y) < low and x * y > 0 < y * z and abs(y) <= min(abs(x), abs(z))
+            if abs(y) < low and x * y > 0 < y * z and abs(y) <= min(abs(x), abs(z)) and (x != y or y != z)
         ]
 
 

@@ -73,15 +73,16 @@ class Zeros:
                 self.add(s, width)
 
     def look_around(self) -> None:
-        """Sample the function at all distances from its zeros, and from those that come out, and locate what is there."""
+        """Sample the function at all distances from its zeros, and from those that come out, and locate these."""
         done: set[Zero] = set()
         while new := set(middles := self._middles()) - done:
             done |= new
             ends = [self.low, *(0.5 * (p.high + q.low) for p, q in pairwise(middles)), self.high]
             for middle, low, high in zip(middles, ends, ends[1:], strict=False):
                 if middle in new and len(self.samples.values) <= MOST:
-                    self._graded(middle.low, low)
-                    self._graded(middle.high, high)
+                    for near, far in ((middle.low, low), (middle.high, high)):
+                        if self.low < near < self.high:
+                            self._graded(near, far)
             self.locate()
 
     def _middles(self) -> list[Zero]:
@@ -91,13 +92,17 @@ class Zeros:
 
     def add(self, s: float, width: float = EXACT) -> None:
         """Take ``s`` for a zero, known to ``width``: what is zero to round-off around it is the same one."""
-        level, ends = self._level(s), []
-        for way in (-1.0, 1.0):
+        level, rooms = self._level(s), (s - self.low, self.high - s)
+        distances = []
+        for way, room in zip((-1.0, 1.0), rooms, strict=True):
             distance = width
-            while distance < self.length and abs(self.f(s + way * distance)) <= level:
+            while distance < room and abs(self.f(s + way * distance)) <= level:
                 distance *= WIDER
-            ends.append(s + way * distance)
-        zero = Zero(s, *ends)
+            distances.append(distance)
+        # beyond an end, where a function may have no value, it is taken for what it is on the other side
+        known = [d for d, room in zip(distances, rooms, strict=True) if d < room]
+        left, right = (d if d < room else max([room, *known]) for d, room in zip(distances, rooms, strict=True))
+        zero = Zero(s, s - left, s + right)
         for other in [other for other in self.found if other.low < zero.high and zero.low < other.high]:
             self.found.remove(other)
             zero = Zero(s, min(zero.low, other.low), max(zero.high, other.high))
@@ -108,8 +113,8 @@ class Zeros:
 
     def _level(self, s: float) -> float:
         """Size of a value near ``s`` up to which it may be zero."""
-        beside = max(BESIDE * self.length, RISES * self.fine)  # at a corner, a root or a jump itself a value varies with the place, too
-        return SURE * min(self.noise(s - beside), self.noise(s + beside))
+        beside = max(BESIDE * self.length, RISES * self.fine)  # at a root or a jump it varies with the place, too
+        return SURE * min(self.noise(max(s - beside, self.low)), self.noise(min(s + beside, self.high)))
 
     def _segments(self) -> list[list[tuple[float, float]]]:
         """Samples in order, in pieces between zeros."""
@@ -140,7 +145,7 @@ class Zeros:
             self.samples.values[s] = sign * low
             if low < 0.0:  # changes of sign are beside it
                 return []
-            beside = [s - width, s + width]
+            beside = [max(s - width, self.low), min(s + width, self.high)]
         else:
             low, beside = abs(self.f(s)), [s + width if s == self.low else s - width]
             if 0.0 <= sign * self.f(beside[0]) < low:  # it is lowest inside
@@ -169,4 +174,4 @@ class Zeros:
             if i > 2 and i < len(places) - 2 and min(x * y, y * z) > 0 and abs(y * y / (x * z) - 1.0) < POWER:
                 continue
             for p, q in pairwise(places[i - 1 : i + 2]):
-                more(self.f, self.samples, (min(p, q), max(p, q)), self.noise)
+                more(self.f, self.samples, (min(p, q), max(p, q)), lambda s: SURE * self.noise(s))

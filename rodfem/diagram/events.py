@@ -11,8 +11,8 @@ from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_location import Found, event_at
 from rodfem.continuation.event_search import Happens, search
-from rodfem.continuation.prediction import between
 from rodfem.continuation.kinds import EVENT
+from rodfem.continuation.prediction import between
 from rodfem.diagram.step import Step
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.problem.events import Event
