@@ -29,7 +29,7 @@ from rodfem.adaptivity.grading import SmoothnessIndicator, weights_of
 from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.event_nearest import nearest_event
+from rodfem.continuation.event_location import nearest_event
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.locate import NEAREST, WINDOW, refine
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along

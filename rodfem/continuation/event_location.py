@@ -10,9 +10,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.event_curve import EventCurve
 from rodfem.continuation.event_samples import Samples, sampled
 from rodfem.continuation.event_zeros import EXACT, SURE, Zero, Zeros
+from rodfem.continuation.states_between import ASIDE, Curve, EventCurve, solved_on
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.linalg.orthogonal import generic
 from rodfem.problem.events import Event
@@ -28,6 +28,11 @@ WIDE = 1e-2
 """Length, relative to the curve, of a piece on which an event is zero that is no place any more."""
 ROUNDS = 12
 """Times that the curve is improved."""
+NEAREST, WIDER = 1e-2, 10.0
+"""Half length of the first piece on which an event is sought, relative to the last one; and the ratio of two that
+follow."""
+TOUCHES = 1e-7
+"""Least distance, relative to the last piece, at which it is tried whether a function rises by its lowest value."""
 
 
 class Found(NamedTuple):
@@ -134,3 +139,34 @@ def noise_of(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:
         except SceneError:  # the state is at the edge of those at which there is a value
             continue
     return most
+
+
+def nearest_event(solver: BranchSolver, event: Event, curve: Curve, reach: float) -> Found:
+    """Where an ``event`` happens nearest to the beginning of a ``curve``, within ``reach`` on either side.
+
+    Raises :class:`ConvergenceError` where it does not happen.  Its function may only come near zero, as beside where it
+    touches zero on another mesh: then it is known to the distance at which it has twice its lowest value.  ``solver``
+    has the mesh.
+    """
+    width = NEAREST * reach
+    while True:
+        first, last = (solved_on(solver, curve, s, 2 * ASIDE * width) for s in (-width, width))
+        value = OnCurve(event, EventCurve(solver, first, last))
+        value.curve.solve(0.0)
+        ends = event_at(solver, event, first.x), event_at(solver, event, last.x)
+        zeros = value.zeros(value, ends, known=False)
+        found = [zero for zero in zeros.found if value.inside(zero)] if zeros else []
+        if found:
+            return value.found(min(found, key=lambda zero: abs(zero.s)))
+        if width >= reach:
+            break
+        width = min(WIDER * width, reach)
+    places = [] if zeros is None else [s for s in zeros.above if s not in value.places]
+    if places:
+        lowest = min(places, key=lambda s: abs(value(s)))
+        along, x = TOUCHES * reach, value.curve.nearest(lowest).x
+        while along <= reach:
+            if max(abs(value(lowest - along)), abs(value(lowest + along))) >= 2 * abs(value(lowest)):
+                return Found(lowest, x, along)
+            along *= WIDER
+    raise ConvergenceError(f"The event {event.name!r} does not happen near there.")

@@ -93,7 +93,7 @@ def sampled(f: Function, low: float, high: float, ends: tuple[float, float], noi
 
 
 def more(f: Function, out: Samples, piece: Piece, noise: Function) -> None:
-    """Add samples of a ``piece`` to ``out``, as :func:`sampled` takes them."""
+    """Add samples of ``f`` on a ``piece`` to ``out``, as :func:`sampled` takes them; ``noise(s)`` is round-off."""
     before = len(out.values)
 
     def at(s: float) -> float:

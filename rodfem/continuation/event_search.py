@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.event_curve import EventCurve
 from rodfem.continuation.event_location import Found, OnCurve
 from rodfem.continuation.event_samples import Piece
+from rodfem.continuation.states_between import EventCurve
 from rodfem.problem.events import Event
 from rodfem.tolerances import INSIDE
 

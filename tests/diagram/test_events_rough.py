@@ -136,3 +136,15 @@ def test_what_is_around_a_zero_is_sampled_at_all_distances() -> None:
     assert len(zeros.found) == 1
     zeros.look_around()
     assert [zero.s for zero in zeros.found] == pytest.approx([0.3 - 2.5e-6, 0.3, 0.3 + 2.5e-6], rel=0, abs=1e-12)
+
+
+def test_zeros_beside_a_row_that_is_nearly_zero() -> None:
+    """One of two corners is before the interval, and the samples see a parabola that has its vertex at the end."""
+
+    def f(s: float) -> float:
+        return abs((s + 1e-9) * (s - 5e-8))
+
+    zeros = Zeros(f, Samples({0.0: f(0.0), 0.5: f(0.5), 1.0: f(1.0)}), lambda _: 1e-22)
+    zeros.locate()
+    zeros.look_around()
+    assert [zero.s for zero in zeros.found] == pytest.approx([5e-8], rel=0, abs=1e-12)
