@@ -80,9 +80,10 @@ class Zeros:
             ends = [self.low, *(0.5 * (p.high + q.low) for p, q in pairwise(middles)), self.high]
             for middle, low, high in zip(middles, ends, ends[1:], strict=False):
                 if middle in new and len(self.samples.values) <= MOST:
-                    for near, far in ((middle.low, low), (middle.high, high)):
-                        if self.low < near < self.high:
-                            self._graded(near, far)
+                    if low < middle.low:
+                        self._graded(middle.low, low)
+                    if middle.high < high:
+                        self._graded(middle.high, high)
             self.locate()
 
     def _middles(self) -> list[Zero]:
