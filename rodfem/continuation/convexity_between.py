@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_samples import sampled
-from rodfem.continuation.event_search import between
+from rodfem.continuation.prediction import between
 from rodfem.continuation.states_between import solve_at
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.fem.convexity import Convexity
@@ -44,7 +44,7 @@ def lost_between(convexity: Convexity | None, state: State, holds: Callable[[flo
         return Between()
     scales = convexity.scales(state(0.0))
     margin = cache(lambda t: convexity.margin(state(t), scales))
-    last, samples = 0.0, sampled(margin, 0.0, 1.0, (margin(0.0), margin(1.0)), lambda: ROUND_OFF)
+    last, samples = 0.0, sampled(margin, 0.0, 1.0, (margin(0.0), margin(1.0)), lambda _: ROUND_OFF)
     for t, least in samples.in_order():
         if least > 0.0 or holds(t):
             last = t

@@ -2,84 +2,124 @@
 
 from __future__ import annotations
 
-from math import copysign
+from collections.abc import Callable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.states_between import Curve, solve_beside
-from rodfem.errors import ConvergenceError
+from rodfem.continuation.event_samples import Samples, sampled
+from rodfem.continuation.event_zeros import EXACT, SURE, Zero, Zeros
+from rodfem.continuation.states_between import ASIDE, Curve, EventCurve, solved_on
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.linalg.orthogonal import generic
 from rodfem.problem.events import Event
-from rodfem.roots import lowest_between, zero_between
 from rodfem.tolerances import INSIDE, ROUND_OFF
 
-ASIDE = 1e-6
-"""Distance beside a singular point at which an event's equations are solved, relative to the piece."""
-ALONG = 1e-13
-"""Arclength to which an event is located, in the metric."""
+TRIED = 4
+"""Number of states, each with another round-off, whose values are compared."""
+NOISY = 0.5
+"""Part of a curve that is not resolved above which its ends alone tell of one zero: those between may be of noise."""
+ABOVE = 1e-6
+"""Distance, relative to the curve, to which the place of a lowest value that is not zero is that of equilibria."""
+WIDE = 1e-2
+"""Length, relative to the curve, of a piece on which an event is zero that is no place any more."""
+ROUNDS = 12
+"""Times that the curve is improved."""
+NEAREST, WIDER = 1e-2, 10.0
+"""Half length of the first piece on which an event is sought, relative to the last one; and the ratio of two that
+follow."""
 TOUCHES = 1e-7
-"""Distance to which it is known where a function touches zero, relative to the piece: of its lowest value, which is
-quadratic there, the square is round-off."""
-NEAREST, WIDER = 1e-5, 10.0
-"""Half length of the first piece on which an event is sought near a state, relative to the last one; and the ratio of
-two that follow: of two zeros the nearer one is to be found."""
+"""Least distance, relative to the last piece, at which it is tried whether a function rises by its lowest value."""
 
 
 class Found(NamedTuple):
-    """Where an event happens: parameter ``s`` of the curve, state ``x``, uncertainty ``along`` of the parameter.
-
-    ``touches`` says that the number only touches zero there.
-    """
+    """Where an event happens: parameter ``s`` of the curve, state ``x``, uncertainty ``along`` of the parameter."""
 
     s: float
     x: PETSc.Vec
     along: float
-    touches: bool = False
 
 
-class Solved:
-    """The values of an event at equilibria near a curve, each solved for once."""
+class OnCurve:
+    """An event as a function of the place on a ``curve``, which is led through equilibria where its zeros are."""
 
-    def __init__(self, solver: BranchSolver, event: Event, curve: Curve, length: float) -> None:
-        """Nothing is solved for yet of the ``event``; the piece of the ``curve`` has this ``length``.
-
-        ``solver`` has the mesh.
-        """
-        self.solver, self.event, self.curve, self.aside = solver, event, curve, ASIDE * length
+    def __init__(self, event: Event, curve: EventCurve) -> None:
+        """Nothing of the ``event`` is known yet."""
+        self.event, self.curve, self.solver = event, curve, curve.solver
         self.known: dict[float, float] = {}
+        self.places = [end.arclength for end in curve.ends]
 
     def __call__(self, s: float) -> float:
-        """Value at the equilibrium across the curve at ``s``; raises :class:`ConvergenceError`."""
+        """Value at the state of the curve at ``s``."""
         if s not in self.known:
-            self.known[s] = event_at(self.solver, self.event, self.at(s)[0])
+            self.known[s] = event_at(self.solver, self.event, self.curve(s)[0])
         return self.known[s]
 
-    def at(self, s: float) -> tuple[PETSc.Vec, float]:
-        """The equilibrium, and where it is: where the equations are singular one beside it serves."""
-        return solve_beside(self.solver, self.curve, s, self.aside)
+    def noise(self, s: float) -> float:
+        """How much it varies there with the round-off of a state."""
+        return noise_of(self.solver, self.event, self.curve(s)[0])
 
-    def zero(self, low: float, high: float) -> Found:
-        """Where the event changes its sign between two parameters; raises :class:`ConvergenceError`."""
-        if self(low) * self(high) > 0:
-            raise ConvergenceError(f"The event {self.event.name!r} does not happen between the ends of the piece.")
-        s = zero_between(self, low, high, ALONG)
-        x, there = self.at(s)
-        return Found(there, x, ALONG + 2 * abs(there - s))
+    @cached_property
+    def rough(self) -> float:
+        """What of values is surely above the round-off that they have at the ends."""
+        return SURE * max(noise_of(self.solver, self.event, end.x) for end in self.curve.ends)
 
-    def lowest(self, low: float, s: float, high: float, sign: float, width: float) -> tuple[float, float]:
-        """Where ``sign`` times the event is lowest, or negative, to ``width``; and its value.
+    def zeros(self, first: Callable[[float], float], ends: tuple[float, float], *, known: bool) -> Zeros | None:
+        """Zeros at equilibria, and lowest values; None where the event is zero all along.
 
-        It is sought between the parameters ``low`` and ``high``, beginning at ``s``.
+        ``first(s)`` is the value on the curve as it is now, ``ends`` are those at its ends, of which the first one may
+        be ``known`` to be zero.  Raises :class:`ConvergenceError` where equilibria are not found.
         """
-        return lowest_between(lambda t: sign * self(t), low, s, high, width)
+        at_ends = dict(zip(self.places, ends, strict=True))
+        for _ in range(ROUNDS):
+            self.known = at_ends.copy()
+            f = self if self.curve.solved else first
+            samples = sampled(f, self.places[0], self.places[-1], ends, lambda _: self.rough)
+            sizes = [abs(y) for y in samples.values.values()]
+            if min(sizes) == 0.0 and max(sizes) <= self.rough:
+                return None
+            noisy = sum(q - p for p, q in samples.unresolved) > NOISY * self.curve.length
+            if noisy:
+                samples = Samples(at_ends.copy(), samples.unresolved)
+            self.known |= samples.values
+            zeros = Zeros(self, samples, self.noise)
+            if known:
+                zeros.add(self.places[0])
+            zeros.locate()
+            if not (more := self._open(zeros)) and not noisy:
+                zeros.look_around()
+                more = self._open(zeros)
+            if not more:
+                return zeros
+            for s in more:
+                self.curve.solve(s)
+        raise ConvergenceError(
+            f"The zeros of the event {self.event.name!r} change with the states that are solved for."
+        )
 
-    def touches(self, s: float, sign: float, width: float) -> bool:
-        """Whether within ``width`` of a lowest value the event rises by more than that value: it may be zero there."""
-        low = sign * self(s)
-        return max(sign * self(s - width), sign * self(s + width)) - low >= low
+    def found(self, zero: Zero) -> Found:
+        """A zero that is inside."""
+        node = self.curve.nearest(zero.s)
+        along = zero.along + abs(node.s - zero.s) + 2 * abs(node.arclength - node.s)
+        return Found(node.arclength, node.x, along)
+
+    def inside(self, zero: Zero) -> bool:
+        """Whether a zero is none of an end."""
+        margin = max(INSIDE * self.curve.length, zero.along)
+        return not self.still(zero) and all(abs(zero.s - s) > margin for s in self.places)
+
+    def still(self, zero: Zero) -> bool:
+        """Whether a zero is a whole piece of the curve."""
+        return zero.high - zero.low >= WIDE * self.curve.length
+
+    def _open(self, zeros: Zeros) -> list[float]:
+        """Places at which equilibria are to decide."""
+        places = [(zero.s, max(zero.along, EXACT)) for zero in zeros.found if self.inside(zero)]
+        places += [(s, ABOVE * self.curve.length) for s in zeros.above if s not in self.places]
+        return [s for s, near in places if not any(abs(s - node.s) <= near for node in self.curve.solved)]
 
 
 def event_at(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:
@@ -90,33 +130,43 @@ def event_at(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:
 def noise_of(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:
     """How much the value of an event varies with the round-off of a state; collective."""
     first, last = x.getOwnershipRange()
-    other = x.copy()
-    other.array[:] += ROUND_OFF * generic(np.arange(first, last))
-    return abs(event_at(solver, event, other) - event_at(solver, event, x))
+    here, most = event_at(solver, event, x), 0.0
+    for which in range(TRIED):
+        other = x.copy()
+        other.array[:] += ROUND_OFF * generic(np.arange(first, last), which)
+        try:
+            most = max(most, abs(event_at(solver, event, other) - here))
+        except SceneError:  # the state is at the edge of those at which there is a value
+            continue
+    return most
 
 
 def nearest_event(solver: BranchSolver, event: Event, curve: Curve, reach: float) -> Found:
     """Where an ``event`` happens nearest to the beginning of a ``curve``, within ``reach`` on either side.
 
-    Raises :class:`ConvergenceError` where it does not happen.  Its function may only touch zero: then it is known to
-    the distance at which it has twice its lowest value.  ``solver`` has the mesh.
+    Raises :class:`ConvergenceError` where it does not happen.  Its function may only come near zero, as beside where it
+    touches zero on another mesh: then it is known to the distance at which it has twice its lowest value.  ``solver``
+    has the mesh.
     """
     width = NEAREST * reach
     while True:
-        try:
-            return Solved(solver, event, curve, 2 * width).zero(-width, width)
-        except ConvergenceError:
-            if width >= reach:
-                break
+        first, last = (solved_on(solver, curve, s, 2 * ASIDE * width) for s in (-width, width))
+        value = OnCurve(event, EventCurve(solver, first, last))
+        value.curve.solve(0.0)
+        ends = event_at(solver, event, first.x), event_at(solver, event, last.x)
+        zeros = value.zeros(value, ends, known=False)
+        found = [zero for zero in zeros.found if value.inside(zero)] if zeros else []
+        if found:
+            return value.found(min(found, key=lambda zero: abs(zero.s)))
+        if width >= reach:
+            break
         width = min(WIDER * width, reach)
-    value = Solved(solver, event, curve, 2 * reach)
-    sign = copysign(1.0, value(reach))
-    s, low = value.lowest(-reach, 0.0, reach, sign, INSIDE * reach)
-    if low < 0:
-        return min((value.zero(-reach, s), value.zero(s, reach)), key=lambda found: abs(found.s))
-    width = TOUCHES * reach
-    while not value.touches(s, sign, width):
-        width *= WIDER
-        if width > reach:
-            raise ConvergenceError(f"The event {event.name!r} does not happen near there.")
-    return Found(s, value.at(s)[0], width, touches=True)
+    places = [] if zeros is None else [s for s in zeros.above if s not in value.places]
+    if places:
+        lowest = min(places, key=lambda s: abs(value(s)))
+        along, x = TOUCHES * reach, value.curve.nearest(lowest).x
+        while along <= reach:
+            if max(abs(value(lowest - along)), abs(value(lowest + along))) >= 2 * abs(value(lowest)):
+                return Found(lowest, x, along)
+            along *= WIDER
+    raise ConvergenceError(f"The event {event.name!r} does not happen near there.")

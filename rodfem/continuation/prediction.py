@@ -7,6 +7,7 @@ where the last row is.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from petsc4py import PETSc
@@ -17,6 +18,22 @@ from rodfem.linalg.orthogonal import combine
 
 ROWS = 4
 """Rows of a branch that a prediction extrapolates, at most."""
+
+
+class Knot(Protocol):
+    """A state ``x`` of a curve, its place there, and the derivative of the curve; None where it is not known."""
+
+    @property
+    def arclength(self) -> float:
+        """Its parameter."""
+
+    @property
+    def x(self) -> PETSc.Vec:
+        """The state."""
+
+    @property
+    def tangent(self) -> PETSc.Vec | None:
+        """The derivative."""
 
 
 def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
@@ -64,7 +81,7 @@ def predict_at_load(system: System, points: Sequence[Point], load: float) -> PET
     return combine([p.x for p in recent], lagrange(np.array([p.load for p in recent]), load)[0])
 
 
-def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+def hermite(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
     """Cubic through two points with their tangents at arclength ``s`` between them: state and direction.
 
     Raises :class:`ValueError` for a point without a tangent.
@@ -77,6 +94,21 @@ def hermite(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
     value = np.array([(1 + 2 * t) * (1 - t) ** 2, h * t * (1 - t) ** 2, t * t * (3 - 2 * t), h * t * t * (t - 1)])
     slope = np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
     return combine(parts, value), combine(parts, slope)
+
+
+def between(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """State and direction at ``s`` on the polynomial of least degree through two states and what tangents they have."""
+    if a.tangent is not None and b.tangent is not None:
+        return hermite(a, b, s)
+    h = b.arclength - a.arclength
+    way = (b.x - a.x) * (1.0 / h)
+    if a.tangent is not None:
+        d, bend = s - a.arclength, (way - a.tangent) * (1.0 / h)
+        return combine([a.x, a.tangent, bend], np.array([1.0, d, d * d])), a.tangent + bend * (2 * d)
+    if b.tangent is not None:
+        d, bend = s - b.arclength, (b.tangent - way) * (1.0 / h)
+        return combine([b.x, b.tangent, bend], np.array([1.0, d, d * d])), b.tangent + bend * (2 * d)
+    return a.x + way * (s - a.arclength), way
 
 
 def across_orbit(system: System, last: PETSc.Vec, x: PETSc.Vec, direction: PETSc.Vec) -> None:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import replace
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_location import Found, event_at
-from rodfem.continuation.event_search import Happens, Search, between
+from rodfem.continuation.event_search import Happens, search
 from rodfem.continuation.kinds import EVENT
+from rodfem.continuation.prediction import between
 from rodfem.diagram.step import Step
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.problem.events import Event
-from rodfem.tolerances import INSIDE, round_off
+from rodfem.tolerances import round_off
 
 if TYPE_CHECKING:
     from rodfem.continuation.observer import Observer
@@ -30,7 +32,7 @@ Range = tuple[float, float]
 class Events:
     """The events of one branch: their values at the last row, and what is to be said of each.
 
-    ``_row`` is that row, ``_values`` are the values there, and ``_zero`` says which are zero to round-off.  ``_open``
+    ``_row`` is that row, ``_values`` are the values there, and ``_last`` the arclengths of the last zeros.  ``_open``
     has the loads at the ends of steps in which zeros of an event may be missing, ``_still`` those of steps on which it
     is zero, by its name.
     """
@@ -42,7 +44,7 @@ class Events:
         self.events = tuple(plan.events)
         self._row: Point | None = None
         self._values: list[float] = []
-        self._zero: list[bool] = []
+        self._last: list[float] = []
         self._open: dict[str, list[Range]] = defaultdict(list)
         self._still: dict[str, list[Range]] = defaultdict(list)
 
@@ -53,17 +55,17 @@ class Events:
         solver, a, b = step.solver, step.a, step.b
         follows = self._row is a
         before = self._values if follows else [event_at(solver, event, a.x) for event in self.events]
-        known = self._zero if follows else [False] * len(self.events)
+        before_it = self._last if follows else [-inf] * len(self.events)
         after = [event_at(solver, event, b.x) for event in self.events]
         # a branch that leaves another one begins with a state of that one, at which an eigenvalue vanishes
-        first = follows or (step.begins and a.zero <= b.zero)
-        states, out, self._zero = _States(solver, a, b), list[SpecialPoint](), []
-        for event, ends, zero in zip(self.events, zip(before, after, strict=True), known, strict=True):
-            happens = self._in_step(step, event, states, ends, known=zero)
-            self._zero.append(happens.last)
+        begins = follows or (step.begins and a.zero <= b.zero)
+        states, out, self._last = _States(solver, a, b), list[SpecialPoint](), []
+        for event, ends, last in zip(self.events, zip(before, after, strict=True), before_it, strict=True):
+            happens = self._in_step(step, event, states, ends, last)
             out += [_special(solver, event, a, b, found) for found in happens.found]
-            rows = [a] * (happens.first and first) + [b] * (happens.last and not step.closed)
-            out += [_at_row(solver, event, row, INSIDE * (b.arclength - a.arclength)) for row in rows]
+            rows = (a, happens.first if begins else None), (b, None if step.closed else happens.last)
+            out += [_at_row(solver, event, row, along) for row, along in rows if along is not None]
+            self._last.append(max([last, *happens.places]))
         self._row, self._values = b, after
         return out
 
@@ -80,18 +82,19 @@ class Events:
         self._open.clear()
         self._still.clear()
 
-    def _in_step(self, step: Step, event: Event, states: _States, ends: Range, *, known: bool) -> Happens:
-        """What an event does in a step; what is left open is kept, to be said."""
-        search, loads = Search(step.solver, event, step.a, step.b), (step.a.load, step.b.load)
+    def _in_step(self, step: Step, event: Event, states: _States, ends: Range, last: float) -> Happens:
+        """What an event does in a step, the last zero before at arclength ``last``; what is left open is kept."""
+        solver, a, b = step.solver, step.a, step.b
         try:
-            happens = search(lambda s: event(states(s)), ends, known=known)
+            happens = search(solver, event, (a, b), lambda s: event(states(s)), ends, last)
         except ConvergenceError:
-            self._open[event.name].append(loads)
+            self._open[event.name].append((a.load, b.load))
             return Happens([], [])
         if happens.unresolved:
-            self._open[event.name].append(loads)
-        if happens.still:
-            self._still[event.name].append(loads)
+            self._open[event.name].append((a.load, b.load))
+        for piece in happens.still:
+            low, high = (solver.system.scalar(between(a, b, s)[0]) for s in piece)
+            self._still[event.name].append((low, high))
         return happens
 
 

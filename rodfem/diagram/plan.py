@@ -119,6 +119,11 @@ class Plan:
         span = self.over(scene)
         scene.check_span(span)
         check_load(scene)
+        if self.events and not scene.conservative:
+            raise InputError(
+                f"The event {self.events[0].name!r} is sought along branches, and a load without a potential is swept: "
+                "leave events out."
+            )
         for event in self.events:
             event.check(scene.length)
         if self.accuracy is not None:

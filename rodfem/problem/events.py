@@ -37,8 +37,8 @@ class Event:
 
     The function receives the nodes, the ends of the rod among them: ``state.r[:, 0].max()`` is that of the highest
     node, and ``numpy.interp`` or a sum is taken over nodes.  What this misses of the rod is in the error bar of the
-    special point, for which the function receives states at more places, too (another ``m``).  A function that jumps from
-    node to node, as the place of the highest one, has no error bar: interpolate.
+    special point, for which the function receives states at more places, too (another ``m``).  A function that jumps
+    from node to node, as the place of the highest one, has no error bar: interpolate.
     """
 
     name: str
