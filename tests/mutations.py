@@ -47,6 +47,7 @@ STEP = "tests/continuation/test_compiled_step.py"
 RESUME = "tests/hard/test_resume.py"
 WORK = "tests/continuation/test_work.py"
 RECORDED = "tests/modes/test_recorded.py"
+CLOSE = "tests/diagram/test_close_critical_loads.py"
 
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
@@ -431,7 +432,7 @@ FAULTS = {
         "tests/literature/test_free_rods.py",
     ),
     "divergence-by-vectors-of-rigid-motions": Fault(
-        "rodfem/diagram/critical_loads.py",
+        "rodfem/diagram/divergence_loads.py",
         "if not self.still:",
         "if True:",
         "tests/literature/test_free_rods.py",
@@ -449,10 +450,40 @@ FAULTS = {
         LOCATE,
     ),
     "flutter-without-conjugates": Fault(
-        f"{CONTINUATION}flutter.py",
-        "others[others.imag > 0]",
-        "others[others.imag >= 0]",
+        f"{CONTINUATION}complex_pairs.py",
+        "np.flatnonzero(found.values.imag > 0)",
+        "np.flatnonzero(found.values.imag >= 0)",
         "tests/literature/test_follower.py tests/diagram/test_sweep.py",
+    ),
+    "pairs-by-their-values": Fault(
+        f"{CONTINUATION}complex_pairs.py",
+        "assignment(distance + outside)",
+        "assignment(distance)",
+        CLOSE,
+    ),
+    "pairs-that-are-mistaken": Fault(
+        "rodfem/diagram/collisions.py",
+        "if place in known]",
+        "if place in known[:0]]",
+        CLOSE,
+    ),
+    "steps-are-not-parted": Fault(
+        "rodfem/diagram/critical_loads.py",
+        "if not told.doubts or self._parted >= PARTS:",
+        "if True:",
+        CLOSE,
+    ),
+    "what-comes-and-goes-between-rows": Fault(
+        "rodfem/diagram/hidden_events.py",
+        "[load] if lowest < 0 else []",
+        "[]",
+        CLOSE,
+    ),
+    "pairs-taken-for-one-meet-at-one-load": Fault(
+        "rodfem/diagram/collisions.py",
+        "(abs(noise.discriminant) + split)",
+        "abs(noise.discriminant)",
+        CLOSE,
     ),
     "frequencies-without-a-certificate": Fault(
         "rodfem/diagram/frequency_rows.py",

@@ -248,18 +248,22 @@ class SpecialPoint:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """Neighbouring rows ``a``, ``b``: the index changes from ``before`` to ``after`` without a special point."""
+    """Neighbouring rows ``a``, ``b``: the index changes from ``before`` to ``after`` without a special point.
+
+    The ``remedy`` is what to try.
+    """
 
     a: Point
     b: Point
     before: int
     after: int
+    remedy: str = f"{SMALLER_STEPS} or more elements"
 
     def __str__(self) -> str:
         """Say it in a sentence."""
         return (
             f"Between loads {self.a.load:.8g} and {self.b.load:.8g} the index changes from {self.before} to "
-            f"{self.after}, and no special point was found that says why: {SMALLER_STEPS} or more elements."
+            f"{self.after}, and no special point was found that says why: {self.remedy}."
         )
 
 

@@ -8,15 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rodfem.continuation.eigenvalue_curves import assignment
 from rodfem.continuation.interpolant import SHARP, in_doubt, real_root, zero_uncertainty
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured
-from rodfem.stability.frequencies import MULTIPLE, Frequencies, groups
 from rodfem.tolerances import ROUND_OFF
 
-MOVED = 0.3
-"""A complex eigenvalue that changes by more than this, relative, in a step may be another one."""
 RANK = 1e-6
 """Relative distance of eigenvalues above which their vectors span their invariant subspace well."""
 ENOUGH = 1e-8
@@ -45,30 +41,6 @@ class Located:
     def mean_uncertainty(self) -> float:
         """Uncertainty of the mean of the cluster."""
         return self.left + abs(self.drift) * self.uncertainty
-
-
-def unmatched(found: Frequencies, others: np.ndarray) -> list[list[int]]:
-    """Places of the complex eigenvalues of ``found`` that go on from none of ``others``, with their conjugates.
-
-    Equal ones are together.
-    """
-    upper = np.flatnonzero(found.values.imag > 0).tolist()
-    if not upper:
-        return []
-    mine, there = found.values[upper][:, None], others[others.imag > 0]
-    distance = abs(mine - there[None, :]) / abs(mine)
-    rows, columns = assignment(distance)
-    matched = {upper[i] for i, j in zip(rows, columns, strict=True) if distance[i, j] < MOVED}
-    new = [i for i in upper if i not in matched]
-    values = found.values
-    out = []
-    for group in groups(values[new]):
-        members = [new[i] for i in group]
-        mirrored = values[members[0]].conjugate()
-        conjugates = [j for j, v in enumerate(values) if abs(v - mirrored) < MULTIPLE * abs(v)]
-        if len(conjugates) == len(members):
-            out.append([*members, *conjugates])
-    return out
 
 
 def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> Located:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint
+from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
 from rodfem.continuation.convexity_between import lost_between, unresolved
 from rodfem.continuation.eigenvalue_curves import Curves
 from rodfem.continuation.invariants import Invariants
@@ -214,13 +214,14 @@ class Sweep:
         """Take what happens between two loads into a branch: critical loads, in their order, each with its state."""
         a, b = first.point, second.point
         with self.solver.system.clock.scope("location"):
-            events = self.critical.between(first, second)
-        negative = a.negative
+            told = self.critical.between(first, second)
+        events, negative = told.events, a.negative
+        explained = negative + sum(e.change for e in events) + told.entered == b.negative
         for i, event in enumerate(events):
             point = a if event.load == a.load else b if event.load == b.load else None
             point = point or self.at(at_load(self.solver, a.x, event.load))
             after_it = negative + event.change
-            if i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
+            if explained and i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
                 after_it = b.negative  # of all eigenvalues that are recorded
             if event.cluster is not None:
                 self._name(point, event.cluster, event.cluster.size - event.still)
@@ -232,6 +233,15 @@ class Sweep:
                 branch.points.append(point)
             self._special(branch, special)
             negative = after_it
+        if not explained:
+            change = Unexplained(branch.points[-1], b, negative, b.negative, "use a smaller range or more elements")
+            branch.unexplained.append(change)
+            self.observer.warn(str(change))
+        elif told.entered > 0 and a.negative == 0:
+            self.observer.warn(
+                f"{told.entered} eigenvalues that are found at {self._load} = {b.load:.6g} and not at {a.load:.6g} are "
+                "complex at both: the rows before, which count none, may count too few. Ask for more frequencies."
+            )
 
     def _name(self, point: Point, cluster: Cluster, number: int) -> None:
         """Name the ``number`` of motions that meet at a point by all that a cluster does: their vectors are one."""

@@ -9,7 +9,8 @@ from rodfem.adaptivity.ordinate_bound import OrdinateBound, bound
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.continuation.static_solver import StaticSolver
-from rodfem.diagram.critical_loads import Mean, Measuring, located_flutter, zero_near
+from rodfem.diagram.collisions import Measuring, located_flutter
+from rodfem.diagram.divergence_loads import Mean, zero_near
 from rodfem.diagram.held import at_load
 from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.stability.cluster import Cluster, as_vectors

@@ -48,9 +48,13 @@ class Frequencies:
         """Magnitude below which an eigenvalue counts as zero."""
         return REAL * max(self.one, float(abs(self.values).min(initial=np.inf)))
 
+    def negative(self) -> list[int]:
+        """Places of the negative real eigenvalues."""
+        return [int(i) for i in np.flatnonzero((self.values.imag == 0) & (self.values.real < -self.noise))]
+
     def diverged(self) -> int:
         """Number of negative real eigenvalues."""
-        return int(((self.values.imag == 0) & (self.values.real < -self.noise)).sum())
+        return len(self.negative())
 
     def still(self) -> int:
         """Number of eigenvalues that are zero: of rigid motions, and their partners in Jordan blocks."""

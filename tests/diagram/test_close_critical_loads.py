@@ -1,0 +1,215 @@
+"""Critical loads of a sweep that are close to one another: in one step, in neighbouring ones, nearly equal.
+
+Beck's column in space is two columns, one for each plane: all loads of the second one are those of the first one times
+its stiffness B2.  What the load does may be any function of a parameter, so that flutter comes and goes where we like.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from math import sqrt
+from typing import Any
+
+import classics
+import numpy as np
+import pytest
+from closed_forms import column, double
+from hemitropic_cases import specials
+from mpi4py import MPI
+from scipy.linalg import expm
+from scipy.optimize import brentq, fsolve
+
+from rodfem import Diagram, Plan, clamped, free
+from rodfem.continuation.complex_pairs import paired, upper
+from rodfem.continuation.eigenvalue_curves import assignment
+from rodfem.diagram.trace import trace
+from rodfem.fem.fields import Discretization
+from rodfem.problem.scene import Scene
+from rodfem.stability.frequencies import Frequencies
+
+BECK = float(double(20.0, 120.0)[0])
+MESH = Discretization("pointwise", 4, 6)
+SHARE = 0.4
+"""Of a thrust, which follows the tip: the column diverges, comes back, and flutters."""
+
+
+def test_the_load_of_beck() -> None:
+    assert pytest.approx(20.0509536189738, abs=1e-11) == BECK
+
+
+def critical(branch: Any, kind: str = "flutter") -> list[tuple[float, float, int, int]]:
+    """Loads in ascending order, with their bars, and the numbers of unstable eigenvalues before and after."""
+    found = [(s.point.load, s.error_estimate, s.negative_before, s.negative_after) for s in specials(branch, kind)]
+    return sorted(found)
+
+
+def agree(found: Sequence[tuple[float, float, int, int]], exact: Sequence[float], within: float = 1e-9) -> None:
+    assert len(found) == len(exact)
+    for (load, bar, *_), expected in zip(found, sorted(exact), strict=True):
+        assert abs(load - expected) <= bar <= within
+
+
+def adds_up(diagram: Diagram, say: bool = False) -> None:
+    """From row to row the number of unstable eigenvalues changes by what special points say, and nothing is left."""
+    branch = diagram[0]
+    at = {id(s.point): s for s in branch.special if not s.kind.given}
+    number = branch.points[0].negative
+    for p in branch.points:
+        if (s := at.get(id(p))) is not None:
+            assert s.negative_before == number
+            number = s.negative_after
+        else:
+            assert p.negative == number
+    assert not branch.unexplained
+    assert bool(diagram.warnings) == say
+
+
+def columns(strong: float, span: tuple[float, float], share: float = 1.0) -> Diagram:
+    return trace(classics.partly_following(share, span, strong), MESH, Plan(depth=0))
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("span", [(0.0, 30.0), (30.0, 0.0), (19.0, 21.0)])
+@pytest.mark.parametrize("strong", [1 + 1e-6, 1.001, 1.005, 1.01, 1.012, 1.02])
+def test_two_flutters(strong: float, span: tuple[float, float]) -> None:
+    """In one step, or in two that follow one another: what is born lies where the other one was before."""
+    diagram = columns(strong, span)
+    found = critical(diagram[0])
+    agree(found, [BECK, BECK * strong])
+    order = found if span[0] < span[1] else found[::-1]
+    assert [numbers for _, _, *numbers in order] == ([[0, 2], [2, 4]] if span[0] < span[1] else [[4, 2], [2, 0]])
+    adds_up(diagram)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("strong", [1.005, 1.02])
+def test_numbers_between_two_flutters(strong: float) -> None:
+    """Of complex eigenvalues, by the frequency equation of either plane, at every row."""
+    for p in columns(strong, (19.0, 21.0))[0].points:
+        if min(abs(p.load - BECK), abs(p.load - BECK * strong)) > 1e-3:
+            growing = 0
+            for EI in (1.0, strong):
+                roots = [column(complex(*mu), p.load, EI) for mu in p.omega2 if mu[1] > 0]
+                near = [abs(r - complex(*mu)) for r, mu in zip(roots, [m for m in p.omega2 if m[1] > 0], strict=True)]
+                growing += 2 * sum(1 for d, r in zip(near, roots, strict=True) if d < 1e-6 * abs(r))
+            assert p.negative == growing == 2 * (p.load > BECK) + 2 * (p.load > BECK * strong)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("strong", [1 + 1e-9, 1 + 1e-10])
+def test_flutters_that_are_one_to_round_off(strong: float) -> None:
+    """Four eigenvalues that are taken for two equal pairs: the bar of their load has those of both."""
+    for span in ((19.0, 21.0), (0.0, 200.0)):
+        found = [one for one in critical(columns(strong, span)[0]) if one[0] < 100]
+        for exact in (BECK, BECK * strong):
+            assert any(abs(load - exact) <= bar < 1e-6 for load, bar, *_ in found)
+
+
+def by_values(comm: MPI.Comm, found: Frequencies, others: Frequencies) -> dict[int, int]:
+    """Pairs that go on from the nearest one."""
+    mine, there = upper(found), upper(others)
+    if not mine or not there:
+        return {}
+    rows, columns = assignment(abs(found.values[mine][:, None] - others.values[there]))
+    return {mine[i]: there[j] for i, j in zip(rows.tolist(), columns.tolist(), strict=True)}
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("span", [(0.0, 30.0), (30.0, 0.0)])
+def test_a_pair_that_is_mistaken_is_put_right(span: tuple[float, float], monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is born within the step lies nearest to where the other one was; followed, the other one ends there, too."""
+    monkeypatch.setattr("rodfem.diagram.collisions.paired", by_values)
+    diagram = columns(1.01, span)
+    agree(critical(diagram[0]), [BECK, BECK * 1.01])
+    adds_up(diagram)
+
+
+def test_pairs_by_their_vectors() -> None:
+    """Two planes, and the nearest value in the other one."""
+
+    def found(values: Sequence[complex], planes: Sequence[int]) -> Frequencies:
+        vectors = np.zeros((4, 2 * len(values)), dtype=complex)
+        for i, plane in enumerate(planes):
+            vectors[2 * plane : 2 * plane + 2, 2 * i] = 1.0, 0.5j
+        vectors[:, 1::2] = vectors[:, ::2].conj()
+        both = np.array([v for value in values for v in (value, value.conjugate())])
+        return Frequencies(both, np.zeros(len(both)), (), vectors, vectors)
+
+    before, after = found([100 + 5j], [0]), found([100 + 6j, 100 + 30j], [1, 0])
+    assert paired(MPI.COMM_SELF, after, before) == {2: 0}
+    assert paired(MPI.COMM_SELF, before, after) == {0: 2}
+    assert paired(MPI.COMM_SELF, found([100 + 5j], [1]), before) == {}
+
+
+def humped(strong: float, top: float, curvature: float, span: tuple[float, float]) -> Scene:
+    """Beck's column whose thrust is ``BECK + top - curvature (p - 5.0371)^2``."""
+
+    def push(c: Any) -> tuple[Any, ...]:
+        return (0.0, 0.0, -(BECK + c.top - c.curvature * (c.p - 5.0371) ** 2))
+
+    constants = {"p": span[0], "B2": strong, "top": top, "curvature": curvature}
+    ends = clamped(), free(follower=push)
+    return classics.column("humped", ends, span, load="p", inertia=classics.BEAM, constants=constants)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("span", [(0.0, 10.0), (10.0, 0.0)])
+@pytest.mark.parametrize(("top", "curvature"), [(1e-3, 1.0), (1e-6, 1.0), (1e-3, 0.02), (-1e-3, -1.0), (-1e-6, -1.0)])
+def test_flutter_and_its_reverse_in_a_step(top: float, curvature: float, span: tuple[float, float]) -> None:
+    """Rows every 0.1 show none of it, where it takes 0.002 or 0.06 of the parameter; nor of a range without flutter."""
+    diagram = trace(humped(10.0, top, curvature, span), MESH, Plan(depth=0))
+    half = sqrt(top / curvature)
+    agree(critical(diagram[0]), [5.0371 - half, 5.0371 + half], 1e-7)
+    adds_up(diagram)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("top", [1e-12, -1e-2, -1e-8])
+def test_frequencies_that_nearly_meet(top: float) -> None:
+    """They flutter in a range of 2e-6, which round-off leaves open and which is said; or they do not meet."""
+    diagram = trace(humped(10.0, top, 1.0, (0.0, 10.0)), None, Plan(depth=0))
+    assert not specials(diagram[0], "flutter")
+    assert any("is not known" in said for said in diagram.warnings) == (top > 0)
+
+
+def partly(P: float, mu: complex, share: float = SHARE) -> complex:
+    """Zero at eigenvalues: ``w'''' + P w'' = mu w``, clamped, ``w'' = w''' + (1 - share) P w' = 0`` at the tip."""
+    A = np.diag(np.ones(3, dtype=complex), 1)
+    A[3, 0], A[3, 2] = mu, -P
+    E = expm(A)
+    rows = np.array([E[2, 2:], E[3, 2:] + (1 - share) * P * E[1, 2:]])
+    return complex(np.linalg.det(rows))
+
+
+DIVERGES, BACK = (brentq(lambda P: partly(P, 0.0).real, *near, xtol=1e-13) for near in ((5.0, 6.0), (15.0, 16.2)))
+FLUTTERS = float(
+    fsolve(
+        lambda z: [partly(z[0], z[1]).real, partly(z[0], complex(z[1], 1e-20)).imag / 1e-20], [16.4, 21.5], xtol=1e-13
+    )[0]
+)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("span", [(0.0, 25.0), (25.0, 0.0)])
+@pytest.mark.parametrize(
+    "strong", [1.002, 1.035, BACK / DIVERGES + 1e-3, FLUTTERS / DIVERGES + 1e-4, FLUTTERS / DIVERGES]
+)
+def test_flutter_and_divergence(strong: float, span: tuple[float, float]) -> None:
+    """In one step: of one plane flutter, or the end of divergence, and divergence of the other one."""
+    diagram = columns(strong, span, SHARE)
+    inside = [x for x in (DIVERGES, BACK, DIVERGES * strong, BACK * strong) if x < 25]
+    agree(critical(diagram[0], "divergence"), inside)
+    agree(critical(diagram[0]), [x for x in (FLUTTERS, FLUTTERS * strong) if x < 25])
+    adds_up(diagram)
+    for a, b in pairwise(critical(diagram[0])):
+        assert a[0] < b[0]
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("span", [(0.0, 25.0), (25.0, 0.0)])
+def test_one_diverges_where_the_other_comes_back(span: tuple[float, float]) -> None:
+    """At one load: no step parts the two, the number of negative eigenvalues is the same, and it is said."""
+    diagram = columns(BACK / DIVERGES, span, SHARE)
+    agree(critical(diagram[0], "divergence"), [DIVERGES])
+    assert any("pass through zero" in said for said in diagram.warnings)
