@@ -26,6 +26,8 @@ ABOVE = 1e-6
 """Distance, relative to the curve, to which the place of a lowest value that is not zero is that of equilibria."""
 WIDE = 1e-2
 """Length, relative to the curve, of a piece on which an event is zero that is no place any more."""
+QUARTERS = 4
+"""Pieces of such a piece between which it is seen whether the event is zero there."""
 ROUNDS = 12
 """Times that the curve is improved."""
 NEAREST, WIDER = 1e-2, 10.0
@@ -114,6 +116,10 @@ class OnCurve:
     def still(self, zero: Zero) -> bool:
         """Whether a zero is a whole piece of the curve."""
         return zero.high - zero.low >= WIDE * self.curve.length
+
+    def zero_on(self, piece: tuple[float, float]) -> bool:
+        """Whether the event is zero somewhere inside of a ``piece``; where it jumps across zero it is not."""
+        return any(abs(self(s)) <= SURE * self.noise(s) for s in np.linspace(*piece, QUARTERS + 1)[1:-1])
 
     def _open(self, zeros: Zeros) -> list[float]:
         """Places at which equilibria are to decide."""

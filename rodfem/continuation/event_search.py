@@ -53,9 +53,11 @@ def search(
     if zeros is None:
         return Happens([], [], still=[(a, b)])
     found, still, along = list[Found](), list[Piece](), dict[float, float]()
+    unresolved = list(zeros.samples.unresolved)
     for zero in zeros.found:
         if value.still(zero):
-            still.append((max(zero.low, a), min(zero.high, b)))
+            piece = max(zero.low, a), min(zero.high, b)
+            (still if value.zero_on(piece) else unresolved).append(piece)
         elif value.inside(zero):
             found.append(value.found(zero))
         else:
@@ -63,4 +65,4 @@ def search(
     if a - last <= max(margin, along.get(a, 0.0)):
         along.pop(a, None)
     places = [zero.s for zero in zeros.found]
-    return Happens(found, zeros.samples.unresolved, along.get(a), along.get(b), still, places)
+    return Happens(found, unresolved, along.get(a), along.get(b), still, places)

@@ -64,7 +64,7 @@ class Zeros:
         """Locate all zeros and lowest values between samples."""
         before = -1
         while before != (before := len(self.samples.values) + len(self.found) + len(self.above)):
-            if len(self.samples.values) > MOST:
+            if len(self.samples.values) + len(self.above) > MOST:
                 self.samples.unresolved = [(self.low, self.high)]
                 return
             values = self.samples.values.values()
@@ -132,9 +132,14 @@ class Zeros:
         for i, (s, z) in enumerate(known):
             around = known[max(i - 1, 0) : i + 2]
             inside = len(around) == 3 or (len(around) == 2 and s in (self.low, self.high))
-            if inside and abs(z) < near and all(y * z > 0 and abs(y) >= abs(z) for _, y in around):
+            if inside and abs(z) < near and self._is_lowest(z, [y for _, y in around]):
                 out += self._lowest([place for place, _ in around], s, 1.0 if z > 0 else -1.0)
         return out
+
+    @staticmethod
+    def _is_lowest(z: float, around: list[float]) -> bool:
+        """Whether a value is of the sign of those ``around`` it, itself among them, and below one of them."""
+        return all(y * z > 0 and abs(y) >= abs(z) for y in around) and any(abs(y) > abs(z) for y in around)
 
     def _lowest(self, around: list[float], s: float, sign: float) -> list[tuple[float, float]]:
         """Look for the lowest value between the places ``around`` one, or at an end; return it if it is a zero."""

@@ -79,12 +79,14 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
     conditions, magnitudes = np.vstack([rows[i] for i in asked_at]), np.max([sizes[i] for i in asked_at], axis=0)
     moving = _moving(_kept(free, conditions, magnitudes, NEARLY), moved)
     keeping = moving @ _keeping_loads(equations, [Symmetry(w, parts) for w in moving.T])
-    basis = _kept(keeping, conditions, magnitudes, EXACT)
-    return [Symmetry(w, parts) for w in simplest(np.linalg.qr(basis)[0]).T] if basis.shape[1] else []
+    basis = _moving(_kept(keeping, conditions, magnitudes, EXACT), moved)
+    return [Symmetry(w, parts) for w in simplest(basis).T]
 
 
 def _moving(motions: np.ndarray, moved: np.ndarray) -> np.ndarray:
     """Combinations of ``motions`` (m, n) that change free unknowns, whose changes have products ``moved`` (m, m)."""
+    if motions.shape[1] == 0:
+        return motions
     motions = np.linalg.qr(motions)[0]
     scale = np.diag(moved).max(initial=TINY)
     squares, combinations = np.linalg.eigh(motions.T @ (moved / scale) @ motions)

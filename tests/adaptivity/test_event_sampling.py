@@ -190,6 +190,10 @@ def test_a_function_that_takes_no_more_places_has_no_bar() -> None:
 def test_a_function_that_jumps_from_node_to_node_has_no_bar(mesh: tuple[int, int]) -> None:
     """The place at half height is a node: by shooting it may be elsewhere by more than samples tell."""
     place = Event("half", of=lambda st: st.s[abs(st.r[:, 2] - 0.5).argmin()] - 0.506)
-    (event,) = rodfem.trace(rod(), Discretization("auto", *mesh), Plan(depth=0, events=(place,))).special("half")
+    found = rodfem.trace(rod(), Discretization("auto", *mesh), Plan(depth=0, events=(place,)))
+    if not found.special("half"):
+        assert any("Zeros of the event 'half' may be missing" in said for said in found.warnings)
+        return
+    (event,) = found.special("half")
     assert event.error_estimate == np.inf
     assert "no error estimate: the event 'half' jumps there from node to node: interpolate between" in event.note
