@@ -113,7 +113,7 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
     states = [generic_state(equations, seed, rod_alone=True) for seed in range(len(found) + STATES)]
     changes = np.array([[symmetry.change(state) for symmetry in found] for state in states])
     comm, sizes = equations.fields.comm, equations.fields.sizes
-    lengths = comm.allreduce(abs(changes / sizes).max(axis=(0, 2)), op=MPI.MAX)
+    lengths = np.max(comm.allgather(abs(changes / sizes).max(axis=(0, 2))), axis=0)
     lengths = np.where(lengths > 0, lengths, 1.0)
     along = [_along(state, change / lengths[:, None]) for state, change in zip(states, changes, strict=True)]
     size = max(largest for _, largest in along)
