@@ -142,7 +142,7 @@ def test_a_sweep_keeps_what_it_has(
 
     def later() -> bool:
         calls[0] += 1
-        return calls[0] > 5  # two of them at the first state alone, for its two shifts
+        return calls[0] > 6  # two of them at the first state alone, for its two shifts
 
     monkeypatch.setattr(FollowedPairs, "certified", lambda *given: None)
     monkeypatch.setattr(NonsymmetricPencil, "near", failing(NonsymmetricPencil.near, later, fault))
