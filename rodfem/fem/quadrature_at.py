@@ -28,10 +28,13 @@ from rodfem.problem.gradients import Gradient, gradients
 
 MOMENTS = 3
 """Number of moments that are compared."""
-SEEN = 1e-10
-"""Error of a moment, relative to the largest value times the length of the element, that no bar needs to hold."""
+SEEN = 1e-8
+"""Error of a moment, relative to the largest value times the length of the element, that no bar needs to hold: states
+are solved for to 1e-10, and what varies along them by that is no change."""
 NOISE = 100 * float(np.finfo(float).eps)
 """The same for the round-off of curvatures on so many elements, for each of them."""
+LEAST = 1e-4
+"""Values below this, over the natural energy of bending per length, are small: their round-off is no change."""
 POINTS = 8
 """Points of the Gauss quadrature of a piece of an element."""
 PIECES, MOST = 4, 256
@@ -114,7 +117,9 @@ class QuadratureAt:
             true = _true(moments, richer)
             parts.append((abs(richer - true).max(), abs(richer - own).max(), largest))
         error, change, size = np.max(parts, axis=0)
-        return Errors(error / (size or 1.0), change / (size or 1.0))
+        scene = self.shape.system.scene
+        size = max(size, LEAST * scene.units.moment / scene.length)  # of a straight rod all is round-off
+        return Errors(error / size, change / size)
 
 
 def _true(moments: Moments, richer: np.ndarray) -> np.ndarray:
