@@ -458,3 +458,13 @@ def leipholz() -> Scene:
         "leipholz", (clamped(), free()), (30.0, 45.0), follower=push, inertia=BEAM,
         constants={"P": 30.0, "B2": 10.0},
     )  # fmt: skip
+
+
+def imperfect_column() -> Scene:
+    """An extensible column under a thrust and a constant force across it: its branch is curved from the first row."""
+    return Scene(
+        "imperfect column", (0.0, 1.0), "unshearable",
+        lambda v, k, c: 50 * (v[2] - 1) ** 2 + bending_and_twist(k, (1.0, 2.0, 1.0)), {"P": 0.0}, "P",
+        (clamped(), free(lambda c: (0.3, 0.0, -c.P))), Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (0.0, 4.0),
+        planar="e2",
+    )  # fmt: skip

@@ -16,7 +16,6 @@ from rodfem.fem.quadrature_at import AT_ONCE, POINTS, composite
 from rodfem.fem.shape import Shape
 from rodfem.fem.state_along import StateAlong
 from rodfem.problem.gradients import is_polynomial
-from rodfem.problem.local_state import Constants
 from rodfem.problem.pointwise import LocalState, along_rod
 from rodfem.problem.values import Values, scalar
 
@@ -48,7 +47,7 @@ class IntegralOrdinate:
         self.exists = not scene.ordinate.places
         if self.exists:
             self._at = LocalState(scene)
-            of = scalar(scene.ordinate.of(along_rod(scene, self._at), Constants(s=self._at.s, **self._at.parameters)))
+            of = scalar(scene.ordinate.of(along_rod(scene, self._at), self._at.constants))
             self.exists, self._of = not is_polynomial(of, self._at), Values(of)
 
     def __call__(self, x: PETSc.Vec) -> Integral:

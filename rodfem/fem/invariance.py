@@ -110,7 +110,7 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
     """
     if not found or equations.loads is None:
         return np.eye(len(found))
-    states = [generic_state(equations, seed, rod_alone=True) for seed in range(len(found) + STATES)]
+    states = [generic_state(equations, seed, no_multipliers=True) for seed in range(len(found) + STATES)]
     changes = np.array([[symmetry.change(state) for symmetry in found] for state in states])
     comm, sizes = equations.fields.comm, equations.fields.sizes
     lengths = np.max(comm.allgather(abs(changes / sizes).max(axis=(0, 2))), axis=0)
@@ -234,11 +234,11 @@ def _held(fields: Fields) -> np.ndarray:
     return used[fields.number[used] < 0]
 
 
-def generic_state(equations: Equations, seed: int, decay: float = DECAY, *, rod_alone: bool = False) -> Evaluation:
+def generic_state(equations: Equations, seed: int, decay: float = DECAY, *, no_multipliers: bool = False) -> Evaluation:
     """Generic state with a random load: the same on any number of ranks, ends held.
 
     ``equations`` are those of the rod, ``seed`` that of the random numbers, and ``decay`` the ratio of one Fourier
-    coefficient to the next.  With ``rod_alone`` all multipliers are zero.
+    coefficient to the next.  With ``no_multipliers`` these are zero.
 
     Values are functions of the place along the rod, not of the numbering, with all Fourier coefficients: whatever
     function of the arclength a load is, it does work.  Those of a ring are closed: whether a pressure is felt by a
@@ -250,7 +250,7 @@ def generic_state(equations: Equations, seed: int, decay: float = DECAY, *, rod_
         x = (fields.coordinates(block.degree) - scene.interval[0]) / scene.length
         named[block.name] = scene.units.of_field(block) * _generic(fields, block, x[..., None], rng, decay)
     named |= {unknown.name: rng.normal() * scene.units.of_scalar(unknown) for unknown in fields.unknown_scalars}
-    if rod_alone:
+    if no_multipliers:
         multipliers = [block.name for block in fields.blocks if block.multiplier]
         multipliers += [x.name for x in fields.unknown_scalars if x.group.motion is not Motion.POSITION]
         named |= {name: 0.0 * named[name] for name in multipliers}

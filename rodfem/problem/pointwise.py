@@ -39,6 +39,11 @@ class LocalState:
         k = curvature(ufl.as_vector(self.q), ufl.as_vector(self._slopes))
         self._curvatures = [Values(k[i]) for i in range(3)]
 
+    @property
+    def constants(self) -> Constants:
+        """The scene's parameters and the arclength, as functions of a place receive them."""
+        return Constants(s=self.s, **self.parameters)
+
     def curvatures(self, q: Places, slopes: np.ndarray) -> Places:
         """Curvatures of quaternions ``q`` with these ``slopes`` (4, places), by their symbols."""
         known = q | dict(zip(self._slopes, slopes, strict=True))
@@ -63,7 +68,7 @@ def along_rod(scene: Scene, at: LocalState) -> Place:
 
 def pointwise(scene: Scene, at: LocalState) -> Iterator[Pointwise]:
     """Stored energy, potentials and constraints of a ``scene`` as functions of the symbols ``at`` a place."""
-    c, along = Constants(s=at.s, **at.parameters), along_rod(scene, at)
+    c, along = at.constants, along_rod(scene, at)
     yield Pointwise("stored energy", None, scene.energy(along.v, along.k, c))
     for part in scene.parts:
         x = along if part.s is None else place(along.q, along.R, at.s, along.r, length=scene.length)

@@ -116,18 +116,7 @@ def test_zeros_without_a_change_of_sign(of: Callable[[float], float], exact: lis
 @pytest.mark.parametrize("largest", [0.3, 0.11])
 def test_corners_on_a_curved_branch(largest: float) -> None:
     """Each is found where interpolated states are not equilibria, and beside a row, where no sample is between."""
-    rod = rodfem.Scene(
-        name="imperfect column",
-        interval=(0.0, 1.0),
-        rod="unshearable",
-        energy=lambda v, k, c: 50 * (v[2] - 1) ** 2 + bending_and_twist(k, (1.0, 2.0, 1.0)),
-        parameters={"P": 0.0},
-        load="P",
-        ends=(clamped(), rodfem.free(force=lambda c: (0.3, 0.0, -c.P))),
-        ordinate=rodfem.Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
-        span=(0.0, 4.0),
-        planar="e2",
-    )
+    rod = classics.imperfect_column()
     mesh, steps = Discretization("auto", 5, 6), rodfem.StepControl(first=0.05, largest=largest)
     plan = Plan(depth=0, error_bars=False, steps=steps)
     rows = [row.load for row in rodfem.trace(rod, mesh, plan)[0].points[1:-1]]

@@ -10,25 +10,13 @@ import numpy as np
 import pytest
 
 import rodfem
-from forms.energy import bending_and_twist
-from rodfem import Discretization, Event, InputError, Plan, clamped
+from rodfem import Discretization, Event, InputError, Plan
 from rodfem.continuation.event_samples import Samples, sampled
 from rodfem.continuation.event_zeros import Zeros
 
 pytestmark = pytest.mark.alone
 
-COLUMN = rodfem.Scene(
-    name="imperfect column",
-    interval=(0.0, 1.0),
-    rod="unshearable",
-    energy=lambda v, k, c: 50 * (v[2] - 1) ** 2 + bending_and_twist(k, (1.0, 2.0, 1.0)),
-    parameters={"P": 0.0},
-    load="P",
-    ends=(clamped(), rodfem.free(force=lambda c: (0.3, 0.0, -c.P))),
-    ordinate=rodfem.Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
-    span=(0.0, 4.0),
-    planar="e2",
-)
+COLUMN = classics.imperfect_column()
 MESH = Discretization("auto", 5, 6)
 PLAN = Plan(depth=0, error_bars=False, steps=rodfem.StepControl(first=0.05, largest=0.2))
 SHAPES: dict[str, tuple[Callable[[float, float], float], Callable[[float], list[float]]]] = {
