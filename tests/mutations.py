@@ -58,6 +58,21 @@ FAULTS = {
         '(name := f"{before}{number}{after}") in ()',
         "tests/diagram/test_first_name.py",
     ),
+    "ranges-are-left-and-entered-again": Fault(
+        "rodfem/diagram/step.py", "if q is self.b or", "if True or", "tests/hard/test_hard_cases.py"
+    ),
+    "states-are-assessed-by-the-slowest-motions": Fault(
+        "rodfem/stability/assessment.py",
+        "bad = max(bad, len(everything.unstable))",
+        "pass",
+        "tests/diagram/test_sweep.py",
+    ),
+    "bars-of-modes-by-the-nearest": Fault(
+        "rodfem/modes/finder.py",
+        'others[np.argsort(abs(values), kind="stable")] = found.values[moving(found, number)]',
+        "others[:] = [found.values[np.argmin(abs(found.values - v))] for v in values]",
+        "tests/modes/test_modes.py",
+    ),
     "more-modes-than-there-are": Fault(
         "rodfem/fem/fields.py",
         "if number > (most := most_eigenvalues(scene, discretization)):",

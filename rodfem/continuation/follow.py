@@ -23,6 +23,8 @@ PILE = 64
 """Points of a branch after which the vectors that are not used any more are destroyed."""
 ON_BOUND = 1e-8
 """Distance from a bound, in spans, below which a load counts as on it: branches of constant load may lie there."""
+END_OF_RANGE = "end of range"
+"""Why a branch ends at a bound of the range."""
 
 
 def follow(
@@ -58,7 +60,7 @@ def follow(
             point = _to_load(solver, points, made.load, bound, step, steps.smallest)
             if point is not None:
                 yield point
-                yield "end of range"
+                yield END_OF_RANGE
                 return
             missed = f"; no state is found at {bound:.6g}: let the range end elsewhere if that is a bifurcation"
         elif made.outcome is not None and made.tangent is not None and made.aligned > ALIGNED:

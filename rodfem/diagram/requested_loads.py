@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import USER
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.prediction import hermite
-from rodfem.continuation.states_between import solve_at_load
 from rodfem.diagram.step import Step
 
 if TYPE_CHECKING:
@@ -28,7 +26,7 @@ class RequestedLoads:
         """Points at these loads in a step; at its first point, too, where a branch begins there."""
         solver, a, b = step.solver, step.a, step.b
         return [
-            solver.given(USER, _point_at(load, step, p, q))
+            solver.given(USER, step.at_load(load, p, q))
             for p, q in step.pieces()
             for load in self.loads
             if (p.load - load) * (q.load - load) < 0
@@ -38,10 +36,3 @@ class RequestedLoads:
 
     def finish(self, observer: Observer) -> None:
         """Nothing is left open: an equilibrium that is not found ends its branch."""
-
-
-def _point_at(load: float, step: Step, p: Point, q: Point) -> Point:
-    """Point at exactly ``load`` between two neighbours ``p``, ``q`` in a step."""
-    solver = step.solver
-    x, s, outcome = solve_at_load(solver, lambda t: hermite(step.a, step.b, t), p, q, load)
-    return solver.point(x, s, solver.load_tangent(x, q.load > p.load), outcome)

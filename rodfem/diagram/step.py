@@ -7,6 +7,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.prediction import hermite
+from rodfem.continuation.states_between import solve_at_load
 
 if TYPE_CHECKING:
     from rodfem.continuation.branch_solver import BranchSolver
@@ -30,3 +32,25 @@ class Step(NamedTuple):
         """Yield neighbours among ``a``, the folds and branch points, and ``b``: the load is monotone between them."""
         between = (s.point for s in self.singular if s.point.arclength > self.a.arclength)
         return pairwise([self.a, *between, self.b])
+
+    def at_load(self, load: float, p: Point, q: Point) -> Point:
+        """Point at exactly ``load`` between two neighbours ``p``, ``q`` of :meth:`pieces`.
+
+        Raises :class:`~rodfem.errors.ConvergenceError` where there is no such state.
+        """
+        x, s, outcome = solve_at_load(self.solver, lambda t: hermite(self.a, self.b, t), p, q, load)
+        return self.solver.point(x, s, self.solver.load_tangent(x, q.load > p.load), outcome)
+
+    def up_to(self, bounds: tuple[float, float], margin: float) -> Step:
+        """The step up to where its load leaves the ``bounds`` and comes back: the whole one where it does not.
+
+        Between two loads in the range a branch turns at a fold beyond it, by more than the ``margin``, if at all.
+        """
+        low, high = bounds
+        for p, q in self.pieces():
+            if q is self.b or low - margin <= q.load <= high + margin:
+                continue
+            last = self.at_load(low if q.load < low else high, p, q)
+            before = [s for s in self.singular if s.point.arclength < last.arclength]
+            return self._replace(b=last, singular=before, closed=False)
+        return self

@@ -28,6 +28,7 @@ from rodfem.diagram.held import at_load, require_held
 from rodfem.diagram.kinks import Kinks
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep_errors import SweepErrors
+from rodfem.diagram.unfollowed import Unfollowed
 from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without
 from rodfem.problem.fast_load import FastLoad
@@ -58,6 +59,7 @@ class Sweep:
         self.rows = FrequencyRows(self.eigensolver, self.number)
         self.curves = Curves(solver.system.comm)
         self.critical = CriticalLoads(solver, self.eigensolver, self.number, observer.warn)
+        self.unfollowed = Unfollowed(self.eigensolver, observer)
         self.invariants = Invariants(solver)
         self.last: Row | None = None
         self.latest: list[Point] = []
@@ -160,6 +162,7 @@ class Sweep:
         for row in rows:
             point, before, self.last = row.point, self.last, row
             self._record(point, row.found, on_the_way=True)
+            self.unfollowed.look(point, last=point.load == self.span[1])
             if before is not None:
                 self._between(branch, before, row)
             branch.points.append(point)

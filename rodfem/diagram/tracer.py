@@ -13,7 +13,7 @@ from rodfem.adaptivity.soft_rows import SoftRows
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.convexity_between import lost_in_step
-from rodfem.continuation.follow import follow
+from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.invariants import Invariants
 from rodfem.continuation.kinds import END
@@ -249,8 +249,16 @@ class Tracer:
         """
         with self.solver.system.clock.scope("location"):
             specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b, rows)
-            step = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=closed)
-            return self._insert(branch, specials + [s for finder in self.finders for s in finder.between(step)])
+            whole = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=closed)
+            step = whole.up_to((self.low, self.high), ON_BOUND * (self.high - self.low))
+            found = [*step.singular, *(s for finder in self.finders for s in finder.between(step))]
+            reason = self._insert(branch, found)
+        if reason or step.b is b:
+            return reason
+        self._check_invariants(step.b)
+        branch.points.append(step.b)
+        self.observer.progress(branch, step.b)
+        return END_OF_RANGE
 
     def _first_specials(self, branch: Branch) -> None:
         """Insert special points between the branch point that a branch leaves and its first point."""
@@ -362,7 +370,7 @@ class Tracer:
         explain(branch)
         self._singular_start(branch)
         last = branch.points[-1]
-        if branch.ended == "end of range" and last.zero > self.solver.system.active_drifts(last.x):
+        if branch.ended == END_OF_RANGE and last.zero > self.solver.system.active_drifts(last.x):
             self._singular_end(branch, last)
             last = branch.points[-1]
         if not any(s.point is last for s in branch.special):

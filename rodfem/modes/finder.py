@@ -15,7 +15,7 @@ from rodfem.fem.transfer import Transfer, halved, richer_system
 from rodfem.modes.eigenmotions import Eigenmotions, stack
 from rodfem.modes.modes import LEFT, SYMMETRY, Modes
 from rodfem.stability.assessment import Assessor, Verdict
-from rodfem.stability.left_right import two_sided
+from rodfem.stability.left_right import moving, two_sided
 
 FLOOR = 1e-12
 """Least uncertainty of an eigenvalue by round-off, relative to the greatest one."""
@@ -87,11 +87,13 @@ class ModeFinder(Eigenmotions):
         y, outcome = solver.at_load(guess, self.system.scalar(x), reach=1.0)
         if not outcome.converged:
             return np.full(len(values), np.inf)
-        others = assessor(y, number=2 * len(values) + 2 if np.iscomplexobj(values) else len(values)).values
-        rho, left = (
-            halved(self.system.fields.discretization.degree),
-            FLOOR * max(self.system.scene.units.moment, float(abs(values).max())),
-        )
-        if np.iscomplexobj(values):
-            others = np.array([others[np.argmin(abs(others - v))] for v in values])
+        number = len(values)
+        if assessor.conservative:
+            others = assessor(y, number=number).values
+        else:  # each with that of the same rank: what is nearest to a value may be another mode, the more so far off
+            found = assessor.nonsymmetric.at(y).near_zero(2 * number)
+            others = np.empty(number, dtype=complex)
+            others[np.argsort(abs(values), kind="stable")] = found.values[moving(found, number)]
+        rho = halved(self.system.fields.discretization.degree)
+        left = FLOOR * max(self.system.scene.units.moment, float(abs(values).max()))
         return np.array([bound(v, other, left, rho) for v, other in zip(values, others, strict=True)])

@@ -15,6 +15,7 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.faults import as_failure
+from rodfem.stability.census import census
 from rodfem.stability.method import Found, Method
 from rodfem.stability.methods import AUTO, METHODS, find
 from rodfem.stability.rank import rank_of
@@ -36,8 +37,9 @@ class Verdict:
     ----------
     negative, zero, undecided
         Index, number of zero eigenvalues (symmetry modes included), and of those whose sign is not decided, which are
-        not among the negative ones; under non-conservative loads the number of
-        eigenvalues found that have a negative real part or an imaginary part, and that of free motions.
+        not among the negative ones; under non-conservative loads the number of eigenvalues with a negative real part
+        or an imaginary part, of all that the mesh has (of those found, where it is too large for
+        :func:`~rodfem.stability.census.census`), and that of free motions.
     values, vectors, errors
         Left-most eigenvalues ``mu = omega^2`` without symmetry modes (under non-conservative loads those nearest zero),
         their vectors (without multipliers where constraints were reduced), and backward errors.  No vectors where mu is
@@ -142,6 +144,9 @@ class Assessor(Workspace):
                 found = self._method(name).nearest(x, max(number, 1))
             scale = ZERO * self.system.stiffness_scale / self.system.scene.length
             bad = int(((found.values.real < -scale) | (abs(found.values.imag) > scale)).sum())
+            everything = census(self.nonsymmetric.at(x))
+            if everything is not None:
+                bad = max(bad, len(everything.unstable))
             index, zero, nothing = bad, self.system.active_drifts(x), np.zeros(0)
             inside: tuple[float, np.ndarray, np.ndarray] = 0.0, nothing, nothing
             made = 0

@@ -8,6 +8,7 @@ import numpy as np
 
 from rodfem.errors import ConvergenceError
 from rodfem.stability import mode_type
+from rodfem.stability.frequencies import Frequencies
 from rodfem.stability.nonsymmetric import NonsymmetricPencil
 
 SAME = 1e-6
@@ -39,11 +40,10 @@ def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
     These have a zero eigenvalue, and under a thrust that follows the rod no vectors of their own: turning it
     accelerates it.
 
-    Raises :class:`ConvergenceError` if a right eigenvalue has no left partner.
+    Raises :class:`ConvergenceError` if a right eigenvalue has no left partner, or the mesh has fewer of them.
     """
     right, left = (find(2 * number) for find in (pencil.near_zero, pencil.left_near_zero))
-    moving = [i for i in upper(right.values, len(right.values)) if right.kinds[i] != mode_type.RIGID]
-    chosen = sorted(moving[:number], key=lambda i: right.values[i].real)
+    chosen = sorted(moving(right, number), key=lambda i: right.values[i].real)
     partners: list[int] = []
     for value in right.values[chosen]:
         distance = abs(left.values - value)
@@ -65,6 +65,19 @@ def two_sided(pencil: NonsymmetricPencil, number: int) -> TwoSided:
         Z,
         pencil.weighed(Z),
     )
+
+
+def moving(found: Frequencies, number: int) -> list[int]:
+    """Places of the ``number`` eigenvalues ``found`` nearest zero, nearest first: one of each pair, no rigid motion.
+
+    Raises :class:`ConvergenceError` where there are fewer.
+    """
+    places = [i for i in upper(found.values, len(found.values)) if found.kinds[i] != mode_type.RIGID]
+    if len(places) < number:
+        raise ConvergenceError(
+            f"The mesh has {len(places)} modes, not {number}: ask for fewer, or use a richer discretisation."
+        )
+    return places[:number]
 
 
 def upper(values: np.ndarray, number: int) -> list[int]:

@@ -19,6 +19,7 @@ Nothing here comes from what was followed but the two bases: ``K`` is solved for
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,12 +58,11 @@ def enclosed(x: np.ndarray, y: np.ndarray, mass: sp.csr_matrix, factors: Elimina
     The bases are about orthonormal in the ``mass``, and ``factors`` are those of ``S - a M``.  Raises
     :class:`numpy.linalg.LinAlgError` where ``N`` is singular.
     """
-    heavy, m = _heavy(mass)
-    if len(heavy) > LARGEST:
+    found = inverse_with_mass(mass, factors.solve)
+    if found is None:
         return None
-    units = np.zeros((mass.shape[0], len(heavy)), order="F")
-    units[heavy, np.arange(len(heavy))] = 1.0
-    inverse, x, y = factors.solve(units)[heavy], x[heavy], y[heavy]
+    heavy, inverse, m = found
+    x, y = x[heavy], y[heavy]
     x_image, y_image = m @ x, m @ y
     overlap, seen = y.T @ x_image, y_image.T @ inverse
     dual, share = np.linalg.solve(overlap, y.T), np.linalg.solve(overlap, seen)
@@ -76,6 +76,18 @@ def enclosed(x: np.ndarray, y: np.ndarray, mass: sp.csr_matrix, factors: Elimina
     if outside > SHARP * abs(nu).min():
         outside = min(outside, float(np.sqrt(_frobenius(m, rest @ (m @ rest)))))
     return Enclosed(nu, outside, residuals * float(np.linalg.cond(w)))
+
+
+def inverse_with_mass(
+    mass: sp.csr_matrix, solve: Callable[[np.ndarray], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix] | None:
+    """Rows with mass (h,), the inverse that ``solve`` applies and the ``mass`` there (h, h); None for too many rows."""
+    heavy, m = _heavy(mass)
+    if len(heavy) > LARGEST:
+        return None
+    units = np.zeros((mass.shape[0], len(heavy)), order="F")
+    units[heavy, np.arange(len(heavy))] = 1.0
+    return heavy, solve(units)[heavy], m
 
 
 def _heavy(mass: sp.csr_matrix) -> tuple[np.ndarray, sp.csr_matrix]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import classics
 import numpy as np
 import pytest
-from closed_forms import column
+from closed_forms import column, double
 from hemitropic_cases import specials
 from matplotlib.figure import Figure
 from mpi4py import MPI
@@ -192,6 +192,25 @@ def test_frequencies_of_a_rod_that_turns_freely_in_any_units(length: float, stif
     b = TURNING, brentq(lambda x: np.tan(x) - np.tanh(x), 7.0, 7.1)
     assert branch.points[0].negative == 0
     assert np.allclose(measured[:4], np.repeat(b, 2) ** 4, rtol=1e-6)
+
+
+def test_flutter_among_dozens_of_slow_motions() -> None:
+    """A rod that is so soft in torsion that 17 motions are slower than those that flutter, at Beck's load."""
+    scene = replace(
+        classics.beck(span=(19.0, 22.0)),
+        energy=lambda v, k, c: bending_and_twist(k, (1.0, 10.0, 1e-3)),
+        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0)),
+    )
+    mesh = Discretization("pointwise", 4, 6)
+    few = trace(scene, mesh, Plan(error_bars=False))
+    assert not specials(few[0], "flutter")
+    (said,) = [w for w in few.warnings if "not among those that are followed" in w]
+    number = int(said.split("spectrum=")[1].rstrip("."))
+    many = trace(scene, mesh, Plan(spectrum=number))
+    (flutter,) = specials(many[0], "flutter")
+    assert abs(flutter.point.load - double(20.0, 120.0)[0]) <= flutter.error_estimate
+    for method in ("auto", "dense", "shift-invert"):
+        assert [many.assess(many[0].points[row], method).negative for row in (0, -1)] == [0, 2]
 
 
 def test_long_pencil_on_any_number_of_ranks() -> None:

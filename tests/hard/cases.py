@@ -112,6 +112,11 @@ BIFURCATIONS = (
         "Euler, pi^2/4 and pi^2/2", "distance from both", ranges.beside, (1e-6,), (1e-6, 1e-3, 0.1),
     ),
     Case(
+        "a range that ends just before a fold", "a step that leaves the range and comes back turns at the fold", EXACT,
+        "u^3 - a u = P", "distance from it, over its load", ranges.turning, (1e-3, 0.5),
+        (1e-4, 1e-3, 1e-2, 0.1, 0.5, 0.9, 1.5),
+    ),
+    Case(
         "a load asked for at a branch point", "its equations are singular, or nearly", EXACT,
         "Euler, pi^2/4", "distance from it", ranges.asked, (0.0, -1e-9), (0.0, 1e-12, -1e-12, 1e-9, -1e-9),
     ),

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from math import inf
 
+import numpy as np
 from classics import SUPPORTS, column
 from hard.case import Change, Measured, compare, run, said, singular
 from hard.stiffness import EULER
+from hard.two_freedoms import scene
+
+from rodfem import Discretization
 
 LOADS = (EULER, 2 * EULER)
 """Branch points of a cantilever of bending stiffnesses 1 and 2."""
+HEIGHT = 1e-5
+"""Load of a fold."""
+TO = 1e-6
+"""Relative error of the last state: its load is exact, and the curve is not steep there."""
+MESH = Discretization("reduced", 4, 3)
 
 
 def within(low: float, high: float) -> Measured:
@@ -48,3 +57,20 @@ def asked(off: float) -> Measured:
     if row.load != EULER + off or not expected & set(range(row.negative, row.negative + row.zero + 1)):
         return Measured(inf, 1.0, said(diagram), f"row at {row.load}, index {row.negative}, zero {row.zero}")
     return found
+
+
+def turning(short: float) -> Measured:
+    """``u^3 - a u = P``, whose range ends a part ``short`` of the height of the fold before it: there the branch ends.
+
+    A step that turns at the fold begins and ends within the range.
+    """
+    a = 3 * (HEIGHT / 2) ** (2 / 3)
+    high = HEIGHT * (1 - short)
+    model = scene(lambda u, f2, c: 0.25 * u**4 - 0.5 * c.a * u**2 - c.P * u + 0.5 * f2, (-0.1, high), a=a)
+    diagram = run(model, MESH)
+    (branch,) = diagram
+    u = np.roots([1.0, 0.0, -a, -high]).real.min()
+    outside = max(p.load for p in branch.points) > high
+    if outside or branch.ended != "end of range" or abs(branch.points[-1].ordinate - u) > TO * abs(u):
+        return Measured(inf, 1.0, said(diagram), f"ended: {branch.ended}, at {branch.points[-1].ordinate}, not {u}")
+    return compare(singular(branch), [], said(diagram))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import classics
@@ -20,7 +21,7 @@ from small_states import solver as solver_of
 
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.diagram.solver import Solver
-from rodfem.errors import InputError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import SYMMETRY, Modes, load_modes, save_modes
@@ -122,6 +123,19 @@ def test_beck_column(P: float, near: complex) -> None:
         assert abs(found[:, [0, 2]]).max() < 1e-8 * abs(scaled).max()
     overlap = np.array([modes.amplitude(u, w) for u, w in zip(modes.displacement, modes.rotation, strict=True)])
     np.testing.assert_allclose(overlap, np.eye(3), atol=1e-8)
+
+
+@pytest.mark.parametrize(("elements", "degree"), [(1, 3), (2, 2), (3, 1), (2, 4)])
+def test_bars_on_coarse_meshes_are_those_of_the_same_mode(elements: int, degree: int) -> None:
+    """Beck's column: the third mode of a coarse mesh is nearer to a higher one of the next mesh than to the third."""
+    solver, x = state(
+        replace(classics.beck(span=(1.0, 35.0)), planar="e1"), Discretization("pointwise", elements, degree), 10.0
+    )
+    modes = ModeFinder(solver)(x, 3)[1]
+    exact = [beck_value(near, 10.0).real for near in (26.8, 345.5, 3450.0)]
+    assert (abs(modes.value - exact) <= modes.error).all()
+    with pytest.raises(ConvergenceError, match=r"has \d+ modes?, not 40"):
+        modes_of(solver, x, 40)
 
 
 # --- finite differences ------------------------------------------------------------------------------------------
