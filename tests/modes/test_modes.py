@@ -125,7 +125,7 @@ def test_beck_column(P: float, near: complex) -> None:
     np.testing.assert_allclose(overlap, np.eye(3), atol=1e-8)
 
 
-@pytest.mark.parametrize(("elements", "degree"), [(1, 3), (2, 2), (3, 1), (2, 4)])
+@pytest.mark.parametrize(("elements", "degree"), [(3, 1), (2, 2), (2, 3), (2, 4)])
 def test_bars_on_coarse_meshes_are_those_of_the_same_mode(elements: int, degree: int) -> None:
     """Beck's column: the third mode of a coarse mesh is nearer to a higher one of the next mesh than to the third."""
     solver, x = state(
