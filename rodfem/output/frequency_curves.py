@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +20,8 @@ from rodfem.output.sheet import PALETTE
 
 COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending": 4, "mixed": 5, "rigid motion": 6}
 """Places in the palette."""
-RANGES = ("#E9E4F3", "#FBE6D9")
-"""Shades of ranges of divergence, and of those of flutter."""
+RANGES = ("#E9E4F3", "#FBE6D9", "#F3D3C6")
+"""Shades of ranges of divergence, of flutter, and of both."""
 REAL = 1e-6
 """An imaginary part smaller than this is none, relative to the root."""
 PAIR, GROWTH, DIVERGED = "complex pair, real part", "complex pair, imaginary part", "diverged, growth rate"
@@ -99,23 +100,36 @@ def curves(columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = ()
 
 
 def ranges_of(branch: Mapping[str, Any]) -> Iterator[Range]:
-    """Ranges of the load in which a branch is unstable."""
+    """Ranges of the load in which a branch is unstable in one way."""
     columns = branch["columns"]
     for interval in intervals_of(branch):
         if interval.kind == STABLE:
             continue
-        values = [complex(*v) for row in columns["omega2"][interval.first : interval.last + 1] for v in row]
-        real = [v.real for v in values if abs(v.imag) <= REAL * abs(v)]
-        least = REAL * max(map(abs, values))
-        found = {FLUTTER: len(real) < len(values), DIVERGENCE: any(x < -least for x in real)}
-        words = "range of " + (" and ".join(kind for kind, there in found.items() if there) or "instability")
-        yield Range(*interval.covers, words, RANGES[found[FLUTTER]])
+        rows = range(interval.first, interval.last + 1)
+        values = [[complex(*v) for v in columns["omega2"][row]] for row in rows]
+        least = REAL * max(abs(v) for row in values for v in row)
+        kinds = [_kinds(row, least) for row in values]
+        # a step is what either end is: at critical loads eigenvalues are still real, or zero
+        steps = [a | b for a, b in pairwise(kinds)]
+        for kind, group in groupby(zip(rows, steps, strict=False), lambda step: step[1]):
+            places = [row for row, _ in group]
+            loads = columns["load"][places[0] : places[-1] + 2]
+            words = "range of " + (" and ".join(k for k in (FLUTTER, DIVERGENCE) if k in kind) or "instability")
+            yield Range(min(loads), max(loads), words, RANGES[2 if len(kind) > 1 else int(FLUTTER in kind)])
 
 
-def top(columns: Mapping[str, Any], most: int) -> float:
-    """Greatest imaginary part of all roots, and real part of the ``most`` left-most, at any load."""
+def _kinds(values: Sequence[complex], least: float) -> frozenset[str]:
+    """Kinds of instability among eigenvalues, of which those below ``least`` are zero."""
+    flutter = any(abs(v.imag) > REAL * abs(v) for v in values)
+    divergence = any(v.real < -least and abs(v.imag) <= REAL * abs(v) for v in values)
+    return frozenset([FLUTTER] * flutter + [DIVERGENCE] * divergence)
+
+
+def top(branch: Mapping[str, Any], most: int) -> float:
+    """Greatest of critical frequencies, imaginary parts of all roots, and real parts of the ``most`` left-most ones."""
     highest = LEAST
-    for pairs in columns["omega2"]:
+    for pairs in branch["columns"]["omega2"]:
         roots = [complex(*pair) ** 0.5 for pair in pairs]  # in ascending order of the real parts of the squares
         highest = max([highest, *(w.imag for w in roots), *(w.real for w in roots[:most])])
-    return highest
+    critical = [abs(complex(s["omega2"])) ** 0.5 for s in branch["special"] if s.get("omega2") is not None]
+    return max([highest, *critical])

@@ -61,7 +61,7 @@ def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]], most: int) -> l
     motions: dict[str, str] = {}
     shown: set[str] = set()
     ranges: dict[str, Patch] = {}
-    axes.set_ylim(0, 1.15 * max(top(b["columns"], most) for b in branches))
+    axes.set_ylim(0, 1.15 * max(top(b, most) for b in branches))
     for branch in branches:
         ranges |= _shade(axes, branch)
         for curve in curves(branch["columns"], branch["special"]):

@@ -35,5 +35,5 @@ def frequencies_of(branch: Mapping[str, Any]) -> dict[str, Any] | None:
             for special in branch["special"]
             if special["kind"] in SPECIAL
         ],
-        "top": top(columns, MOST),
+        "top": top(branch, MOST),
     }

@@ -10,7 +10,7 @@ from pathlib import Path
 import classics
 import numpy as np
 import pytest
-from closed_forms import column, double
+from closed_forms import column, double, flutter
 from hemitropic_cases import specials
 from matplotlib.figure import Figure
 from mpi4py import MPI
@@ -24,7 +24,7 @@ from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
 from rodfem.errors import SceneError
 from rodfem.fem.fields import Discretization
-from rodfem.output.frequency_curves import curves
+from rodfem.output.frequency_curves import curves, ranges_of
 from rodfem.output.plot_frequencies import draw_frequencies
 from rodfem.problem.end import End
 from rodfem.problem.scene import Scene
@@ -105,6 +105,21 @@ def test_double_frequencies_have_one_name(monkeypatch: pytest.MonkeyPatch) -> No
     """Where the rod bends alike in all planes the vectors of a frequency are any in a plane, its name is not."""
     for scene in (classics.partly_following(1.0, (0.0, 25.0), 1.0), classics.partly_following(0.2, (0.0, 25.0), 1.0)):
         assert named(lambda name: name == "bending", swept(scene, monkeypatch)[1])
+
+
+def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thrust that follows in part: one plane diverges, holds again and flutters, before the other one diverges."""
+    share, strong = 0.45, 3.0
+    _, data, _ = swept(classics.partly_following(share, (0.0, 30.0), strong), monkeypatch)
+    first, meet = np.arccos(-share / (1 - share)), flutter(share, 16.1, 37.0)[0]
+    expected = [
+        ("range of divergence", first**2, (2 * np.pi - first) ** 2),
+        ("range of flutter", meet, strong * first**2),
+        ("range of flutter and divergence", strong * first**2, 30.0),
+    ]
+    found = list(ranges_of(data["branches"][0]))
+    assert [r.words for r in found] == [words for words, *_ in expected]
+    assert [[r.low, r.high] for r in found] == [pytest.approx(loads, rel=1e-6) for _, *loads in expected]
 
 
 @pytest.mark.alone
