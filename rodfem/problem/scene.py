@@ -27,6 +27,7 @@ from rodfem.problem.local_state import Constants, inside, watched
 from rodfem.problem.plane import check_plane
 from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
 from rodfem.problem.start import check_continuity
+from rodfem.problem.unchanged import check_unchanged, numbers_of
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import LARGEST, TINIEST, check_kinds, check_scene, two_numbers
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
@@ -277,6 +278,12 @@ class Scene(Contribution):
         check_scene(self)
         check_plane(self)
         check_continuity(self)
+        check_unchanged(self)  # from now on: the first call keeps the numbers of all functions
+
+    @cached_property
+    def numbers(self) -> list[tuple[str, list[float]]]:
+        """Values of each function, by its words, when the scene was made."""
+        return numbers_of(self)
 
     @property
     def sides(self) -> tuple[End, End]:
