@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import floor, isfinite, log10
+from math import ceil, floor, isfinite, log10
 from typing import Any
 
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD, IMPERFECT
@@ -11,8 +11,8 @@ from rodfem.output.intervals import Interval, changes_at
 from rodfem.output.plot_pieces import STABLE, UNDECIDED
 
 Branches = Sequence[Mapping[str, Any]]
-DIGITS, FEW = 10, 6
-"""Significant digits of a load at most, and of one without an error bar."""
+DIGITS, FEW, MOST = 10, 6, 15
+"""Significant digits of a load at most, and of one without an error bar; those of a float."""
 EVENTS = {
     FOLD: "turns back in a fold",
     FLUTTER: "flutters: two frequencies coincide and become complex",
@@ -35,7 +35,8 @@ def change_in_words(one: Interval, after: Interval, branches: Branches) -> tuple
     if found:
         return known_digits(found[0]), " and ".join(_event(special, branch, branches) for special in found)
     column, segment = branch["columns"]["load"], row if after.rank > one.rank else row - 1
-    where = f"some load between {column[segment]:.{FEW}g} and {column[segment + 1]:.{FEW}g}"
+    a, b = told_apart(column[segment], column[segment + 1])
+    where = f"some load between {a} and {b}"
     if any(change["row"] == segment for change in branch.get("unexplained") or ()):
         return where, "changes its index without a special point that says why"
     if one.kink or after.kink:
@@ -85,6 +86,13 @@ def _directions(special: Mapping[str, Any], branch: Mapping[str, Any], branches:
 def _least_zeros(branch: Mapping[str, Any]) -> int:
     """Number of eigenvalues that vanish all along a branch."""
     return min(branch["columns"]["zero"])
+
+
+def told_apart(*loads: float, width: float = 0.0) -> list[str]:
+    """Loads with as many digits as a range of that ``width`` needs: by default from the first load to the last."""
+    width = width or abs(loads[-1] - loads[0])
+    more = ceil(log10(max(map(abs, loads)) / width)) if width and any(loads) else 0
+    return [f"{load:.{min(FEW + max(more, 0), MOST)}g}" for load in loads]
 
 
 def known_digits(special: Mapping[str, Any]) -> str:

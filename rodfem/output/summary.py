@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rodfem.continuation.branch import FIRST_BRANCH
-from rodfem.output.change_words import FEW, UNRESOLVED, change_in_words, known_digits
+from rodfem.output.change_words import UNRESOLVED, change_in_words, known_digits, told_apart
 from rodfem.output.endings import MEETS
 from rodfem.output.intervals import Interval, coexisting, intervals_of, stable_ones, without_stable
 from rodfem.output.plot_pieces import PLANAR, STABLE, UNDECIDED
@@ -42,7 +42,7 @@ def _of_branch(branch: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     if not intervals:
         return f"{name} has one state only; {_end(branch)}."
     parts, told = [], intervals if len(intervals) <= MOST_INTERVALS + 1 else intervals[:MOST_INTERVALS]
-    start, stop = (f"{x:.{FEW}g}" for x in (intervals[0].loads[0], intervals[-1].loads[1]))
+    start, stop = told_apart(intervals[0].loads[0], intervals[-1].loads[1], width=_width(data))
     if len(intervals) == 1:
         coarse = any(special.get("resolved") is False for special in branch["special"])
         parts.append(
@@ -112,13 +112,21 @@ def _ranges(data: Mapping[str, Any]) -> Iterator[str]:
     load, stable = data["parameter"], stable_ones(data["branches"])
     low, high = sorted(data["range"])
     for a, b in without_stable(stable, low, high):
-        yield f"From {load} = {a:.{FEW}g} to {b:.{FEW}g} no stable state was found."
+        first, last = told_apart(a, b, width=_width(data))
+        yield f"From {load} = {first} to {last} no stable state was found."
     pairs = list(coexisting(stable))
     for one, other, a, b in pairs[:MOST_NAMES]:
         names = " and ".join(dict.fromkeys(called(interval.branch["name"]) for interval in (one, other)))
-        yield f"From {load} = {a:.{FEW}g} to {b:.{FEW}g} two stable states coexist, of {names}: hysteresis is possible."
+        first, last = told_apart(a, b, width=_width(data))
+        yield f"From {load} = {first} to {last} two stable states coexist, of {names}: hysteresis is possible."
     if more := pairs[MOST_NAMES:]:
         yield f"So do {_count(len(more), 'further pair', 'further pairs')} of stable states at other loads."
+
+
+def _width(data: Mapping[str, Any]) -> float:
+    """Width of the range of the load."""
+    low, high = data["range"]
+    return float(abs(high - low))
 
 
 def _open(data: Mapping[str, Any]) -> Iterator[str]:

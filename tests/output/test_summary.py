@@ -13,7 +13,7 @@ import golden_cases
 import pytest
 
 from rodfem import Discretization, Plan, trace
-from rodfem.output.change_words import known_digits
+from rodfem.output.change_words import known_digits, told_apart
 from rodfem.output.summary import in_sentences
 
 pytestmark = pytest.mark.alone
@@ -47,6 +47,19 @@ def known(name: str) -> str:
 def test_loads_are_rounded_by_less_than_their_error() -> None:
     for load, error, words in ((3.384, 0.17, "3.4"), (1.449, 0.0145, "1.45"), (9.8696044, 2e-11, "9.8696044")):
         assert known_digits(special("branch point", 1, load, 0, 1, error_estimate=error)) == words
+
+
+@pytest.mark.parametrize(
+    ("loads", "words"),
+    [
+        ((0.0, 25.0), ["0", "25"]),
+        ((20.05095, 20.05096), ["20.05095", "20.05096"]),
+        ((-1e6, -1e6 + 1e-3), ["-1000000", "-999999.999"]),
+        ((1.0, 1.0), ["1", "1"]),
+    ],
+)
+def test_ends_of_a_narrow_range_are_told_apart(loads: tuple[float, float], words: list[str]) -> None:
+    assert told_apart(*loads) == words
 
 
 @pytest.mark.parametrize(
