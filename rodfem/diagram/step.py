@@ -41,16 +41,10 @@ class Step(NamedTuple):
         x, s, outcome = solve_at_load(self.solver, lambda t: hermite(self.a, self.b, t), p, q, load)
         return self.solver.point(x, s, self.solver.load_tangent(x, q.load > p.load), outcome)
 
-    def up_to(self, bounds: tuple[float, float], margin: float) -> Step:
-        """The step up to where its load leaves the ``bounds`` and comes back: the whole one where it does not.
-
-        Between two loads in the range a branch turns at a fold beyond it, by more than the ``margin``, if at all.
-        """
+    def up_to(self, bounds: tuple[float, float]) -> Step:
+        """The step up to where its load leaves the ``bounds`` for the first time, at one of the singular points."""
         low, high = bounds
-        for p, q in self.pieces():
-            if q is self.b or low - margin <= q.load <= high + margin:
-                continue
-            last = self.at_load(low if q.load < low else high, p, q)
-            before = [s for s in self.singular if s.point.arclength < last.arclength]
-            return self._replace(b=last, singular=before, closed=False)
-        return self
+        p, q = next((p, q) for p, q in self.pieces() if not low <= q.load <= high)
+        last = self.at_load(low if q.load < low else high, p, q)
+        before = [s for s in self.singular if self.a.arclength < s.point.arclength < last.arclength]
+        return self._replace(b=last, singular=before, closed=False)

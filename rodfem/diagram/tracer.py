@@ -249,11 +249,28 @@ class Tracer:
         """
         with self.solver.system.clock.scope("location"):
             specials = [] if a is branch.points[0] and branch.parent else self.specials.after(a, b, rows)
-            whole = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=closed)
-            step = whole.up_to((self.low, self.high), ON_BOUND * (self.high - self.low))
-            found = [*step.singular, *(s for finder in self.finders for s in finder.between(step))]
-            reason = self._insert(branch, found)
-        if reason or step.b is b:
+            if last := self._leaving(branch, specials, b):
+                return last
+            step = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=closed)
+            return self._insert(branch, specials + [s for finder in self.finders for s in finder.between(step)])
+
+    def _leaving(self, branch: Branch, specials: list[SpecialPoint], b: Point) -> str:
+        """End a branch where it leaves the range before one of its ``specials``, found up to ``b``; the reason, if so.
+
+        A branch that goes out of the range and comes back turns at a fold beyond it.
+        """
+        margin = ON_BOUND * (self.high - self.low)
+        out = next((s for s in specials if not self.low - margin <= s.point.load <= self.high + margin), None)
+        if out is None:
+            return ""
+        before = [p for p in branch.points if p.arclength < out.point.arclength]
+        a = self.here(before[-1])
+        begins = len(branch.points) == 1  # else what is at its first point has been found
+        step = Step(self.solver, a, b, specials, begins=begins).up_to((self.low, self.high))
+        branch.cut(a.arclength)
+        known = [s for s in specials if s.point.arclength < a.arclength]
+        found = [*known, *step.singular, *(s for finder in self.finders for s in finder.between(step))]
+        if reason := self._insert(branch, found):
             return reason
         self._check_invariants(step.b)
         branch.points.append(step.b)
@@ -278,7 +295,8 @@ class Tracer:
     def _rest(self, branch: Branch) -> str:
         """Insert the special points that only the end of a branch shows; a reason if the branch ends at one."""
         with self.solver.system.clock.scope("location"):
-            return self._insert(branch, self.specials.rest())
+            specials = self.specials.rest()
+            return self._leaving(branch, specials, branch.points[-1]) or self._insert(branch, specials)
 
     def _insert(self, branch: Branch, specials: list[SpecialPoint]) -> str:
         """Insert special points into a branch, up to one at which it ends: then the reason."""

@@ -114,7 +114,12 @@ BIFURCATIONS = (
     Case(
         "a range that ends just before a fold", "a step that leaves the range and comes back turns at the fold", EXACT,
         "u^3 - a u = P", "distance from it, over its load", ranges.turning, (1e-3, 0.5),
-        (1e-4, 1e-3, 1e-2, 0.1, 0.5, 0.9, 1.5),
+        (1e-3, 1e-2, 0.1, 0.5, 0.9, 1.5),
+    ),
+    Case(
+        "a range that ends between two folds", "the last step leads past both, to the bound", EXACT,
+        "u^3 - a u = P", "distance from the first, over its load", ranges.turning_in_the_last_step, (0.5,),
+        (0.3, 0.5, 0.9, 1.5),
     ),
     Case(
         "a load asked for at a branch point", "its equations are singular, or nearly", EXACT,

@@ -14,8 +14,8 @@ from rodfem import Discretization
 
 LOADS = (EULER, 2 * EULER)
 """Branch points of a cantilever of bending stiffnesses 1 and 2."""
-HEIGHT = 1e-5
-"""Load of a fold."""
+HEIGHT, LOW = 1e-5, 1e-8
+"""Load of a fold, and a load so low that one step leads past two folds."""
 TO = 1e-6
 """Relative error of the last state: its load is exact, and the curve is not steep there."""
 MESH = Discretization("reduced", 4, 3)
@@ -59,13 +59,13 @@ def asked(off: float) -> Measured:
     return found
 
 
-def turning(short: float) -> Measured:
-    """``u^3 - a u = P``, whose range ends a part ``short`` of the height of the fold before it: there the branch ends.
+def turning(short: float, height: float = HEIGHT) -> Measured:
+    """``u^3 - a u = P``, whose range ends before a fold, by a part ``short`` of its ``height``: there the branch ends.
 
     A step that turns at the fold begins and ends within the range.
     """
-    a = 3 * (HEIGHT / 2) ** (2 / 3)
-    high = HEIGHT * (1 - short)
+    a = 3 * (height / 2) ** (2 / 3)
+    high = height * (1 - short)
     model = scene(lambda u, f2, c: 0.25 * u**4 - 0.5 * c.a * u**2 - c.P * u + 0.5 * f2, (-0.1, high), a=a)
     diagram = run(model, MESH)
     (branch,) = diagram
@@ -74,3 +74,8 @@ def turning(short: float) -> Measured:
     if outside or branch.ended != "end of range" or abs(branch.points[-1].ordinate - u) > TO * abs(u):
         return Measured(inf, 1.0, said(diagram), f"ended: {branch.ended}, at {branch.points[-1].ordinate}, not {u}")
     return compare(singular(branch), [], said(diagram))
+
+
+def turning_in_the_last_step(short: float) -> Measured:
+    """The same, with both folds and the end of the range in one step."""
+    return turning(short, LOW)
