@@ -76,6 +76,9 @@ FAULTS = {
     "scenes-of-a-loop": Fault(
         "rodfem/fem/system.py", "        check_unchanged(scene)\n", "", "tests/problem/test_unchanged.py"
     ),
+    "rods-by-their-code-alone": Fault(
+        "rodfem/app/code_digest.py", "*_stated(scene), repr(scene.numbers), ", "", "tests/app/test_many.py"
+    ),
     "more-modes-than-there-are": Fault(
         "rodfem/fem/fields.py",
         "if number > (most := most_eigenvalues(scene, discretization)):",

@@ -1,4 +1,7 @@
-"""A digest of functions by what they do: their code, constants, and the functions that they call.
+"""A digest of functions by what they do: their code, constants, and the functions that they call; and of a scene.
+
+What a scene states is in its fields, in the code of its functions, and in the values that these have at some states:
+an object, a method or a partial function has the same code whatever numbers it holds.
 
 Files that are used again tell by it whether an energy, or the work on a rod, has changed since.  Another version of
 Python compiles to other code: then what could be used is computed anew.
@@ -7,13 +10,17 @@ Python compiles to other code: then what could be used is computed anew.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from functools import partial
 from inspect import unwrap
 from types import CodeType, FunctionType, MethodType
 from typing import Any
 
 import numpy as np
+
+from rodfem.problem.roles import functions_of
+from rodfem.problem.scene import Scene
 
 VALUES = (bool, int, float, complex, str, bytes, type(None))
 """Types of values that are part of what a function does; objects of others may change while it runs."""
@@ -24,6 +31,28 @@ def digest(functions: Iterable[Callable[..., Any]]) -> str:
     seen: set[int] = set()
     parts = [part for function in functions for part in _of(function, seen)]
     return hashlib.sha1("\n".join(parts).encode()).hexdigest()[:16]
+
+
+def digest_of(scene: Scene) -> str:
+    """Sixteen hexadecimal digits that are equal for scenes that state the same rod."""
+    parts = [*_stated(scene), repr(scene.numbers), digest(function for _, function, _ in functions_of(scene))]
+    return hashlib.sha1("\n".join(parts).encode()).hexdigest()[:16]
+
+
+def _stated(value: Any) -> Iterator[str]:
+    """Fields of an object and of all that it is made of; of functions that there is one."""
+    if is_dataclass(value) and not isinstance(value, type):
+        yield type(value).__name__
+        for field in fields(value):
+            yield field.name
+            yield from _stated(getattr(value, field.name))
+    elif isinstance(value, Mapping):
+        yield from (part for item in value.items() for part in _stated(item))
+    elif isinstance(value, tuple | list):
+        yield str(len(value))
+        yield from (part for x in value for part in _stated(x))
+    else:
+        yield "function" if callable(value) else repr(value)
 
 
 def _of(value: Any, seen: set[int]) -> Iterator[str]:

@@ -1,8 +1,8 @@
 """Many rods: the same work on a list of scenes, shared among the ranks, each rod on one of them.
 
 Results are files, one for each rod, written whole as they finish: an interrupted run goes on where it stopped, on any
-number of ranks.  A rod that is no longer the same (other constants, another range, energy or load) is computed anew,
-and so are all where the work on them is another.
+number of ranks.  A rod that is no longer the same, in whatever its scene states, is computed anew, and so are all
+where the work on them is another.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from rodfem.app.code_digest import digest
+from rodfem.app.code_digest import digest, digest_of
 from rodfem.app.interrupts import held
 from rodfem.diagram.solver import RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
@@ -23,7 +23,6 @@ from rodfem.file_format import RESULT
 from rodfem.output.files import save_json
 from rodfem.output.folder import locked
 from rodfem.problem.arguments import checked, each, function, path
-from rodfem.problem.roles import functions_of
 from rodfem.problem.scene import Scene
 from rodfem.ranks import end_together, on_first
 
@@ -33,8 +32,8 @@ Work = Callable[[Scene], dict[str, Any]]
 def key_of(scene: Scene, work: Work) -> dict[str, Any]:
     """Properties of a scene, and of the ``work`` on it, in which a saved result must agree to be used again."""
     constants = {name: p.value for name, p in scene.parameters.items()}
-    code = digest([*(function for _, function, _ in functions_of(scene)), work])
-    return {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants, "code": code}
+    known = {"scene": scene.name, "load": scene.load, "span": list(scene.span), "constants": constants}
+    return known | {"stated": digest_of(scene), "code": digest([work])}
 
 
 @checked(

@@ -32,6 +32,7 @@ from rodfem.diagram.unfollowed import Unfollowed
 from rodfem.errors import ConvergenceError
 from rodfem.faults import as_failure, without
 from rodfem.problem.fast_load import FastLoad
+from rodfem.stability.census import census
 from rodfem.stability.cluster import Cluster
 from rodfem.stability.frequencies import REAL, Frequencies
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
@@ -179,6 +180,13 @@ class Sweep:
         )
 
     def at(self, x: PETSc.Vec) -> Point:
+        """Evaluate the records of an equilibrium by itself; unstable are all eigenvalues of the mesh that are."""
+        point = self._beside(x)
+        if (everything := census(self.eigensolver.at(x))) is not None:
+            point.negative = max(point.negative, len(everything.unstable))
+        return point
+
+    def _beside(self, x: PETSc.Vec) -> Point:
         """Evaluate the records of an equilibrium that is not on the way of the sweep."""
         point, before = self._point(x), NONE if self.last is None else self.last.found
         self._record(point, leftmost(self.eigensolver.at(x), self.number, before), on_the_way=False)
@@ -222,7 +230,7 @@ class Sweep:
         explained = negative + sum(e.change for e in events) + told.entered == b.negative
         for i, event in enumerate(events):
             point = a if event.load == a.load else b if event.load == b.load else None
-            point = point or self.at(at_load(self.solver, a.x, event.load))
+            point = point or self._beside(at_load(self.solver, a.x, event.load))
             after_it = negative + event.change
             if explained and i == len(events) - 1 and all(e.kind == FLUTTER for e in events):
                 after_it = b.negative  # of all eigenvalues that are recorded

@@ -226,6 +226,8 @@ def test_flutter_among_dozens_of_slow_motions() -> None:
     assert abs(flutter.point.load - double(20.0, 120.0)[0]) <= flutter.error_estimate
     for method in ("auto", "dense", "shift-invert"):
         assert [many.assess(many[0].points[row], method).negative for row in (0, -1)] == [0, 2]
+    (state,) = few.at(22.0)
+    assert (state.negative, state.stable) == (2, False)
 
 
 def test_long_pencil_on_any_number_of_ranks() -> None:
