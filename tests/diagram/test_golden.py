@@ -34,7 +34,7 @@ def marked(name: str) -> Any:
 
 @pytest.mark.parametrize("name", [marked(name) for name in NUMBERS])
 def test_nothing_has_changed(name: str) -> None:
-    """Bars are computed of varied cases; of the others, whose bars nobody compares, they would take half of the time."""
+    """Bars, which nobody compares, are computed of varied cases: of the others they would take half of the time."""
     found, recorded = record(cases()[name](), error_bars=name in VARIED), NUMBERS[name]
     for key in ("name", "ended", "indices"):
         assert [b[key] for b in found] == [b[key] for b in recorded]
