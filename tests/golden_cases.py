@@ -110,8 +110,11 @@ def trace(scene: Scene, *, error_bars: bool = True) -> rodfem.Diagram:
     return rodfem.trace(scene, mesh, Plan(depth=0 if scene.name in FAMILIES else 1, error_bars=error_bars))
 
 
-def record(scene: Scene) -> list[dict[str, Any]]:
-    """What is recorded of a scene: its branches, with their special points and the sequence of their indices."""
+def record(scene: Scene, *, error_bars: bool = True) -> list[dict[str, Any]]:
+    """What is recorded of a scene: its branches, with their special points and the sequence of their indices.
+
+    Without ``error_bars`` the bars are round-off, and no forms of a higher degree are compiled.
+    """
     return [
         {
             "name": branch.name,
@@ -119,7 +122,7 @@ def record(scene: Scene) -> list[dict[str, Any]]:
             "indices": [index for index, _ in groupby(p.negative for p in branch.points)],
             "special": [_point(s) for s in branch.special],
         }
-        for branch in trace(scene).branches
+        for branch in trace(scene, error_bars=error_bars).branches
     ]
 
 

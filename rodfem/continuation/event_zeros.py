@@ -132,7 +132,8 @@ class Zeros:
         for i, (s, z) in enumerate(known):
             around = known[max(i - 1, 0) : i + 2]
             inside = len(around) == 3 or (len(around) == 2 and s in (self.low, self.high))
-            if inside and abs(z) < near and self._is_lowest(z, [y for _, y in around]):
+            values = [y for _, y in around]
+            if inside and abs(z) < near and self._is_lowest(z, values) and not self._is_round_off(s, z, values):
                 out += self._lowest([place for place, _ in around], s, 1.0 if z > 0 else -1.0)
         return out
 
@@ -140,6 +141,11 @@ class Zeros:
     def _is_lowest(z: float, around: list[float]) -> bool:
         """Whether a value is of the sign of those ``around`` it, itself among them, and below one of them."""
         return all(y * z > 0 and abs(y) >= abs(z) for y in around) and any(abs(y) > abs(z) for y in around)
+
+    def _is_round_off(self, s: float, z: float, around: list[float]) -> bool:
+        """Whether a value ``z`` at ``s`` that is surely not zero differs from those ``around`` it by round-off only."""
+        rise = max(map(abs, around)) - abs(z)
+        return rise < abs(z) and rise <= SURE * self.noise(s) < abs(z)
 
     def _lowest(self, around: list[float], s: float, sign: float) -> list[tuple[float, float]]:
         """Look for the lowest value between the places ``around`` one, or at an end; return it if it is a zero."""

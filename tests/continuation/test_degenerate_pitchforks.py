@@ -7,6 +7,7 @@ end, is ``P = f/sin f - 1 + eps f2 + f2^2``: in f it begins with ``(eps + 1/6) f
 from __future__ import annotations
 
 from math import cos, sin
+from typing import Any
 
 import pytest
 from hard.two_freedoms import scene
@@ -30,7 +31,12 @@ def load(f: float, beside: float) -> float:
     return float(f / sin(f) - 1 + (-1 / 6 + beside) * f2 + f2**2)
 
 
-@pytest.mark.parametrize("beside", [-1e-2, -2e-3, -1e-3, -5e-4, -2e-4])
+def on_one_rank(*given: Any) -> list[Any]:
+    """Parameters of tests that two ranks do without."""
+    return [pytest.param(*one if isinstance(one, tuple) else (one,), marks=pytest.mark.alone) for one in given]
+
+
+@pytest.mark.parametrize("beside", [-1e-3, *on_one_rank(-1e-2, -2e-3, -5e-4, -2e-4)])
 def test_a_fold_beside_a_subcritical_pitchfork(beside: float) -> None:
     """Beyond the fold the branch is stable, and at loads above: there the pitchfork is none that is supercritical.
 
@@ -52,7 +58,7 @@ def test_a_fold_beside_a_subcritical_pitchfork(beside: float) -> None:
     assert {(p.negative, p.slope < 0) for p in rows} == {(1, True), (0, False)} and len(rows) > 20
 
 
-@pytest.mark.parametrize("beside", [-1e-4, -5e-5, -1e-5])
+@pytest.mark.parametrize("beside", on_one_rank(-1e-4, -5e-5, -1e-5))
 def test_no_row_before_a_fold_is_called_stable(beside: float) -> None:
     """The fold is 2e-9 to 2e-11 away in load: eigenvalues are as small as round-off."""
     turns = minimize_scalar(load, bounds=(1e-9, 3 * (-beside) ** 0.5), args=(beside,), method="bounded").x
@@ -61,7 +67,10 @@ def test_no_row_before_a_fold_is_called_stable(beside: float) -> None:
     assert before and all(p.stable is not True for p in before)
 
 
-@pytest.mark.parametrize(("beside", "kind"), [(-1e-6, "subcritical"), (1e-6, "supercritical"), (1e-2, "supercritical")])
+@pytest.mark.parametrize(
+    ("beside", "kind"),
+    [(1e-2, "supercritical"), *on_one_rank((-1e-6, "subcritical"), (1e-6, "supercritical"))],
+)
 def test_the_sign_of_the_coefficient_names_the_pitchfork(beside: float, kind: str) -> None:
     """Also where the fold is as near to the branch point as the uncertainty of that, which a note says."""
     diagram = pitchfork(beside)
@@ -71,6 +80,7 @@ def test_the_sign_of_the_coefficient_names_the_pitchfork(beside: float, kind: st
     assert ("turns back in a fold" in special.note) == (beside < 0)
 
 
+@pytest.mark.alone
 def test_a_coefficient_that_is_not_told_from_zero() -> None:
     diagram = pitchfork(0.0)
     (special,) = diagram.special(BRANCH_POINT)
@@ -80,7 +90,7 @@ def test_a_coefficient_that_is_not_told_from_zero() -> None:
     assert "undetermined form" in diagram.in_words()
 
 
-@pytest.mark.parametrize(("slow", "span"), [(1e-4, 0.02), (1e-5, 0.3)])
+@pytest.mark.parametrize(("slow", "span"), [(1e-4, 0.02), *on_one_rank((1e-5, 0.3))])
 def test_an_eigenvalue_that_passes_zero_slowly(slow: float, span: float) -> None:
     """``u (slow (u - P) + u^2) = 0``: the trunk, u = 0, has the eigenvalue ``-slow P``, the tolerance of a count or so.
 

@@ -31,7 +31,7 @@ def column(thrust: rodfem.problem.local_state.OfConstants, span: tuple[float, fl
     )
 
 
-@pytest.mark.parametrize("rate", [70.0, 200.0])
+@pytest.mark.parametrize("rate", [70.0, pytest.param(200.0, marks=pytest.mark.alone)])
 def test_a_thrust_that_is_a_fast_sine(rate: float) -> None:
     """It passes the critical one, ``pi^2/4``, twice in each of many periods."""
     once = asin(pi**2 / 12)
@@ -54,6 +54,7 @@ def test_ordinary_functions_bound_no_step() -> None:
         assert not len(fast.low)
 
 
+@pytest.mark.alone
 def test_a_sweep_of_a_fast_sine() -> None:
     """A follower thrust 25 sin(200 P): it flutters where that passes Beck's load, twice in each of 31 periods."""
     ends = clamped(), free(follower=lambda c: (0.0, 0.0, -25 * ufl.sin(200 * c.P)))

@@ -28,8 +28,12 @@ from rodfem.stability.blocks import Blocks
 from rodfem.stability.dependence import _distance, require_independent_constraints
 from rodfem.stability.rank import smallest_singular
 
-MESHES = [(3, 3), (2, 2), (4, 3), (7, 5), (24, 1), (30, 4)]
 PLAN = Plan(depth=0, steps=StepControl(most=3), error_bars=False)
+
+
+def meshes(first: tuple[int, int], *others: tuple[int, int]) -> list[Any]:
+    """Numbers of elements and degrees, of which two ranks have the first one alone."""
+    return [first, *(pytest.param(mesh, marks=pytest.mark.alone) for mesh in others)]
 
 
 def shortened(far: Any = clamped, near: Any = clamped, rod: str = "unshearable and inextensible", **more: Any) -> Scene:
@@ -51,7 +55,7 @@ def solver_of(scene: Scene, formulation: str, mesh: tuple[int, int], factors: st
 
 @pytest.mark.parametrize("factors", ["chain", "petsc"])
 @pytest.mark.parametrize("formulation", ["pointwise", "reduced"])
-@pytest.mark.parametrize("mesh", MESHES)
+@pytest.mark.parametrize("mesh", meshes((4, 3), (3, 3), (2, 2), (7, 5), (24, 1), (30, 4)))
 def test_a_taut_rod_is_refused_on_any_mesh(formulation: str, mesh: tuple[int, int], factors: str) -> None:
     """Any tension balances it: by round-off Newton's method found one of its buckling thrusts, or nothing."""
     for scene in (shortened(), shortened(pinned, pinned, planar="e2")):
@@ -59,7 +63,7 @@ def test_a_taut_rod_is_refused_on_any_mesh(formulation: str, mesh: tuple[int, in
             trace(scene, Discretization(formulation, *mesh, factors=factors), PLAN)
 
 
-@pytest.mark.parametrize("mesh", [(5, 4), (9, 2)])
+@pytest.mark.parametrize("mesh", meshes((5, 4), (9, 2)))
 def test_so_is_one_that_may_shear(mesh: tuple[int, int]) -> None:
     """To first order shear does not lengthen a straight rod either."""
     with pytest.raises(SceneError, match="is taut"):
@@ -67,7 +71,7 @@ def test_so_is_one_that_may_shear(mesh: tuple[int, int]) -> None:
 
 
 @pytest.mark.parametrize("formulation", ["pointwise", "reduced"])
-@pytest.mark.parametrize("mesh", [(4, 3), (7, 5), (40, 2)])
+@pytest.mark.parametrize("mesh", meshes((4, 3), (7, 5), (40, 2)))
 @pytest.mark.parametrize("slack", [1e-8, 1e-4])
 def test_the_distance_of_a_slack_rod_from_the_taut_one(formulation: str, mesh: tuple[int, int], slack: float) -> None:
     """Its turning in closed form, ``2 sqrt(P) sin(2 pi s)``: a bound that neither the mesh nor its degree changes."""
@@ -96,7 +100,7 @@ def test_a_state_given_is_looked_at_as_well() -> None:
 
 
 @pytest.mark.parametrize("factors", ["chain", "petsc"])
-@pytest.mark.parametrize("mesh", [(4, 3), (5, 6), (7, 5)])
+@pytest.mark.parametrize("mesh", meshes((4, 3), (5, 6), (7, 5)))
 def test_a_rod_that_is_held_twice_is_refused_on_any_mesh(mesh: tuple[int, int], factors: str) -> None:
     """Straight, clamped at both ends and bent about d2 alone: ``k1 = 0`` says already how the one is turned about d1.
 
@@ -116,6 +120,7 @@ def test_a_rod_that_is_held_twice_is_refused_on_any_mesh(mesh: tuple[int, int], 
     assert trace(bent, Discretization("pointwise", *mesh, factors=factors), PLAN)[0].points[0].negative == 0
 
 
+@pytest.mark.alone
 def test_neither_units_nor_small_numbers_make_constraints_depend() -> None:
     """Of a rod a nanometre long, in metres, and of a constraint that is multiplied by 1e-9."""
     for length, small in ((1e-9, 1.0), (1.0, 1e-9), (1e6, 1e-9)):
