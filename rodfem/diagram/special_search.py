@@ -15,7 +15,7 @@ from rodfem.continuation.index_chain import Row, chained
 from rodfem.continuation.jumping import joined, suspected
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.special_points import COUPLED, find_special, same_point
+from rodfem.continuation.special_points import COUPLED, Taut, find_special, same_point
 from rodfem.continuation.states_between import midpoint
 from rodfem.continuation.touching import Touching
 from rodfem.continuation.work import EnergyBalance
@@ -280,15 +280,18 @@ class SpecialSearch:
 
         It is where they explain the indices of both rows.  ``troubles`` gets sentences on pieces that are not.
         """
-        found, why = [], ""
+        found, why, turned = [], "", ""
         try:
             found = find_special(self.solver, p.point, q.point, p.crossing(q), self._persistent(p.point.x))
+        except Taut as state:
+            turned = str(state)
         except ConvergenceError as trouble:
             why = str(trouble)
         if p.decided and q.decided and found and sum(s.multiplicity for s in found) == abs(q.low - p.low):
             # counts beside a zero may lie beyond the next one: those of the rows hold for the first and the last
             found[0].negative_before, found[-1].negative_after = p.low, q.low
         if not why and chained(p.low, p.high, found, q.low, q.high):
+            troubles += [turned] if turned else []
             return found
         # bisection: on a shorter piece fewer crossings fall together, until each half explains its own ends
         middle = midpoint(self.solver, p.point, q.point) if halvings else None

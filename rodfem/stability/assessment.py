@@ -19,14 +19,13 @@ from rodfem.stability.census import census
 from rodfem.stability.dense import check_number
 from rodfem.stability.method import Found, Method
 from rodfem.stability.methods import AUTO, METHODS, find
-from rodfem.stability.methods.dense import LARGEST
 from rodfem.stability.rank import rank_of
 from rodfem.stability.round_off import Decision, decide
 from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, is_stable
 from rodfem.stability.workspace import Workspace
 
-COUNT = "count"
-"""Method that finds no eigenvalues."""
+COUNT, DENSE = "count", "dense"
+"""Methods that find no eigenvalues, and all there are."""
 SMALL = 12
 """A system with fewer unknowns than this for each eigenvalue is solved by dense matrices."""
 ZERO = 1e-7
@@ -124,7 +123,7 @@ class Assessor(Workspace):
             if number == 0:
                 return COUNT, "no eigenvalues were asked for"
             if self.system.fields.unknowns < SMALL * number:
-                return "dense", f"{self.system.fields.unknowns} unknowns are too few for a Krylov space"
+                return DENSE, f"{self.system.fields.unknowns} unknowns are too few for a Krylov space"
             return "shift-invert", "the pencil is symmetric: one sparse factorisation serves eigenvalues and count"
         if refusal := find(name).refusal(self.system):
             others = ", ".join(other for other in METHODS if not find(other).refusal(self.system))
@@ -163,7 +162,8 @@ class Assessor(Workspace):
                 with as_failure(self.system.comm):
                     found = self._method(name if number else COUNT).leftmost(x, number, interval)
             except ConvergenceError:
-                if self.system.fields.unknowns < min(SMALL * number, LARGEST):  # there may be no more than it has found
+                few = self.system.fields.unknowns < SMALL * number  # there may be no more than were found
+                if few and not find(DENSE).refusal(self.system):
                     check_number(self.pencil(x), self.below(x).shift, number)
                 raise
             made += self.factorisations()
