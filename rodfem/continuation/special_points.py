@@ -22,8 +22,10 @@ from rodfem.continuation.locate import across, locate, locate_mode
 from rodfem.continuation.prediction import hermite
 from rodfem.continuation.states_between import solve_at
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
+from rodfem.stability.dependence import taut
 from rodfem.stability.inertia import NULL, Factored, Index
 from rodfem.stability.round_off import Decision, decide, quotient_error, resolve
+from rodfem.tolerances import ROUND_OFF, SAME_LOAD
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
@@ -39,6 +41,10 @@ APART = 1e-7
 """Arclength above which there is a state to count at between two special points."""
 
 
+class Taut(ConvergenceError):
+    """The load turns back where a rod that cannot stretch is straight between its ends: no special point."""
+
+
 def special_at(
     solver: BranchSolver, located: Located, arclength: float, still: Sequence[PETSc.Vec] = ()
 ) -> SpecialPoint:
@@ -46,7 +52,7 @@ def special_at(
 
     Vectors of eigenvalues that are zero on the whole branch (``still``) are none of its null vectors.  ``solver`` has
     the mesh, ``located`` is the zero found there, ``arclength`` that of the point.  Raises :class:`ConvergenceError`
-    where no null vector is left.
+    where no null vector is left, and :class:`Taut` where none is to be.
     """
     system, inertia = solver.system, solver.inertia
     x = located.x
@@ -55,6 +61,8 @@ def special_at(
     index, missed = _index_of(decide(found), found, located)
     point = solver.point(x, arclength, tangent, index=index)
     null_count = point.zero - found.drifts
+    if null_count < 1 and taut(solver.shape, x):
+        raise Taut(_at_the_taut_state(solver, point.load))
     if null_count < 1:  # what was interpolated has no zero there: two branches were taken for one
         raise ConvergenceError(
             f"No eigenvalue vanishes at load {point.load:.8g}, where one was expected to", SMALLER_STEPS
@@ -76,6 +84,19 @@ def special_at(
     if apart > left:
         special.note = f"{len(vectors)} eigenvalues that are not told apart vanish within {apart:.0e}"
     return special
+
+
+def _at_the_taut_state(solver: BranchSolver, load: float) -> str:
+    """Sentence on a taut state at a ``load``, which is known to round-off."""
+    span, name = solver.system.scene.span, solver.system.scene.load
+    known = load if abs(load) > ROUND_OFF * solver.units.load else 0.0
+    at_end = min(abs(load - bound) for bound in span) < SAME_LOAD * abs(span[1] - span[0])
+    where = f"The range ends at {name} = {known:.8g}, where" if at_end else f"At {name} = {known:.8g}"
+    return (
+        f"{where} the rod is taut: it cannot stretch, and any tension balances it; the branch turns back there, "
+        "through no special point, and what else leaves that state is not followed; end the range before it, or let "
+        "the rod stretch."
+    )
 
 
 def _index_of(decision: Decision, found: Factored, located: Located) -> tuple[Index, float]:

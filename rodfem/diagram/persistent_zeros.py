@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.observer import Observer
+from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.round_off import resolve
 
 ROWS = 4
@@ -49,8 +50,8 @@ class PersistentZeros:
             self._say(solver, recent[0], point, extra)
 
     def _say(self, solver: BranchSolver, before: Point, point: Point, extra: int) -> None:
-        """Report eigenvalues that count as zero at two rows: within round-off, or persistently zero."""
-        system, inertia, still = solver.system, solver.inertia, _still(solver, (before, point), extra)
+        """Report eigenvalues that are zero at two rows: to round-off, or to what Newton's method leaves of a state."""
+        load, still = solver.system.scene.load, _still(solver, (before, point), extra)
         if still:
             self.observer.note(
                 f"  {still} eigenvalue(s) stay zero that no symmetry of the scene explains: these states may turn or "
@@ -58,9 +59,9 @@ class PersistentZeros:
             )
         if extra > still:
             self.observer.note(
-                f"  {extra - still} eigenvalue(s) are within {inertia.tolerance / inertia.scale:.0e} of zero, relative "
-                "to the lowest bending eigenvalue, without being zero: a critical load is close to "
-                f"{system.scene.load} = {before.load:.8g}"
+                f"  {extra - still} eigenvalue(s) stay within {TOLERANCE:.0e} of zero, relative to the lowest bending "
+                f"eigenvalue, from {load} = {before.load:.8g} to {point.load:.8g} at least, without being zero to "
+                "round-off: Newton's method leaves that open of a state, their sign is undecided"
             )
 
 

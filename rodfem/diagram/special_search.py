@@ -15,12 +15,12 @@ from rodfem.continuation.index_chain import Row, chained
 from rodfem.continuation.jumping import joined, suspected
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.special_points import COUPLED, find_special, same_point
+from rodfem.continuation.special_points import COUPLED, Taut, find_special, same_point
 from rodfem.continuation.states_between import midpoint
 from rodfem.continuation.touching import Touching
 from rodfem.continuation.work import EnergyBalance
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
-from rodfem.stability.round_off import resolve
+from rodfem.stability.round_off import clear_of_zero, resolve
 
 HALVINGS = 4
 """How many times a piece of a branch is halved until its special points explain the indices of its ends."""
@@ -67,7 +67,8 @@ class SpecialSearch:
         """Special points that the row ``b`` after ``a`` shows, in order of arclength.
 
         An eigenvalue within the tolerance of zero has no sign yet: rows with one wait until it has.  One that stays
-        zero to working accuracy belongs to a family of equilibria at one load, and is not waited for.  The ``rows`` are
+        zero to working accuracy belongs to a family of equilibria at one load, and is not waited for.  One that stays
+        within the tolerance, and is not zero, has the sign of its Rayleigh quotient.  The ``rows`` are
         those that the step to ``b`` was predicted from.
 
         Raises
@@ -90,12 +91,18 @@ class SpecialSearch:
     def _shown_by(self, a: Point, b: Point) -> list[SpecialPoint]:
         """Special points that the row ``b`` shows; raises as :meth:`after`."""
         rows = [self._here(p) for p in self._open]
-        self.level = min(rows[0].zero, b.zero)
-        if b.zero > self.level:  # the sign of an eigenvalue within the tolerance is settled by the rows that follow
+        stay = min(rows[0].zero, b.zero)
+        clear = self._clear(b, stay)
+        # one that differs from zero at either end does not stay: it crosses slowly, within the tolerance
+        slow = max(clear, self._clear(rows[0], stay))
+        self.level = stay - slow
+        settled = 0 < slow == clear  # nothing is to be waited for
+        if b.zero > self.level and not settled:  # the rows that follow settle the sign of one within the tolerance
             self._open.append(b)
             if len(self._open) <= PATIENCE or self.row(b).decided:
                 return []
         changed = len(rows) > 1 or a.negative != b.negative or a.slope * b.slope < 0
+        changed |= settled and self.row(a).low != self.row(b).low
         self._open = [b]
         between = [] if changed else self._touching.between(self.solver, a, b)
         self._touching.add(b, told=changed or any(row.arclength > a.arclength for row in between))
@@ -168,6 +175,12 @@ class SpecialSearch:
         if point.zero <= self.level:
             return Row(point, point.negative, point.negative)
         return Row(point, *resolve(self.solver.inertia.at(point.x)))
+
+    def _clear(self, point: Point, stay: int) -> int:
+        """Number of eigenvalues of a point, of ``stay`` within the tolerance of a count, that are not zero."""
+        if stay <= self.solver.system.active_drifts(point.x):
+            return 0
+        return min(clear_of_zero(self.solver.inertia.at(point.x)), stay)
 
     def _on(self, point: Point) -> None:
         self.solver = self.meshes.solvers[point.mesh]
@@ -267,15 +280,18 @@ class SpecialSearch:
 
         It is where they explain the indices of both rows.  ``troubles`` gets sentences on pieces that are not.
         """
-        found, why = [], ""
+        found, why, turned = [], "", ""
         try:
             found = find_special(self.solver, p.point, q.point, p.crossing(q), self._persistent(p.point.x))
+        except Taut as state:
+            turned = str(state)
         except ConvergenceError as trouble:
             why = str(trouble)
         if p.decided and q.decided and found and sum(s.multiplicity for s in found) == abs(q.low - p.low):
             # counts beside a zero may lie beyond the next one: those of the rows hold for the first and the last
             found[0].negative_before, found[-1].negative_after = p.low, q.low
         if not why and chained(p.low, p.high, found, q.low, q.high):
+            troubles += [turned] if turned else []
             return found
         # bisection: on a shorter piece fewer crossings fall together, until each half explains its own ends
         middle = midpoint(self.solver, p.point, q.point) if halvings else None

@@ -171,7 +171,8 @@ class Tracer:
                 if not begun:
                     self._first_specials(branch)
                     begun = True
-                self._advance(branch, history)
+                while not self._advance(branch, history):  # each time from where it has gone back to
+                    pass
                 return
             except TooCoarse as trouble:
                 history = self._remesh(branch, history, trouble)
@@ -194,15 +195,18 @@ class Tracer:
         branch.cut(history[-1].arclength)
         return history
 
-    def _advance(self, branch: Branch, history: list[Point]) -> None:
-        """Append points until the branch ends, which :attr:`Branch.ended` then says."""
+    def _advance(self, branch: Branch, history: list[Point]) -> bool:
+        """Append points until the branch ends, which :attr:`Branch.ended` then says; whether it has.
+
+        Otherwise both are as before a step that was too long, and are to be gone on with.
+        """
         self.specials.resume(history)
         for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self._reach):
             if isinstance(item, str):
                 branch.ended = self._rest(branch) or item
                 if branch.ended.startswith(NO_CONVERGENCE):
                     self.observer.warn(f"{branch.name} ends: {branch.ended}; use more elements or smaller steps.")
-                return
+                return True
             previous = history[-1]
             width = self.high - self.low
             last = closing(self.solver, branch, previous, item, width, self.here, self.alike)
@@ -213,25 +217,26 @@ class Tracer:
             self.zeros.check(self.solver, history, item, self.specials.level)
             if item.stretch > 0 and (why := lost_in_step(self.solver, previous, item, self.observer.warn)):
                 branch.ended = self._rest(branch) or why
-                return
+                return True
             try:
                 if item.stretch <= 0:
                     self._end_at_zero_stretch(branch, previous, item)
-                    return
+                    return True
                 reason = self._between(branch, previous, item, self._own(branch, history[-4:]), closed=bool(last))
             except (Gap, Unresolved):  # the step was too long, or led to another branch: back, to smaller ones
                 branch.cut(self.specials.settled)
-                self._advance(branch, [p for p in history if p.arclength <= self.specials.settled])
-                return
+                history[:] = [p for p in history if p.arclength <= self.specials.settled]
+                return False
             if reason:
                 branch.ended = reason
-                return
+                return True
             history.append(item)
             branch.points.append(item)
             self.observer.progress(branch, item)
             if last:
                 branch.ended = self._rest(branch) or "closed loop"
-                return
+                return True
+        return True
 
     def _reach(self, point: Point) -> float:
         """Largest step from a point: by what is known of the branch, and by how fast the load acts."""

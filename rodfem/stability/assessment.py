@@ -16,6 +16,7 @@ from petsc4py import PETSc
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.faults import as_failure
 from rodfem.stability.census import census
+from rodfem.stability.dense import check_number
 from rodfem.stability.method import Found, Method
 from rodfem.stability.methods import AUTO, METHODS, find
 from rodfem.stability.rank import rank_of
@@ -23,6 +24,8 @@ from rodfem.stability.round_off import Decision, decide
 from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, is_stable
 from rodfem.stability.workspace import Workspace
 
+COUNT, DENSE = "count", "dense"
+"""Methods that find no eigenvalues, and all there are."""
 SMALL = 12
 """A system with fewer unknowns than this for each eigenvalue is solved by dense matrices."""
 ZERO = 1e-7
@@ -118,9 +121,9 @@ class Assessor(Workspace):
             if not self.conservative:
                 return "shift-invert", "the load has no potential, the pencil no symmetry"
             if number == 0:
-                return "count", "no eigenvalues were asked for"
+                return COUNT, "no eigenvalues were asked for"
             if self.system.fields.unknowns < SMALL * number:
-                return "dense", f"{self.system.fields.unknowns} unknowns are too few for a Krylov space"
+                return DENSE, f"{self.system.fields.unknowns} unknowns are too few for a Krylov space"
             return "shift-invert", "the pencil is symmetric: one sparse factorisation serves eigenvalues and count"
         if refusal := find(name).refusal(self.system):
             others = ", ".join(other for other in METHODS if not find(other).refusal(self.system))
@@ -131,7 +134,8 @@ class Assessor(Workspace):
         """Assess the equilibrium ``x``.
 
         ``interval`` (low, high) is where slicing looks, by default where the ``number`` left-most are.  Raises
-        :class:`InputError` for a method that does not exist or apply and for dependent constraints,
+        :class:`InputError` for a method that does not exist or apply, for dependent constraints, and on a small mesh
+        for more eigenvalues than it has,
         :class:`ConvergenceError` where an eigensolver fails.  ``method`` is a name of :mod:`rodfem.stability.methods`,
         or ``auto``.
         """
@@ -154,8 +158,14 @@ class Assessor(Workspace):
             decision = self._index(x)
             index, zero = decision.index.negative, decision.index.zero
             inside, made = (decision.band, decision.inside, decision.uncertainty), 2 - self.factorisations()
-            with as_failure(self.system.comm):
-                found = self._method(name if number else "count").leftmost(x, number, interval)
+            try:
+                with as_failure(self.system.comm):
+                    found = self._method(name if number else COUNT).leftmost(x, number, interval)
+            except ConvergenceError:
+                few = self.system.fields.unknowns < SMALL * number  # there may be no more than were found
+                if few and not find(DENSE).refusal(self.system):
+                    check_number(self.pencil(x), self.below(x).shift, number)
+                raise
             made += self.factorisations()
         return Verdict(
             *(index, zero, found.values, found.vectors, found.errors, *inside, found.certified),

@@ -269,8 +269,8 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         solver.destroy()
         if found < least:
             raise ConvergenceError(
-                f"SLEPc found {found} of the {least} eigenvalues asked for: "
-                f"ask for at most {found} at this discretisation."
+                f"SLEPc found {found} of the {least} eigenvalues asked for: ask for fewer, or use a richer "
+                "discretisation."
             )
         self._purify(values, vectors)
         errors = self.backward_errors(values, vectors)

@@ -20,9 +20,11 @@ from mpi4py import MPI
 from rows import verify
 from scipy.optimize import brentq
 
+from forms import loads
 from forms.energy import bending_and_twist
 from rodfem import (
     Discretization,
+    End,
     Observer,
     Ordinate,
     Parameter,
@@ -297,8 +299,6 @@ def test_steps_that_do_not_explain_are_repeated() -> None:
     """
     import ufl
 
-    from forms import loads
-
     scene = column(
         "nearly uniform", Ring(), (2.6, 3.4), start=circle, planar="e2", constants={"P": 2.6, "B2": 1.0, "e": 1e-4},
         potential=lambda x, c: loads.pressure(x.r, x.dr, c.P), **ROUND,
@@ -335,12 +335,25 @@ def test_a_range_that_begins_at_a_branch_point() -> None:
 
 
 def test_eigenvalues_beside_a_critical_load_are_no_family_of_equilibria() -> None:
-    """Within the tolerance of a count, yet far above the round-off of their Rayleigh quotients: nothing moves."""
+    """Within the tolerance of a count, yet far above the round-off of their Rayleigh quotients: nothing moves.
+
+    Nor does one stay near zero: that the range begins at its zero is what is said.
+    """
     scene = column("range", (clamped(), free(push)), (EULER, EULER + 1e-6))
     diagram = trace(scene, Discretization("reduced", 8, 6), Plan(error_bars=False))
     said = " ".join((*diagram.warnings, *diagram.notes))
-    assert "move freely" not in said
-    assert "without being zero: a critical load is close to P = 2.4674011" in said
+    assert "move freely" not in said and "of zero, relative" not in said
+    assert "The first state, at P = 2.4674011, is singular" in said
+
+
+def test_an_eigenvalue_that_stays_small_is_no_critical_load() -> None:
+    """A spring of 5e-10 that falls by a tenth over the range: no load in it is critical, and the sign is undecided."""
+    foot = End(
+        position=lambda c: (0.0, 0.0, 0.0), energy=lambda x, c: loads.rotational_spring(x.q, c.k * (1 - c.P))
+    )  # fmt: skip
+    scene = column("soft", (foot, free()), (0.0, 0.1), constants={"k": 5e-10}, planar="e2")
+    (note,) = trace(scene, Discretization("reduced", 8, 6), Plan(depth=0, error_bars=False)).notes
+    assert "1 eigenvalue(s) stay within 1e-10 of zero" in note and "their sign is undecided" in note
 
 
 def test_mirror_images_are_compared_at_one_load() -> None:

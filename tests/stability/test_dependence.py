@@ -70,6 +70,16 @@ def test_so_is_one_that_may_shear(mesh: tuple[int, int]) -> None:
         trace(shortened(rod="inextensible"), Discretization("pointwise", *mesh), PLAN)
 
 
+@pytest.mark.parametrize("planar", ["e2", None])
+def test_a_range_that_ends_where_the_rod_is_taut(planar: str | None) -> None:
+    """Its ends are as far apart as it is long at P = 0: nothing is missing there, and that is what is said."""
+    scene = shortened(planar=planar, span=(0.3, 0.0))
+    diagram = trace(scene, Discretization("auto", 8, 6), Plan(depth=0, error_bars=False))
+    (warning,) = diagram.warnings
+    assert warning.startswith("The range ends at P = 0, where the rod is taut: it cannot stretch")
+    assert not diagram.special("fold") and not diagram.special("branch point")
+
+
 @pytest.mark.parametrize("formulation", ["pointwise", "reduced"])
 @pytest.mark.parametrize("mesh", meshes((4, 3), (7, 5), (40, 2)))
 @pytest.mark.parametrize("slack", [1e-8, 1e-4])
