@@ -58,6 +58,11 @@ FAR = 1e5
 The pencil has infinite eigenvalues with Jordan blocks of size two, one for each pair of constraint and multiplier,
 which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than the nearest: those are not kept.
 """
+DOUBT = 1e-5
+"""Relative round-off of an eigenvalue above which it is an infinite one, whose vector has forces and hardly moves.
+
+It is that of the stiffness over the kinetic energy of the vector: 1e-3 for such, 1e-7 and less for others.
+"""
 SHIFT = -10.0
 """Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix may be singular.
 
@@ -282,8 +287,12 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         solver = self._solve(matrix, mass, number, target if compat.COMPLEX else target.real)
         re, im = matrix.createVecRight(), matrix.createVecRight()
         values, out = [solver.getEigenvalue(i) for i in range(solver.getConverged())], []
+        round_off = EPS * matrix.norm(PETSc.NormType.INFINITY)
         for i in sorted(range(len(values)), key=lambda i: abs(values[i] - target))[: number + SPARE]:
             value = solver.getEigenpair(i, re, im)
+            kinetic = sum(abs(x.dot(mass * x)) for x in (re, im))
+            if round_off * (re.norm() ** 2 + im.norm() ** 2) > DOUBT * abs(value) * kinetic:
+                continue
             parts = mode_type.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
             error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
             out.append(_Pair(complex(value), [part[self._own].copy() for part in parts], error))

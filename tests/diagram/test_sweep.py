@@ -14,7 +14,8 @@ from closed_forms import column, double, flutter
 from hemitropic_cases import specials
 from matplotlib.figure import Figure
 from mpi4py import MPI
-from scipy.optimize import brentq
+from scipy.linalg import expm
+from scipy.optimize import brentq, fsolve
 
 from forms.energy import bending_and_twist
 from rodfem import Inertia, Ordinate, Plan, clamped, everywhere, free
@@ -228,6 +229,39 @@ def test_flutter_among_dozens_of_slow_motions() -> None:
         assert [many.assess(many[0].points[row], method).negative for row in (0, -1)] == [0, 2]
     (state,) = few.at(22.0)
     assert (state.negative, state.stable) == (2, False)
+
+
+@pytest.mark.parametrize(("elements", "degree"), [(4, 8), (20, 4)])
+def test_infinite_eigenvalues_of_a_light_rod_are_left_out(elements: int, degree: int) -> None:
+    """Pflueger's column with a mass of a hundred times its own: the twelfth eigenvalue is 5e7 times the first.
+
+    Round-off makes finite eigenvalues of the infinite ones there: -1.7e8, or complex, which are none of the rod.
+    """
+    light = Inertia(rho_A=lambda c: LIGHT, rho_I=lambda c: (0.0, 0.0, 0.0))
+    scene = replace(classics.beck(tip=1.0, span=(0.0, 25.0)), inertia=light, planar="e1")
+    diagram = trace(scene, Discretization("pointwise", elements, degree))
+    assert not diagram.warnings and diagram[0].points[0].negative == 0
+    found = specials(diagram[0], "flutter")
+    assert len(found) == 2
+    for point in found:
+        P, _ = fsolve(pflueger, [point.point.load, point.omega2], xtol=1e-13)
+        assert abs(point.point.load - P) <= point.error_estimate
+
+
+LIGHT = 0.01
+"""Mass of a rod, over that at its tip."""
+
+
+def pflueger(z: np.ndarray) -> list[float]:
+    """Zero where two eigenvalues of ``w'''' + P w'' = LIGHT mu w`` meet, with ``w'' = w''' + mu w = 0`` at the tip."""
+
+    def determinant(mu: complex) -> complex:
+        A = np.eye(4, k=1, dtype=complex)
+        A[3, 0], A[3, 2] = LIGHT * mu, -z[0]
+        y = expm(A)[:, 2:]
+        return complex(np.linalg.det(np.array([y[2], y[3] + mu * y[0]])))
+
+    return [determinant(z[1]).real, determinant(complex(z[1], 1e-20)).imag / 1e-20]
 
 
 def test_long_pencil_on_any_number_of_ranks() -> None:
