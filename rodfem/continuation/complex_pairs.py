@@ -46,7 +46,7 @@ def _shares(comm: MPI.Comm, found: Frequencies, mine: list[int], others: Frequen
     """Shares (k, m) of vectors of ``found`` in the planes of pairs of ``others``; of equal ones in those of all."""
     energy = np.maximum(squares(comm, found.vectors[:, mine], found.weighed[:, mine]), TINY)
     shares = np.zeros((len(mine), len(there)))
-    for group in groups(others.values[there], ALIKE):
+    for group in groups(others.values[there], others.far, ALIKE):
         vectors, weighed = (x[:, [there[i] for i in group]] for x in (others.vectors, others.weighed))
         both, weighed_both = (np.concatenate([x, x.conj()], axis=1) for x in (vectors, weighed))
         parts = product(comm, orthonormal(comm, both, weighed_both), found.weighed[:, mine])
@@ -72,7 +72,7 @@ def strange(comm: MPI.Comm, a: Frequencies, b: Frequencies, chosen: list[int], o
 def together(found: Frequencies, chosen: list[int]) -> list[list[int]]:
     """The ``chosen`` ones of :func:`upper`, equal ones together, each with as many conjugates as ``found`` has."""
     values, out = found.values, []
-    for group in groups(values[chosen]):
+    for group in groups(values[chosen], found.far):
         members = [chosen[i] for i in group]
         mirrored = values[members[0]].conjugate()
         out.append([*members, *(j for j, v in enumerate(values) if abs(v - mirrored) < MULTIPLE * abs(v))])

@@ -63,7 +63,7 @@ class Curves:
 
     def _keep(self, found: Frequencies, energy: np.ndarray) -> None:
         """Keep a basis of the span of each group of equal eigenvalues, orthonormal in the mass."""
-        together = groups(found.values, ALIKE)
+        together = groups(found.values, found.far, ALIKE)
         self._span = np.empty(len(found.values), dtype=int)
         for number, group in enumerate(together):
             self._span[group] = number

@@ -83,19 +83,14 @@ class FrequencyRows:
         found = self._followed(pencil, point)
         numbers = None if found is None else _numbers(found)
         changed = numbers != self._numbers
-        if (
-            found is not None
-            and not changed
-            and len(self._open) < EVERY - 1
-            and not near(found.values[: self.number + 1])
-        ):
+        if found is not None and not changed and len(self._open) < EVERY - 1 and not near(found, self.number + 1):
             self._open.append(Row(point, found, pencil.turned, anew=False))
             self._before, self._kept = found, self._kept + 1
             return []
         done = self.finish() if changed else []
         if done:
             pencil = self.eigensolver.at(point.x)
-        if found is not None and not near(found.values[: self.number + 1]) and self._proved(pencil, point, found):
+        if found is not None and not near(found, self.number + 1) and self._proved(pencil, point, found):
             self._open.append(Row(point, found, pencil.turned, anew=False))
             return done + self._close()
         anew, self._first = self._first or leftmost(pencil, self.number, self._before), None
@@ -114,7 +109,7 @@ class FrequencyRows:
         found = self.followed.at(pencil, point.load)
         if found is None:
             return None
-        return in_order(replace(found, values=_without_round_off(found.values, SHIFT * found.one)))
+        return in_order(_without_round_off(found))
 
     def _proved(self, pencil: NonsymmetricPencil, point: Point, found: Frequencies) -> bool:
         """Whether what was followed to a point is proved to be all that is as near to the shift."""
@@ -172,9 +167,10 @@ def sought(number: int) -> int:
     return max(number, FREQUENCIES) + BEYOND
 
 
-def near(values: np.ndarray) -> bool:
-    """Whether two of some eigenvalues are near each other, but not one that is multiple."""
-    sizes = np.maximum(abs(values), NEAR_ZERO * abs(values).max())
+def near(found: Frequencies, number: int) -> bool:
+    """Whether two of the first ``number`` eigenvalues are near each other, but not one that is multiple."""
+    values = found.values[:number]
+    sizes = np.maximum(abs(values), NEAR_ZERO * min(abs(values).max(), found.far))
     apart = abs(values[:, None] - values) / np.maximum(sizes[:, None], sizes)
     return bool(((apart < NEAR) & (apart > ALIKE)).any())
 
@@ -188,7 +184,7 @@ def leftmost(pencil: NonsymmetricPencil, number: int, before: Frequencies = NONE
     one = pencil.system.scene.units.omega2
     found = pencil.near(sought(number), SHIFT * one)
     pairs = _beyond(before, found)
-    found = replace(found, values=_without_round_off(found.values, SHIFT * one))
+    found = _without_round_off(found)
     for pair in pairs:
         found = _joined(found, pencil.near(2, pair * (1 + BESIDE)))
     return in_order(found)
@@ -232,6 +228,7 @@ def _joined(found: Frequencies, beside: Frequencies) -> Frequencies:
                     np.concatenate([found.vectors, column], axis=1),
                     np.concatenate([found.weighed, weighed], axis=1),
                     found.one,
+                    found.floating,
                 )
     return found
 
@@ -249,6 +246,7 @@ def in_order(found: Frequencies) -> Frequencies:
         found.vectors[:, order],
         found.weighed[:, order],
         found.one,
+        found.floating,
     )
 
 
@@ -277,12 +275,13 @@ def _numbers(found: Frequencies) -> tuple[int, int, int]:
     return int((found.values.imag != 0).sum()), found.diverged(), found.unstable(found.noise)
 
 
-def _without_round_off(values: np.ndarray, shift: float) -> np.ndarray:
-    """Eigenvalues next to a ``shift``, imaginary parts that are round-off of real ones dropped: (k,).
+def _without_round_off(found: Frequencies) -> Frequencies:
+    """Eigenvalues found next to the shift, imaginary parts that are round-off of real ones dropped.
 
     The solver has ``1 / (mu - shift)`` to round-off of the largest of them: ``mu`` to ``eps |mu - shift|^2 / min |mu -
     shift|``, and one near zero to that of the matrix.
     """
-    apart, least = abs(values - shift), NEAR_ZERO * abs(values).max()
+    values = found.values
+    apart, least = abs(values - SHIFT * found.one), NEAR_ZERO * found.far
     doubt = np.maximum(REAL * np.maximum(abs(values), least), MANY * EPS * apart**2 / apart.min())
-    return np.where(abs(values.imag) < doubt, values.real, values)
+    return replace(found, values=np.where(abs(values.imag) < doubt, values.real, values))

@@ -47,10 +47,10 @@ def approaches(found: Frequencies) -> list[Approach]:
     values, noise = found.values, found.noise
     real = [int(i) for i in np.flatnonzero((values.imag == 0) & (abs(values.real) > noise))]
     real.sort(key=lambda i: values[i].real)
-    equal = [[real[i] for i in group] for group in groups(values[real], ALIKE)]
+    equal = [[real[i] for i in group] for group in groups(values[real], found.far, ALIKE)]
     out = [Approach(both, 1, float(values[both].real.var())) for both in (a + b for a, b in pairwise(equal))]
     high = upper(found)
-    for group in groups(values[high], ALIKE):
+    for group in groups(values[high], found.far, ALIKE):
         both = [high[i] for i in group] + [int(np.argmin(abs(values - values[high[i]].conjugate()))) for i in group]
         out.append(Approach(both, -1, float(values[high[group[0]]].imag ** 2)))
     above, below = [i for i in real if values[i].real > noise], [i for i in real if values[i].real < -noise]

@@ -87,7 +87,7 @@ def members(
         energy = pencil.squares(found.vectors, found.weighed)
         share = (abs(inside) ** 2).sum(axis=0) / energy
         if abs(cluster.mean) > beside:
-            share[abs(found.values) < STILL * abs(found.values).max()] = 0.0
+            share[abs(found.values) < STILL * found.far] = 0.0
         chosen = sorted(np.argsort(-share, kind="stable")[:size].tolist())
         values = found.values[chosen]
         closed = abs(values.imag.sum()) < REAL * abs(values).max()

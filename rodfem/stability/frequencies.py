@@ -21,6 +21,8 @@ ALIKE = 1e-6
 """Eigenvalues that differ by less than this, relative, have one name: where another is near the shift, digits go."""
 STILL = 1e-10
 """Share of the farthest eigenvalue below which one is zero."""
+SLOW = 1e4
+"""Times the slowest two eigenvalues, or their natural size, that others are far at most."""
 NEAR_ZERO = 1e-2
 """Share of the farthest eigenvalue below which differences of others are relative to this share."""
 EPS = float(np.finfo(float).eps)
@@ -33,7 +35,8 @@ class Frequencies:
     Errors are backward errors; of eigenvalues that were followed (:mod:`rodfem.stability.followed_pairs`) relative ones
     of ``1 / (mu - shift)``.  ``kinds`` names the motion of each: see :mod:`rodfem.stability.mode_type`.  ``vectors``
     (n, k) are complex, or real where all eigenvalues are, with the n unknowns of this rank, ``weighed`` (n, k) are
-    their products with the mass, and ``one`` is the natural size of the eigenvalues.
+    their products with the mass, and ``one`` is the natural size of the eigenvalues.  The rod is ``floating`` where
+    nothing holds it: it has zero eigenvalues.
     """
 
     values: np.ndarray
@@ -42,6 +45,17 @@ class Frequencies:
     vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     weighed: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     one: float = 1.0
+    floating: bool = False
+
+    @property
+    def far(self) -> float:
+        """Size of an eigenvalue beside which others are zero: the greatest one, but for a light rod with heavy bodies.
+
+        That has a few slow motions, and others whose eigenvalues are 1e10 times as great.
+        """
+        sizes = np.sort(abs(self.values))
+        greatest = float(sizes[-1]) if len(sizes) else 0.0
+        return greatest if self.floating else min(greatest, SLOW * max(float(sizes[:2].max(initial=0.0)), self.one))
 
     @property
     def noise(self) -> float:
@@ -58,7 +72,7 @@ class Frequencies:
 
     def still(self) -> int:
         """Number of eigenvalues that are zero: of rigid motions, and their partners in Jordan blocks."""
-        return int((abs(self.values) < STILL * abs(self.values).max(initial=0.0)).sum())
+        return int((abs(self.values) < STILL * self.far).sum())
 
     def unstable(self, tolerance: float) -> int:
         """Number of eigenvalues with a negative real part or a non-zero imaginary part."""
@@ -76,7 +90,9 @@ def named(
     blocks: list[np.ndarray] = []
     owners: list[np.ndarray] = []
     counts: list[int] = []
-    together = [[g for g in groups(found.values, ALIKE) if number is None or g[0] < number] for found, _ in rows]
+    together = [
+        [g for g in groups(found.values, found.far, ALIKE) if number is None or g[0] < number] for found, _ in rows
+    ]
     count = 0
     for (found, _), of_row in zip(rows, together, strict=True):
         sizes = [len(group) for group in of_row]
@@ -99,17 +115,20 @@ def named(
     for (found, _), of_row in zip(rows, together, strict=True):
         kinds = [""] * len(found.values)
         for group, name in zip(of_row, names, strict=False):
-            rigid = floating and abs(found.values[group]).max() < STILL * abs(found.values).max()
+            rigid = floating and abs(found.values[group]).max() < STILL * found.far
             for j in group:
                 kinds[j] = mode_type.RIGID if rigid else name
         out.append(replace(found, kinds=tuple(kinds)))
     return out
 
 
-def groups(values: np.ndarray, tolerance: float = MULTIPLE) -> list[list[int]]:
-    """Places of eigenvalues in groups of equal ones, in the order of the first of each."""
+def groups(values: np.ndarray, far: float, tolerance: float = MULTIPLE) -> list[list[int]]:
+    """Places of eigenvalues in groups of equal ones, in the order of the first of each.
+
+    They differ by less than the ``tolerance``, relative; those near zero are compared with what is ``far`` from it.
+    """
     out: list[list[int]] = []
-    least = NEAR_ZERO * abs(values).max(initial=0.0)
+    least = NEAR_ZERO * min(abs(values).max(initial=0.0), far)
     sizes = tolerance * np.maximum(abs(values), least)
     if (abs(values[:, None] - values) < sizes[:, None]).sum() <= len(values):  # no two of them
         return [[i] for i in range(len(values))]

@@ -35,6 +35,7 @@ from rodfem.linalg.chain import Chain, Elimination
 from rodfem.linalg.factorization import PETSC_ERR_LIB, Factors, GaveUpError, is_spread
 from rodfem.linalg.matrices import Shared, gathered, local_rows, petsc_matrix, places_in, shared
 from rodfem.linalg.selection import factors_of
+from rodfem.problem.local_state import floats
 from rodfem.stability import mode_type
 from rodfem.stability.dense import finite_eigenpairs
 from rodfem.stability.frequencies import EPS, Frequencies, named, orthonormal, product, squares
@@ -58,10 +59,10 @@ FAR = 1e5
 The pencil has infinite eigenvalues with Jordan blocks of size two, one for each pair of constraint and multiplier,
 which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than the nearest: those are not kept.
 """
-DOUBT = 1e-5
-"""Relative round-off of an eigenvalue above which it is an infinite one, whose vector has forces and hardly moves.
+DOUBT = 1e-4
+"""Relative round-off of a far eigenvalue above which it is an infinite one: its vector hardly moves.
 
-It is that of the stiffness over the kinetic energy of the vector: 1e-3 for such, 1e-7 and less for others.
+It is that of the stiffness over the kinetic energy of the vector: 5e-4 and more for such, 2e-5 and less for others.
 """
 SHIFT = -10.0
 """Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix may be singular.
@@ -101,6 +102,7 @@ class NonsymmetricSolver(PencilMatrices):
         self.places: np.ndarray | None = None
         self.turned, self.free = np.zeros((0, 0, 4)), dict[int, PETSc.Vec]()
         self._rows: sp.csr_matrix | None = None
+        self.floating = system.scene.closed or floats(system.scene)
 
     @property
     def rows(self) -> sp.csr_matrix:
@@ -225,7 +227,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
             values, errors, vectors = values[order], errors[order], vectors[:, order]
             weighed = None if weighed is None else weighed[:, order]
         weighed = self.weighed(vectors) if weighed is None else weighed
-        return Frequencies(values, errors, (), vectors, weighed, units.omega2)
+        return Frequencies(values, errors, (), vectors, weighed, units.omega2, self._shared.floating)
 
     def motion(self, basis: np.ndarray) -> str:
         """Type of the motion spanned by a ``basis`` (n, k)."""
@@ -287,11 +289,14 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         solver = self._solve(matrix, mass, number, target if compat.COMPLEX else target.real)
         re, im = matrix.createVecRight(), matrix.createVecRight()
         values, out = [solver.getEigenvalue(i) for i in range(solver.getConverged())], []
+        order = sorted(range(len(values)), key=lambda i: abs(values[i] - target))[: number + SPARE]
+        far = FAR * abs(values[order[0]] - target)
         round_off = EPS * matrix.norm(PETSc.NormType.INFINITY)
-        for i in sorted(range(len(values)), key=lambda i: abs(values[i] - target))[: number + SPARE]:
+        for i in order:
             value = solver.getEigenpair(i, re, im)
             kinetic = sum(abs(x.dot(mass * x)) for x in (re, im))
-            if round_off * (re.norm() ** 2 + im.norm() ** 2) > DOUBT * abs(value) * kinetic:
+            noise = round_off * (re.norm() ** 2 + im.norm() ** 2)
+            if abs(value - target) > far and noise > DOUBT * abs(value) * kinetic:
                 continue
             parts = mode_type.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
             error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)

@@ -264,6 +264,33 @@ def pflueger(z: np.ndarray) -> list[float]:
     return [determinant(z[1]).real, determinant(complex(z[1], 1e-20)).imag / 1e-20]
 
 
+@pytest.mark.parametrize("light", [1e-3, 1e-5])
+def test_slow_motions_of_two_bodies_on_a_light_rod(light: float) -> None:
+    """Two masses on a rod of 1e-5 of theirs: the eigenvalues that flutter, 27.5, are beside others of 1e10."""
+    inertia = Inertia(rho_A=lambda c: light, rho_I=lambda c: (0.0, 0.0, 0.0))
+    scene = replace(classics.beck(tip=1.0, middle=1.0, span=(0.0, 25.0)), inertia=inertia, planar="e1")
+    diagram = trace(scene, Discretization("pointwise", 4, 6))
+    (point,) = specials(diagram[0], "flutter")
+    assert not diagram.warnings
+
+    def equations(z: np.ndarray) -> list[float]:
+        """Zero where two eigenvalues of the rod with masses of one at its middle and its tip meet."""
+
+        def determinant(mu: complex) -> complex:
+            A, body = np.eye(4, k=1, dtype=complex), np.eye(4, dtype=complex)
+            A[3, 0], A[3, 2], body[3, 0] = light * mu, -z[0], mu
+            y = (expm(A / 2) @ body @ expm(A / 2))[:, 2:]
+            return complex(np.linalg.det(np.array([y[2], y[3] + mu * y[0]])))
+
+        return [determinant(z[1]).real, determinant(complex(z[1], 1e-20)).imag / 1e-20]
+
+    P, _ = fsolve(equations, [point.point.load, point.omega2], xtol=1e-13)
+    assert abs(point.point.load - P) <= point.error_estimate < 1e-9
+    assert [p.negative for p in diagram[0].points if p is not point.point] == [
+        2 * (p.load > P) for p in diagram[0].points if p is not point.point
+    ]
+
+
 def test_long_pencil_on_any_number_of_ranks() -> None:
     """22001 unknowns: cut at the ranks where there are several (exact: the frequency equation)."""
     solver = Solver(classics.partly_following(1.0, (0.0, 25.0)), Discretization("pointwise", 2000, 1)).equilibria
