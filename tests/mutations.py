@@ -166,6 +166,12 @@ FAULTS = {
         "if False",
         "tests/diagram/test_events_rough.py",
     ),
+    "zeros-are-sought-in-round-off": Fault(
+        f"{CONTINUATION}event_zeros.py",
+        " and not self._is_round_off(s, z, values)",
+        "",
+        "tests/diagram/test_events.py",
+    ),
     "a-read-diagram-forgets-its-plan": Fault(
         "rodfem/diagram/saved.py",
         "Plan() if asked is None else plan_without(asked)",

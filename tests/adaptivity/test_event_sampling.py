@@ -19,7 +19,7 @@ from rodfem.adaptivity.event_sampling import finer, where_places_matter
 from rodfem.continuation.branch_solver import BranchSolver
 
 Curve = Callable[[float], np.ndarray]
-MESHES = [(8, 6), (3, 4), (5, 3), (7, 2)]
+MESHES = [(5, 3), *(pytest.param(mesh, marks=pytest.mark.alone) for mesh in [(8, 6), (3, 4), (7, 2)])]
 POST = np.array([0.3, 0.45])
 """Place beside the rod, from which its distance is taken."""
 
@@ -156,6 +156,7 @@ def test_more_places_of_the_same_polynomials() -> None:
     assert np.linalg.norm(more["q"], axis=1) == pytest.approx(1.0, abs=1e-14)
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     "of",
     [
@@ -186,7 +187,7 @@ def test_a_function_that_takes_no_more_places_has_no_bar() -> None:
     assert "no error estimate: with more places along the rod the event 'short' fails with ValueError" in event.note
 
 
-@pytest.mark.parametrize("mesh", [(8, 6), (7, 2)])
+@pytest.mark.parametrize("mesh", [pytest.param((8, 6), marks=pytest.mark.alone), (7, 2)])
 def test_a_function_that_jumps_from_node_to_node_has_no_bar(mesh: tuple[int, int]) -> None:
     """The place at half height is a node: by shooting it may be elsewhere by more than samples tell."""
     place = Event("half", of=lambda st: st.s[abs(st.r[:, 2] - 0.5).argmin()] - 0.506)

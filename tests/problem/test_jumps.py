@@ -69,7 +69,9 @@ def test_where_functions_jump() -> None:
     assert jumps(column("none", SUPPORTS["clamped-free"], (0.0, 1.0))) == {}
 
 
-@pytest.mark.parametrize("width", [4e-4, 1e-5, 1e-7])
+@pytest.mark.parametrize(
+    "width", [pytest.param(4e-4, marks=pytest.mark.alone), 1e-5, pytest.param(1e-7, marks=pytest.mark.alone)]
+)
 @pytest.mark.parametrize(
     "notch",
     [

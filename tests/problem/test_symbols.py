@@ -13,6 +13,8 @@ from forms.energy import bending_and_twist
 from rodfem import Attachment, Inertia, Ordinate, Scene, clamped, free
 from rodfem.errors import SceneError
 
+pytestmark = pytest.mark.alone
+
 COMPARES, TAKES = r"compares c\.on by ==, != or in", "takes .* for true or false"
 OTHER = "as a function of numbers and .* as an expression of its constants"
 SOFT, STIFF = (1.0, 1.0, 1.0), (9.0, 9.0, 9.0)
