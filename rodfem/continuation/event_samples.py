@@ -21,6 +21,8 @@ NODES = np.array([0.0, MIDDLE**2, MIDDLE, MIDDLE + (1 - MIDDLE) * MIDDLE, 1.0])
 """Nodes of a piece: its ends, its middle, and those of its halves."""
 INNER = [float(t) for t in NODES[1:-1]]
 """Those between its ends."""
+WIDEST = float(np.diff(NODES).max())
+"""Greatest distance of two nodes: what comes and goes between them is not seen."""
 POWERS = np.linalg.inv(np.vander(NODES, increasing=True))
 """Coefficients of the quartic through five values, by rising powers."""
 CLOSE = 0.03

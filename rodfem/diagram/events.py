@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_location import Found, event_at
+from rodfem.continuation.event_samples import NODES, WIDEST
 from rodfem.continuation.event_search import Happens, search
 from rodfem.continuation.kinds import EVENT
 from rodfem.continuation.prediction import between
@@ -34,7 +35,7 @@ class Events:
 
     ``_row`` is that row, ``_values`` are the values there, and ``_last`` the arclengths of the last zeros.  ``_open``
     has the loads at the ends of steps in which zeros of an event may be missing, ``_still`` those of steps on which it
-    is zero, by its name.
+    is zero, by its name.  ``_apart`` is how far apart in the load, ``_load``, the samples of a step are at most.
     """
 
     at_start = True
@@ -47,12 +48,14 @@ class Events:
         self._last: list[float] = []
         self._open: dict[str, list[Range]] = defaultdict(list)
         self._still: dict[str, list[Range]] = defaultdict(list)
+        self._apart, self._load = 0.0, ""
 
     def between(self, step: Step) -> list[SpecialPoint]:
         """Special points of the events that happen in a step."""
         if not self.events:
             return []
         solver, a, b = step.solver, step.a, step.b
+        self._apart, self._load = max(self._apart, WIDEST * abs(b.load - a.load)), solver.system.scene.load
         follows = self._row is a
         before = self._values if follows else [event_at(solver, event, a.x) for event in self.events]
         before_it = self._last if follows else [-inf] * len(self.events)
@@ -70,7 +73,13 @@ class Events:
         return out
 
     def finish(self, observer: Observer) -> None:
-        """Say where zeros may be missing on a branch that is complete, and where an event is zero all along."""
+        """Say how finely a branch that is complete was sampled, where zeros may be missing, and where all are zero."""
+        if self._apart:
+            observer.note(
+                f"  events were looked at in {len(NODES)} states of each step, or more: one that comes and goes "
+                f"between two of them, here up to {self._apart:.2g} in {self._load} apart, is not seen"
+            )
+        self._apart = 0.0
         for name, ranges in self._open.items():
             observer.warn(
                 f"Zeros of the event {name!r} may be missing between loads {_words(ranges)}, where it varies too fast "

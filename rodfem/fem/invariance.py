@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from mpi4py import MPI
 
+from rodfem.errors import SceneError
 from rodfem.fem.fields import LOAD, Fields
 from rodfem.fem.state import Evaluation
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
@@ -56,7 +57,7 @@ SMOOTH = 0.35
 
 
 def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
-    """Find a basis of all exact symmetries."""
+    """Find a basis of all exact symmetries; raises :class:`SceneError` where the equations are no numbers anywhere."""
     parts = elementary_generators(fields)
     single = [Symmetry(row, parts) for row in np.eye(len(parts))]
     moved = np.zeros((len(parts),) * 2)
@@ -75,6 +76,12 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
         moved += fields.comm.allreduce(free @ free.T, op=MPI.SUM)
     free = _null_space(np.vstack(fields.comm.allgather(np.linalg.qr(np.vstack(held), mode="r"))))
     greatest = np.nan_to_num(np.max(sizes, axis=1), nan=np.inf)
+    if not np.isfinite(greatest).any():
+        raise SceneError(
+            f"The equations of the rod are no numbers at any of the {len(greatest)} states that were tried: a function "
+            "of the scene, or its derivative, overflows or is not defined there; write it such that it does not (that "
+            "of tanh(x) overflows beyond x = 350; x/sqrt(1 + x^2) does not)."
+        )
     asked_at = np.flatnonzero(greatest <= WILD * greatest.min())
     conditions, magnitudes = np.vstack([rows[i] for i in asked_at]), np.max([sizes[i] for i in asked_at], axis=0)
     moving = _moving(_kept(free, conditions, magnitudes, NEARLY), moved)
