@@ -63,6 +63,8 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
             cluster, clear = clearest.cluster, node
         if root is None:
             slope = (d[-1] - d[0]) / (2 * half)
+            if not slope:
+                break
             load += float(np.clip(-(d[0] + d[-1]) / 2 / slope, -2 * half, 2 * half))
             continue
         load += half * root

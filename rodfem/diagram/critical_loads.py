@@ -32,6 +32,8 @@ from rodfem.tolerances import ROUND_OFF, unit
 
 PARTS, PART = 16, 0.47
 """Times that a step is parted, at most, and where: not in its middle, at which a step is likely to be special."""
+PATIENCE = 3
+"""Steps of a sweep that are not clear, whatever is tried, after which no other one is parted."""
 SMALL = 1e-3
 """Change of negative eigenvalues, relative, that takes none of them to zero."""
 CLEAR = 1e-4
@@ -55,6 +57,7 @@ class CriticalLoads:
         self.collisions, self._still, self._parted = Collisions(solver, eigensolver), 0, 0
         self.hidden = HiddenEvents(lambda x: Measuring(solver, eigensolver, x), self.units.omega2)
         self._last: Side | None = None
+        self._unclear = 0
 
     def between(self, first: Row, second: Row) -> Told:
         """What happens between two rows, in its order: eigenvalues that collide, real ones that pass through zero.
@@ -66,6 +69,7 @@ class CriticalLoads:
         self._before, self._still = b.found, min(a.found.still(), b.found.still())
         self._parted = 0
         told, self._last = self._hidden(self._last, a, b), a
+        self._unclear += bool(told.doubts)
         for words in dict.fromkeys(told.doubts):
             self.warn(words)
         told.events.sort(key=lambda e: abs(e.load - a.load))
@@ -100,7 +104,7 @@ class CriticalLoads:
     def _told(self, a: Side, b: Side) -> Told:
         """What happens in a step, which is parted where not all of it is clear."""
         told = self._whole(a, b)
-        if not told.doubts or self._parted >= PARTS:
+        if not told.doubts or self._parted >= (PARTS if self._unclear < PATIENCE else 0):
             return told
         self._parted += 1
         try:

@@ -176,7 +176,7 @@ def index_of(oracle: Oracle, system: System, point: Point, special: bool) -> str
     """
     mu = oracle.eigenvalues(point.x)
     near = OF_A_RING if any(s.along for s in system.symmetries) else NEAR
-    unsure = ((abs(mu) > ZERO) & (abs(mu) < near)) | (ZERO < oracle.noise > abs(mu))
+    unsure = ((abs(mu) > ZERO) & (abs(mu) < near)) | (oracle.noise > np.maximum(abs(mu), ZERO))
     if special or oracle.dependent or unsure.any():
         return None
     negative, zero = int((mu < -ZERO).sum()), int((abs(mu) <= ZERO).sum())

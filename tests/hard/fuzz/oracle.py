@@ -37,8 +37,8 @@ class Oracle:
 
     dependent = False
     """Whether the constraints of the last state are nearly dependent."""
-    noise = 0.0
-    """Round-off of the eigenvalues of the last state."""
+    noise: Any = 0.0
+    """Round-off of the eigenvalues of the last state, of all or of each."""
 
     def __init__(self, system: System) -> None:
         self.system = system
@@ -53,18 +53,21 @@ class Oracle:
         self.state = np.setdiff1d(np.arange(f.unknowns), np.append(self.constraints, none))
 
     def eigenvalues(self, x: Any) -> np.ndarray:
-        """Eigenvalues of ``K`` on the null space of ``C^t`` at the state ``x``, ascending."""
+        """Eigenvalues of ``K`` on the null space of ``C^t`` at the state ``x``, ascending, and their ``noise``."""
         K, Z, G, _ = self._reduced(x)
         inside = Z.T @ G @ Z
         try:
             L = np.linalg.cholesky(inside)
         except np.linalg.LinAlgError:  # of elements of very different sizes; no metric changes a sign
             L = np.linalg.cholesky(inside + FLOOR * abs(inside).max() * np.eye(len(inside)))
-        half = np.linalg.solve(L, Z.T @ (K + K.T) / 2 @ Z)
+        K = Z.T @ (K + K.T) / 2 @ Z
+        half = np.linalg.solve(L, K)
         full = np.linalg.solve(L, half.T)
-        mu = np.linalg.eigvalsh((full + full.T) / 2) / self.system.stiffness_scale
-        self.noise = float(ROUND_OFF * abs(mu).max())
-        return mu
+        mu, w = np.linalg.eigh((full + full.T) / 2)
+        vectors = np.linalg.solve(L.T, w)  # of unit size in the metric: a long one has the round-off of K so often
+        self.noise = ROUND_OFF * np.maximum(abs(mu).max(), abs(K).max() * (vectors**2).sum(axis=0))
+        self.noise /= self.system.stiffness_scale
+        return mu / self.system.stiffness_scale
 
     def squares(self, x: Any) -> np.ndarray:
         """Finite eigenvalues ``omega^2`` of a rod under loads without a potential, by their distance from zero.
