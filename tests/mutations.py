@@ -91,6 +91,12 @@ FAULTS = {
         "return greatest if True else",
         "tests/diagram/test_sweep.py",
     ),
+    "bars-of-loads-by-those-of-ordinates": Fault(
+        "rodfem/diagram/sweep_errors.py",
+        "        of_ordinate = of_load = self",
+        "        of_ordinate = of_load = s.error_estimate = self",
+        "tests/diagram/test_sweep.py",
+    ),
     "more-modes-than-there-are": Fault(
         "rodfem/fem/fields.py",
         "if number > (most := most_eigenvalues(scene, discretization)):",

@@ -37,32 +37,36 @@ class SweepErrors:
         self.ordinate = OrdinateBound(solver.shape, self.richer.shape)
 
     def estimate(self, s: SpecialPoint) -> None:
-        """Set the error bars of a special point: of its load, its ordinate, and of the eigenvalues that collide."""
+        """Set the error bars of a special point: of its load, its ordinate, and of the eigenvalues that collide.
+
+        Raises :class:`~rodfem.errors.ConvergenceError` where one is not estimated: then all are left as they are.
+        """
         point, richer, rho = s.point, self.richer, self.rho
         guess = self.transfer(point.x, state=True)
         x = at_load(richer, guess, point.load)
         left = round_off(point.ordinate, self.units.ordinate)
-        s.ordinate_error = s.error_estimate = self.ordinate(point.x, x, left, rho)
+        of_ordinate = of_load = self.ordinate(point.x, x, left, rho)
         if s.kind == FLUTTER:
             load, left, mu, doubt = self._flutter(guess, s)
-            s.error_estimate = max(bound(point.load, load, left, rho), s.located_to)
+            of_load = max(bound(point.load, load, left, rho), s.located_to)
             s.omega2_error = bound(s.omega2, mu, max(doubt, MEAN * abs(mu) * ROUND_OFF), rho)
         elif s.kind == DIVERGENCE:
             cluster = self._transferred(s)
             still = cluster.size - abs(s.negative_after - s.negative_before)
             mean = Mean(Measuring(richer, self.eigensolver, x), cluster, still)
             load, left = zero_near(mean, point.load, self.units.load)
-            s.error_estimate = max(bound(point.load, load, max(left, s.located_to), rho), s.located_to)
+            of_load = max(bound(point.load, load, max(left, s.located_to), rho), s.located_to)
         if s.kind in (FLUTTER, DIVERGENCE):
-            s.ordinate_error += self._moved(x, s)
+            of_ordinate += self._moved(x, s, of_load)
+        s.error_estimate, s.ordinate_error = of_load, of_ordinate  # none of them where one is not estimated
 
-    def _moved(self, x: PETSc.Vec, s: SpecialPoint) -> float:
-        """Change of the ordinate, on the richer mesh, over the error bar of a special point's load, where ``x`` is.
+    def _moved(self, x: PETSc.Vec, s: SpecialPoint, bar: float) -> float:
+        """Change of the ordinate, on the richer mesh, over the error ``bar`` of a special point's load, where ``x`` is.
 
         Of a bar wider than half of the range no more is asked for.
         """
         low, high = sorted(self.span)
-        step = min(s.error_estimate, (high - low) / 2) * (1.0 if s.point.load < (low + high) / 2 else -1.0)
+        step = min(bar, (high - low) / 2) * (1.0 if s.point.load < (low + high) / 2 else -1.0)
         beside = at_load(self.richer, x, s.point.load + step)
         return abs(self.richer.shape.ordinate(beside) - self.richer.shape.ordinate(x))
 

@@ -23,7 +23,7 @@ from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch
 from rodfem.diagram.solver import Solver
 from rodfem.diagram.trace import trace
-from rodfem.errors import SceneError
+from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.fields import Discretization
 from rodfem.output.frequency_curves import curves, ranges_of
 from rodfem.output.plot_frequencies import draw_frequencies
@@ -289,6 +289,19 @@ def test_slow_motions_of_two_bodies_on_a_light_rod(light: float) -> None:
     assert [p.negative for p in diagram[0].points if p is not point.point] == [
         2 * (p.load > P) for p in diagram[0].points if p is not point.point
     ]
+
+
+def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its bar was that of the ordinate, which is zero for a straight rod: 1e-12."""
+
+    def lost(*given: object) -> object:
+        raise ConvergenceError("There is none: use a smaller range.")
+
+    monkeypatch.setattr("rodfem.diagram.sweep_errors.located_flutter", lost)
+    diagram = trace(classics.beck(span=(19.0, 21.0)), Discretization("pointwise", 4, 6))
+    (point,) = specials(diagram[0], "flutter")
+    assert np.isnan([point.error_estimate, point.ordinate_error]).all()
+    assert any("No error of the flutter" in sentence for sentence in diagram.warnings)
 
 
 def test_long_pencil_on_any_number_of_ranks() -> None:
