@@ -97,6 +97,9 @@ FAULTS = {
         "        of_ordinate = of_load = s.error_estimate = self",
         "tests/diagram/test_sweep.py",
     ),
+    "matrices-pile-up": Fault(
+        "rodfem/stability/nonsymmetric.py", "if self.filled % PILE == 0:", "if False:", "tests/diagram/test_sweep.py"
+    ),
     "more-modes-than-there-are": Fault(
         "rodfem/fem/fields.py",
         "if number > (most := most_eigenvalues(scene, discretization)):",

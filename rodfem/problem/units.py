@@ -67,13 +67,14 @@ ONES = Units(*[1.0] * len(Units._fields))
 
 
 def units_of(scene: Scene) -> Units:
-    """Natural sizes of a scene: by its length, bending stiffness, mass with what is attached, and range of loads."""
+    """Natural sizes of a scene: by its length, bending stiffness, masses and range of loads."""
     length, stiffness = scene.length, float(np.linalg.eigvalsh(scene.stiffness()[-3:, -3:])[0])
     c = scene.constants()
-    rotary = [float(x) for x in scene.inertia.rho_I(c)]
-    attached = sum(float(x.mass(c)) for x in scene.attachments if x.mass)
-    rotary += [float(i) / length for x in scene.attachments if x.rotary_inertia for i in x.rotary_inertia(c)]
-    mass = max(float(scene.inertia.rho_A(c)), attached / length, *(x / length**2 for x in rotary))
+    own = max(float(scene.inertia.rho_A(c)), *(float(x) / length**2 for x in scene.inertia.rho_I(c)))
+    rotary = [i for x in scene.attachments if x.rotary_inertia for i in x.rotary_inertia(c)]
+    attached = sum(float(x.mass(c)) for x in scene.attachments if x.mass) / length
+    carried = max(attached, own, *(float(i) / length**3 for i in rotary))
+    mass = (own * carried) ** 0.5 if own > 0 else carried  # between fast motions of a light rod and slow ones of bodies
     omega2 = stiffness / (mass * length**4) if mass > 0 else 1.0
     sizes = length, stiffness / length**2, stiffness / length, stiffness / length, max(map(abs, scene.span)), omega2
     if all(size(x) == 1.0 for x in sizes):

@@ -74,6 +74,8 @@ BEYOND = 6
 """Eigenvalues beside the shift that are sought beyond those nearest zero: a negative one may be nearer to it."""
 DENSE = 3
 """A pencil smaller than this many Krylov spaces is solved by dense reductions: it may have few finite eigenvalues."""
+PILE = 64
+"""States after which what PETSc keeps of matrices that are not used any more is destroyed."""
 SPARE = 2
 """Eigenvalues that are kept beyond those asked for: one of a pair, or of equal ones, may be the last."""
 
@@ -120,6 +122,8 @@ class NonsymmetricSolver(PencilMatrices):
         Motions of symmetries are kept out, as elsewhere: the massless spin of a thin rod would make it singular.
         """
         self.filled += 1
+        if self.filled % PILE == 0:
+            compat.destroy_garbage(self.system.comm)
         with self.system.clock("assembly"):
             state = assemble_pencil(self.system, x, self.matrix, self.mass)
             self.system.verify(self.matrix, state)

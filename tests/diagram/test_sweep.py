@@ -11,6 +11,7 @@ import classics
 import numpy as np
 import pytest
 from closed_forms import column, double, flutter
+from hard.endurance import resident
 from hemitropic_cases import specials
 from matplotlib.figure import Figure
 from mpi4py import MPI
@@ -29,7 +30,7 @@ from rodfem.output.frequency_curves import curves, ranges_of
 from rodfem.output.plot_frequencies import draw_frequencies
 from rodfem.problem.end import End
 from rodfem.problem.scene import Scene
-from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.nonsymmetric import PILE, NonsymmetricSolver
 
 
 def swept(scene: Scene, monkeypatch: pytest.MonkeyPatch, loads: int = 26) -> tuple[Branch, dict, str]:
@@ -302,6 +303,17 @@ def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytes
     (point,) = specials(diagram[0], "flutter")
     assert np.isnan([point.error_estimate, point.ordinate_error]).all()
     assert any("No error of the flutter" in sentence for sentence in diagram.warnings)
+
+
+@pytest.mark.alone
+def test_memory_does_not_grow_with_the_states_whose_frequencies_are_found() -> None:
+    """PETSc keeps what is destroyed on a communicator of several ranks until all of them clean up."""
+    solver = Solver(classics.beck(), Discretization("pointwise", 4, 6)).equilibria
+    x, eigensolver, used = solver.start(10.0), NonsymmetricSolver(solver.system), list[float]()
+    for _ in range(2 * PILE + 1):
+        eigensolver.at(x).near(3, -10.0)
+        used.append(resident())
+    assert used[-1] - used[PILE] < 0.25 * (used[PILE - 2] - used[1]) + 512
 
 
 def test_long_pencil_on_any_number_of_ranks() -> None:
