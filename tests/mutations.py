@@ -517,7 +517,7 @@ FAULTS = {
     ),
     "steps-are-not-parted": Fault(
         "rodfem/diagram/critical_loads.py",
-        "if not told.doubts or self._parted >= PARTS:",
+        "if not told.doubts or self._parted >= (PARTS if self._unclear < PATIENCE else 0):",
         "if True:",
         CLOSE,
     ),
