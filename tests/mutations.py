@@ -575,7 +575,7 @@ FAULTS = {
     ),
     "ordinate-of-a-load-that-is-exact": Fault(
         "rodfem/diagram/sweep_errors.py",
-        "s.ordinate_error += self._moved(x, s)",
+        "of_ordinate += self._moved(x, s, of_load)",
         "pass",
         "tests/literature/test_follower.py",
     ),
