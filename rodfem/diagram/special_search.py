@@ -40,14 +40,17 @@ class SpecialSearch:
     Attributes
     ----------
     level
-        Number of eigenvalues that are zero at both ends of the piece looked at: those stay zero along the branch.
+        Number of eigenvalues that are zero at both ends of the piece looked at: those stay zero along the branch, or
+        beside zero, with the sign that they have.
+    undecided
+        Number of those of which not even the sign is known.
     """
 
     def __init__(self, meshes: Meshes, gaps: Gaps, observer: Observer) -> None:
         """Nothing is known about a branch before :meth:`begin`."""
         self.meshes, self.gaps, self.observer = meshes, gaps, observer
         self.solver = meshes.solvers[0]
-        self.level = 0
+        self.level = self.undecided = 0
         self._open: list[Point] = []
         self._touching, self._balance = Touching(), EnergyBalance()
         self._short = (-inf, inf, 0)
@@ -56,7 +59,7 @@ class SpecialSearch:
     def begin(self, first: Point, short: float = 0.0, until: float = -inf) -> None:
         """Begin a branch at its last row so far, with steps of at most ``short`` up to the arclength ``until``."""
         self._short = (until, short or inf, 0)
-        self.level = first.zero
+        self.level = self.undecided = first.zero
 
     def resume(self, history: Sequence[Point]) -> None:
         """Go on from the last row of a branch, up to which everything has been found."""
@@ -92,9 +95,12 @@ class SpecialSearch:
         """Special points that the row ``b`` shows; raises as :meth:`after`."""
         rows = [self._here(p) for p in self._open]
         stay = min(rows[0].zero, b.zero)
-        clear = self._clear(b, stay)
+        before, clear = self._clear(rows[0], stay), self._clear(b, stay)
+        self.undecided = stay - max(before, clear)
+        if before == clear and self._below(rows[0]) == self._below(b):
+            before = clear = 0  # it keeps its sign, beside zero
         # one that differs from zero at either end does not stay: it crosses slowly, within the tolerance
-        slow = max(clear, self._clear(rows[0], stay))
+        slow = max(before, clear)
         self.level = stay - slow
         settled = 0 < slow == clear  # nothing is to be waited for
         if b.zero > self.level and not settled:  # the rows that follow settle the sign of one within the tolerance
@@ -181,6 +187,11 @@ class SpecialSearch:
         if stay <= self.solver.system.active_drifts(point.x):
             return 0
         return min(clear_of_zero(self.solver.inertia.at(point.x)), stay)
+
+    def _below(self, point: Point) -> int:
+        """Number of eigenvalues of a point within the tolerance of a count that are negative."""
+        low, _ = resolve(self.solver.inertia.at(point.x))
+        return low - point.negative
 
     def _on(self, point: Point) -> None:
         self.solver = self.meshes.solvers[point.mesh]

@@ -214,7 +214,7 @@ class Tracer:
             self._check_symmetry(item)
             self._check_invariants(item)
             self.control.row(item, self.solver)
-            self.zeros.check(self.solver, history, item, self.specials.level)
+            self.zeros.check(self.solver, history, item, self.specials.undecided)
             if item.stretch > 0 and (why := lost_in_step(self.solver, previous, item, self.observer.warn)):
                 branch.ended = self._rest(branch) or why
                 return True

@@ -191,8 +191,12 @@ def test_accuracy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_near_and_agreed() -> None:
-    values = np.array([12.0, 12.001, 480.0, 50 + 1e-3j, 50 - 1e-3j])
-    assert frequency_rows.near(values[:3]) and frequency_rows.near(values[2:])
-    assert not frequency_rows.near(np.array([12.0, 12.0 + 1e-9, 480.0]))
-    one, other = (Frequencies(np.array(v, dtype=complex), np.zeros(len(v))) for v in ([1.0, 1.0, 5.0], [1.0, 5.0, 9.0]))
+    def found(*values: complex) -> Frequencies:
+        return Frequencies(np.array(values, dtype=complex), np.zeros(len(values)))
+
+    assert frequency_rows.near(found(12.0, 12.001, 480.0), 3)
+    assert frequency_rows.near(found(480.0, 50 + 1e-3j, 50 - 1e-3j), 3)
+    assert not frequency_rows.near(found(12.0, 12.0 + 1e-9, 480.0), 3)
+    assert not frequency_rows.near(found(480.0, 12.0, 12.001), 2)
+    one, other = found(1.0, 1.0, 5.0), found(1.0, 5.0, 9.0)
     assert not frequency_rows.agree(one, other) and frequency_rows.agree(other, other)
