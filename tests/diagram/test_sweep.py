@@ -293,7 +293,7 @@ def test_slow_motions_of_two_bodies_on_a_light_rod(light: float) -> None:
 
 
 def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its bar was that of the ordinate, which is zero for a straight rod: 1e-12."""
+    """The bar of its ordinate, 1e-12 for a straight rod, is none of the load."""
 
     def lost(*given: object) -> object:
         raise ConvergenceError("There is none: use a smaller range.")
