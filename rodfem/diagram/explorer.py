@@ -16,13 +16,14 @@ from rodfem.continuation.follow import ON_BOUND
 from rodfem.continuation.normal_form import normal_form_of, origin_of
 from rodfem.continuation.reduced import lines
 from rodfem.continuation.special_points import COUPLED, coupling_of
-from rodfem.continuation.switching import between, directions, start_branch
+from rodfem.continuation.switching import directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
-from rodfem.diagram.equivalence import SAME_DETERMINANT, equally_stable, equivalent, near
+from rodfem.diagram.equivalence import equivalent, near
 from rodfem.diagram.first_name import ahead, name_of_first
 from rodfem.diagram.first_state import first_state
 from rodfem.diagram.tracer import Tracer
+from rodfem.diagram.two_sides import are_images
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.link import link
 from rodfem.stability.bordered import Bordered
@@ -209,7 +210,7 @@ class Explorer(Tracer):
                     self.observer.note(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
                     continue
                 first = branch.points[1]
-                if any(self._mirrored(special, known, first) for known in firsts):
+                if any(are_images(self, special, known, first) for known in firsts):
                     continue  # the mirror image of a branch just traced
                 firsts.append(replace(first))  # as it is now: once it is traced richer meshes have decided its index
                 if special.connects_to is None and self._traced_already(branch, special):
@@ -287,26 +288,6 @@ class Explorer(Tracer):
         while (name := f"{before}{number}{after}") in names:
             number += 1
         return name
-
-    def _mirrored(self, special: SpecialPoint, a: Point, b: Point) -> bool:
-        """Whether first points of the two branches that leave in opposite ways are of mirror images, at one load.
-
-        The metric need not share the symmetry: points at one distance in it need not be mirror images themselves.
-        """
-        if not equivalent(a, b, self.solver.units):
-            a, b = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
-            there = between(self.solver, special, b, a.load)
-            if there is None or not self.alike(a, there, SAME_STATE):
-                return False
-            b = there
-        return equally_stable(a, b) and self._equally_stable_in_space(a, b)
-
-    def _equally_stable_in_space(self, a: Point, b: Point) -> bool:
-        """Whether the states of a planar rod have the same index and determinant in space."""
-        if (space := self.solver.space) is None:
-            return True
-        first, second = (space.count(p.x) for p in (a, b))
-        return first == second and abs(first.determinant - second.determinant) <= SAME_DETERMINANT
 
     def _came_from(self, parent: Branch, special: SpecialPoint, point: Point) -> bool:
         """Whether what leaves the end of a side branch is that branch again, or its mirror image."""

@@ -46,7 +46,7 @@ class InSpace:
 
     def count(self, x: PETSc.Vec) -> Index:
         """Index in space of the planar equilibrium ``x``; raises :class:`SceneError` where it is none in space."""
-        return self._at(x).count()
+        return self.at(x).count()
 
     def negative(self, x: PETSc.Vec) -> int:
         """Number of negative eigenvalues in space of the planar equilibrium ``x``; raises as :meth:`count` does.
@@ -54,7 +54,7 @@ class InSpace:
         Those out of the plane that the count has as zero are decided by their Rayleigh quotients: symmetries in space
         are left out, and a rod that is nearly symmetric may fall out of its plane slowly.
         """
-        found = self._at(x)
+        found = self.at(x)
         index = found.count()
         near = index.zero - found.drifts
         if near <= 0:
@@ -73,8 +73,8 @@ class InSpace:
         own = float((v.array_r * (self.inertia.metric * v).array_r).real[self._out].sum())
         return float(self.system.comm.allreduce(own, op=MPI.SUM))
 
-    def _at(self, x: PETSc.Vec) -> Factored:
-        """Second variation in space at the planar equilibrium ``x``."""
+    def at(self, x: PETSc.Vec) -> Factored:
+        """Second variation in space at the planar equilibrium ``x``; raises :class:`SceneError` as :meth:`count` does."""
         state = self.lift(x)
         self.system.set_phase(state)
         residual = self.system.new_vector()
