@@ -210,7 +210,7 @@ class Explorer(Tracer):
                     self.observer.note(f"  what leaves {parent.name} at {special.point.load:.8g} is outside the range")
                     continue
                 first = branch.points[1]
-                if any(are_images(self, special, known, first) for known in firsts):
+                if any(are_images(self.solver, special, known, first, self.alike) for known in firsts):
                     continue  # the mirror image of a branch just traced
                 firsts.append(replace(first))  # as it is now: once it is traced richer meshes have decided its index
                 if special.connects_to is None and self._traced_already(branch, special):

@@ -14,9 +14,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.switching import between
 from rodfem.diagram.equivalence import equivalent
-from rodfem.diagram.tracer import Tracer
 from rodfem.stability.inertia import Factored
 from rodfem.tolerances import SAME_STATE
 
@@ -27,24 +27,26 @@ LOOKED_AT = 3
 """Eigenvalues nearest zero, beyond those that count as zero, between which the shift lies."""
 
 
-def are_images(tracer: Tracer, special: SpecialPoint, a: Point, b: Point) -> bool:
+def are_images(
+    solver: BranchSolver, special: SpecialPoint, a: Point, b: Point, alike: Callable[[Point, Point, float], bool]
+) -> bool:
     """Whether the first points ``a``, ``b`` of branches that leave ``special`` in opposite ways are of mirror images.
 
-    The ``tracer`` traces them.  They are compared at one load.  The metric need not share the symmetry: points at one distance in it need not be
-    mirror images themselves.
+    They are compared at one load, by ``alike`` where the ``solver`` moves one to that of the other.  The metric need
+    not share the symmetry: points at one distance in it need not be mirror images themselves.
     """
-    if not equivalent(a, b, tracer.solver.units):
+    if not equivalent(a, b, solver.units):
         a, b = sorted((a, b), key=lambda p: abs(p.load - special.point.load))
-        there = between(tracer.solver, special, b, a.load)
-        if there is None or not tracer.alike(a, there, SAME_STATE):
+        there = between(solver, special, b, a.load)
+        if there is None or not alike(a, there, SAME_STATE):
             return False
         b = there
     if (a.negative, a.zero) != (b.negative, b.zero):
         return False
     apart = abs(a.determinant - b.determinant) if a.mesh == b.mesh else 0.0  # nan where it is not known
-    if apart > SAME_DETERMINANT and not _as_stable(tracer.solver.inertia.at, a, b):
+    if apart > SAME_DETERMINANT and not _as_stable(solver.inertia.at, a, b):
         return False
-    space = tracer.solver.space
+    space = solver.space
     return space is None or _as_stable(space.at, a, b)
 
 

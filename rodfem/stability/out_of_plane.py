@@ -74,7 +74,7 @@ class InSpace:
         return float(self.system.comm.allreduce(own, op=MPI.SUM))
 
     def at(self, x: PETSc.Vec) -> Factored:
-        """Second variation in space at the planar equilibrium ``x``; raises :class:`SceneError` as :meth:`count` does."""
+        """Second variation in space at the planar equilibrium ``x``; raises :class:`SceneError` where it is none."""
         state = self.lift(x)
         self.system.set_phase(state)
         residual = self.system.new_vector()
