@@ -1,11 +1,15 @@
-"""Unstable eigenvalues of a sweep that are not among those that it follows: looked for from time to time, and said."""
+"""Unstable eigenvalues of a sweep that are not among those that it follows: looked for from time to time, and said.
+
+Of a mesh with many rows only the last row of the sweep is looked at; of one with very many none is, which is said.
+"""
 
 from __future__ import annotations
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.observer import Observer
-from rodfem.stability.census import census
+from rodfem.stability.census import MANY, census
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
+from rodfem.stability.outside import LARGEST
 
 OFTEN = 5
 """Rows from one look at all eigenvalues of the mesh to the next."""
@@ -24,7 +28,12 @@ class Unfollowed:
         self._rows += 1
         if self._said or point.negative or not (last or self._rows % OFTEN == 1):
             return
-        found = census(self.eigensolver.at(point.x))
+        found = census(self.eigensolver.at(point.x), MANY if last else LARGEST)
+        if found is None and last:
+            self.observer.note(
+                f"  the mesh has too many unknowns to look at all its eigenvalues at {point.load:.6g}: that the rod is "
+                "stable there is said of those nearest zero"
+            )
         if found is None or not len(found.unstable):
             return
         self._said = True

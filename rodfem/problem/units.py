@@ -68,7 +68,8 @@ ONES = Units(*[1.0] * len(Units._fields))
 
 def units_of(scene: Scene) -> Units:
     """Natural sizes of a scene: by its length, bending stiffness, masses and range of loads."""
-    length, stiffness = scene.length, float(np.linalg.eigvalsh(scene.stiffness()[-3:, -3:])[0])
+    least, middle, _ = map(float, np.linalg.eigvalsh(scene.stiffness()[-3:, -3:]))
+    length, stiffness = scene.length, (least * middle) ** 0.5  # a rod may be soft in one way only, as in torsion
     c = scene.constants()
     own = max(float(scene.inertia.rho_A(c)), *(float(x) / length**2 for x in scene.inertia.rho_I(c)))
     rotary = [i for x in scene.attachments if x.rotary_inertia for i in x.rotary_inertia(c)]

@@ -2,8 +2,13 @@ r"""Unstable eigenvalues among all that a mesh has, of a rod under loads without
 
 Eigenvalues nearest to a shift need not be those that flutter: where a rod has dozens of slow motions, as a soft one in
 torsion, a pair farther off is not among them.  With ``K`` the rows and columns of ``(S - a M)^-1`` that have mass, and
-``m`` the mass there, the eigenvalues of ``K m`` are ``nu = 1 / (mu - a)`` of all finite ``mu``, and zeros
-(:mod:`rodfem.stability.outside`).
+``m = L L^t`` the mass there, the eigenvalues of ``L^t K L`` are ``nu = 1 / (mu - a)`` of all finite ``mu``, and zeros
+(:mod:`rodfem.stability.outside`).  Unlike in the pencil those zeros are in no Jordan blocks: round-off leaves them as
+small as it is, and finite eigenvalues are told from them down to there.
+
+Round-off of a matrix ``A`` moves a simple eigenvalue by up to ``|dA| / |y.x|``, for its right and left vectors ``x``
+and ``y`` of norm one (Wilkinson, The Algebraic Eigenvalue Problem, 1965, chapter 2).  What that may have made unstable
+is left out.
 """
 
 from __future__ import annotations
@@ -11,18 +16,24 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import cholesky, eig
 from scipy.sparse.linalg import splu
 
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.matrices import gathered
-from rodfem.stability.nonsymmetric import FAR, SHIFT, NonsymmetricPencil
+from rodfem.stability.nonsymmetric import SHIFT, NonsymmetricPencil
 from rodfem.stability.outside import inverse_with_mass
+from rodfem.tolerances import TINY
 
 CLEAR = 1e-5
 """Imaginary part, relative to its eigenvalue, above which that is complex, and negative real part, to natural size.
 
-Round-off takes far and equal eigenvalues apart by less.
+Equal eigenvalues are taken apart by less.
 """
+ROUNDED = 1e-14
+"""Round-off of the inverse relative to its norm, and to the natural size of its entries where that is larger."""
+MANY = 1000
+"""Rows with mass of which a second or so finds all eigenvalues."""
 MOST = 4000
 """Rows of a pencil that each rank factors by itself."""
 
@@ -34,36 +45,51 @@ class Census(NamedTuple):
     nearer: np.ndarray
 
 
-def census(pencil: NonsymmetricPencil) -> Census | None:
-    """Unstable eigenvalues among all finite ones of a ``pencil``; None where it has too many rows to look at all.
+def census(pencil: NonsymmetricPencil, largest: int = MANY) -> Census | None:
+    """Unstable eigenvalues among all finite ones of a ``pencil``; None where more than ``largest`` rows have mass.
 
-    Those that are so far from the shift that round-off makes the like of them are left out.
+    Those that round-off may have made unstable are left out.  None also where the shift is an eigenvalue.
     """
-    one = pencil.system.scene.units.omega2
-    values = _all(pencil)
-    if values is None:
+    found = _inverse(pencil, largest)
+    if found is None:
         return None
-    values = values[np.argsort(abs(values - SHIFT), kind="stable")]
-    bad = (abs(values.imag) > CLEAR * np.maximum(abs(values), 1.0)) | (values.real < -CLEAR)
-    return Census(values[bad] * one, np.flatnonzero(bad))
+    inverse, round_off = found
+    values, unstable = _values(np.linalg.eigvals(inverse), round_off)
+    if unstable.any():  # whether they are, their vectors tell
+        nu, left, right = eig(inverse, left=True, right=True)
+        condition = 1.0 / np.maximum(abs(np.einsum("ij,ij->j", left.conj(), right)), TINY)
+        values, unstable = _values(nu, round_off * condition)
+    return Census(values[unstable] * pencil.system.scene.units.omega2, np.flatnonzero(unstable))
 
 
-def _all(pencil: NonsymmetricPencil) -> np.ndarray | None:
-    """All finite eigenvalues in units of their natural size; None where there are too many rows, or no factors."""
+def _values(nu: np.ndarray, round_off: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Finite eigenvalues of ``nu`` (n,), nearest to the shift first, and which are unstable beyond their round-off."""
+    order = np.argsort(-abs(nu), kind="stable")
+    order = order[abs(nu[order]) > np.broadcast_to(round_off, nu.shape)[order]]
+    nu, doubt = nu[order], np.broadcast_to(round_off, nu.shape)[order] / abs(nu[order])
+    values = SHIFT + 1.0 / nu
+    doubt = np.maximum(CLEAR, doubt)
+    complex_ones = abs(values.imag) > doubt * abs(values - SHIFT)
+    return values, complex_ones & (abs(values.imag) > CLEAR) | (values.real < -doubt * abs(values - SHIFT))
+
+
+def _inverse(pencil: NonsymmetricPencil, largest: int) -> tuple[np.ndarray, float] | None:
+    """``L^t K L`` of a pencil in units of natural sizes, and its round-off; None for too many rows, or no factors."""
     try:
         factors = pencil.eliminated(SHIFT * pencil.system.scene.units.omega2)
         if factors is not None:
-            found = inverse_with_mass(pencil.mass_in_units(), factors.solve)
+            found = inverse_with_mass(pencil.mass_in_units(), factors.solve, largest)
         elif pencil.matrix.getSize()[0] > MOST:
             return None
         else:  # on several ranks, or with PETSc's factors: each rank has all of it
             stiffness, mass = (gathered(A) for A in pencil.in_units())
-            found = inverse_with_mass(mass, splu((stiffness - SHIFT * mass).tocsc()).solve)
+            found = inverse_with_mass(mass, splu((stiffness - SHIFT * mass).tocsc()).solve, largest)
     except (ConvergenceError, RuntimeError):  # the shift is an eigenvalue
         return None
     if found is None:
         return None
-    _, inverse, m = found
-    nu = np.linalg.eigvals(inverse @ m.toarray())
-    nu = nu[abs(nu) > abs(nu).max(initial=0.0) / FAR]
-    return np.asarray(SHIFT + 1.0 / nu, dtype=complex)
+    _, inverse, sparse = found
+    m = sparse.toarray()
+    lower = cholesky(m, lower=True)
+    round_off = ROUNDED * max(float(np.linalg.norm(inverse, 2)), 1.0) * float(np.linalg.norm(m, 2))
+    return np.asarray(lower.T @ inverse @ lower), round_off

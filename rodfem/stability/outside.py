@@ -79,11 +79,14 @@ def enclosed(x: np.ndarray, y: np.ndarray, mass: sp.csr_matrix, factors: Elimina
 
 
 def inverse_with_mass(
-    mass: sp.csr_matrix, solve: Callable[[np.ndarray], np.ndarray]
+    mass: sp.csr_matrix, solve: Callable[[np.ndarray], np.ndarray], largest: int = LARGEST
 ) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix] | None:
-    """Rows with mass (h,), the inverse that ``solve`` applies and the ``mass`` there (h, h); None for too many rows."""
+    """Rows with mass (h,), the inverse that ``solve`` applies and the ``mass`` there (h, h).
+
+    None for more rows than the ``largest`` number.
+    """
     heavy, m = _heavy(mass)
-    if len(heavy) > LARGEST:
+    if len(heavy) > largest:
         return None
     units = np.zeros((mass.shape[0], len(heavy)), order="F")
     units[heavy, np.arange(len(heavy))] = 1.0
