@@ -48,13 +48,12 @@ def last_admissible(solver: BranchSolver, a: Point, b: Point) -> Point:
 
 
 def before_the_end(solver: BranchSolver, a: Point, last: Point) -> Point | None:
-    """A point right before the ``last`` admissible one if it has another index than the row ``a``; None if not.
+    """A point right before the ``last`` admissible one after the row ``a``; None where it is not found.
 
     A rod that is squeezed to nothing has no stiffness against some motions: at the very end their eigenvalues are zero,
     whatever sign they had before.
     """
-    beside = point_between(solver, a, last, last.arclength - ASIDE * (last.arclength - a.arclength))
-    return None if beside is None or beside.negative == a.negative else beside
+    return point_between(solver, a, last, last.arclength - ASIDE * (last.arclength - a.arclength))
 
 
 def end_at_zero_stretch(solver: BranchSolver, last: Point, *, error_bars: bool) -> SpecialPoint:

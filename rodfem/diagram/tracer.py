@@ -215,10 +215,9 @@ class Tracer:
             self._check_invariants(item)
             self.control.row(item, self.solver)
             self.zeros.check(self.solver, history, item, self.specials.undecided)
-            if item.stretch > 0 and (why := lost_in_step(self.solver, previous, item, self.observer.warn)):
-                branch.ended = self._rest(branch) or why
-                return True
             try:
+                if item.stretch > 0 and self._ends_not_convex(branch, previous, item):
+                    return True
                 if item.stretch <= 0:
                     self._end_at_zero_stretch(branch, previous, item)
                     return True
@@ -319,11 +318,20 @@ class Tracer:
                 return reason
         return ""
 
+    def _ends_not_convex(self, branch: Branch, a: Point, b: Point) -> bool:
+        """Whether the branch ends at the row ``a`` as the stored energy ceases to be convex between it and ``b``."""
+        why = lost_in_step(self.solver, a, b, self.observer.warn)
+        if why:
+            branch.ended = self._rest(branch) or why
+        return bool(why)
+
     def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> None:
         """Add the last admissible point, where the smallest stretch vanishes, and say so."""
         last = last_admissible(self.solver, a, b)
         beside = before_the_end(self.solver, a, last)
-        if beside is not None:  # what passes zero before the end is zero there once more
+        if beside is not None and self._ends_not_convex(branch, a, beside):
+            return
+        if beside is not None and beside.negative != a.negative:  # what passes zero before is zero at the end once more
             self._check_invariants(beside)
             if reason := self._between(branch, a, beside):
                 branch.ended = reason

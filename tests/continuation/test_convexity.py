@@ -10,7 +10,7 @@ import ufl
 from classics import SUPPORTS, column
 
 from forms.energy import bending_and_twist
-from rodfem import Discretization, Inertia, Plan, Scene, Solver, clamped, free, trace
+from rodfem import Discretization, Inertia, Plan, Scene, Solver, StepControl, clamped, free, trace
 from rodfem.codim2.locus import locus
 from rodfem.errors import SceneError
 from rodfem.problem.local_state import Constants
@@ -130,3 +130,19 @@ def test_a_locus(energy: Energy, until: float) -> None:
     assert any(end.startswith("the stored energy is not convex any more near P = ") for end in curve.ended)
     assert curve.values[:, 1].min() > until
     assert {tuple(row) for row in curve.index.tolist()} == {(0, 1)}
+
+
+@pytest.mark.parametrize("loss", [3.0, 3.99])
+def test_convexity_lost_in_the_step_to_zero_stretch(loss: float) -> None:
+    """A thrust squeezes a rod of ``EA = 4`` to nothing at 4; before that its twisting stiffness vanishes."""
+    scene = rod(
+        lambda v, k, c: bending_and_twist(k, (9.0, 9.0, 1.0 - c.P / c.loss)) + 2.0 * (v[2] - 1) ** 2,
+        (0.0, 5.0),
+        ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
+        rod="unshearable",
+        constants={"loss": loss},
+    )
+    steps = StepControl(first=0.25, largest=0.25)
+    (branch,) = trace(scene, MESH, Plan(depth=0, error_bars=False, steps=steps))
+    assert branch.ended == f"the stored energy is not convex any more at P = {loss:g}"
+    assert branch.points[-1].load < loss
