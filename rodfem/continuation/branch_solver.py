@@ -21,6 +21,7 @@ from rodfem.fem.system import System
 from rodfem.linalg.factorization import Factors
 from rodfem.stability.inertia import Index, Inertia
 from rodfem.stability.out_of_plane import InSpace
+from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.round_off import decide
 from rodfem.stability.symmetric import SymmetricSolver
 
@@ -161,7 +162,7 @@ class BranchSolver(StaticSolver):
         if self.spectrum is None:
             return []
         modes = self.spectrum.at(x).leftmost(self.modes)
-        tolerance = self.inertia.tolerance / self.system.scene.length
+        tolerance = self.inertia.tolerance / self.inertia.scale * least_eigenvalue(self.system)
         least, most = modes.negative(tolerance), modes.negative(-tolerance)
         if not least <= min(index.negative, self.modes) <= most or not modes.certified:
             raise ConvergenceError(

@@ -95,5 +95,5 @@ class ModeFinder(Eigenmotions):
             others = np.empty(number, dtype=complex)
             others[np.argsort(abs(values), kind="stable")] = found.values[moving(found, number)]
         rho = halved(self.system.fields.discretization.degree)
-        left = FLOOR * max(self.system.scene.units.moment, float(abs(values).max()))
+        left = FLOOR * max(self.system.scene.units.omega2, float(abs(values).max()))
         return np.array([bound(v, other, left, rho) for v, other in zip(values, others, strict=True)])

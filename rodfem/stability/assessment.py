@@ -19,6 +19,7 @@ from rodfem.stability.census import census
 from rodfem.stability.dense import check_number
 from rodfem.stability.method import Found, Method
 from rodfem.stability.methods import AUTO, METHODS, find
+from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.rank import rank_of
 from rodfem.stability.round_off import Decision, decide
 from rodfem.stability.soft_mode import ONE_SIDE, SoftMode, is_stable
@@ -146,7 +147,7 @@ class Assessor(Workspace):
         if self.inertia is None:
             with as_failure(self.system.comm):
                 found = self._method(name).nearest(x, max(number, 1))
-            scale = ZERO * self.system.stiffness_scale / self.system.scene.length
+            scale = ZERO * least_eigenvalue(self.system)
             bad = int(((found.values.real < -scale) | (abs(found.values.imag) > scale)).sum())
             everything = census(self.nonsymmetric.at(x))
             if everything is not None:

@@ -47,7 +47,7 @@ from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import block_matrix, first_of, local_rows, petsc_matrix
 from rodfem.problem.ring import CLOSING_MOMENT
-from rodfem.stability.pencil import assemble_pencil
+from rodfem.stability.pencil import assemble_pencil, in_units
 
 COORDINATES = ("full", "tangent", "compatible")
 
@@ -119,15 +119,18 @@ class Blocks:
         self._find_quaternions()
         self.place = self._places()
 
-    def assemble(self, x: PETSc.Vec) -> Pencil:
-        """Blocks at the state ``x``."""
+    def assemble(self, x: PETSc.Vec, sizes: PETSc.Vec | None = None) -> Pencil:
+        """Blocks at the state ``x``, in units of natural ``sizes`` of the unknowns if these are given."""
         comm = self.system.comm
         state = assemble_pencil(self.system, x, self.matrix, self.mass)
+        matrix, mass = self.matrix, self.mass
+        if sizes is not None:
+            matrix, mass = in_units(self.system, matrix, mass, sizes)
         rows, columns = (
             PETSc.IS().createGeneral(n.astype(PETSc.IntType), comm=comm) for n in (self.rows, self.columns)
         )
-        K, C = self.matrix.createSubMatrix(rows, rows), self.matrix.createSubMatrix(rows, columns)
-        M = self.mass.createSubMatrix(rows, rows)
+        K, C = matrix.createSubMatrix(rows, rows), matrix.createSubMatrix(rows, columns)
+        M = mass.createSubMatrix(rows, rows)
         symmetric = self.system.scene.conservative
         where = {
             name: np.searchsorted(self.rows, n) + self._first_row

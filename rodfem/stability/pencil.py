@@ -90,18 +90,36 @@ class StatePencil(Generic[Matrices]):
         return self._held().sizes
 
     def in_units(self) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """The pencil for unknowns and eigenvalues in units of their natural sizes.
+        """The pencil for unknowns and eigenvalues in units of their natural sizes: see :func:`in_units`."""
+        return in_units(self.system, self.matrix, self.mass, self.sizes)
 
-        Round-off makes finite eigenvalues of the infinite ones, among the others where multipliers have large units.
-        """
-        units, sizes = self.system.scene.units, self.sizes
-        if units.ordinary:
-            return self.matrix, self.mass
-        scaled = self.matrix.copy(), self.mass.copy()
-        for matrix, size in zip(scaled, (units.energy, units.energy / units.omega2), strict=True):
-            matrix.diagonalScale(sizes, sizes)
-            matrix.scale(1.0 / size)
-        return scaled
+
+def in_units(system: System, matrix: PETSc.Mat, mass: PETSc.Mat, sizes: PETSc.Vec) -> tuple[PETSc.Mat, PETSc.Mat]:
+    """Matrices of a ``system``'s pencil for unknowns and eigenvalues in units of their natural ``sizes``.
+
+    Round-off makes finite eigenvalues of the infinite ones, among the others where multipliers have large units; and
+    what is near, far or zero is a number of order one.  Where all units are one they are ``matrix`` and ``mass``.
+    """
+    units = system.scene.units
+    if units.ordinary:
+        return matrix, mass
+    scaled = matrix.copy(), mass.copy()
+    for each, size in zip(scaled, (units.energy, units.energy / units.omega2), strict=True):
+        each.diagonalScale(sizes, sizes)
+        each.scale(1.0 / size)
+    return scaled
+
+
+def scale_in_units(system: System) -> float:
+    """Size of the least eigenvalue of a ``system``'s pencil in units of natural sizes, up to a number about one."""
+    units = system.scene.units
+    return system.stiffness_scale if units.ordinary else system.stiffness_scale / units.energy
+
+
+def least_eigenvalue(system: System) -> float:
+    """Size of the least eigenvalue ``mu = omega^2`` of a ``system``, up to a number about one."""
+    units = system.scene.units
+    return system.stiffness_scale / system.scene.length if units.ordinary else scale_in_units(system) * units.omega2
 
 
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> State:

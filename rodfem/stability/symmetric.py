@@ -9,14 +9,15 @@ eigenvalue is known to be zero, is kept out by the constraint ``g.Mx = 0`` and b
 and is not among those returned.
 
 The shift is put below the spectrum: the nearest eigenvalues to it are then the left-most ones.  A count just above the
-last of them proves that none is missing, wherever the shift was.  Along a branch the shift, the symbolic factorisations
+last of them proves that none is missing, wherever the shift was.  All is in units of natural sizes, but for the
+modes that are returned.  Along a branch the shift, the symbolic factorisations
 and a first vector, the sum of the modes, are those of the point before: two numeric factorisations a point, one to
 solve with and one to count.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
@@ -32,6 +33,8 @@ from rodfem.stability.pencil import (
     StatePencil,
     assemble_pencil,
     exclude_modes,
+    in_units,
+    scale_in_units,
     symmetry_modes,
     with_factors,
 )
@@ -90,6 +93,10 @@ class SymmetricSolver(PencilMatrices):
 
     Attributes
     ----------
+    scale
+        Size of the least eigenvalue.
+    scaled
+        Matrix and mass of the state.
     shift
         Where the next computation starts; the first one, and one whose count finds any missing, moves it to the left
         until no eigenvalue is below it.
@@ -103,10 +110,12 @@ class SymmetricSolver(PencilMatrices):
         self.inertia = inertia
         system, sizes = self.system, (self.system.fields.along, self.system.fields.dense_rows)
         self.shifted = _Shifted(inertia_factors(system.comm, *sizes), system.state_matrix())
-        self.shift = -inertia.scale
+        self.scale = scale_in_units(self.system)
+        self.shift = -self.scale
         self.factorisations = 0
         self.last = np.zeros(0)
         self.deflated: list[PETSc.Vec] = []
+        self.scaled = self.matrix, self.mass
         self._places: np.ndarray | None = None
 
     def at(self, x: PETSc.Vec) -> SymmetricPencil:
@@ -117,6 +126,10 @@ class SymmetricSolver(PencilMatrices):
             modes = symmetry_modes(system, x)
             assemble_pencil(system, x, self.matrix, self.mass)
             self.deflated = exclude_modes(system, modes, self.matrix, self.mass)
+            self.scaled = in_units(system, self.matrix, self.mass, self.sizes)
+            if not system.scene.units.ordinary:
+                for mode in self.deflated:
+                    mode.pointwiseDivide(mode, self.sizes)
         self.shifted.at = np.nan
         return SymmetricPencil(self)
 
@@ -133,10 +146,10 @@ class SymmetricSolver(PencilMatrices):
 
     def _fill(self, target: PETSc.Mat, sigma: float) -> None:
         """Let ``target`` be ``S - sigma M``: by numpy where it shares the arrays, in a tenth of PETSc's time."""
-        own, mass, values = (shared(matrix) for matrix in (self.matrix, self.mass, target))
+        own, mass, values = (shared(matrix) for matrix in (*self.scaled, target))
         if own is None or mass is None or values is None:
-            self.matrix.copy(target, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            target.axpy(-sigma, self.mass, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            self.scaled[0].copy(target, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            target.axpy(-sigma, self.scaled[1], PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             return
         if self._places is None:
             self._places = places_in(own.pattern, mass.pattern)
@@ -157,8 +170,21 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         """Where the next computation starts."""
         return self._held().shift
 
+    @property
+    def scale(self) -> float:
+        """Size of the least eigenvalue."""
+        return self._held().scale
+
+    @property
+    def scaled(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """Matrix and mass."""
+        return self._held().scaled
+
     def leftmost(self, number: int) -> Modes:
-        """Return the ``number`` left-most eigenvalues; raises :class:`ConvergenceError` where SLEPc finds fewer."""
+        """Return the ``number`` left-most eigenvalues; raises :class:`ConvergenceError` where SLEPc finds fewer.
+
+        They, and their vectors, are not in units of natural sizes.
+        """
         held = self._held()
         with self.system.clock("stability"):
             modes = self._solve(number, EXTRA[0]) if len(held.last) else NOTHING
@@ -175,12 +201,17 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             )
         spread = modes.values[-1] - modes.values[0] + LEAST_SPREAD * abs(modes.values).max()
         held.shift = modes.values[0] - 0.1 * spread
-        return modes
+        units = self.system.scene.units
+        if units.ordinary:
+            return modes
+        for vector in modes.vectors:
+            vector.pointwiseMult(vector, self.sizes)
+        return replace(modes, values=units.omega2 * modes.values)
 
     def go_below(self) -> None:
         """Move the shift to below the spectrum; raises :class:`ConvergenceError` where it has no lower end."""
         held = self._held()
-        step = max(abs(held.shift), self.inertia.scale)
+        step = max(abs(held.shift), held.scale)
         for _ in range(40):
             if self.below(held.shift) == 0 and not self._shift_is_an_eigenvalue():
                 return
@@ -196,7 +227,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         held, mode = self._held(), self.inertia.seed(0)
         mode.scale(1.0 / self.system.norm(mode))
         grown = mode.duplicate()
-        held.shifted.factors.solve(self.mass * mode, grown)
+        held.shifted.factors.solve(held.scaled[1] * mode, grown)
         return not self.system.norm(grown) * COINCIDENT * abs(held.shift) < 1.0
 
     def below(self, sigma: float) -> int:
@@ -217,7 +248,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
     def certifies(self, values: np.ndarray) -> bool:
         """Whether counts find none below the least of ``values``, and as many as there are below the greatest."""
-        small = DISTINCT * max(abs(values).max(), self.inertia.scale)
+        small = DISTINCT * max(abs(values).max(), self.scale)
         distinct = values < values[-1] - small
         return (
             self.below(values[0] - small) == 0
@@ -234,17 +265,17 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
         held = self._held()
         held.factor(held.shift)
         if not held.shifted.factors.regular:
-            held.shift -= self.inertia.scale
+            held.shift -= held.scale
             return self._solve(number, extra)
         values, vectors, errors = self._krylov_schur(number, number + extra)
-        reach = max(values[-1] - held.shift, self.inertia.scale) if len(values) else np.inf
+        reach = max(values[-1] - held.shift, held.scale) if len(values) else np.inf
         if len(values) and values[0] - held.shift < HIT * reach:
             held.shift -= reach
             return self._solve(number, extra)
         if len(values) < number:
             return Modes(values, vectors, errors, False)
         held.last = sum(vector.array_r for vector in vectors)
-        cut = values[number - 1] + DISTINCT * max(abs(values[number - 1]), self.inertia.scale)
+        cut = values[number - 1] + DISTINCT * max(abs(values[number - 1]), held.scale)
         known = int((values < cut).sum())
         return Modes(values[:number], vectors[:number], errors[:number], self.below(cut) == known)
 
@@ -258,7 +289,7 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
             start.scale(NOISE / self.system.norm(start))
             start.array[:] += held.last
         inverse = Inverse(held.shifted.factors)
-        solver = with_factors(held.matrix, held.mass, number, held.shift, inverse, start, held.deflated)
+        solver = with_factors(*held.scaled, number, held.shift, inverse, start, held.deflated)
         solver.solve()
         found = solver.getConverged()
         values = np.array([solver.getEigenvalue(i).real for i in range(found)])
@@ -280,17 +311,18 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
 
     def _norms(self) -> tuple[float, float]:
         """Greatest sums of magnitudes of rows of stiffness and mass."""
-        return self.matrix.norm(PETSc.NormType.INFINITY), self.mass.norm(PETSc.NormType.INFINITY)
+        stiffness, mass = (matrix.norm(PETSc.NormType.INFINITY) for matrix in self._held().scaled)
+        return stiffness, mass
 
     def _purify(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> None:
         """Purification: replace vectors by ``(mu - sigma) (S - sigma M)^-1 M x``, without arbitrary massless parts.
 
         All at once: the cost is that of the call, hardly of a column.
         """
+        held = self._held()
         right, solved = dense_columns(self.system, len(vectors)), dense_columns(self.system, len(vectors))
         for i, vector in enumerate(vectors):
-            right.getDenseArray()[:, i] = (self.mass * vector).array_r
-        held = self._held()
+            right.getDenseArray()[:, i] = (held.scaled[1] * vector).array_r
         held.shifted.factors.solve_all(right, solved)
         for i, (value, vector) in enumerate(zip(values, vectors, strict=True)):
             vector.array[:] = (value - held.shift) * solved.getDenseArray()[:, i]
@@ -298,8 +330,8 @@ class SymmetricPencil(StatePencil[SymmetricSolver]):
     def backward_errors(self, values: np.ndarray, vectors: list[PETSc.Vec]) -> np.ndarray:
         """Backward errors ``|S x - mu M x| / ((|S| + |mu| |M|) |x|)``."""
         stiffness, mass = self._norms()
-        errors = []
+        errors, (S, M) = [], self._held().scaled
         for value, vector in zip(values, vectors, strict=True):
-            residual = self.matrix * vector - self.mass * vector * value
+            residual = S * vector - M * vector * value
             errors.append(residual.norm() / ((stiffness + abs(value) * mass) * vector.norm()))
         return np.array(errors)

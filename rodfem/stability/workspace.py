@@ -53,19 +53,36 @@ class Workspace:
         pencil.go_below()
         return pencil
 
+    @property
+    def one(self) -> float:
+        """Natural size of eigenvalues."""
+        return self.system.scene.units.omega2
+
+    @property
+    def sizes(self) -> PETSc.Vec:
+        """Natural size of each unknown."""
+        return (self.symmetric if self.conservative else self.nonsymmetric).sizes
+
     def pencil(self, x: PETSc.Vec, coordinates: str = "tangent") -> Pencil:
-        """Blocks at ``x``, with a constraint ``g.Mx = 0`` more for each symmetry mode ``g``."""
+        """Blocks at ``x``, with a constraint ``g.Mx = 0`` more for each symmetry mode ``g``.
+
+        They are in units of natural sizes, but for ``full`` coordinates.
+        """
         if self._blocks is None or self._blocks.coordinates != coordinates:
             self._blocks = Blocks(self.system, coordinates)
         blocks = self._blocks
         modes = symmetry_modes(self.system, x)
-        pencil = blocks.assemble(x)
+        sizes = None if coordinates == "full" or self.system.scene.units.ordinary else self.sizes
+        pencil = blocks.assemble(x, sizes)
         self._map = gathered(pencil.T) if pencil.T is not None else None
         if not modes:
             return pencil
         comm = self.system.comm
         images = []
         for _, weighed in weighed_modes(self.system, modes, blocks.mass).values():
+            if sizes is not None:
+                weighed.pointwiseMult(weighed, sizes)
+                weighed.scale(1.0 / weighed.norm())
             full = weighed.array_r[blocks.rows - self.system.fields.offset].copy()
             image = PETSc.Vec().createWithArray(full, comm=comm)
             if pencil.T is not None:
@@ -82,7 +99,7 @@ class Workspace:
         return replace(pencil, C=C, place=np.append(pencil.place, np.full(len(modes), np.nan)))
 
     def lift(self, vectors: np.ndarray) -> list[PETSc.Vec]:
-        """Vectors of the system from columns in the pencil's coordinates."""
+        """Vectors of the system from columns in the pencil's coordinates and units."""
         blocks = self._blocks
         assert blocks is not None
         full: Any = vectors if self._map is None else self._map @ vectors
@@ -92,5 +109,7 @@ class Workspace:
             vector = self.system.new_vector()
             vector.array[blocks.rows - self.system.fields.offset] = column[first : first + len(blocks.rows)]
             vector.assemble()
+            if not self.system.scene.units.ordinary:
+                vector.pointwiseMult(vector, self.sizes)
             out.append(vector)
         return out

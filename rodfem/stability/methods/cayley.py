@@ -52,7 +52,8 @@ class Cayley(SymmetricMethod):
         if number > 1:
             self._estimates = two_distinct(found.values)
         values, vectors = found.values[:number], self.work.lift(found.vectors[:, :number])
-        return Found(values, vectors, found.errors[:number], below.certifies(values), made, note)
+        certified = below.certifies(values)
+        return Found(self.work.one * values, vectors, found.errors[:number], certified, made, note)
 
 
 def two_distinct(values: np.ndarray) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from petsc4py import PETSc
 from rodfem.fem.system import System
 from rodfem.stability.dense import eigenvalues_near, symmetric_eigenpairs
 from rodfem.stability.method import NEAR_ZERO, Found, Interval, Method
+from rodfem.stability.pencil import scale_in_units
 
 LARGEST = 3000
 """Unknowns that dense matrices may have."""
@@ -28,11 +29,12 @@ class Dense(Method):
         """By the symmetric eigenvalue problem in the metric of the mass."""
         below = self.work.below(x)
         values, vectors = symmetric_eigenpairs(self.work.pencil(x), below.shift, number)
-        return Found(values, self.work.lift(vectors), np.full(len(values), EXACT), below.certifies(values))
+        errors = np.full(len(values), EXACT)
+        return Found(self.work.one * values, self.work.lift(vectors), errors, below.certifies(values))
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
         """By the QZ algorithm."""
-        values = eigenvalues_near(self.work.pencil(x), NEAR_ZERO * self.work.system.stiffness_scale)
+        values = eigenvalues_near(self.work.pencil(x), NEAR_ZERO * scale_in_units(self.work.system))
         values = values[np.argsort(abs(values), kind="stable")[:number]]
         order = np.lexsort((values.imag, np.round(values.real, 9)))
-        return Found(values[order], [], np.full(len(values), EXACT))
+        return Found(self.work.one * values[order], [], np.full(len(values), EXACT))

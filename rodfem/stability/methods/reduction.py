@@ -6,6 +6,7 @@ from petsc4py import PETSc
 
 from rodfem.stability import reduction
 from rodfem.stability.method import NEAR_ZERO, Found, Interval, Method
+from rodfem.stability.pencil import scale_in_units
 
 
 class Reduction(Method):
@@ -16,10 +17,11 @@ class Reduction(Method):
         below = self.work.below(x)
         found = reduction.Reduction(self.work.pencil(x)).near(number, below.shift)
         certified = below.certifies(found.values)
-        return Found(found.values, self.work.lift(found.vectors), found.errors, certified, reduction.FACTORISATIONS)
+        vectors = self.work.lift(found.vectors)
+        return Found(self.work.one * found.values, vectors, found.errors, certified, reduction.FACTORISATIONS)
 
     def nearest(self, x: PETSc.Vec, number: int) -> Found:
         """With a shift near zero."""
-        target = NEAR_ZERO * self.work.system.stiffness_scale
+        target = NEAR_ZERO * scale_in_units(self.work.system)
         found = reduction.Reduction(self.work.pencil(x)).near(number, target)
-        return Found(found.values, [], found.errors, factorisations=1)
+        return Found(self.work.one * found.values, [], found.errors, factorisations=1)

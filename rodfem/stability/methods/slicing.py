@@ -36,28 +36,31 @@ class Slicing(SymmetricMethod):
         Raises :class:`InputError` for an empty interval, :class:`ConvergenceError` where an end is an eigenvalue.
         """
         pencil, units = self.work.below(x), self.work.system.scene.units
-        matrix, mass = pencil.in_units()
-        low, high = interval or enclose(pencil, number)
+        one = units.omega2
+        low, high = (interval[0] / one, interval[1] / one) if interval else enclose(pencil, number)
         if not low < high:
-            raise InputError(f"An interval from {low:g} to {high:g} is empty: give its lower end first.")
+            raise InputError(f"An interval from {one * low:g} to {one * high:g} is empty: give its lower end first.")
         for wider in WIDER:  # an end on an eigenvalue is moved off it
             low, high = low - wider * (high - low), high + wider * (high - low)
             wanted = pencil.below(high) - pencil.below(low)
-            solver = solved(matrix, mass, low / units.omega2, high / units.omega2)
+            solver = solved(*pencil.scaled, low, high)
             if solver is not None:
                 break
         else:
-            raise ConvergenceError(f"An end of the interval from {low:.6g} to {high:.6g} is an eigenvalue: move it.")
-        values = units.omega2 * np.array([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
+            ends = f"{one * low:.6g} to {one * high:.6g}"
+            raise ConvergenceError(f"An end of the interval from {ends} is an eigenvalue: move it.")
+        values = np.array([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
         complete = len(values) == wanted
         order = np.argsort(values)[: None if interval else number]
         vectors = [self.work.system.new_vector() for _ in order]
         for i, vector in zip(order, vectors, strict=True):
             solver.getEigenvector(int(i), vector)
-            vector.pointwiseMult(vector, pencil.sizes)
         solver.destroy()
         values = values[order]
-        return Found(values, vectors, pencil.backward_errors(values, vectors), complete, FACTORISATIONS)
+        errors = pencil.backward_errors(values, vectors)
+        for vector in vectors:
+            vector.pointwiseMult(vector, pencil.sizes)
+        return Found(one * values, vectors, errors, complete, FACTORISATIONS)
 
 
 def solved(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> SLEPc.EPS | None:
@@ -82,7 +85,7 @@ def solved(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float) -> SLEPc
 
 def enclose(pencil: SymmetricPencil, number: int) -> Interval:
     """Interval from below the spectrum that holds at least ``number`` eigenvalues, and not many more."""
-    low, step = pencil.shift, max(abs(pencil.shift), pencil.inertia.scale) * STEP
+    low, step = pencil.shift, max(abs(pencil.shift), pencil.scale) * STEP
     high = low + step
     inside = low
     while pencil.below(high) < number:

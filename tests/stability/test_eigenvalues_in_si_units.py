@@ -1,0 +1,70 @@
+"""Frequencies of rods in metres, newtons and kilograms: those of the closed form, by every method."""
+
+from __future__ import annotations
+
+import classics
+import numpy as np
+import pytest
+from closed_forms import tip
+from scipy.optimize import brentq
+
+from forms.energy import bending_and_twist
+from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, Solver, clamped, free, trace
+
+UNITS = [(1e4, 1e9, 1e3), (100.0, 1e7, 100.0), (300.0, 1e14, 3e5), (100.0, 1.0, 1.0), (1e-8, 2e-28, 1e-18)]
+"""Length, bending stiffness and mass per length."""
+LOADS = [(0.0, 0), (2.3, 0), (4.0, 1)]
+"""Thrusts in units of stiffness over squared length, and the index."""
+METHODS = ["auto", "shift-invert", "slicing", "reduction", "cayley", "dense"]
+
+
+def cantilever(length: float, stiffness: float, mass: float) -> Scene:
+    """Twenty times stiffer in the other plane, whose frequencies are among neither of the first two here."""
+    return classics.column(
+        "cantilever",
+        (clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
+        (0.0, 5.0 * stiffness / length**2),
+        interval=(0.0, length),
+        energy=lambda v, k, c: bending_and_twist(k, (stiffness, 1e3 * stiffness, stiffness)),
+        ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]),
+        inertia=Inertia(rho_A=lambda c: mass),
+    )
+
+
+def dead(mu: float, thrust: float) -> float:
+    """Zero at the eigenvalues of the cantilever, in units of its stiffness, length and mass."""
+    return tip(mu, thrust, 0.0).real
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_each_method_finds_those_of_a_cantilever_under_thrust(units: tuple[float, float, float]) -> None:
+    length, stiffness, mass = units
+    of_force, of_value = stiffness / length**2, stiffness / (mass * length**4)
+    solver = Solver(cantilever(*units), Discretization("pointwise", 5, 7))
+    for thrust, index in LOADS:
+        grid = np.linspace(-20.0, 600.0, 156) + 0.0123
+        signs = [dead(mu, thrust) for mu in grid]
+        exact = [
+            brentq(dead, a, b, args=(thrust,), xtol=1e-13)
+            for a, b, f, g in zip(grid, grid[1:], signs, signs[1:], strict=False)
+            if f * g < 0
+        ][:2]
+        point = solver.equilibrium(thrust * of_force)
+        for method in METHODS:
+            found = solver.assess(point, method, 2)
+            assert found.negative == index
+            np.testing.assert_allclose(found.values / of_value, exact, rtol=1e-8, err_msg=method)
+            assert found.certified, method
+        modes = solver.modes(point, 2)
+        assert (abs(modes.value / of_value - exact) <= modes.error / of_value).all()
+        assert (modes.error < 1e-5 * abs(modes.value)).all()
+
+
+def test_a_spectrum_along_a_branch() -> None:
+    """The count of inertia and the frequencies of a row agree in any units."""
+    length, stiffness, mass = UNITS[0]
+    diagram = trace(cantilever(*UNITS[0]), Discretization("pointwise", 5, 7), Plan(depth=0, spectrum=2))
+    (special,) = diagram.special("branch point")
+    assert special.point.load == pytest.approx(np.pi**2 / 4 * stiffness / length**2, rel=1e-9)
+    first = diagram[0].points[0]
+    assert first.spectrum[0] == pytest.approx(12.362363368326239 * stiffness / (mass * length**4), rel=1e-8)
