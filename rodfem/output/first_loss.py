@@ -20,7 +20,7 @@ def first_loss(data: Mapping[str, Any]) -> str:
         return "no branches"
     branch = data["branches"][0]
     columns = branch["columns"]
-    plane = " in the plane" if "negative_in_space" in columns else ""
+    plane = " in the plane" if data.get("planar") else ""
     if branch.get("singular_start"):
         return "the first state is singular"
     if columns["negative"][0]:
@@ -36,7 +36,8 @@ def first_loss(data: Mapping[str, Any]) -> str:
         return f"{lost['kind']}{plane} at {data['parameter']} = {load}"
     if any(columns["negative"]):
         return f"unstable{plane} somewhere, without a special point"
-    return f"none{plane}: {called(branch['name'])} is stable from {columns['load'][0]:.6g} to {columns['load'][-1]:.6g}"
+    ends = f"from {columns['load'][0]:.6g} to {columns['load'][-1]:.6g}"
+    return f"none{plane}: {called(branch['name'])} is stable {ends}"
 
 
 def _loses(special: Mapping[str, Any]) -> bool:

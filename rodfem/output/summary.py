@@ -93,11 +93,8 @@ def _named(name: str) -> str:
 def _state(interval: Interval, data: Mapping[str, Any]) -> str:
     """Stability of an interval in words."""
     if interval.kind == STABLE:
-        if _is_sweep(data):
-            return "stable, by the frequencies found,"
-        if data.get("planar") and interval.in_space is None:
-            return "stable in its plane (not examined in space)"
-        return "stable"
+        plane = " in its plane (not examined in space)" if data.get("planar") and interval.in_space is None else ""
+        return f"stable{plane}, by the frequencies found," if _is_sweep(data) else f"stable{plane}"
     if interval.kind == UNDECIDED:
         return f"of undecided stability ({interval.why})"
     if interval.kind == PLANAR:

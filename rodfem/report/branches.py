@@ -32,10 +32,15 @@ DERIVED = {
 """Ordinates that follow from the shapes, in words."""
 
 
-def branch_data(branch: Mapping[str, Any], shapes: Shapes, colour: str, natural: Mapping[str, float]) -> dict[str, Any]:
-    """A ``branch`` in a ``colour``; ``shapes`` are those of its rows, ``natural`` the sizes of load and ordinate."""
+def branch_data(
+    branch: Mapping[str, Any], shapes: Shapes, colour: str, natural: Mapping[str, float], *, planar: bool = False
+) -> dict[str, Any]:
+    """A ``branch`` in a ``colour``; ``shapes`` are those of its rows, ``natural`` the sizes of load and ordinate.
+
+    Whether the rod is ``planar`` is told of stable rows.
+    """
     columns = branch["columns"]
-    words = words_of(branch)
+    words = words_of(branch, planar=planar)
     told = list(dict.fromkeys(words))
     ordinates = {name: plain(np.array(columns[name], dtype=float)) for name in _listed(columns)} | _derived(shapes)
     return {

@@ -63,7 +63,7 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
         along = profiles_data(group, states)
         image = "" if is_traced(branch, data["branches"]) else branch.get("image", "")
         branches.append(
-            branch_data(branch, here, colour, data.get("natural") or {})
+            branch_data(branch, here, colour, data.get("natural") or {}, planar=bool(data.get("planar")))
             | _drawn(here, found)
             | along
             | {"modes": modes, "missed": missed, "image": image}

@@ -21,8 +21,11 @@ class Words:
     sentence: str
 
 
-def words_of(branch: Mapping[str, Any]) -> list[Words]:
-    """Stability of each row of a branch of ``diagram.json``, with what is uncertain of it."""
+def words_of(branch: Mapping[str, Any], *, planar: bool = False) -> list[Words]:
+    """Stability of each row of a branch of ``diagram.json``, with what is uncertain of it.
+
+    Of a ``planar`` rod it is that in its plane, where nothing tells it in space.
+    """
     columns = branch["columns"]
     specials: dict[int, list[Mapping[str, Any]]] = {}
     for special in branch["special"]:
@@ -31,6 +34,9 @@ def words_of(branch: Mapping[str, Any]) -> list[Words]:
     out = []
     for row in range(len(columns["load"])):
         plain = _verdict(columns, row, specials.get(row, []))
+        if planar and plain.verdict == STABLE and (columns.get("negative_in_space") or {row: None})[row] is None:
+            sentence = plain.sentence.replace("Stable", "Stable in its plane (not examined in space)", 1)
+            plain = replace(plain, sentence=sentence)
         out.append(replace(plain, sentence=" ".join([plain.sentence, *doubts.get(row, [])])))
     return out
 

@@ -108,6 +108,9 @@ def test_stable_in_the_plane_only() -> None:
     rod = classics.planar_column()
     columns = branch("straight", [0.0, 1.0], [0, 0])
     assert "stable in its plane (not examined in space) on" in said(columns, span=(0.0, 1.0), planar=rod.planar)
+    columns = branch("straight", [0.0, 1.0], [0, 0], columns={"omega2": []})
+    words = said(columns, span=(0.0, 1.0), planar=rod.planar)
+    assert "stable in its plane (not examined in space), by the frequencies found, on" in words
 
 
 def test_divergence_is_named() -> None:

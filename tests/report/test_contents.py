@@ -79,6 +79,10 @@ def test_words_of_frequencies() -> None:
     words = words_of(branch([0, 2, 1], omega2=omega2))
     assert "none" in words[0].sentence and "2 complex (flutter)" in words[1].sentence
     assert "1 negative (divergence)" in words[2].sentence and "flutter" not in words[2].sentence
+    planar = words_of(branch([0, 2, 1], omega2=omega2), planar=True)
+    assert (
+        planar[0].sentence.startswith("Stable in its plane (not examined in space): none") and planar[1:] == words[1:]
+    )
 
 
 def test_eigenvalues_that_vanish_are_zero() -> None:
@@ -118,11 +122,17 @@ def test_words_warn() -> None:
         (branch([0, 1]) | {"unexplained": [{"row": 0}]}, "unknown: the index changes near P = 0 unexplained"),
         (branch([0, 0]) | {"singular_start": 1}, "the first state is singular"),
         (branch([0, 0, 2], special(1, "flutter", 0, 2)), "flutter at P = 1.000000 (1e-06)"),
-        (branch([0, 0], negative_in_space=[0, 0]), "none in the plane: first is stable from 0 to 1"),
     ],
 )
 def test_first_loss_of_stability(data: dict[str, Any], text: str) -> None:
     assert first_loss({"branches": [data], "parameter": "P"}) == text
+
+
+def test_first_loss_of_stability_of_a_planar_rod() -> None:
+    """By frequencies, too, of which none is known in space."""
+    for columns in ({"negative_in_space": [0, 0]}, {"omega2": []}):
+        data = {"branches": [branch([0, 0], **columns)], "parameter": "P", "planar": "e2"}
+        assert first_loss(data) == "none in the plane: first is stable from 0 to 1"
 
 
 def gauss_integral(curve: np.ndarray, tangent: np.ndarray) -> float:
