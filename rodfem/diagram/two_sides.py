@@ -2,13 +2,16 @@
 
 Two sides of a pitchfork may be mirror images in their plane, at the same loads, energies and stretches, and differ in
 what they do across it: then no symmetry of the rod carries one into the other.  Determinants tell.  Beside a branch
-point one eigenvalue is so small that round-off is a visible part of it, and of the determinant: that is taken at a
-shift clear of all eigenvalues, ``det(S - sigma M)``, which the mirror images share as well.
+point one eigenvalue is so small that the round-off of factors is a visible part of it, and of the determinant.  Its
+Rayleigh quotient is much more precise, and is compared; the determinant is taken at a shift clear of all eigenvalues,
+``det(S - sigma M)``, which mirror images share as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
+from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
@@ -17,7 +20,7 @@ from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.switching import between
 from rodfem.diagram.equivalence import equivalent
-from rodfem.stability.inertia import Factored
+from rodfem.stability.inertia import NULL, Factored, Index
 from rodfem.tolerances import SAME_STATE
 
 SAME_DETERMINANT = 1e-3
@@ -43,24 +46,46 @@ def are_images(
         b = there
     if (a.negative, a.zero) != (b.negative, b.zero):
         return False
-    apart = abs(a.determinant - b.determinant) if a.mesh == b.mesh else 0.0  # nan where it is not known
-    if apart > SAME_DETERMINANT and not _as_stable(solver.inertia.at, a, b):
+    known = a.mesh == b.mesh and isfinite(a.determinant) and isfinite(b.determinant)
+    if known and abs(a.determinant - b.determinant) > SAME_DETERMINANT and not _as_stable(solver.inertia.at, a, b):
         return False
-    space = solver.space
-    return space is None or _as_stable(space.at, a, b)
+    return solver.space is None or _as_stable(solver.space.at, a, b)
 
 
 def _as_stable(at: Callable[[PETSc.Vec], Factored], a: Point, b: Point) -> bool:
     """Whether two states, whose second variations are those ``at`` them, have the same index and determinant."""
-    first = at(a.x)
-    index = first.count()
-    values = np.sort(first.nearest(index.zero + LOOKED_AT)[0])
-    widest = int(np.argmax(np.diff(values)))
-    shift = float(values[widest : widest + 2].mean())
-    below, determinant = first.below(shift), first.factors.determinant()
-    second = at(b.x)
-    return (
-        second.count() == index
-        and second.below(shift) == below
-        and abs(second.factors.determinant() - determinant) <= SAME_DETERMINANT
-    )
+    indices = [at(point.x).count() for point in (a, b)]
+    if indices[0] != indices[1]:
+        return False
+    if abs(indices[0].determinant - indices[1].determinant) <= SAME_DETERMINANT:
+        return True
+    zero = indices[0].zero
+    first, second = (_nearest(at(point.x), zero) for point in (a, b))
+    allowed = SAME_DETERMINANT * abs(first.values) + np.where(np.arange(len(first.values)) < zero, first.noise, 0.0)
+    if (abs(first.values - second.values) > allowed).any():
+        return False
+    ascending = np.sort(first.values)
+    widest = int(np.argmax(np.diff(ascending)))
+    shift = float(ascending[widest : widest + 2].mean())
+    shifted = [_shifted(at(point.x), shift) for point in (a, b)]
+    return shifted[0] == shifted[1] and abs(shifted[0].determinant - shifted[1].determinant) <= SAME_DETERMINANT
+
+
+class _Nearest(NamedTuple):
+    """Eigenvalues nearest zero, and the greatest round-off of them."""
+
+    values: np.ndarray
+    noise: float
+
+
+def _nearest(found: Factored, zero: int) -> _Nearest:
+    """Those that count as ``zero``, by magnitude, and a few more."""
+    found.count()
+    values, vectors = found.nearest(zero + LOOKED_AT, NULL)
+    return _Nearest(values, max(found.noise(v) for v in vectors))
+
+
+def _shifted(found: Factored, shift: float) -> Index:
+    """Number of eigenvalues below a ``shift``, and the determinant there."""
+    below = found.below(shift)
+    return Index(below, 0, found.factors.determinant())
