@@ -247,24 +247,6 @@ FAULTS = {
         "    if True:\n        return matrix, mass\n",
         "tests/stability/test_eigenvalues_in_si_units.py",
     ),
-    "known-states-but-for-those-of-rows": Fault(
-        "rodfem/deflation/search.py",
-        "if p.load == load and last != load]",
-        "if p.load == load and last != load and p is not points[-1]]",
-        "tests/deflation/test_loads_at_the_ends.py",
-    ),
-    "steps-of-no-length": Fault(
-        "rodfem/diagram/step.py",
-        "if p.load == q.load == load:",
-        "if False:",
-        "tests/deflation/test_loads_at_the_ends.py",
-    ),
-    "stable-in-space-by-frequencies": Fault(
-        "rodfem/output/summary.py",
-        'if data.get("planar") and interval.in_space is None',
-        'if data.get("planar") and interval.in_space is None and not _is_sweep(data)',
-        "tests/output/test_summary.py",
-    ),
     "natural-sizes-of-the-least-stiffness": Fault(
         "rodfem/problem/units.py",
         "(least * middle) ** 0.5  # a rod",

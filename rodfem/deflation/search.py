@@ -229,9 +229,8 @@ def equilibria_at(
     found = []
     for branch in branches:
         points = [here(p) for p in branch.points]
-        found += _first_rows_at(load, points[branch.parent is not None :])  # the branch point is another one's row
         for a, b in pairwise(points):
-            if (a.load - load) * (b.load - load) >= 0:
+            if (a.load - load) * (b.load - load) > 0 or a.load == b.load or (b.load == load and b is not points[-1]):
                 continue
             smooth = a.tangent is not None and b.tangent is not None and b.arclength > a.arclength
             curve = partial(hermite, a, b) if smooth else partial(_chord, a, b)
@@ -240,12 +239,3 @@ def equilibria_at(
             s = s if smooth else a.arclength + s * (b.arclength - a.arclength)
             found.append(solver.point(x, s, solver.load_tangent(x, True), outcome))
     return found
-
-
-def _first_rows_at(load: float, points: Sequence[Point]) -> list[Point]:
-    """The points at exactly that load, of several that follow one another the first.
-
-    So do rows of one state where a load that is asked for ends the range.
-    """
-    before = [float("nan"), *(p.load for p in points)]
-    return [p for p, last in zip(points, before, strict=False) if p.load == load and last != load]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -39,8 +38,6 @@ class Step(NamedTuple):
 
         Raises :class:`~rodfem.errors.ConvergenceError` where there is no such state.
         """
-        if p.load == q.load == load:  # a branch that begins on a bound and leaves the range has no other state
-            return replace(p)
         x, s, outcome = solve_at_load(self.solver, lambda t: hermite(self.a, self.b, t), p, q, load)
         return self.solver.point(x, s, self.solver.load_tangent(x, q.load > p.load), outcome)
 
