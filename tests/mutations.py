@@ -211,8 +211,8 @@ FAULTS = {
     ),
     "pitchforks-by-their-loads": Fault(
         f"{CONTINUATION}normal_form.py",
-        "side = int(np.sign(load.best)) if load.told() else 0",
-        "side = int(np.sign(load.rough + load.best)) if load.told() else 0",
+        "_pitchfork(leading(amplitudes, even, 2, origin.load_left), hidden",
+        "_pitchfork(Leading(even[-1], even[-1], 0.0), hidden",
         "tests/continuation/test_degenerate_pitchforks.py",
     ),
     "no-index-before-zero-stretch": Fault(
