@@ -35,6 +35,7 @@ CORD = "tests/literature/test_cord.py"
 CLASSICS = "tests/literature/test_classics.py"
 GOLDEN = "tests/diagram/test_golden.py"
 CHAIN = "tests/continuation/test_index_chain.py"
+MIXED = "tests/continuation/test_laws_of_mixed_ordinates.py"
 FOLLOW = "tests/continuation/test_continuation.py"
 LOCATE = "tests/continuation/test_locate.py"
 ERRORS = "tests/adaptivity/test_error_estimate.py"
@@ -210,8 +211,8 @@ FAULTS = {
     ),
     "pitchforks-by-their-loads": Fault(
         f"{CONTINUATION}normal_form.py",
-        "form.side = _leading_side(amplitudes, loads[:4], origin.load_left)",
-        "form.side = int(np.sign(plus))",
+        "_pitchfork(leading(amplitudes, even, 2, origin.load_left), hidden",
+        "_pitchfork(Leading(even[-1], even[-1], 0.0), hidden",
         "tests/continuation/test_degenerate_pitchforks.py",
     ),
     "no-index-before-zero-stretch": Fault(
@@ -435,8 +436,8 @@ FAULTS = {
     ),
     "pitchfork-opens-the-other-way": Fault(
         f"{CONTINUATION}normal_form.py",
-        'return NormalForm("pitchfork", best,',
-        'return NormalForm("pitchfork", -best,',
+        'return NormalForm("pitchfork", best /',
+        'return NormalForm("pitchfork", -best /',
         f"{ERRORS}",
     ),
     "no-fold-next-to-a-branch-point": Fault(
@@ -446,10 +447,28 @@ FAULTS = {
         "tests/literature/test_postbuckling.py",
     ),
     "law-of-an-ordinate-that-says-nothing": Fault(
-        f"{CONTINUATION}normal_form.py",
-        "if not (seen and _determined(amplitudes, ordinates / one, odd)):",
-        "if False:",
+        f"{CONTINUATION}amplitude_series.py",
+        "return (QUADRATIC, quadratic, hidden / abs(quadratic.best)) if turns else None",
+        "return QUADRATIC, quadratic, hidden / abs(quadratic.best)",
         "tests/literature/test_postbuckling.py",
+    ),
+    "law-by-one-side-of-a-mixed-ordinate": Fault(
+        f"{CONTINUATION}amplitude_series.py",
+        "even, odd = parts(ordinates)",
+        "even, odd = ordinates[0], ordinates[0]",
+        MIXED,
+    ),
+    "quadratic-term-that-hides-no-linear-one": Fault(
+        f"{CONTINUATION}amplitude_series.py",
+        "hidden = (abs(linear.best) + linear.missed) / amplitudes[0]",
+        "hidden = 0.0",
+        MIXED,
+    ),
+    "a-linear-term-below-round-off-leads": Fault(
+        f"{CONTINUATION}amplitude_series.py",
+        "and not (turns and linear.best**2 <= SEEN * left * abs(quadratic.best))",
+        "and True",
+        MIXED,
     ),
     # index
     "constraints-are-miscounted": Fault(

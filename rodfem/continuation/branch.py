@@ -139,7 +139,9 @@ class NormalForm:
 
     ``side`` is the sign of the load's change on the bifurcating branch, zero where there is none or none is known, and
     ``x`` the change ``of`` the ordinate.  Where the ordinate does not change to leading order it is the distance from
-    the branch point, in the metric.
+    the branch point, in the metric.  Of ``x = o1 a + o2 a^2`` in the distance a the first term gives the law.  Where it
+    leads only as long as the ordinate does not change visibly the second one does, and the uncertainty has what the
+    first adds to it where the branch was solved.
     """
 
     kind: str

@@ -1,0 +1,97 @@
+"""Laws of branch points in ordinates that are neither even nor odd in the amplitude.
+
+Of the pinned elastica with the end slope A (Euler): ``P = pi^2 (1 + A^2/8 + ...)``; its end comes closer by
+``A^2/4 + ...``, its middle moves by ``A/pi + ...`` across and by ``A^2/8 + ...`` along.
+"""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+from typing import Any
+
+import pytest
+from classics import ON_AXIS, column, push
+
+import rodfem
+from forms.energy import bending_and_twist
+from rodfem import Ordinate, Plan, clamped, free, pinned
+from rodfem.continuation.branch import NormalForm
+
+
+def law_of(of: Any, s: float = 1.0, span: tuple[float, float] = (9.0, 10.5), cubic: float = 0.0) -> NormalForm:
+    """Law of the pinned column in the ordinate ``of`` at s, on a foundation of energy ``cubic x^3`` per length."""
+    energy = lambda v, k, c: bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
+    more = {"planar": "e2", "ordinate": Ordinate("mixed", s=s, of=of), "energy": energy, "constants": {"k": cubic}}
+    scene = column("mixed", (pinned(), pinned(ON_AXIS, push)), span, potential=lambda x, c: c.k * x.r[0] ** 3, **more)
+    (found,) = rodfem.trace(scene, plan=Plan(depth=1)).special("branch point", "straight")
+    assert found.law is not None
+    return found.law
+
+
+def holds(law: NormalForm, truth: float, part: float) -> bool:
+    return abs(law.coefficient - truth) <= law.uncertainty <= part * abs(truth)
+
+
+def on_one_rank(*given: Any) -> list[Any]:
+    """Parameters of tests that two ranks do without."""
+    return [pytest.param(*one, marks=pytest.mark.alone) for one in given]
+
+
+@pytest.mark.parametrize("span", [(8.0, 11.0), *on_one_rank(((9.8, 9.9),))])
+@pytest.mark.parametrize("eps", [0.01, *on_one_rank((1.0,), (0.1,), (1e-3,))])
+def test_shortening_and_part_of_a_slope(eps: float, span: tuple[float, float]) -> None:
+    """``x = A^2/4 + eps A``: the law is quadratic, ``pi^2/(8 eps^2) x^2``, however small eps is."""
+    law = law_of(lambda r, q: 1 - r[2] + eps * 2 * q[2] * q[0], span=span)
+    assert (law.kind, law.power, law.of) == ("supercritical pitchfork", 2, "ordinate")
+    assert holds(law, pi**2 / 8 / eps**2, 1e-6)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("span", [(8.0, 11.0), (9.8, 9.9)])
+def test_slope_that_is_no_part_of_the_shortening(span: tuple[float, float]) -> None:
+    """Up to ``x = 4 eps^2``, round-off, eps = 1e-6 gives the law: it is ``pi^2/2 x``, uncertain by ``4 eps/A`` of it.
+
+    The branch is solved up to A = 0.17, on the lesser span up to a quarter of that.
+    """
+    for eps in (0.0, 1e-6):
+        law = law_of(lambda r, q, e=eps: 1 - r[2] + e * 2 * q[2] * q[0], span=span)
+        assert (law.kind, law.power) == ("supercritical pitchfork", 1)
+        assert holds(law, pi**2 / 2, 1e-6 + 120 * eps) and law.uncertainty >= 4 * eps / 0.17 * pi**2 / 2
+
+
+@pytest.mark.alone
+def test_mirror_images_of_a_sensor_that_looks_askew() -> None:
+    """A cantilever that a dead force bends buckles out of its plane: across that alone the law goes as 1/sin^2."""
+
+    def law(angle: float) -> NormalForm:
+        scene = column(
+            "askew", (clamped(), free(lambda c: (0.5, 0.0, -c.P))), (0.0, 4.0),
+            energy=lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)),
+            ordinate=Ordinate("sensor", s=1.0, of=lambda r, q: cos(angle) * r[0] + sin(angle) * r[1]),
+        )  # fmt: skip
+        (found,) = rodfem.trace(scene, plan=Plan(depth=1)).special("branch point", "first branch")
+        assert found.law is not None and found.law.power == 2
+        return found.law
+
+    across, here, there = (law(angle) for angle in (pi / 2, 1.2, -1.2))
+    assert abs(here.coefficient - there.coefficient) < 1e-10
+    for askew in (here, there):
+        assert holds(askew, across.coefficient / sin(1.2) ** 2, 1e-6)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("part", [1.0, 0.1, 1e-3])
+def test_transcritical_point(part: float) -> None:
+    """``8 beta/pi^3`` is the slope in the middle's displacement, of which the ordinate has a part."""
+    law = law_of(lambda r, q: part * r[0] + r[2], s=0.5, cubic=0.3)
+    assert (law.kind, law.of) == ("transcritical", "ordinate")
+    assert holds(law, 8 * 0.3 / pi**3 / part, 1e-6)
+
+
+@pytest.mark.alone
+def test_size_of_a_displacement_and_what_is_added_to_it() -> None:
+    """``pi^4/8 x^2`` in the size, also beside a shortening; beside a displacement it differs on the two sides."""
+    for of in (lambda r, q: abs(r[0]), lambda r, q: abs(r[0]) + 0.5 - r[2], lambda r, q: abs(r[0] + 0.5 - r[2])):
+        law = law_of(of, s=0.5)
+        assert law.power == 2 and holds(law, pi**4 / 8, 2e-5)
+    assert law_of(lambda r, q: abs(r[0]) + 0.01 * r[0], s=0.5).of == "distance"
