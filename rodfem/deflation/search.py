@@ -12,10 +12,9 @@ A search can show that there are more equilibria, and never that there are no mo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 from petsc4py import PETSc
@@ -27,6 +26,7 @@ from rodfem.continuation.prediction import hermite
 from rodfem.continuation.states_between import solve_at_load
 from rodfem.deflation.deflated_newton import FLOW, MOST, DeflatedNewton
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
+from rodfem.deflation.group_orbit import Orbits
 from rodfem.deflation.guesses import turned_over, turned_state
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import correct
@@ -223,19 +223,39 @@ def equilibria_at(
 ) -> list[Point]:
     """Equilibria of traced branches at exactly ``load``, which a search for further ones deflates.
 
-    Raises :class:`ConvergenceError` where there is none between two points on either side of the load.  ``here`` brings
-    points of ``branches`` to the mesh of ``solver``, where they are on others.
+    A row at that load is one; none counts twice, as where branches begin and end at one state, or what the symmetries
+    carry into each other.  Raises :class:`ConvergenceError` where there is none between two points on either side of
+    the load.  ``here`` brings points of ``branches`` to the mesh of ``solver``, where they are on others.
     """
-    found = []
+    found, known = list[Point](), Orbits(solver.system)
     for branch in branches:
-        points = [here(p) for p in branch.points]
-        for a, b in pairwise(points):
-            if (a.load - load) * (b.load - load) > 0 or a.load == b.load or (b.load == load and b is not points[-1]):
-                continue
-            smooth = a.tangent is not None and b.tangent is not None and b.arclength > a.arclength
-            curve = partial(hermite, a, b) if smooth else partial(_chord, a, b)
-            p, q = (a, b) if smooth else (replace(a, arclength=0.0), replace(b, arclength=1.0))
-            x, s, outcome = solve_at_load(solver, curve, p, q, load)
-            s = s if smooth else a.arclength + s * (b.arclength - a.arclength)
-            found.append(solver.point(x, s, solver.load_tangent(x, True), outcome))
+        for point in _along(solver, [here(p) for p in branch.points], load):
+            if all(apart >= SAME for apart, _ in known.nearest(point.x)):
+                found.append(point)
+                known.add(point.x)
     return found
+
+
+def _along(solver: BranchSolver, points: Sequence[Point], load: float) -> Iterator[Point]:
+    """Yield the equilibria at ``load`` at and between neighbouring ``points`` of a branch, which are on its mesh."""
+    for a, b in zip(points, [*points[1:], None], strict=True):
+        if a.load == load:
+            x, outcome = solver.at_load(a.x, load, reach=1.0)
+            if not outcome.converged:
+                raise ConvergenceError(
+                    f"No equilibrium was found at {solver.system.scene.load} = {load:g} beside a row there: use more "
+                    "elements, or another load."
+                )
+            yield solver.point(x, a.arclength, solver.load_tangent(x, True), outcome)
+        if b is not None and (a.load - load) * (b.load - load) < 0:
+            yield _between(solver, a, b, load)
+
+
+def _between(solver: BranchSolver, a: Point, b: Point, load: float) -> Point:
+    """Equilibrium at ``load`` between neighbours ``a``, ``b`` on either side of it."""
+    smooth = a.tangent is not None and b.tangent is not None and b.arclength > a.arclength
+    curve = partial(hermite, a, b) if smooth else partial(_chord, a, b)
+    p, q = (a, b) if smooth else (replace(a, arclength=0.0), replace(b, arclength=1.0))
+    x, s, outcome = solve_at_load(solver, curve, p, q, load)
+    s = s if smooth else a.arclength + s * (b.arclength - a.arclength)
+    return solver.point(x, s, solver.load_tangent(x, True), outcome)
