@@ -70,6 +70,12 @@ FAULTS = {
         "found.append(replace(q))",
         "tests/diagram/test_load_at_an_end.py",
     ),
+    "start-anew": Fault(
+        "rodfem/diagram/tracer.py",
+        "anew = trouble.point, branch.points[0]  #",
+        "anew = (trouble.point,)  #",
+        "tests/diagram/test_load_at_an_end.py",
+    ),
     "out-of-the-range": Fault(
         "rodfem/continuation/follow.py",
         "(made.load - last.load) * last.slope > 0:",

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from forms.energy import bending_and_twist
-from rodfem import Diagram, Ordinate, Plan, Scene, clamped, free, pinned, trace
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, clamped, free, pinned, trace
 
 pytestmark = pytest.mark.alone
 
@@ -69,7 +69,7 @@ def tips(load: float) -> list[float]:
 
 def rows_are_apart(diagram: Diagram) -> bool:
     """Whether no two rows of a branch are at one place."""
-    return all(a.arclength < b.arclength for branch in diagram for a, b in pairwise(branch.points))
+    return all(b.arclength - a.arclength > 1e-6 for branch in diagram for a, b in pairwise(branch.points))
 
 
 @pytest.mark.parametrize(
@@ -119,4 +119,13 @@ def test_branches_that_are_found_at_an_end_of_the_range(span: tuple[float, float
     assert len(tips(HIGH)) == 3
     assert sorted(p.ordinate for p in found.at(HIGH)) == pytest.approx(tips(HIGH), abs=1e-6)
     assert [p.load for branch in found for p in (branch.points[0], branch.points[-1])].count(HIGH) == 3
+    assert rows_are_apart(found)
+
+
+def test_a_load_at_the_start_where_the_first_step_asks_for_another_mesh() -> None:
+    """The first row is that of the request on whatever mesh."""
+    coarse = Discretization(elements=2, degree=2, vertices=(0.0, 0.5, 1.0))
+    found = trace(cantilever(60.0), coarse, Plan(at=(0.0,), depth=0, accuracy=1e-10))
+    assert len(found.solvers) > 1
+    assert [(s.point.load, s.row) for s in found[0].special if s.kind == "user"] == [(0.0, 0)]
     assert rows_are_apart(found)
