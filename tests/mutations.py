@@ -53,6 +53,42 @@ CLOSE = "tests/diagram/test_close_critical_loads.py"
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
 FAULTS = {
+    "known-row": Fault(
+        "rodfem/deflation/known.py",
+        "if a.load == load:",
+        "if a.load == load and b is not None:",
+        "tests/diagram/test_load_at_an_end.py",
+    ),
+    "known-twice": Fault(
+        "rodfem/deflation/known.py",
+        "if all(apart >= SAME for apart, _ in known.nearest(point.x)):",
+        "if all(apart >= 0 for apart, _ in known.nearest(point.x)):",
+        "tests/diagram/test_load_at_an_end.py",
+    ),
+    "asked-row": Fault(
+        "rodfem/diagram/requested_loads.py",
+        "found.append(q if q is step.b else replace(q))",
+        "found.append(replace(q))",
+        "tests/diagram/test_load_at_an_end.py",
+    ),
+    "start-anew": Fault(
+        "rodfem/diagram/tracer.py",
+        "anew = trouble.point, branch.points[0]  #",
+        "anew = (trouble.point,)  #",
+        "tests/diagram/test_load_at_an_end.py",
+    ),
+    "round-off-of-forces": Fault(
+        "rodfem/fem/newton.c",
+        "double moved = step[i] / rod->sizes[i], value = x[i] / rod->sizes[i];",
+        "double moved = step[i], value = x[i];",
+        "tests/diagram/test_stiff_units.py",
+    ),
+    "out-of-the-range": Fault(
+        "rodfem/continuation/follow.py",
+        "(made.load - last.load) * last.slope > 0:",
+        "(made.load - last.load) * last.slope > 9e9:",
+        "tests/diagram/test_load_at_an_end.py",
+    ),
     "names-twice": Fault(
         "rodfem/diagram/explorer.py",
         '(name := f"{before}{number}{after}") in names',

@@ -42,12 +42,13 @@ class SoftRows:
         first = {id(branch.points[0])} if branch.parent else set()  # the branch point that it leaves
         doubtful = any(s.kind.singular and s.error_estimate == inf for s in branch.special)
         family = self._is_family(branch)
-        for s in given:
+        counted = {id(s.point): s.point.negative for s in given}
+        for s in {id(s.point): s for s in given}.values():  # a load asked for may be that of the end
             fixed = s.kind.given
-            before = s.point.negative
             self._of(s.point).examine(s.point, fixed_load=fixed, compare=self.error_bars, family=family)
             doubtful |= s.point.undecided > 0
-            if s.negative_before == s.negative_after == before:
+        for s in given:
+            if s.negative_before == s.negative_after == counted[id(s.point)]:
                 s.negative_before = s.negative_after = s.point.negative
         for point in branch.points:
             if id(point) not in special and id(point) not in first:

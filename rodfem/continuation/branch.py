@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -323,11 +323,22 @@ class Branch:
         self.points = [p for p in self.points if p.arclength <= last]
         self.special = [s for s in self.special if s.point.arclength <= last]
 
+    def append(self, point: Point) -> None:
+        """Put a point at the end of the rows, unless it is one of them: a load asked for may be that of a row."""
+        if not any(row is point for row in self.points):
+            self.points.append(point)
+
     def insert(self, special: SpecialPoint) -> None:
         """Put a special point among the points by its arclength, and renumber the rows of all special points."""
         self.special.append(special)
-        self.points.append(special.point)
+        self.append(special.point)
         self.renumber()
+
+    def replace(self, others: Mapping[int, Point]) -> None:
+        """Put others in the place of rows, by the ``id`` of these; special points that are at such a row stay there."""
+        self.points = [others.get(id(row), row) for row in self.points]
+        for special in self.special:
+            special.point = others.get(id(special.point), special.point)
 
     def renumber(self) -> None:
         """Sort points and special points along the branch and set their rows."""

@@ -16,6 +16,7 @@ from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.prediction import predict
 from rodfem.continuation.step_control import StepControl
+from rodfem.tolerances import SAME_LOAD
 
 ALIGNED = 0.9
 """Least cosine between the direction of a prediction and the tangent at the corrected point."""
@@ -57,6 +58,9 @@ def follow(
         made = solver.step(known, last.arclength + step, (low, high), 0.5 * step)
         if not low <= made.load <= high or _on_bound(made.load, last, bounds, span):
             bound = min(bounds, key=lambda bound: abs(bound - made.load))
+            if abs(last.load - bound) < SAME_LOAD * span and (made.load - last.load) * last.slope > 0:
+                yield END_OF_RANGE  # the row is there, and the branch goes on out of the range
+                return
             point = _to_load(solver, points, made.load, bound, step, steps.smallest)
             if point is not None:
                 yield point

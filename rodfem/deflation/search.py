@@ -5,32 +5,26 @@ equations from which the known equilibria are divided out (:mod:`rodfem.deflatio
 makes of a known equilibrium is known too: a continuous symmetry makes it a circle
 (:mod:`rodfem.deflation.group_orbit`), discrete ones a few isolated images
 (:mod:`rodfem.deflation.discrete_symmetries`).  What converges is polished by the plain Newton method, and kept if it is
-new and admissible.  States of known branches are found by :func:`equilibria_at`.
+new and admissible.  States of known branches are found by :mod:`rodfem.deflation.known`.
 
 A search can show that there are more equilibria, and never that there are no more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
-from itertools import pairwise
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
-import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch import Branch, Point
+from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.observer import Observer
-from rodfem.continuation.prediction import hermite
-from rodfem.continuation.states_between import solve_at_load
 from rodfem.deflation.deflated_newton import FLOW, MOST, DeflatedNewton
 from rodfem.deflation.discrete_symmetries import Mirror, mirrors
 from rodfem.deflation.guesses import turned_over, turned_state
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import correct
-from rodfem.linalg.orthogonal import combine
 from rodfem.tolerances import DRIFT, SAME_LOAD
 
 IMAGE = 1e-12
@@ -210,32 +204,4 @@ def find_equilibria(
     found = search.run(tries)
     if observer is not None:
         observer.note(str(search.tally))
-    return found
-
-
-def _chord(a: Point, b: Point, t: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """State at a part ``t`` of the way from ``a`` to ``b``, and the direction from one to the other."""
-    return combine([a.x, b.x], np.array([1 - t, t])), b.x - a.x
-
-
-def equilibria_at(
-    solver: BranchSolver, branches: Sequence[Branch], load: float, here: Callable[[Point], Point] = lambda p: p
-) -> list[Point]:
-    """Equilibria of traced branches at exactly ``load``, which a search for further ones deflates.
-
-    Raises :class:`ConvergenceError` where there is none between two points on either side of the load.  ``here`` brings
-    points of ``branches`` to the mesh of ``solver``, where they are on others.
-    """
-    found = []
-    for branch in branches:
-        points = [here(p) for p in branch.points]
-        for a, b in pairwise(points):
-            if (a.load - load) * (b.load - load) > 0 or a.load == b.load or (b.load == load and b is not points[-1]):
-                continue
-            smooth = a.tangent is not None and b.tangent is not None and b.arclength > a.arclength
-            curve = partial(hermite, a, b) if smooth else partial(_chord, a, b)
-            p, q = (a, b) if smooth else (replace(a, arclength=0.0), replace(b, arclength=1.0))
-            x, s, outcome = solve_at_load(solver, curve, p, q, load)
-            s = s if smooth else a.arclength + s * (b.arclength - a.arclength)
-            found.append(solver.point(x, s, solver.load_tangent(x, True), outcome))
     return found

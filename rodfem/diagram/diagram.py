@@ -15,7 +15,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import EVENT, KINDS
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
-from rodfem.deflation.search import equilibria_at
+from rodfem.deflation.known import equilibria_at
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, METHOD, POINT, Solver
 from rodfem.errors import InputError

@@ -18,7 +18,8 @@ from rodfem.continuation.reduced import lines
 from rodfem.continuation.special_points import COUPLED, coupling_of
 from rodfem.continuation.switching import directions, start_branch
 from rodfem.deflation.group_orbit import Orbits
-from rodfem.deflation.search import SAME, equilibria_at, find_equilibria
+from rodfem.deflation.known import equilibria_at
+from rodfem.deflation.search import SAME, find_equilibria
 from rodfem.diagram.equivalence import equivalent, near
 from rodfem.diagram.first_name import ahead, name_of_first
 from rodfem.diagram.first_state import first_state

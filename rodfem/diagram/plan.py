@@ -40,7 +40,7 @@ class Plan:
     span
         Range of the load, start first; by default that of the scene.
     at
-        Loads to stop at.
+        Loads to stop at, each once.
     depth
         Branches are followed from branch points of branches of a depth less than this; the first branch has depth 0.
     steps
@@ -85,7 +85,7 @@ class Plan:
         """Check that all is of the right kind; raises :class:`InputError`."""
         if self.span is not None:
             object.__setattr__(self, "span", reals("span", self.span, (0.0, 1.0), 2))
-        object.__setattr__(self, "at", reals("at", self.at, (0.5, 1.0)))
+        object.__setattr__(self, "at", tuple(dict.fromkeys(reals("at", self.at, (0.5, 1.0)))))
         for name, example in (("depth", 2), ("spectrum", 4), ("tries", 24), ("modes", 3), ("most_branches", 20)):
             object.__setattr__(self, name, whole(name, getattr(self, name), example))
         if not isinstance(self.steps, StepControl):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rodfem.continuation.branch import SpecialPoint
@@ -23,16 +24,21 @@ class RequestedLoads:
         self.loads = tuple(plan.at)
 
     def between(self, step: Step) -> list[SpecialPoint]:
-        """Points at these loads in a step; at its first point, too, where a branch begins there."""
-        solver, a, b = step.solver, step.a, step.b
-        return [
-            solver.given(USER, step.at_load(load, p, q))
-            for p, q in step.pieces()
-            for load in self.loads
-            if (p.load - load) * (q.load - load) < 0
-            or (load == p.load and p is a and step.begins)
-            or (load == q.load and q is b and not step.closed)
-        ]
+        """Points at these loads in a step; at its first point, too, where a branch begins there.
+
+        A row at such a load is the point itself, and the branch has it once, unless it is a special point of another
+        kind: one at which an eigenvalue vanishes, in a step, or where a branch leaves another one.
+        """
+        found = []
+        for p, q in step.pieces():
+            for load in self.loads:
+                if load == p.load and p is step.a and step.begins:
+                    found.append(p if p.zero <= step.b.zero else replace(p))
+                if (p.load - load) * (q.load - load) < 0:
+                    found.append(step.at_load(load, p, q))
+                if load == q.load and not (q is step.b and step.closed):
+                    found.append(q if q is step.b else replace(q))
+        return [step.solver.given(USER, point) for point in found]
 
     def finish(self, observer: Observer) -> None:
         """Nothing is left open: an equilibrium that is not found ends its branch."""

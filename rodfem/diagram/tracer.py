@@ -16,7 +16,7 @@ from rodfem.continuation.convexity_between import lost_in_step
 from rodfem.continuation.follow import END_OF_RANGE, ON_BOUND, follow
 from rodfem.continuation.index_chain import explain, merge_doubles, persistent_zeros
 from rodfem.continuation.invariants import Invariants
-from rodfem.continuation.kinds import END
+from rodfem.continuation.kinds import END, USER
 from rodfem.continuation.observer import Observer, Recorder
 from rodfem.continuation.switching import FIRST
 from rodfem.diagram.bookkeeper import Bookkeeper, Recalled
@@ -158,8 +158,10 @@ class Tracer:
 
     def _follow(self, branch: Branch) -> None:
         """Follow a branch to its end; where its mesh is too coarse, from there on with another."""
-        special = {id(s.point) for s in branch.special}
-        history, begun = [p for p in branch.points if id(p) not in special] or branch.points[-1:], False
+        special, begun = {id(s.point) for s in branch.special}, False
+        history = [p for p in branch.points if id(p) not in special]
+        if not history or history[-1].arclength < branch.points[-1].arclength:  # a load asked for is where it goes on
+            history.append(branch.points[-1])
         first = history[-1].arclength
         if branch.parent and 0 < first < FIRST / 2:  # it begins near something: see start_branch
             self.specials.begin(history[-1], short=first, until=NEAR_START * first)
@@ -187,8 +189,8 @@ class Tracer:
             solver.damp(self.solver.system.damping > 0)
             with self.solver.system.clock.scope("location"):
                 pairs = self.meshes.carry(history, solver, branch.parent is not None)
-            moved = {id(old): new for old, new in pairs if old is trouble.point}
-            branch.points = [moved.get(id(p), p) for p in branch.points]
+            anew = trouble.point, branch.points[0]  # what is to be found where a branch begins is found on this mesh
+            branch.replace({id(old): new for old, new in pairs if any(old is point for point in anew)})
             history = [new for _, new in pairs]
             self.solver = solver
             self.observer.mesh(solver.system, trouble.point.load, str(trouble))
@@ -230,7 +232,7 @@ class Tracer:
                 branch.ended = reason
                 return True
             history.append(item)
-            branch.points.append(item)
+            branch.append(item)
             self.observer.progress(branch, item)
             if last:
                 branch.ended = self._rest(branch) or "closed loop"
@@ -277,7 +279,7 @@ class Tracer:
         if reason := self._insert(branch, found):
             return reason
         self._check_invariants(step.b)
-        branch.points.append(step.b)
+        branch.append(step.b)
         self.observer.progress(branch, step.b)
         return END_OF_RANGE
 
@@ -309,6 +311,8 @@ class Tracer:
             self.control.special(special)
         for special in sorted(specials, key=lambda s: s.point.arclength):
             reason = ""
+            if any(s.kind == special.kind and s.point is special.point for s in branch.special):
+                continue  # at a row that the branch has gone back to
             if special.kind.branches:
                 reason = meeting(branch, special, self.branches, self.alike, self.scene.load)
             branch.insert(special)
@@ -336,7 +340,7 @@ class Tracer:
             if reason := self._between(branch, a, beside):
                 branch.ended = reason
                 return
-            branch.points.append(beside)
+            branch.append(beside)
             a = beside
         if reason := self._between(branch, a, last):
             branch.ended = reason
@@ -345,7 +349,7 @@ class Tracer:
         end = end_at_zero_stretch(self.solver, last, error_bars=self.plan.error_bars)
         if not isnan(end.error_estimate):
             self.control.check(end)
-        branch.points.append(end.point)
+        branch.append(end.point)
         branch.special.append(end)
 
     def _singular_start(self, branch: Branch) -> None:
@@ -368,9 +372,9 @@ class Tracer:
             self.observer.warn(f"The last state, at {where}, is singular, and was not resolved: {trouble}")
             return
         if special is not None:
-            branch.points[-1] = special.point
-            branch.special.append(special)
-            branch.renumber()
+            if not any(s.point is last for s in branch.special):  # else a load asked for, which stays
+                branch.replace({id(last): special.point})
+            branch.insert(special)
             self.observer.special(branch, special)
 
     def alike(self, a: Point, b: Point, tolerance: float) -> bool:
@@ -404,7 +408,7 @@ class Tracer:
         if branch.ended == END_OF_RANGE and last.zero > self.solver.system.active_drifts(last.x):
             self._singular_end(branch, last)
             last = branch.points[-1]
-        if not any(s.point is last for s in branch.special):
+        if not any(s.point is last for s in branch.special if s.kind != USER):
             branch.special.append(self.solver.given(END, last))
             branch.renumber()
         if self.plan.error_bars or self.plan.accuracy:

@@ -114,6 +114,7 @@ class CompiledNewton:
         rod.drift_column = self._ints(np.array([column[d] for d in drifts]))
         rod.starts, rod.indices = self._ints(metric.pattern.indptr), self._ints(metric.pattern.indices)
         rod.metric, rod.border = self._doubles(metric.values), self._doubles(self.border)
+        rod.sizes = self._doubles(system.sizes.array.copy())
         self.load_equation = np.zeros(1)
         rod.load_equation = self._doubles(self.load_equation)
         self.newton = self.ffi.new("Newton *")

@@ -36,6 +36,7 @@ typedef struct {
     const int *drift_row, *drift_column; /* drifts x n: places in S */
     const int *starts, *indices;
     const double *metric;       /* compressed sparse rows */
+    const double *sizes;        /* natural sizes of the unknowns */
     double *border;             /* F_lam */
     double *load_equation;      /* equation of the load at the last residual: the Lagrangian's derivative in it */
 } Rod;
@@ -243,8 +244,9 @@ int correct(const Rod *rod, Block *b, Newton *newton, double *x, const double *r
         for (int i = 0; i < n; i++) {
             if (b) step[i] -= share * b->tangent[i];
             x[i] -= step[i];
-            length += step[i] * step[i];
-            state += x[i] * x[i];
+            double moved = step[i] / rod->sizes[i], value = x[i] / rod->sizes[i];
+            length += moved * moved;
+            state += value * value;
         }
         double distance = size_of(rod, step);
         size = fmax(distance, sqrt(length) / (1 + sqrt(state)));

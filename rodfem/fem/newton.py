@@ -14,7 +14,8 @@ from rodfem.fem.state import State
 from rodfem.fem.system import System
 
 TOLERANCE = 1e-10
-"""Size of the last correction of a converged state: rotations in radian, load over its span, all else relative."""
+"""Size of the last correction of a converged state: rotations in radian, load over its span, all else relative, in
+natural sizes: reactions that vanish beside the stiffness of the rod are round-off of that."""
 STALLED = 1e-6
 """Below this a correction that no longer shrinks is round-off, not divergence; it is reported as the error."""
 KEPT, SHRUNK = 0.02, 0.1
@@ -121,7 +122,7 @@ def iterate(
             break
         x.axpy(-1.0, step)
         distance = system.norm(step)
-        size = max(distance, step.norm() / (1.0 + x.norm()))
+        size = max(distance, system.in_units(step, -1).norm() / (1.0 + system.in_units(x, -1).norm()))
         if not isfinite(size) or distance > reach:
             break
         # chord steps converge linearly: their rate, doubled for safety, says what the next correction would be

@@ -1,0 +1,67 @@
+"""Equilibria of traced branches at a load: at rows there and between rows, each once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from petsc4py import PETSc
+
+from rodfem.continuation.branch import Branch, Point
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.prediction import hermite
+from rodfem.continuation.states_between import solve_at_load
+from rodfem.deflation.group_orbit import Orbits
+from rodfem.deflation.search import SAME
+from rodfem.errors import ConvergenceError
+from rodfem.linalg.orthogonal import combine
+
+
+def equilibria_at(
+    solver: BranchSolver, branches: Sequence[Branch], load: float, here: Callable[[Point], Point] = lambda p: p
+) -> list[Point]:
+    """Equilibria of traced branches at exactly ``load``, which a search for further ones deflates.
+
+    A row at that load is one; none counts twice, as where branches begin and end at one state, or what the symmetries
+    carry into each other.  Raises :class:`ConvergenceError` where there is none between two points on either side of
+    the load.  ``here`` brings points of ``branches`` to the mesh of ``solver``, where they are on others.
+    """
+    found, known = list[Point](), Orbits(solver.system)
+    for branch in branches:
+        for point in _along(solver, [here(p) for p in branch.points], load):
+            if all(apart >= SAME for apart, _ in known.nearest(point.x)):
+                found.append(point)
+                known.add(point.x)
+    return found
+
+
+def _along(solver: BranchSolver, points: Sequence[Point], load: float) -> Iterator[Point]:
+    """Yield the equilibria at ``load`` at and between neighbouring ``points`` of a branch, which are on its mesh."""
+    for a, b in zip(points, [*points[1:], None], strict=True):
+        if a.load == load:
+            x, outcome = solver.at_load(a.x, load, reach=1.0)
+            if not outcome.converged:
+                raise ConvergenceError(
+                    f"No equilibrium was found at {solver.system.scene.load} = {load:g} beside a row there: use more "
+                    "elements, or another load."
+                )
+            yield solver.point(x, a.arclength, solver.load_tangent(x, True), outcome)
+        if b is not None and (a.load - load) * (b.load - load) < 0:
+            yield _between(solver, a, b, load)
+
+
+def _between(solver: BranchSolver, a: Point, b: Point, load: float) -> Point:
+    """Equilibrium at ``load`` between neighbours ``a``, ``b`` on either side of it."""
+    smooth = a.tangent is not None and b.tangent is not None and b.arclength > a.arclength
+    curve = partial(hermite, a, b) if smooth else partial(_chord, a, b)
+    p, q = (a, b) if smooth else (replace(a, arclength=0.0), replace(b, arclength=1.0))
+    x, s, outcome = solve_at_load(solver, curve, p, q, load)
+    s = s if smooth else a.arclength + s * (b.arclength - a.arclength)
+    return solver.point(x, s, solver.load_tangent(x, True), outcome)
+
+
+def _chord(a: Point, b: Point, t: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """State at a part ``t`` of the way from ``a`` to ``b``, and the direction from one to the other."""
+    return combine([a.x, b.x], np.array([1 - t, t])), b.x - a.x

@@ -1,0 +1,131 @@
+"""A load asked for that is an end of the range: its states are known once, and branches found there end there."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import pairwise
+from math import hypot
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from forms.energy import bending_and_twist
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, clamped, free, pinned, trace
+
+pytestmark = pytest.mark.alone
+
+LEAN = 0.05
+HIGH = 6.0
+
+
+def column() -> Scene:
+    """Pinned ends: of its Euler loads ``pi^2`` and ``2 pi^2``, in its two planes, are below 20."""
+    return Scene(
+        "column",
+        (0.0, 1.0),
+        "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)),
+        {"P": 0.0},
+        "P",
+        (pinned(), pinned(lambda c: (0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P))),
+        Ordinate("q", s=0.3, of=lambda r, q: hypot(r[0], r[1])),
+        (0.0, 20.0),
+    )
+
+
+def cantilever(high: float = HIGH) -> Scene:
+    """In its plane ``2 a'' = -(P sin a + LEAN cos a)``, ``a(0) = a'(1) = 0``, with the slope ``a`` of the rod."""
+    return Scene(
+        "cantilever",
+        (0.0, 1.0),
+        "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)),
+        {"P": 0.0},
+        "P",
+        (clamped(), free(lambda c: (LEAN, 0.0, -c.P))),
+        Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
+        (0.0, high),
+        planar="e2",
+    )
+
+
+@cache
+def tips(load: float) -> list[float]:
+    """Where the tip of the cantilever is in all its equilibria, by shooting from the clamp."""
+
+    def shot(bend: float) -> np.ndarray:
+        def slope(s: float, y: np.ndarray) -> list[float]:
+            return [y[1], -(load * np.sin(y[0]) + LEAN * np.cos(y[0])) / 2, np.sin(y[0])]
+
+        return solve_ivp(slope, (0.0, 1.0), [0.0, bend, 0.0], rtol=1e-10, atol=1e-12).y[:, -1]
+
+    bends = np.linspace(-6.0, 6.0, 121)
+    ends = [shot(bend)[1] for bend in bends]
+    pieces = [(p, q) for (p, x), (q, y) in pairwise(zip(bends, ends, strict=True)) if x * y < 0]
+    return sorted(shot(brentq(lambda bend: shot(bend)[1], p, q))[2] for p, q in pieces)
+
+
+def rows_are_apart(diagram: Diagram) -> bool:
+    """Whether no two rows of a branch are at one place."""
+    return all(b.arclength - a.arclength > 1e-6 for branch in diagram for a, b in pairwise(branch.points))
+
+
+@pytest.mark.parametrize(
+    ("span", "at", "accuracy"),
+    [
+        ((0.0, 20.0), (20.0,), None),
+        ((20.0, 0.0), (20.0, 20.0, 0.0), None),
+        ((0.0, 20.0), (0.0, 20.0), 1e-6),
+    ],
+)
+def test_states_at_the_ends_of_the_range(span: tuple[float, float], at: tuple[float, ...], accuracy: float) -> None:
+    """Straight with index 2, bent in the one plane and stable, bent in the other one with index 1; a row each."""
+    found = trace(column(), plan=Plan(span, at=at, depth=1, accuracy=accuracy, error_bars=False))
+    assert sorted(p.index for p in found.at(20.0)) == [0, 1, 2]
+    assert [p.index for p in found.at(0.0)] == [0]
+    assert [p.load for p in found.at(20.0)] == [20.0] * 3
+    asked = [s.point.load for branch in found for s in branch.special if s.kind == "user"]
+    assert sorted(asked) == sorted([20.0] * 3 + [0.0] * (0.0 in at))
+    assert rows_are_apart(found)
+    known = found.search(20.0, tries=6)  # hanging, in tension: nothing else is new
+    assert all(p.index == 0 and abs(p.ordinate) < 1e-9 for p in known)
+
+
+def test_states_at_a_branch_point() -> None:
+    """What leaves it begins with its state: there is one."""
+    found = trace(column(), plan=Plan((5.0, 15.0), depth=1, error_bars=False))
+    (special,) = found.special("branch point")
+    assert len(found) == 2
+    assert len(found.at(special.point.load)) == 1
+
+
+def test_nothing_is_found_beside_the_only_state() -> None:
+    """Far below its first critical load the cantilever has one equilibrium."""
+    assert len(tips(1.0)) == 1
+    found = trace(cantilever(1.0), plan=Plan(at=(1.0,), tries=6, error_bars=False))
+    assert len(found) == 1
+    assert [p.ordinate for p in found.at(1.0)] == pytest.approx(tips(1.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("span", [(0.0, HIGH), (HIGH, 0.0)])
+def test_branches_that_are_found_at_an_end_of_the_range(span: tuple[float, float]) -> None:
+    """All states that shooting finds, each once, on branches that end with the range."""
+    found = trace(cantilever(), plan=Plan(span, at=(HIGH,), tries=8, error_bars=False))
+    assert len(found) == 2
+    assert [branch.ended for branch in found] == ["end of range"] * 2
+    assert found.warnings == []
+    assert len(tips(HIGH)) == 3
+    assert sorted(p.ordinate for p in found.at(HIGH)) == pytest.approx(tips(HIGH), abs=1e-6)
+    assert [p.load for branch in found for p in (branch.points[0], branch.points[-1])].count(HIGH) == 3
+    assert rows_are_apart(found)
+
+
+def test_a_load_at_the_start_where_the_first_step_asks_for_another_mesh() -> None:
+    """The first row is that of the request on whatever mesh."""
+    coarse = Discretization(elements=2, degree=2, vertices=(0.0, 0.5, 1.0))
+    found = trace(cantilever(60.0), coarse, Plan(at=(0.0,), depth=0, accuracy=1e-10))
+    assert len(found.solvers) > 1
+    assert [(s.point.load, s.row) for s in found[0].special if s.kind == "user"] == [(0.0, 0)]
+    assert rows_are_apart(found)
