@@ -2,9 +2,9 @@ r"""Unstable eigenvalues among all that a mesh has, of a rod under loads without
 
 Eigenvalues nearest to a shift need not be those that flutter: where a rod has dozens of slow motions, as a soft one in
 torsion, a pair farther off is not among them.  With ``K`` the rows and columns of ``(S - a M)^-1`` that have mass, and
-``m = L L^t`` the mass there, the eigenvalues of ``L^t K L`` are ``nu = 1 / (mu - a)`` of all finite ``mu``, and zeros
-(:mod:`rodfem.stability.outside`).  Unlike in the pencil those zeros are in no Jordan blocks: round-off leaves them as
-small as it is, and finite eigenvalues are told from them down to there.
+``m = L L^t`` the mass there, of the rank that ``L`` has columns, the eigenvalues of ``L^t K L`` are those ``nu = 1 /
+(mu - a)`` of all finite ``mu``, and zeros (:mod:`rodfem.stability.outside`).  Unlike in the pencil those zeros are in
+no Jordan blocks: round-off leaves them as small as it is, and finite eigenvalues are told from them down to there.
 
 Round-off of a matrix ``A`` moves a simple eigenvalue by up to ``|dA| / |y.x|``, for its right and left vectors ``x``
 and ``y`` of norm one (Wilkinson, The Algebraic Eigenvalue Problem, 1965, chapter 2).  What that may have made unstable
@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cholesky, eig
+from scipy.linalg import eig, eigh
 from scipy.sparse.linalg import splu
 
 from rodfem.errors import ConvergenceError
@@ -90,6 +90,7 @@ def _inverse(pencil: NonsymmetricPencil, largest: int) -> tuple[np.ndarray, floa
         return None
     _, inverse, sparse = found
     m = sparse.toarray()
-    lower = cholesky(m, lower=True)
-    round_off = ROUNDED * max(float(np.linalg.norm(inverse, 2)), 1.0) * float(np.linalg.norm(m, 2))
+    masses, ways = eigh(m)  # a quaternion's own length has no mass
+    lower = ways[:, masses > 0.0] * np.sqrt(masses[masses > 0.0])
+    round_off = ROUNDED * max(float(np.linalg.norm(inverse, 2)), 1.0) * float(masses.max(initial=0.0))
     return np.asarray(lower.T @ inverse @ lower), round_off

@@ -78,6 +78,7 @@ def test_a_missing_or_moved_event_is_seen() -> None:
     first, second = [s for s in branch.special if s.note == "sine of 2"]
     first.point.load += 3 * first.error_estimate
     branch.special.remove(second)
+    branch.points = [p for p in branch.points if p is not second.point]  # its row may be on the zero to the last digit
     assert ["zero is" in sentence or "happens 0 times" in sentence for sentence in facts.faults(diagram)] == [True] * 2
 
 
