@@ -259,8 +259,8 @@ FAULTS = {
     ),
     "sides-by-determinants-clear-of-the-least": Fault(
         "rodfem/diagram/two_sides.py",
-        "if (abs(first.values - second.values) > allowed).any():",
-        "if False:",
+        "        return False\n    widest",
+        "        pass\n    widest",
         "tests/literature/test_postbuckling.py",
     ),
     "no-convexity-before-zero-stretch": Fault(
@@ -268,12 +268,6 @@ FAULTS = {
         "if beside is not None and self._ends_not_convex(branch, a, beside):",
         "if False:",
         "tests/continuation/test_convexity.py",
-    ),
-    "mirror-images-by-recorded-determinants": Fault(
-        "rodfem/diagram/two_sides.py",
-        "> SAME_DETERMINANT and not _as_stable(solver.inertia.at, a, b):",
-        "> SAME_DETERMINANT:",
-        "tests/continuation/test_index_chain.py",
     ),
     "eigenvalues-of-the-mesh-near-the-slowest": Fault(
         f"{STABILITY}census.py", "ROUNDED = 1e-14", "ROUNDED = 1e-2", "tests/diagram/test_sweep.py"

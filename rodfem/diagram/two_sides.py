@@ -1,16 +1,15 @@
 """The two ways along a null vector: whether the branches that leave there are mirror images of each other.
 
 Two sides of a pitchfork may be mirror images in their plane, at the same loads, energies and stretches, and differ in
-what they do across it: then no symmetry of the rod carries one into the other.  Determinants tell.  Beside a branch
-point one eigenvalue is so small that the round-off of factors is a visible part of it, and of the determinant.  Its
-Rayleigh quotient is much more precise, and is compared; the determinant is taken at a shift clear of all eigenvalues,
-``det(S - sigma M)``, which mirror images share as well.
+what they do across it: then no symmetry of the rod carries one into the other.  The eigenvalues nearest zero tell, and
+determinants what is beyond.  Beside a branch point one eigenvalue is so small that the round-off of factors is a
+visible part of it, and of the determinant: that is taken at a shift clear of all eigenvalues, ``det(S - sigma M)``,
+which mirror images share as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -46,8 +45,7 @@ def are_images(
         b = there
     if (a.negative, a.zero) != (b.negative, b.zero):
         return False
-    known = a.mesh == b.mesh and isfinite(a.determinant) and isfinite(b.determinant)
-    if known and abs(a.determinant - b.determinant) > SAME_DETERMINANT and not _as_stable(solver.inertia.at, a, b):
+    if a.mesh == b.mesh and not _as_stable(solver.inertia.at, a, b):
         return False
     return solver.space is None or _as_stable(solver.space.at, a, b)
 
@@ -57,32 +55,29 @@ def _as_stable(at: Callable[[PETSc.Vec], Factored], a: Point, b: Point) -> bool:
     indices = [at(point.x).count() for point in (a, b)]
     if indices[0] != indices[1]:
         return False
-    if abs(indices[0].determinant - indices[1].determinant) <= SAME_DETERMINANT:
-        return True
-    zero = indices[0].zero
-    first, second = (_nearest(at(point.x), zero) for point in (a, b))
-    allowed = SAME_DETERMINANT * abs(first.values) + np.where(np.arange(len(first.values)) < zero, first.noise, 0.0)
-    if (abs(first.values - second.values) > allowed).any():
+    first, second = (_nearest(at(point.x), indices[0].zero) for point in (a, b))
+    if (abs(first.values - second.values) > SAME_DETERMINANT * abs(first.values) + first.noise).any():
         return False
-    ascending = np.sort(first.values)
-    widest = int(np.argmax(np.diff(ascending)))
-    shift = float(ascending[widest : widest + 2].mean())
+    widest = int(np.argmax(np.diff(first.values)))
+    shift = float(first.values[widest : widest + 2].mean())
     shifted = [_shifted(at(point.x), shift) for point in (a, b)]
     return shifted[0] == shifted[1] and abs(shifted[0].determinant - shifted[1].determinant) <= SAME_DETERMINANT
 
 
 class _Nearest(NamedTuple):
-    """Eigenvalues nearest zero, and the greatest round-off of them."""
+    """Eigenvalues nearest zero, ascending, and the round-off of those that count as zero; 0 for others."""
 
     values: np.ndarray
-    noise: float
+    noise: np.ndarray
 
 
 def _nearest(found: Factored, zero: int) -> _Nearest:
-    """Those that count as ``zero``, by magnitude, and a few more."""
+    """Those that count as ``zero``, and a few more."""
     found.count()
     values, vectors = found.nearest(zero + LOOKED_AT, NULL)
-    return _Nearest(values, max(found.noise(v) for v in vectors))
+    order = np.argsort(values)
+    noise = np.array([found.noise(v) for v in vectors]) * (abs(values) <= found.inertia.tolerance)
+    return _Nearest(values[order], noise[order])
 
 
 def _shifted(found: Factored, shift: float) -> Index:
