@@ -17,6 +17,7 @@ from collections.abc import Callable
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.deflation.same_rotations import same_rotations
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.tolerances import NEGLIGIBLE
@@ -112,9 +113,10 @@ class Orbits:
         self._weighed = [system.metric * t for t in self.translations]
 
     def add(self, y: PETSc.Vec) -> None:
-        """Add a state."""
-        self.states.append(y)
-        self.orbits.append({i: self._orbit(y, i) for i in self.rotations[:1]})
+        """Add a state, and the other unknowns that it may have."""
+        for each in (y, *same_rotations(self.system, y)):
+            self.states.append(each)
+            self.orbits.append({i: self._orbit(each, i) for i in self.rotations[:1]})
 
     def nearest(self, x: PETSc.Vec) -> list[tuple[float, PETSc.Vec]]:
         """Distance of each orbit from ``x``, and ``x`` minus the nearest state of the orbit.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from io import StringIO
+from itertools import combinations
 from math import pi
 
 import classics
@@ -13,6 +14,7 @@ import pytest
 from demo_cases import Found, explored, scene
 from shooting_solver import Problem, Rod
 
+from rodfem import pinned, trace
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
@@ -245,3 +247,17 @@ def test_guesses_do_not_depend_on_ranks() -> None:
     assert q[0] == pytest.approx([1, 0, 0, 0], abs=1e-15)
     assert np.linalg.norm(q, axis=1) == pytest.approx(1, abs=1e-14)
     assert q[24] == pytest.approx([0.80094931574151, -0.54006580455896, 0.24587627411001, -0.07971184], abs=1e-8)
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("planar", ["e2", None])
+def test_quaternions_of_opposite_signs_are_one_rotation(planar: str | None) -> None:
+    """And so are angles a turn apart: of a rod between hinges no state has the shape and rotations of another."""
+    hinges = pinned(), pinned(classics.ON_AXIS, classics.push)
+    scene = classics.column("hinges", hinges, (0.0, 9.0), planar=planar, constants={"B1": 9.0, "B2": 1.0})
+    diagram = trace(scene, Discretization("auto", 8, 6), Plan(depth=0, error_bars=False))
+    states = [*diagram.at(5.0), *diagram.search(5.0, tries=60 if planar else 24, seed=1)]
+    shapes = [diagram.solvers[0].shape.sample(p.x) for p in states]
+    for one, other in combinations(shapes, 2):
+        turned = abs((one["q"] * other["q"]).sum(axis=1))  # the cosine of half the angle between them
+        assert abs(one["r"] - other["r"]).max() > 1e-6 or turned.min() < 1 - 1e-9
