@@ -263,6 +263,15 @@ FAULTS = {
         "        pass\n    widest",
         "tests/literature/test_postbuckling.py",
     ),
+    "the-sign-of-round-off-along-a-locus": Fault(
+        "rodfem/codim2/singular.py", "if sharp and others > 0:", "if False:", "tests/codim2/test_locus.py"
+    ),
+    "quaternions-of-one-sign": Fault(
+        "rodfem/deflation/group_orbit.py",
+        "for each in (y, *same_rotations(self.system, y)):",
+        "for each in (y,):",
+        "tests/deflation/test_deflation.py",
+    ),
     "no-convexity-before-zero-stretch": Fault(
         "rodfem/diagram/tracer.py",
         "if beside is not None and self._ends_not_convex(branch, a, beside):",

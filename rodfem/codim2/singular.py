@@ -50,7 +50,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import KEPT, SHRUNK, STALLED, TOLERANCE
 from rodfem.linalg.orthogonal import combine, orthonormalize, project_out
 from rodfem.stability.bordered import Bordered
-from rodfem.stability.inertia import Factored, Inertia
+from rodfem.stability.inertia import ZERO_BAND, Factored, Inertia
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import ROUND_OFF, TINY
 
@@ -107,6 +107,7 @@ class Singular:
         constraints = None if left else self.saddle.constraints
         self.bordered = Bordered(self.system, matrix, len(vectors), constraints)
         self.turned: Bordered | None = None
+        self._stay: bool | None = None
         self.others = UNSTABLE if left else VANISHED
         if left:
             self._transposed = matrix.transpose(PETSc.Mat())
@@ -291,12 +292,31 @@ class Singular:
             dx,
             located,
             ordinate=self.solver.shape.ordinate(x),
-            rest=at.rest if self.turned is None else self._others(p, x),
+            rest=self._negative(p, x, at.rest) if self.turned is None else self._others(p, x),
             curvature=float(curvature) if self.fold else 0.0,
             coupling=coupling if self.fold else np.zeros(2),
             modes=at.v,
             left=[] if self.turned is None else at.w,
         )
+
+    def _negative(self, p: np.ndarray, x: PETSc.Vec, rest: int) -> int:
+        """Negative eigenvalues but for those that vanish: ``rest``, unless others are zero all along the curve.
+
+        Those have the sign of their round-off, and are counted as zero, as they are along branches.  Whether there are
+        any the first point tells.
+        """
+        if self._stay is not False:
+            self.system.line = self.plane.along(p, 0)
+            self.system.set_load(x, float(p[0]))
+            found = self.saddle.at(x)
+            index = found.count()
+            sharp = self.saddle.tolerance <= ZERO_BAND * self.saddle.scale
+            others = index.zero - found.drifts - len(self.phi)
+            if self._stay is None:
+                self._stay = sharp and others > 0
+            if sharp and others > 0:
+                return index.negative
+        return rest
 
     def _others(self, p: np.ndarray, x: PETSc.Vec) -> int:
         """Unstable eigenvalues at a divergence load but for those that vanish."""

@@ -22,6 +22,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from shooting_solver import Problem, Rod
 
+from forms import loads
 from forms.energy import bending_and_twist
 from rodfem.codim2.locus import Locus, locus
 from rodfem.continuation.branch import Branch, SpecialPoint
@@ -34,7 +35,7 @@ from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization
 from rodfem.output.plot_locus import _footer, draw_locus
 from rodfem.output.stable_region import stable_region
-from rodfem.problem.ends import clamped, free
+from rodfem.problem.ends import clamped, free, pinned
 from rodfem.problem.scene import Ordinate, Parameter, Scene
 
 pytestmark = pytest.mark.alone
@@ -304,3 +305,20 @@ def test_no_locus_of_an_end() -> None:
     end: SpecialPoint = specials(explored()[0], "end")[0]
     with pytest.raises(InputError, match="has no locus"):
         locus(follower(), end, "A", ((0.01, 0.96), (-3.1, 1.0)))
+
+
+@pytest.mark.alone
+def test_what_is_zero_all_along_is_not_counted() -> None:
+    """A straight rod spins freely about its axis, whatever a foundation does to it across: ``P = pi^2 + k/pi^2``."""
+    scene = classics.column(
+        "foundation",
+        (pinned(), pinned(classics.ON_AXIS, classics.push)),
+        (0.0, 30.0),
+        constants={"B2": 5.0, "k": 20.0},
+        potential=lambda x, c: loads.spring(x.r, (0.0, c.k, 0.0)),
+    )
+    diagram = trace(scene, Discretization("auto", 8, 6), Plan(depth=0, error_bars=False))
+    found = diagram.locus(diagram.special("branch point")[0], "k", (20.0, 100.0))
+    load, k = np.array(found.values).T
+    assert abs(load - pi**2 - k / pi**2).max() < 1e-9
+    assert set(map(tuple, found.index.tolist())) == {(0, 1)}
