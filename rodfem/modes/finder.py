@@ -18,7 +18,7 @@ from rodfem.stability.assessment import Assessor, Verdict
 from rodfem.stability.left_right import moving, two_sided
 
 FLOOR = 5e-12
-"""Least uncertainty of an eigenvalue by round-off, relative to the greatest one: of rings of 32 elements 2e-12 was seen."""
+"""Least uncertainty of an eigenvalue by round-off, relative to the greatest one (rings of 32 elements: 2e-12)."""
 
 
 class ModeFinder(Eigenmotions):
