@@ -20,6 +20,7 @@ from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.soft_mode import index_range
 
 FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
+BARS = "richer meshes may decide that, ask for error bars"
 FLAT = 1e-6
 """Slope of the load, in spans, below which all along a branch this is a family of equilibria at one load."""
 CLEARLY = 10.0
@@ -111,6 +112,8 @@ class SoftRows:
                 worst = max((m for p in points for m in p.soft if not m.decided), key=lambda m: m.uncertainty)
                 least = TOLERANCE * solver.inertia.scale
                 remedy = FINER if worst.uncertainty > CLEARLY * least else EXACT
+                if remedy == FINER and not self.error_bars and worst.uncertainty <= solver.inertia.tolerance:
+                    remedy = BARS
                 low, high = (f"{p.load:.8g}" for p in (points[0], points[-1]))
                 load = solver.system.scene.load
                 where = f"At {load} = {low}" if len(points) == 1 else f"From {load} = {low} to {high}"

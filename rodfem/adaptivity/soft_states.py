@@ -119,14 +119,20 @@ class SoftStates:
         return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
 
     def judgement(self, point: Point, near: NearZero, *, fixed_load: bool, family: bool) -> Judgement:
-        """Decide on eigenvalues ``near`` zero of a point as far as can be; ``fixed_load`` and ``family`` as above."""
+        """Decide on eigenvalues ``near`` zero of a point as far as can be; ``fixed_load`` and ``family`` as above.
+
+        Without a richer mesh those within the tolerance of a count are undecided, beyond round-off too: they are zero
+        in every count, and round-off alone does not tell what is zero for the rod.
+        """
         every, near = len(near.values), self._across_the_branch(point, near) if family else near
-        names = self.names(point.x, near.vectors)
-        modes = [SoftMode(*m) for m in zip(names, near.values.tolist(), near.uncertainty.tolist(), strict=True)]
+        names, tolerance = self.names(point.x, near.vectors), self.solver.inertia.tolerance
+        least, bars = 0.0 if self._richer else tolerance, near.uncertainty
+        bars = np.where(abs(near.values) > bars, np.maximum(bars, least), bars)
+        modes = [SoftMode(*m) for m in zip(names, near.values.tolist(), bars.tolist(), strict=True)]
         if modes and self._richer:
             with self.solver.system.clock.scope("error bars"):
                 modes = self._refined(point, modes, fixed_load, every - len(modes))
-        return judge(near, modes, self.solver.inertia.tolerance, refined=bool(self._richer))
+        return judge(near, modes, tolerance)
 
     def _across_the_branch(self, point: Point, near: NearZero) -> NearZero:
         """Eigenvalues without that of the branch itself, a family of equilibria at one load."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rodfem.output.plot_pieces import STABLE, STYLES, pieces_of
+from rodfem.output.plot_pieces import STABLE, STYLES, UNDECIDED, pieces_of
 from rodfem.stability.soft_mode import on_kink
 from rodfem.tolerances import SAME_SPECIAL
 
@@ -46,8 +46,13 @@ class Interval:
 
     @property
     def rank(self) -> int:
-        """The greater, the less stable."""
-        return list(STYLES).index(self.kind)
+        """Of two intervals that meet, the one of greater rank has the segment between their rows.
+
+        It is the less stable one, or one that is undecided by an eigenvalue near zero: between a row of known and one
+        of undecided index that is undecided, too.
+        """
+        styles = list(STYLES)
+        return len(styles) if self.kind == UNDECIDED and self.soft else styles.index(self.kind)
 
     @property
     def loads(self) -> tuple[float, float]:

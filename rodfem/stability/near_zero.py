@@ -101,14 +101,13 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
     return NearZero(quotients[order], [members[i] for i in order], uncertainty[order], firm, found.drifts)
 
 
-def judge(found: NearZero, modes: Sequence[SoftMode], tolerance: float, *, refined: bool) -> Judgement:
+def judge(found: NearZero, modes: Sequence[SoftMode], tolerance: float) -> Judgement:
     """Numbers of eigenvalues of a state with its ``modes``, decided or not.
 
-    ``found`` are these modes as the mesh has them.  Those within the ``tolerance`` of a count are zero, as in every
-    count, unless they were computed on richer meshes, too (``refined``): round-off alone does not tell what is zero for
-    the rod.
+    ``found`` are these modes as the mesh has them.  Those that are decided have a sign; others are undecided, and zero,
+    too, within the ``tolerance`` of a count, as in every count.
     """
-    told = [m for m in modes if m.decided and (refined or abs(m.value) > tolerance)]
+    told = [m for m in modes if m.decided]
     negative = found.firm + sum(m.value < 0 for m in told)
-    zero = sum(m not in told and abs(v) <= tolerance for m, v in zip(modes, found.values.tolist(), strict=True))
-    return Judgement(negative, found.zero + zero, sum(not m.decided for m in modes), tuple(modes))
+    zero = sum(not m.decided and abs(v) <= tolerance for m, v in zip(modes, found.values.tolist(), strict=True))
+    return Judgement(negative, found.zero + zero, len(modes) - len(told), tuple(modes))

@@ -230,6 +230,9 @@ def test_undecided_stability_is_no_stability() -> None:
     words = said(branch("straight", loads, [0, 0, 0, 0], columns=columns))
     assert "straight, is stable from P = 0 to some load between 1 and 2" in words
     assert "then of undecided stability" in words and "its whole range" not in words
+    for index, undecided in (([0, 0, 1, 1], [1, 1, 0, 0]), ([1, 1, 0, 0], [0, 0, 1, 1])):
+        words = said(branch("straight", loads, index, columns={"undecided": undecided}))
+        assert "to some load between 1 and 2, where it has an eigenvalue that is not told from zero" in words
     side = branch("branch 1", loads, [0] * 4, columns={"undecided": [1] * 4}, parent=["straight", 0])
     first = branch("straight", loads, [0] * 4) | {"special": [special("branch point", 1, 1.0, 0, 0)]}
     assert "of undecided stability" in said(first, side) and "unstable on its whole range" not in said(first, side)

@@ -72,6 +72,24 @@ def test_an_end_too_free_to_tell() -> None:
         assert "undecided, index 0 to 3" in stream.getvalue() and "sign undecided" in stream.getvalue()
 
 
+@pytest.mark.parametrize("error_bars", [pytest.param(False, marks=pytest.mark.short), True])
+@pytest.mark.parametrize("k", [5e-8, -5e-8])
+def test_a_zero_of_the_count_is_decided_by_richer_meshes_or_not_at_all(k: float, error_bars: bool) -> None:
+    """A spring of +-5e-8, beyond round-off and within the tolerance of a count: without error bars its sign is open."""
+    foot = replace(pinned(), energy=lambda x, c: loads.rotational_spring(x.q, c.k * (1 - c.P)))
+    scene = column("soft", (foot, free()), (0.0, 0.1), constants={"k": k}, planar="e2")
+    diagram = trace(scene, Discretization("reduced", 8, 6), Plan(depth=0, error_bars=error_bars))
+    index = int(k < 0)
+    expected = (index, 0, 0, not index) if error_bars else (0, 1, 1, None)
+    assert {(p.negative, p.zero, p.undecided, p.stable) for p in diagram[0].points} == {expected}
+    for point in diagram[0].points:
+        (mode,) = point.soft
+        assert mode.value == pytest.approx(k * (1 - point.load), abs=2e-9) and mode.decided == error_bars
+    assert ("undecided stability" in diagram.in_words()) == (not error_bars)
+    said = [sentence for sentence in diagram.warnings if "the index is 0 or 1 (rotation about e2" in sentence]
+    assert len(said) == (not error_bars) and all(s.endswith("decide that, ask for error bars.") for s in said)
+
+
 @pytest.mark.parametrize("imperfection", [1e-9, -1e-9, 1e-6])
 def test_sections_that_are_nearly_round(imperfection: float) -> None:
     """A circle turns its sections inside out at the cost of (B1 - B2)/2 sin^2 in the curvature 1, over 2 pi."""
