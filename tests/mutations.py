@@ -263,6 +263,12 @@ FAULTS = {
         "        pass\n    widest",
         "tests/literature/test_postbuckling.py",
     ),
+    "stable-in-space-by-frequencies": Fault(
+        "rodfem/output/summary.py",
+        'if data.get("planar") and interval.in_space is None',
+        'if data.get("planar") and interval.in_space is None and not _is_sweep(data)',
+        "tests/output/test_summary.py",
+    ),
     "the-sign-of-round-off-along-a-locus": Fault(
         "rodfem/codim2/singular.py", "if sharp and others > 0:", "if False:", "tests/codim2/test_locus.py"
     ),
