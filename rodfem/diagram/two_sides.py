@@ -23,8 +23,8 @@ from rodfem.stability.inertia import NULL, Factored, Index
 from rodfem.tolerances import SAME_STATE
 
 SAME_DETERMINANT = 1e-3
-"""Logarithm of the ratio of two determinants that are one: of the last iterates of Newton's method, and of meshes that
-are not symmetric."""
+"""Logarithm of the ratio of two determinants, or of two eigenvalues, that are one: of the last iterates of Newton's
+method, and of meshes that are not symmetric."""
 LOOKED_AT = 3
 """Eigenvalues nearest zero, beyond those that count as zero, between which the shift lies."""
 
