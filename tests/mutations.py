@@ -418,6 +418,9 @@ FAULTS = {
     "step-checks-nothing": Fault(
         f"{CONTINUATION}step.c", "double left = fabs(step->right[i])", "double left = 0 * step->right[i]", STEP
     ),
+    "threads-work-at-once": Fault(
+        "rodfem/problem/arguments.py", "with ONE_THREAD:", "with RLock():", "tests/app/test_threads.py"
+    ),
     "a-bent-rod-breaks-a-symmetry": Fault(
         "rodfem/fem/phase.py", "SYMMETRIC_STATE = 1e-4", "SYMMETRIC_STATE = 1e-6", "tests/fem/test_nearly_symmetric.py"
     ),

@@ -3,6 +3,8 @@
 :func:`checked` takes a check for each argument by name: a function of the argument's name and value that returns the
 value to go on with, or raises :class:`InputError` in one sentence that names the value, what was expected and an
 example.  A default is not checked.
+
+These functions work in one thread at a time, as neither PETSc nor FFCx can be used by two: others wait.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from functools import wraps
 from math import isfinite
 from pathlib import Path
 from reprlib import Repr
+from threading import RLock
 from typing import Any, ParamSpec, TypeVar
 
 from rodfem.errors import InputError
@@ -24,6 +27,8 @@ from rodfem.problem.kinds import finite, reals, whole
 P = ParamSpec("P")
 T = TypeVar("T")
 Check = Callable[[str, Any], Any]
+ONE_THREAD = RLock()
+"""Held while a public function works."""
 SHORT = Repr()
 SHORT.maxother = SHORT.maxstring = 60
 
@@ -49,7 +54,8 @@ def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
             for name, check in checks.items():
                 if name in given.arguments and given.arguments[name] is not defaults[name]:
                     given.arguments[name] = check(name, given.arguments[name])
-            return function(*given.args, **given.kwargs)
+            with ONE_THREAD:
+                return function(*given.args, **given.kwargs)
 
         return call
 
