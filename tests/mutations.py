@@ -418,6 +418,9 @@ FAULTS = {
     "step-checks-nothing": Fault(
         f"{CONTINUATION}step.c", "double left = fabs(step->right[i])", "double left = 0 * step->right[i]", STEP
     ),
+    "writhe-of-one-polygon": Fault(
+        "rodfem/writhe.py", "(4 * polygons[-1] - polygons[-2]) / 3", "polygons[-1]", "tests/report/test_contents.py"
+    ),
     "threads-work-at-once": Fault(
         "rodfem/problem/arguments.py", "with ONE_THREAD:", "with RLock():", "tests/app/test_threads.py"
     ),

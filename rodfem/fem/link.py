@@ -13,24 +13,10 @@ import numpy as np
 
 from rodfem.errors import InputError
 from rodfem.problem.quaternions import CONJUGATE, product
+from rodfem.writhe import writhe
 
-
-def writhe(r: np.ndarray) -> float:
-    """Writhe of the closed polygon through the points ``r`` (m, 3), the first not repeated at the end.
-
-    The sum over pairs of edges of their signed solid angles: Klenin & Langowski, Biopolymers 54 (2000) 307-317.
-    """
-    a, b = r, np.roll(r, -1, axis=0)
-    i, j = (x.ravel() for x in np.triu_indices(len(r), k=2))
-    apart = ~((i == 0) & (j == len(r) - 1))
-    i, j = i[apart], j[apart]
-    r13, r14, r24, r23 = a[j] - a[i], b[j] - a[i], b[j] - b[i], a[j] - b[i]
-    normals = [np.cross(p, q) for p, q in ((r13, r14), (r14, r24), (r24, r23), (r23, r13))]
-    sizes = [np.linalg.norm(n, axis=1, keepdims=True) for n in normals]
-    units = [n / np.where(s > 0, s, 1.0) for n, s in zip(normals, sizes, strict=True)]
-    angle = sum(np.arcsin(np.clip(np.sum(units[k] * units[(k + 1) % 4], axis=1), -1.0, 1.0)) for k in range(4))
-    sign = np.sign(np.sum(np.cross(b[j] - a[j], b[i] - a[i]) * r13, axis=1))
-    return float(np.sum(sign * angle) / (2 * np.pi))
+TO = 1e-5
+"""Change with which the writhe is accepted."""
 
 
 def twist(s: np.ndarray, q: np.ndarray) -> float:
@@ -46,7 +32,7 @@ def twist(s: np.ndarray, q: np.ndarray) -> float:
     return float(trapezoid(k3, fine)) / (2 * np.pi)
 
 
-def link(sample: dict[str, Any], points: int = 400) -> tuple[int, float, float]:
+def link(sample: dict[str, Any]) -> tuple[int, float, float]:
     """Linking number, twist and writhe of a state of a closed rod, given by :meth:`~rodfem.fem.shape.Shape.sample`.
 
     Raises :class:`InputError` where the sum of the last two is not near an integer: the rod is not closed, or touches
@@ -54,11 +40,10 @@ def link(sample: dict[str, Any], points: int = 400) -> tuple[int, float, float]:
     """
     from scipy.interpolate import CubicSpline
 
-    s, r = np.asarray(sample["s"]), np.asarray(sample["r"])
-    fine = np.linspace(s[0], s[-1], points + 1)[:-1]
-    closed = r.copy()
+    s, closed = np.asarray(sample["s"]), np.array(sample["r"])
     closed[-1] = closed[0]
-    Tw, Wr = twist(s, np.asarray(sample["q"])), writhe(CubicSpline(s, closed, bc_type="periodic")(fine))
+    Wr = writhe(CubicSpline(s, closed, bc_type="periodic"), (s[0], s[-1]), to=TO)
+    Tw = twist(s, np.asarray(sample["q"]))
     Lk = round(Tw + Wr)
     if abs(Tw + Wr - Lk) > 0.05:
         raise InputError(f"Twist {Tw:.4f} plus writhe {Wr:.4f} is no integer: close the rod, without contact.")

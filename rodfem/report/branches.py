@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from rodfem.continuation.kinds import KINDS
 from rodfem.modes.modes import RIGID
@@ -18,7 +19,7 @@ from rodfem.report.packing import plain
 from rodfem.report.readings import readings_of
 from rodfem.report.shapes import Shapes
 from rodfem.report.words import words_of
-from rodfem.report.writhe import writhe
+from rodfem.writhe import writhe
 
 UNLISTED = ("load", "negative", "zero", "mesh", "unstable", "negative_in_space", "drift", "error")
 """Columns that are no ordinates: the abscissa, counts, and residuals."""
@@ -27,7 +28,7 @@ VANISHED = 1e-9
 SHORTENING, WRITHE = "end shortening", "writhe"
 DERIVED = {
     SHORTENING: "end shortening: length − distance of the ends",
-    WRITHE: "writhe: Gauss integral of the centreline",
+    WRITHE: "writhe: Gauss integral of the centreline, to about 1e-4",
 }
 """Ordinates that follow from the shapes, in words."""
 
@@ -112,10 +113,9 @@ def _numbers(column: Iterable[Any]) -> bool:
 def _derived(shapes: Shapes) -> dict[str, list[float | None]]:
     length = shapes.s[-1] - shapes.s[0]
     ends = np.linalg.norm(shapes.r[:, -1] - shapes.r[:, 0], axis=1)
-    coarse = max(1, len(shapes.s) // 60)
     return {
         SHORTENING: plain(length - ends),
-        WRITHE: plain(np.array([writhe(r[::coarse]) for r in shapes.r])),
+        WRITHE: plain(np.array([writhe(CubicSpline(shapes.s, r), (shapes.s[0], shapes.s[-1])) for r in shapes.r])),
     }
 
 

@@ -13,7 +13,7 @@ from hemitropic_cases import scene as hemitropic
 from forms.energy import bending_and_twist
 from rodfem.diagram.solver import Solver
 from rodfem.fem.fields import Discretization
-from rodfem.fem.link import link, writhe
+from rodfem.fem.link import link
 from rodfem.fem.newton import relax
 from rodfem.fem.system import FEW, System
 from rodfem.problem.ends import Constants, End, Ring, clamped, free, pinned
@@ -126,21 +126,6 @@ def test_first_equilibrium_far_from_the_start() -> None:
     x, outcome = solver.first(20.0)
     assert outcome.converged
     assert solver.energy(x) > 5
-
-
-@pytest.mark.alone
-def test_writhe_of_a_trefoil() -> None:
-    """Of the symmetric trefoil, by the double Gauss integral."""
-    t = np.linspace(0, 2 * np.pi, 1501)[:-1]
-    curve = np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], axis=1)
-    d = np.stack([np.cos(t) + 4 * np.cos(2 * t), -np.sin(t) + 4 * np.sin(2 * t), -3 * np.cos(3 * t)], axis=1)
-    total = 0.0
-    for i in range(0, len(t), 10):
-        apart = np.delete(np.arange(len(t)), i)
-        r = curve[i] - curve[apart]
-        total += 10 * np.sum(np.cross(d[i], d[apart]) * r / np.linalg.norm(r, axis=1, keepdims=True) ** 3)
-    gauss = total * (t[1] - t[0]) ** 2 / (4 * np.pi)
-    assert writhe(curve[::3]) == pytest.approx(gauss, abs=2e-3)
 
 
 @pytest.mark.alone

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import base64
 import json
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID
@@ -24,7 +26,7 @@ from rodfem.report.packing import packed, plain, script_json
 from rodfem.report.readings import eigenvalue_in_words, readings_of
 from rodfem.report.shapes import shapes_of, stations
 from rodfem.report.words import words_of
-from rodfem.report.writhe import writhe
+from rodfem.writhe import writhe
 
 pytestmark = pytest.mark.alone
 
@@ -149,14 +151,31 @@ def trefoil(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(curve).T, np.array(tangent).T
 
 
-def test_writhe() -> None:
+def test_writhe_of_a_knot() -> None:
     exact = gauss_integral(*trefoil(np.linspace(0, 2 * np.pi, 1200, endpoint=False)))
-    knot = trefoil(np.linspace(0, 2 * np.pi, 401))[0]
-    assert abs(exact) > 3 and writhe(knot) == pytest.approx(exact, abs=5e-3)
-    assert writhe(knot * (1, 1, -1)) == pytest.approx(-writhe(knot)) and writhe(knot[::-1]) == pytest.approx(
-        writhe(knot)
-    )
-    assert writhe(knot * (1, 1, 0)) == pytest.approx(0.0, abs=1e-9)
+    round_ = (0.0, 2 * np.pi)
+
+    def mirrored(t: np.ndarray) -> np.ndarray:
+        return trefoil(t)[0] * (1, 1, -1)
+
+    assert abs(exact) > 3 and writhe(lambda t: trefoil(t)[0], round_) == pytest.approx(exact, abs=1e-4)
+    assert writhe(mirrored, round_) == pytest.approx(-exact, abs=1e-4)
+    assert writhe(lambda t: trefoil(-t)[0], round_) == pytest.approx(exact, abs=1e-4)
+    assert writhe(lambda t: trefoil(t)[0] * (1, 1, 0), round_) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("turns", [2.5, 27.25])
+def test_writhe_of_an_open_helix(turns: float) -> None:
+    """Of radius one and rise b a radian: ``(2 pi)^-1 int (T - x) f(x) dx``, as all pairs x apart are alike."""
+    b, T = 0.3, 2 * np.pi * turns
+
+    def density(x: float) -> float:
+        return b * (2 - 2 * np.cos(x) - x * np.sin(x)) / (2 - 2 * np.cos(x) + b**2 * x**2) ** 1.5
+
+    pieces = np.linspace(0.0, T, int(8 * turns) + 1)
+    exact = sum(quad(lambda x: (T - x) * density(x), low, high, epsabs=1e-12)[0] for low, high in pairwise(pieces))
+    found = writhe(lambda t: np.array([np.cos(t), np.sin(t), b * t]).T, (0.0, T))
+    assert found == pytest.approx(exact / (2 * np.pi), rel=1e-4)
 
 
 def group_of(**arrays: np.ndarray) -> Any:
