@@ -162,6 +162,11 @@ class Assessor(Workspace):
             try:
                 with as_failure(self.system.comm):
                     found = self._method(name if number else COUNT).leftmost(x, number, interval)
+                if interval is None and len(found.values) < number and name != COUNT:
+                    raise ConvergenceError(
+                        f"The method {name} found {len(found.values)} of {number} eigenvalues: ask for fewer of them, "
+                        "or choose another method."
+                    )
             except ConvergenceError:
                 few = self.system.fields.unknowns < SMALL * number  # there may be no more than were found
                 if few and not find(DENSE).refusal(self.system):
