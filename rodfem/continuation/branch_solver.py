@@ -91,8 +91,14 @@ class BranchSolver(StaticSolver):
         self.corrector.restart()
 
     def is_stable(self, x: PETSc.Vec) -> bool:
-        """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero."""
-        return decide(self.inertia.at(x)).index.negative == 0
+        """Whether the index of an equilibrium, the last one that a phase condition was taken at, is zero.
+
+        A search asks that of states that may be far from all others: their round-off is that of no other.
+        """
+        try:
+            return decide(self.inertia.at(x)).index.negative == 0
+        finally:
+            self.inertia.forget_band()
 
     def off(self, x: PETSc.Vec, start: PETSc.Vec) -> tuple[PETSc.Vec, float]:
         """State beside the saddle ``x``, along its most unstable mode on the side of ``start``.

@@ -4,14 +4,53 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
 from rodfem.continuation.observer import Observer
 from rodfem.fem.newton import TOLERANCE
+from rodfem.stability.frequencies import REAL, Frequencies
+from rodfem.stability.nonsymmetric import NonsymmetricPencil
 from rodfem.stability.round_off import resolve
 
 ROWS = 4
 """Rows one after the other that have as many zero eigenvalues, before these are said to stay."""
+CHAINED = 1e-6
+"""Drift scalar of a unit vector, over the lowest bending eigenvalue, from which on it is one of a Jordan block."""
+
+
+def family_of(pencil: NonsymmetricPencil, found: Frequencies, least: int) -> str:
+    """In words the frequencies of a sweep that stay zero without a symmetry; empty where there are none.
+
+    Frequencies and critical loads are those of one state of a family then: a rod may turn about its axis, between
+    springs that are not alike all around it.  Zero eigenvalues of a symmetry's Jordan block are none of these: ``S v =
+    -d M g`` with its generator ``g``, and a drift scalar ``d`` that is not zero.  Of a rod that floats, which has many
+    of both, nothing is said.
+
+    Parameters
+    ----------
+    pencil, found
+        Pencil of a state, and the eigenvalues ``found`` of it.
+    least
+        Least number of eigenvalues that are zero at any load of the sweep, those of symmetries left out.
+    """
+    system, moving = pencil.system, list[str]()
+    if found.floating:
+        return ""
+    for i in np.flatnonzero(abs(found.values) < REAL * found.one).tolist():
+        mode = system.new_vector()
+        mode.array[:] = found.vectors[:, i].real
+        if system.drift(mode) <= CHAINED * system.stiffness_scale * system.norm(mode):
+            moving.append(pencil.motion(found.vectors[:, [i]].real))
+    number = min(len(moving), least)
+    if number == 0:
+        return ""
+    names = ", ".join(dict.fromkeys(moving))
+    return (
+        f"{number} frequency(ies) stay zero that no symmetry of the scene explains ({names}): the rod may turn or move "
+        "freely, and frequencies and critical loads are those of the state that its start leads to; others differ."
+    )
 
 
 class PersistentZeros:

@@ -26,6 +26,7 @@ from rodfem.diagram.first_state import first_state
 from rodfem.diagram.frequency_rows import FREQUENCIES, NONE, FrequencyRows, Row, leftmost
 from rodfem.diagram.held import at_load, require_held
 from rodfem.diagram.kinks import Kinks
+from rodfem.diagram.persistent_zeros import family_of
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep_errors import SweepErrors
 from rodfem.diagram.unfollowed import Unfollowed
@@ -63,6 +64,7 @@ class Sweep:
         self.unfollowed = Unfollowed(self.eigensolver, observer)
         self.invariants = Invariants(solver)
         self.last: Row | None = None
+        self._still = self.number  # frequencies that are zero at all loads
         self.latest: list[Point] = []
         self.branches: list[Branch] = []
         self._load = solver.system.scene.load
@@ -93,6 +95,8 @@ class Sweep:
             self._error_bars(branch)
             kinks.error_bars(branch)
         self.observer.finished(branch)
+        with without("Whether frequencies stay zero was not examined", comm, warn):
+            self._family(last)
         with without("The asymmetry of the tangent matrix was not measured", comm, warn):
             self._asymmetry(last)
         self.finished()
@@ -171,6 +175,13 @@ class Sweep:
                 self._special(branch, self.solver.given(USER, point))
             self.observer.progress(branch, point)
 
+    def _family(self, last: Point) -> None:
+        """Say where frequencies are zero at all loads, without a symmetry, to which the ``last`` one belongs, too."""
+        if self._still:
+            pencil = self.eigensolver.at(last.x)
+            if words := family_of(pencil, leftmost(pencil, self.number), self._still):
+                self.observer.warn(words)
+
     def _asymmetry(self, last: Point) -> None:
         """Say what the load does to the tangent matrix at the last point."""
         rank, size = self.eigensolver.at(last.x).asymmetry()
@@ -216,7 +227,9 @@ class Sweep:
         """Record the frequencies ``found`` at a point; a special point is not ``on_the_way`` of the curves."""
         values = found.values
         point.negative = found.unstable(found.noise)
-        point.zero += int((abs(values) < REAL * self.units.omega2).sum())
+        still = int((abs(values) < REAL * self.units.omega2).sum())
+        point.zero += still
+        self._still = min(self._still, still)
         point.omega2 = [[float(v.real), float(v.imag)] for v in values[: self.number]]
         point.motion = list(found.kinds[: self.number])
         point.curve = self.curves.numbers(found, keep=on_the_way)[: self.number]

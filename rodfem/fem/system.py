@@ -225,12 +225,12 @@ class System:
             self._recent = [(values, state), *self._recent[: self._kept - 1]]
         return state
 
-    def tidy(self) -> None:
-        """Destroy the vectors that Python has collected, if they are long; collective.
+    def tidy(self, vectors: int = 1) -> None:
+        """Destroy the vectors that Python has collected, if they are long, or so many at a time; collective.
 
         A hundred of them, as one location of a special point leaves, are as much memory as all matrices.
         """
-        if self.fields.unknowns > FEW:
+        if vectors * self.fields.unknowns > FEW:
             compat.destroy_garbage(self.comm)
 
     def change(self, d: PETSc.Vec) -> NodalValues:

@@ -185,6 +185,10 @@ class Inertia:
             self.resolution = 10 * EPS * system.matrix_in_units(self.matrix).norm(PETSc.NormType.INFINITY) / smallest
             self.tolerance = max(self.tolerance, self.resolution)
 
+    def forget_band(self) -> None:
+        """Settle the band of round-off at the next state."""
+        self.resolution, self.tolerance = 0.0, ZERO_BAND * self.scale
+
     def modes_near_zero(self, x: PETSc.Vec, number: int, accuracy: float = NULL) -> list[PETSc.Vec]:
         """Vectors of the ``number`` eigenvalues nearest zero at ``x``: see :meth:`Factored.nearest`."""
         found = self.at(x)
@@ -307,7 +311,7 @@ class Factored:
             v.axpy(FRESH, own.seed(i))  # the old vectors may span an invariant space that misses the nearest one
         with own.system.clock("stability"):
             for iteration in range(most):
-                own.system.tidy()
+                own.system.tidy(block)
                 if iteration and iteration % EXPANDED == 0:
                     vectors = self._in_krylov_space(vectors)
                 solved = self._inverse(vectors)

@@ -25,6 +25,8 @@ from rodfem.stability.inertia import NULL, ZERO_BAND, Factored, Index
 
 MANY = 100
 """Most eigenvalues in the band that are decided one by one."""
+WILD = 1e6
+"""Half width of the band, over the lowest bending eigenvalue, above which nothing is decided."""
 WIDE = 0.1
 """Half width of the band, over the lowest bending eigenvalue, above which its edge is far from zero."""
 DECIDED = 1e-3
@@ -66,6 +68,11 @@ def decide(found: Factored) -> Decision:
     least = ZERO_BAND * inertia.scale
     if inside == 0 or inertia.resolution <= least:
         return Decision(index, inertia.tolerance, np.zeros(0), np.zeros(0))
+    if inertia.resolution > WILD * inertia.scale:
+        raise ConvergenceError(
+            f"Eigenvalues up to {inertia.resolution:.2g} are within round-off of the count, {inertia.scale:.2g} is the "
+            "lowest of bending: the state, or a stiffness, is out of all proportion to it."
+        )
     if inside > MANY:
         raise ConvergenceError(
             f"{inside} eigenvalues are within round-off of the count, {inertia.resolution:.2g} in the metric: the mesh "
