@@ -1,18 +1,21 @@
 """Unstable eigenvalues of a sweep that are not among those that it follows: looked for from time to time, and said.
 
-Of a mesh with many rows only the last row of the sweep is looked at; of one with very many none is, which is said.
+Of a mesh with many rows fewer rows of the sweep are looked at, among them the last one that is stable; of one with very
+many none is, which is said.
 """
 
 from __future__ import annotations
 
 from rodfem.continuation.branch import Point
 from rodfem.continuation.observer import Observer
-from rodfem.stability.census import MANY, census
+from rodfem.stability.census import MANY, Census, census
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.stability.outside import LARGEST
 
 OFTEN = 5
 """Rows from one look at all eigenvalues of the mesh to the next."""
+RARELY = 25
+"""The same of a mesh with many rows, where a look takes up to a second."""
 
 
 class Unfollowed:
@@ -22,20 +25,35 @@ class Unfollowed:
         """Look with the matrices of the ``eigensolver``; the ``observer`` is warned, once."""
         self.eigensolver, self.observer = eigensolver, observer
         self._rows, self._said = 0, False
+        self._stable: Point | None = None
 
     def look(self, point: Point, *, last: bool) -> None:
-        """Look at the ``point`` of the next row, if it is the ``last`` or its turn."""
+        """Look at the ``point`` of the next row, if it is the ``last`` or its turn, or at the last that was stable."""
         self._rows += 1
-        if self._said or point.negative or not (last or self._rows % OFTEN == 1):
+        if self._said:
             return
-        found = census(self.eigensolver.at(point.x), MANY if last else LARGEST)
-        if found is None and last:
+        if point.negative:
+            if self._stable is not None:
+                self._examine(self._stable, MANY)
+                self._stable = None
+            return
+        rarely, often = (last or self._rows % every == 1 for every in (RARELY, OFTEN))
+        looked = often and self._examine(point, MANY if rarely else LARGEST, said=last)
+        self._stable = None if looked else point
+
+    def _examine(self, point: Point, largest: int, *, said: bool = True) -> bool:
+        """Look at a point of a mesh with up to so many rows; False for one with more, which is ``said`` or not."""
+        found = census(self.eigensolver.at(point.x), largest)
+        if found is None and said:
             self.observer.note(
                 f"  the mesh has too many unknowns to look at all its eigenvalues at {point.load:.6g}: that the rod is "
                 "stable there is said of those nearest zero"
             )
-        if found is None or not len(found.unstable):
-            return
+        if found is not None and len(found.unstable):
+            self._warn(point, found)
+        return found is not None
+
+    def _warn(self, point: Point, found: Census) -> None:
         self._said = True
         value, number = found.unstable[-1], int(found.nearer[-1]) + 1
         self.observer.warn(

@@ -19,6 +19,8 @@ import numpy as np
 from dolfinx import fem
 from ffcx.codegeneration import jit
 from mpi4py import MPI
+from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from rodfem import code_cache, compat
 from rodfem.beside import Job
@@ -202,8 +204,10 @@ def expression(form: Any, points: np.ndarray, mesh: Any, cells: int) -> Callable
     ``form`` is the vector, on cells of ``mesh``, of which the first ``cells`` are evaluated.  Raises as
     :func:`compile_forms` does.
     """
+    # dolfinx packs the constants of what it is given; FFCx numbers those that differentiation leaves
+    derived = apply_derivatives(apply_algebra_lowering(form))
     with _from_cache(mesh.comm), compat.quiet():
-        compiled = fem.Expression(form, points, dtype=compat.REAL)
+        compiled = fem.Expression(derived, points, dtype=compat.REAL)
     chosen = np.arange(cells, dtype=np.int32)
     takes_mesh = "mesh" in inspect.signature(compiled.eval).parameters
     takes_entities = "entities" in inspect.signature(compiled.eval).parameters

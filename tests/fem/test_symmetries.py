@@ -17,7 +17,7 @@ from rodfem.fem.link import link
 from rodfem.fem.newton import relax
 from rodfem.fem.system import FEW, System
 from rodfem.problem.ends import Constants, End, Ring, clamped, free, pinned
-from rodfem.problem.scene import Ordinate, Parameter, Scene
+from rodfem.problem.scene import Inertia, Ordinate, Parameter, Scene
 
 MIDDLE = Ordinate("displacement of the middle", s=0.5, of=lambda r, q: hypot(r[0], r[1]))
 
@@ -139,3 +139,16 @@ def test_link_of_a_twisted_circle(turns: int) -> None:
     number, Tw, Wr = link({"s": s, "q": q, "r": r})
     assert number == turns
     assert (Tw, Wr) == pytest.approx((turns, 0.0), abs=1e-4)
+
+
+@pytest.mark.parametrize(("second", "number"), [(1.2, 0), (1.01, 0), (1.0, 1)])
+@pytest.mark.parametrize("twisting", [1.0, 1e7])
+def test_bending_alike_is_told_beside_a_stiff_twist(second: float, number: int, twisting: float) -> None:
+    """Beside 1e7 a difference of 0.2 was round-off: a bending mode, and the flutter load, were lost to a symmetry."""
+    rod = Scene(
+        "stiff", (0.0, 1.0), "unshearable and inextensible",
+        lambda v, k, c: bending_and_twist(k, (1.0, second, twisting)), {"M": Parameter(0.0)}, "M",
+        (clamped(), free(follower_moment=lambda c: (0.0, 0.0, c.M))), MIDDLE, (0.0, 1.0),
+        inertia=Inertia(lambda c: 1.0),
+    )  # fmt: skip
+    assert len(System(rod, Discretization("pointwise", 4, 6)).symmetries) == number
