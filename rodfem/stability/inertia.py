@@ -186,8 +186,9 @@ class Inertia:
             self.tolerance = max(self.tolerance, self.resolution)
 
     def forget_band(self) -> None:
-        """Settle the band of round-off at the next state."""
+        """Settle the band of round-off, and that of symmetries, at the next state."""
         self.resolution, self.tolerance = 0.0, ZERO_BAND * self.scale
+        self.system.verification.norm = 0.0
 
     def modes_near_zero(self, x: PETSc.Vec, number: int, accuracy: float = NULL) -> list[PETSc.Vec]:
         """Vectors of the ``number`` eigenvalues nearest zero at ``x``: see :meth:`Factored.nearest`."""

@@ -32,3 +32,4 @@ def test_the_band_of_a_far_state_is_not_kept() -> None:
         solver.is_stable(far)
     assert solver.is_stable(x)
     assert decide(solver.inertia.at(x)).band < 1e-3
+    assert system.verification.norm < 1e6
