@@ -59,8 +59,9 @@ class Plan:
         Number of left-most modes of these states.
     accuracy
         Meshes are chosen and raised on the way such that load and ordinate of every row and special point are in error
-        by less than this (relative to values greater than one).  Of a discretisation that is given the formulation, the
-        factors and the vertices are taken, which are the first mesh; elements and degree alone are not.
+        by less than this (relative to values greater than one), those of a row across the branch.  Of a discretisation
+        that is given the formulation, the factors and the vertices are taken, which are the first mesh; elements and
+        degree alone are not.
     events
         Numbers of the state whose zeros are special points, too (conservative scenes).
     most_branches
