@@ -91,10 +91,11 @@ class Locus:
     omega2
         The double eigenvalue of flutter, (n,), nan for others.
     located_to
-        How far the parameters are uncertain for the given discretisation, (n, 2).
+        How far the parameters are uncertain for the given discretisation, (n, 2): of turning points, cusps and ends
+        also along the curve.
     error
         How far, measured across the curve, that of a discretisation one degree richer is away in either parameter, (n,
-        2); nan where it was not asked for, inf where the richer one does not find the point.
+        2); of turning points, cusps and ends the distance to those of the other curve, so also along it; nan where it was not asked for, inf where the richer one does not find the point.
     marks
         Rows at which the curve turns in a parameter, cusps, and rows (away from the start) before which another
         eigenvalue has passed through zero, not located.
