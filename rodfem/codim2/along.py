@@ -28,8 +28,8 @@ WINDOWS, WIDE = tuple(0.016 / 4**i for i in range(5)), tuple(0.064 / 2**i for i 
 """Half widths of windows, as arclengths, from wide to narrow: the second ones for ends of folds, singular there."""
 POINTS = 8
 """Points of a window: an even number, none of them in the middle, where the end of a fold is singular."""
-LAST = 2
-"""Coefficients of a polynomial by which it is known how wrong the others are."""
+LAST, TIMES = 2, 3.0
+"""Coefficients of a polynomial by which it is known how wrong the others are, and to which factor: they are few."""
 INSIDE = 0.5
 """Part of the window, about its middle, in which what is sought must be."""
 COARSE = 1e-5
@@ -74,10 +74,10 @@ class Place:
 def place(
     criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sought, windows: tuple[float, ...] = WINDOWS
 ) -> Place:
-    """Where ``sought`` is on the curve through ``node``, close to it: the best that ``windows``, wide to narrow, give.
+    """Where ``sought`` is on the curve of a ``criterion`` through ``node``, close to it: the best of ``windows``.
 
-    Windows that cannot be filled, or that leave the bounds of the ``plane``, are passed over.  Raises
-    :class:`ConvergenceError` where fewer than two can.
+    These are half widths, as arclengths, from wide to narrow.  Windows that cannot be filled, or that leave the bounds
+    of the ``plane``, are passed over.  Raises :class:`ConvergenceError` where fewer than two can.
     """
     best: Place | None = None
     other: Place | None = None
@@ -92,7 +92,7 @@ def place(
     if best is None or other is None:
         raise ConvergenceError("no two windows about the point hold the curve")
     both = (max(best.half, other.half), min(best.half, other.half))
-    return replace(best, ds=best.ds + abs(best.s - other.s), apart=abs(best.p - other.p), windows=both)
+    return replace(best, ds=TIMES * best.ds + abs(best.s - other.s), apart=abs(best.p - other.p), windows=both)
 
 
 def _in_window(criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sought, half: float) -> Place:
@@ -119,7 +119,11 @@ def _in_window(criterion: Criterion, plane: Plane, node: LocusPoint, sought: Sou
 
 
 def shifted(criterion: Criterion, plane: Plane, node: LocusPoint, s: float) -> LocusPoint:
-    """Point of the curve at arclength ``s`` along the tangent of ``node``; raises :class:`ConvergenceError`."""
+    """Point of the curve at arclength ``s`` along the tangent of ``node``.
+
+    It is that of a ``criterion`` in the ``plane``.  Raises :class:`ConvergenceError` where there is none, or out of the
+    bounds.
+    """
     return criterion.correct(*_ahead(plane, node, s), (node.dp, node.dx), node)
 
 

@@ -78,7 +78,10 @@ class Collision:
         )
 
     def onto(self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
-        """The same point with its parameters, state and double eigenvalue alone: no tangent, modes or counts."""
+        """The same point with its parameters, state and double eigenvalue alone: no tangent, modes or counts.
+
+        ``p`` (2,), ``x``, ``tangent``, ``near`` and ``reach`` are those of :meth:`correct`, and so is what is raised.
+        """
         return self._onto(p, x, tangent, near, reach)[0]
 
     def _onto(

@@ -95,7 +95,8 @@ class Locus:
         also along the curve.
     error
         How far, measured across the curve, that of a discretisation one degree richer is away in either parameter, (n,
-        2); of turning points, cusps and ends the distance to those of the other curve, so also along it; nan where it was not asked for, inf where the richer one does not find the point.
+        2); of turning points, cusps and ends how far those of that curve are, so also along it.  It is nan where it was
+        not asked for, inf where the richer one does not find the point.
     marks
         Rows at which the curve turns in a parameter, cusps, and rows (away from the start) before which another
         eigenvalue has passed through zero, not located.

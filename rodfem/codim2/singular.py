@@ -147,7 +147,10 @@ class Singular:
         return self._node(p, x, tangent, last)
 
     def onto(self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
-        """The same point with its parameters and state alone: no tangent, null vectors or counts."""
+        """The same point with its parameters and state alone: no tangent, null vectors or counts.
+
+        ``p`` (2,), ``x``, ``tangent``, ``near`` and ``reach`` are those of :meth:`correct`, and so is what is raised.
+        """
         p, x, last = self._newton(p, x, tangent, near, reach)
         return LocusPoint(p, x, tangent[0], tangent[1] or self.system.new_vector(), self._located(p, last))
 
