@@ -272,6 +272,36 @@ FAULTS = {
     "the-sign-of-round-off-along-a-locus": Fault(
         "rodfem/codim2/singular.py", "if sharp and others > 0:", "if False:", "tests/codim2/test_locus.py"
     ),
+    "turning-points-by-differences": Fault(
+        "rodfem/codim2/curve.py",
+        "found += [(self._placed(n, sought), kind)",
+        "found += [(n, kind)",
+        "tests/codim2/test_places.py",
+    ),
+    "bars-across-loci-only": Fault(
+        "rodfem/codim2/curve.py",
+        "located = better.located_to + found.dp",
+        "located = better.located_to",
+        "tests/codim2/test_places.py",
+    ),
+    "places-of-one-mesh": Fault(
+        "rodfem/codim2/locus.py",
+        "there = place(criterion, other, near, node.sought, node.windows).p",
+        "there = node.p",
+        "tests/codim2/test_places.py",
+    ),
+    "ends-of-folds-corrected": Fault(
+        "rodfem/codim2/curve.py", "end = found.interpolated(node)", "end = replace(node)", "tests/codim2/test_places.py"
+    ),
+    "double-zeros-by-their-sign": Fault(
+        "rodfem/codim2/curve.py",
+        "as_beside(self._placed(n, DOUBLE_ZERO), a)",
+        "self._placed(n, DOUBLE_ZERO)",
+        "tests/codim2/test_places.py",
+    ),
+    "ends-of-folds-counted": Fault(
+        "rodfem/codim2/curve.py", ", dx=dx / size, rest=a.rest)", ", dx=dx / size)", "tests/codim2/test_locus.py"
+    ),
     "quaternions-of-one-sign": Fault(
         "rodfem/deflation/group_orbit.py",
         "for each in (y, *same_rotations(self.system, y)):",

@@ -53,14 +53,9 @@ class Collision:
         ``near`` is a point of the curve whose double eigenvalue and invariant subspace (``modes``) are close by.  ``p``
         (2,) and the state ``x`` are the prediction; ``reach`` bounds how far ``x`` may move, in the metric.
         """
-        width, forward = self.plane.width, tangent[0] / self.plane.width
-        forward = forward / np.linalg.norm(forward)
-        across = np.array([-forward[1], forward[0]])
-        system = self.solver.system
-        system.line = self.plane.line(p, across * width)
-        basis = np.stack([v.array_r.real for v in near.modes], axis=1)
-        t, last, here, x = self._collide(x, Cluster(basis, near.omega2), reach)
-        p, omega2 = p + t * across * width, here.cluster.mean
+        node, here = self._onto(p, x, tangent, near, reach)
+        width, system, p, x, omega2 = self.plane.width, self.solver.system, node.p, node.x, node.omega2
+        basis, forward = _basis(near), tangent[0] / width
         gradient, clearest = np.zeros(2), here
         for which in (0, 1):
             system.line = self.plane.line(p, (np.arange(2) == which) * width)
@@ -73,12 +68,37 @@ class Collision:
         dq = dq if dq @ forward >= 0 else -dq
         system.line = self.plane.along(p, 0)
         system.set_load(x, float(p[0]))
+        rest = beside_cluster(self.eigensolver.at(x), clearest.cluster.basis)
+        return replace(
+            node,
+            dp=dq * width,
+            modes=as_vectors(system, clearest.cluster.basis),
+            rest=rest + (here.cluster.size if omega2 < 0 else 0),
+            lower=int(np.sign(gradient[0])),
+        )
+
+    def onto(self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
+        """The same point with its parameters, state and double eigenvalue alone: no tangent, modes or counts.
+
+        ``p`` (2,), ``x``, ``tangent``, ``near`` and ``reach`` are those of :meth:`correct`, and so is what is raised.
+        """
+        return self._onto(p, x, tangent, near, reach)[0]
+
+    def _onto(
+        self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float
+    ) -> tuple[LocusPoint, Measured]:
+        """Point of the curve on the line, and the cluster there; the tangent is the one that was given."""
+        width, system, forward = self.plane.width, self.solver.system, tangent[0] / self.plane.width
+        forward = forward / np.linalg.norm(forward)
+        across = np.array([-forward[1], forward[0]])
+        system.line = self.plane.line(p, across * width)
+        t, last, here, x = self._collide(x, Cluster(_basis(near), near.omega2), reach)
+        p = p + t * across * width
+        system.line = self.plane.along(p, 0)
+        system.set_load(x, float(p[0]))
         located = np.maximum(last * abs(across) * width, ROUND_OFF * np.maximum(self.plane.sizes, abs(p)))
-        ordinate = self.solver.shape.ordinate(x)
-        still, modes = system.new_vector(), as_vectors(system, clearest.cluster.basis)
-        rest, lower = beside_cluster(self.eigensolver.at(x), clearest.cluster.basis), int(np.sign(gradient[0]))
-        node = LocusPoint(p, x, dq * width, still, located, ordinate=ordinate, omega2=omega2, modes=modes)
-        return replace(node, rest=rest + (here.cluster.size if omega2 < 0 else 0), lower=lower)
+        ordinate, still = self.solver.shape.ordinate(x), system.new_vector()
+        return LocusPoint(p, x, forward * width, still, located, ordinate=ordinate, omega2=here.cluster.mean), here
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> tuple[float, float, Measured, PETSc.Vec]:
         """Zero of ``D`` on the system's line of parameters, by secants: t, its last change, the cluster, state.
@@ -108,3 +128,8 @@ class Collision:
         if not outcome.converged:
             raise ConvergenceError("no equilibrium is found there")
         return measure(self.eigensolver.at(x), cluster), x
+
+
+def _basis(near: LocusPoint) -> np.ndarray:
+    """Basis (n, size) of the invariant subspace at a point, this rank's n unknowns."""
+    return np.stack([v.array_r.real for v in near.modes], axis=1)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.codim2.parameter_plane import LocusPoint, Plane, Tangent, between, predict
+from rodfem.codim2.along import COARSE, WIDE, place, shifted
+from rodfem.codim2.criterion import Criterion
+from rodfem.codim2.parameter_plane import LocusPoint, Plane, Sought, between, predict
 from rodfem.codim2.singular import Destroyed
 from rodfem.continuation.convexity_between import lost_between
 from rodfem.continuation.step_control import StepControl
@@ -18,7 +19,7 @@ from rodfem.fem.convexity import Convexity
 from rodfem.roots import zero_between
 
 LOCATED = 1e-8
-"""Arclength to which turning points and cusps are located: their parameters are so to its square."""
+"""Arclength to which turning points, cusps and ends are located by their tests, before they are placed."""
 AHEAD = 1e-9
 """Arclength after which a curve that begins on a bound shows whether it leaves the plane."""
 REACH = 1e-6
@@ -27,29 +28,10 @@ BESIDE = 1e-3
 """Share of the plane's width by which the last point may miss the two nodes that it is between."""
 CERTAIN = 10.0
 """Uncertainties of a parameter by which it changes towards a turning point: less is the round-off of a constant."""
+DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
+"""The end of a curve of flutter: its double eigenvalue vanishes."""
 CLOSED = 1e-9
 """Difference of ordinates that a closed curve may end with, where they do not change along it: absolute."""
-
-
-class Criterion(Protocol):
-    """Defining equations of a locus: a corrector onto it.
-
-    ``others`` says of a row that the number of unstable eigenvalues but for those of the locus has changed.
-    """
-
-    others: str
-
-    def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
-        """Size of a step."""
-
-    def correct(
-        self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0
-    ) -> LocusPoint:
-        """Point of the locus on the plane through ``(p, x)`` across ``tangent``.
-
-        ``near`` is a point of the locus whose null vectors, or invariant subspace, are close by.  ``reach`` bounds how
-        far ``x`` may move, in the metric.
-        """
 
 
 @dataclass
@@ -176,16 +158,23 @@ class Tracer:
         """Insert what lies between two nodes; a reason if the curve ends there."""
         names = self.plane.names
         if a.coupling @ b.coupling < 0:
-            return self._last(half, a, b, lambda n: float(n.coupling @ a.coupling), "the fold ends on a branch point")
+            sentence = "the fold ends on a branch point"
+            coupling, end = lambda n: float(n.coupling @ a.coupling), lambda n: self._end_of_fold(n, a, b)
+            return self._last(half, a, b, coupling, sentence, end)
         if a.omega2 * b.omega2 < 0:
-            return self._last(half, a, b, lambda n: n.omega2, "the double eigenvalue vanishes: divergence")
+            sentence = "the double eigenvalue vanishes: divergence"
+            return self._last(
+                half, a, b, lambda n: n.omega2, sentence, lambda n: as_beside(self._placed(n, DOUBLE_ZERO), a)
+            )
         found: list[tuple[LocusPoint, str]] = []
         if a.curvature * b.curvature < 0:
-            found = self._located(a, b, lambda n: n.curvature, "cusp")
+            cusps = self._located(a, b, lambda n: n.curvature, "cusp")
+            found = [(self._placed(n, self._reversal(a, b)), kind) for n, kind in cusps]
         else:
             for i in np.flatnonzero(a.dp * b.dp < 0):
                 turn = self._located(a, b, lambda n, i=i: float(n.dp[i]), f"turns in {names[i]}")  # type: ignore[misc]
-                found += [(n, kind) for n, kind in turn if _moves(n, a, b, i)]
+                sought = Sought(lambda n, i=i: float(n.p[i]), stationary=True)  # type: ignore[misc]
+                found += [(self._placed(n, sought), kind) for n, kind in turn if _moves(n, a, b, i)]
         for node, kind in sorted(found, key=lambda item: item[0].s):
             half.marks[len(half.nodes)] = kind
             half.nodes.append(node)
@@ -210,6 +199,40 @@ class Tracer:
         node.s = s
         return [(node, kind)]
 
+    def _placed(self, node: LocusPoint, sought: Sought) -> LocusPoint:
+        """The point near ``node`` that is ``sought``, with uncertainties of its place along the curve, too."""
+        try:
+            found = place(self.criterion, self.plane, node, sought)
+            better = shifted(self.criterion, self.plane, node, found.s)
+        except ConvergenceError:
+            return replace(
+                node, located_to=node.located_to + COARSE * np.maximum(abs(node.dp), COARSE * self.plane.width)
+            )
+        located = better.located_to + found.dp
+        return replace(better, s=node.s + found.s, located_to=located, sought=sought, windows=found.windows)
+
+    def _end_of_fold(self, node: LocusPoint, a: LocusPoint, b: LocusPoint) -> LocusPoint:
+        """The end near ``node`` of a fold on a branch point, by interpolation between its two sides.
+
+        No point can be corrected to it: there the curve of branch points passes, on which corrections may slide along.
+        Nor has the fold a tangent of its own there, but for the cubic between ``a`` and ``b``.
+        """
+        *_, dp, dx = between(a, b, node.s)
+        size = self.criterion.length(dp, dx)
+        node, sought = replace(node, dp=dp / size, dx=dx / size, rest=a.rest), self._reversal(a, b)
+        try:
+            found = place(self.criterion, self.plane, node, sought, WIDE)
+        except ConvergenceError:
+            return replace(node, located_to=np.maximum(abs(node.p - a.p), abs(node.p - b.p)))
+        end = found.interpolated(node)
+        end.ordinate = self.criterion.solver.shape.ordinate(end.x)
+        return replace(end, s=node.s + found.s, sought=sought, windows=found.windows)
+
+    def _reversal(self, a: LocusPoint, b: LocusPoint) -> Sought:
+        """Where both parameters turn back at once between two nodes, as at a cusp: what turns most is stationary."""
+        turned = (b.dp - a.dp) / self.plane.width**2
+        return Sought(lambda n: float(turned @ n.p), stationary=True)
+
     def crossed(self, a: LocusPoint, b: LocusPoint, which: int, value: float) -> list[LocusPoint]:
         """Point between two neighbours at which a parameter has a value; none where it cannot be located.
 
@@ -217,14 +240,23 @@ class Tracer:
         """
         return [node for node, _ in self._located(a, b, lambda n: float(n.p[which]) - value, "")]
 
-    def _last(self, half: Half, a: LocusPoint, b: LocusPoint, f: Callable[[LocusPoint], float], sentence: str) -> str:
-        """End at a node where ``f`` vanishes."""
+    def _last(
+        self,
+        half: Half,
+        a: LocusPoint,
+        b: LocusPoint,
+        f: Callable[[LocusPoint], float],
+        sentence: str,
+        end: Callable[[LocusPoint], LocusPoint],
+    ) -> str:
+        """End at the point that ``end`` makes of one at which ``f`` vanishes."""
         found = self._located(a, b, f, sentence)
         where = (a.p + b.p) / 2
         if found and not np.any(abs(found[0][0].p - where) > abs(b.p - a.p) + BESIDE * self.plane.width):
+            node = end(found[0][0])
             half.marks[len(half.nodes)] = sentence
-            half.nodes.append(found[0][0])
-            where = found[0][0].p
+            half.nodes.append(node)
+            where = node.p
         return f"{sentence} near {', '.join(f'{n} = {v:.8g}' for n, v in zip(self.plane.names, where, strict=True))}"
 
     def _closes(self, start: LocusPoint, a: LocusPoint, b: LocusPoint) -> bool:
@@ -241,3 +273,8 @@ def _moves(turn: LocusPoint, a: LocusPoint, b: LocusPoint, which: int) -> bool:
     """Whether a parameter at its extremum differs from that at the neighbours by more than its uncertainty."""
     moved = max(abs(turn.p[which] - a.p[which]), abs(turn.p[which] - b.p[which]))
     return bool(moved > CERTAIN * turn.located_to[which])
+
+
+def as_beside(end: LocusPoint, a: LocusPoint) -> LocusPoint:
+    """The end of a curve with the count of the node ``a`` before it: a double eigenvalue that is zero has no sign."""
+    return replace(end, rest=end.rest + len(end.modes) * (int(a.omega2 < 0) - int(end.omega2 < 0)))

@@ -21,8 +21,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.codim2.along import place
 from rodfem.codim2.collision import Collision
-from rodfem.codim2.curve import Criterion, Half, Tracer
+from rodfem.codim2.criterion import Criterion
+from rodfem.codim2.curve import Half, Tracer
 from rodfem.codim2.others import unstable
 from rodfem.codim2.parameter_plane import Interval, LocusPoint, Plane
 from rodfem.codim2.singular import Singular, null_vectors
@@ -89,10 +91,12 @@ class Locus:
     omega2
         The double eigenvalue of flutter, (n,), nan for others.
     located_to
-        How far the parameters are uncertain for the given discretisation, (n, 2).
+        How far the parameters are uncertain for the given discretisation, (n, 2): of turning points, cusps and ends
+        also along the curve.
     error
         How far, measured across the curve, that of a discretisation one degree richer is away in either parameter, (n,
-        2); nan where it was not asked for, inf where the richer one does not find the point.
+        2); of turning points, cusps and ends how far those of that curve are, so also along it.  It is nan where it was
+        not asked for, inf where the richer one does not find the point.
     marks
         Rows at which the curve turns in a parameter, cusps, and rows (away from the start) before which another
         eigenvalue has passed through zero, not located.
@@ -420,7 +424,10 @@ def _lower_side(solver: StaticSolver, plane: Plane, special: SpecialPoint, node:
 def _estimate(
     solver: StaticSolver, kind: str, plane: Plane, nodes: Sequence[LocusPoint], rows: list[int], error: np.ndarray
 ) -> None:
-    """Fill ``rows`` of ``error`` with the distance, across the curve, to that of a richer discretisation."""
+    """Fill ``rows`` of ``error`` with the distance to the curve of a richer discretisation.
+
+    It is measured across the curve, but for turning points and ends to those of the other curve.
+    """
     richer = type(solver)(richer_system(solver.system))
     transfer = Transfer(solver.system, richer.system)
     other = Plane(richer.system, plane.names[1], (tuple(plane.bounds[0]), tuple(plane.bounds[1])))
@@ -429,15 +436,18 @@ def _estimate(
         node = nodes[row]
         x = transfer(node.x, state=True)
         modes, left = ([transfer(v, state=False) for v in side] for side in (node.modes, node.left))
-        near = LocusPoint(node.p, x, node.dp, x, node.p, omega2=node.omega2, modes=modes, left=left)
+        dx = transfer(node.dx, state=False)
+        near = LocusPoint(node.p, x, node.dp, dx, node.p, omega2=node.omega2, modes=modes, left=left)
         if criterion is None:
             criterion = _criterion(richer, other, kind, near)
         along = node.dp
         if np.linalg.norm(along / plane.width) < CUSP:
             along = nodes[min(row + 1, len(nodes) - 1)].p - nodes[max(row - 1, 0)].p
         try:
-            error[row] = np.maximum(abs(criterion.correct(node.p, x, (along, None), near, 0.1).p - node.p), 0)
+            if node.sought is None:
+                there = criterion.correct(node.p, x, (along, None), near, 0.1).p
+            else:
+                there = place(criterion, other, near, node.sought, node.windows).p
+            error[row] = np.maximum(abs(there - node.p), node.located_to)
         except ConvergenceError:
             error[row] = np.inf
-            continue
-        error[row] = np.maximum(error[row], node.located_to)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
@@ -21,6 +21,14 @@ Tangent = tuple[np.ndarray, PETSc.Vec | None]
 """Direction of parameters (2,) and state; None: of the parameters alone."""
 
 
+@dataclass(frozen=True)
+class Sought:
+    """What marks a point along a curve: ``of`` a point is stationary there where ``stationary``, else it is zero."""
+
+    of: Callable[[LocusPoint], float]
+    stationary: bool
+
+
 @dataclass
 class LocusPoint:
     """A point of a locus: parameters ``p`` (2,), state ``x``, and its unit tangent ``dp``, ``dx`` at arclength ``s``.
@@ -30,7 +38,9 @@ class LocusPoint:
     folds ``coupling`` (2,) is the derivative of the equations in the two parameters along the null vector, in units of
     the bounds, and ``curvature`` the second one along it.  ``omega2`` is a double eigenvalue.  ``modes`` are the null
     vectors, or a basis of the double eigenvalue's invariant subspace; ``left`` the left null vectors where they are
-    others.  ``located_to`` (2,) are the uncertainties of the parameters, and ``ordinate`` is the scene's.
+    others.  ``located_to`` (2,) are the uncertainties of the parameters, and ``ordinate`` is the scene's.  A turning
+    point or an end is ``sought`` along the curve, and was found in ``windows`` of these half widths (see
+    :mod:`rodfem.codim2.along`); others are not.
     """
 
     p: np.ndarray
@@ -47,6 +57,8 @@ class LocusPoint:
     coupling: np.ndarray = field(default_factory=lambda: np.zeros(2))
     modes: list[PETSc.Vec] = field(default_factory=list)
     left: list[PETSc.Vec] = field(default_factory=list)
+    sought: Sought | None = None
+    windows: tuple[float, ...] = ()
 
     def reversed(self) -> LocusPoint:
         """The same point with the opposite tangent."""

@@ -99,7 +99,8 @@ class Singular:
         ``solver`` has the mesh, ``plane`` the two parameters; there are as many ``vectors`` as eigenvalues vanish.  At
         a ``fold`` the single null vector is coupled to the load; otherwise the points are branch points.
         """
-        self.solver, self.system, self.plane, self.fold = solver, solver.system, plane, fold
+        self.solver: StaticSolver = solver
+        self.system, self.plane, self.fold = solver.system, plane, fold
         self.saddle = solver.inertia if isinstance(solver, BranchSolver) else Inertia(solver.system)
         self.metric = self.saddle.metric
         self._adopt(vectors, left or [])
@@ -142,6 +143,21 @@ class Singular:
         ``near`` is a point of the curve whose null vectors are close by.  ``reach`` bounds how far ``x`` may move, in
         the metric.
         """
+        p, x, last = self._newton(p, x, tangent, near, reach)
+        return self._node(p, x, tangent, last)
+
+    def onto(self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
+        """The same point with its parameters and state alone: no tangent, null vectors or counts.
+
+        ``p`` (2,), ``x``, ``tangent``, ``near`` and ``reach`` are those of :meth:`correct`, and so is what is raised.
+        """
+        p, x, last = self._newton(p, x, tangent, near, reach)
+        return LocusPoint(p, x, tangent[0], tangent[1] or self.system.new_vector(), self._located(p, last))
+
+    def _newton(
+        self, p: np.ndarray, x: PETSc.Vec, tangent: Tangent, near: LocusPoint, reach: float
+    ) -> tuple[np.ndarray, PETSc.Vec, np.ndarray]:
+        """Parameters, state, and the last changes of the parameters."""
         self._adopt(near.modes, near.left)
         p, x, origin = np.array(p, dtype=float), x.copy(), (np.array(p, dtype=float), x.copy())
         # pseudo-arclength equation, in the metric of states and with parameters over the widths of their bounds
@@ -161,7 +177,7 @@ class Singular:
             if not np.isfinite(size) or total > reach:
                 break
             if size < TOLERANCE or (STALLED > size > 0.5 * before):
-                return self._node(p, x, tangent, abs(dp))
+                return p, x, abs(dp)
             # chord step: the third derivatives, which cost most, serve again where corrections shrink tenfold
             old = now if size < SHRUNK * before and size < KEPT else None
             before = size
@@ -284,13 +300,12 @@ class Singular:
         forward = along[0] / width**2 @ dp + ((self.metric * dx).dot(along[1]) if along[1] else 0.0)
         size = size if forward >= 0 else -size
         dx.scale(1.0 / size)
-        located = np.maximum(last, ROUND_OFF * np.maximum(self.plane.sizes, abs(p)))
         return LocusPoint(
             p,
             x,
             dp / size,
             dx,
-            located,
+            self._located(p, last),
             ordinate=self.solver.shape.ordinate(x),
             rest=self._negative(p, x, at.rest) if self.turned is None else self._others(p, x),
             curvature=float(curvature) if self.fold else 0.0,
@@ -298,6 +313,10 @@ class Singular:
             modes=at.v,
             left=[] if self.turned is None else at.w,
         )
+
+    def _located(self, p: np.ndarray, last: np.ndarray) -> np.ndarray:
+        """Uncertainties of both parameters, across the curve, by their ``last`` changes."""
+        return np.asarray(np.maximum(last, ROUND_OFF * np.maximum(self.plane.sizes, abs(p))))
 
     def _negative(self, p: np.ndarray, x: PETSc.Vec, rest: int) -> int:
         """Negative eigenvalues but for those that vanish: ``rest``, unless others are zero all along the curve.

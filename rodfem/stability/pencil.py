@@ -168,7 +168,11 @@ def weighed_modes(
 
     What moves nothing that has inertia is orthonormal in the metric instead, and comes with the metric's product.
     """
-    given = list(modes.values())
+    given, scaled = list(modes.values()), mass
+    if given and not system.scene.units.ordinary:  # rotations and positions have masses of different units
+        scaled = mass.copy()
+        scaled.diagonalScale(system.sizes, system.sizes)
+    least = MASSLESS * scaled.norm(PETSc.NormType.INFINITY) if given else 0.0
     images = [mass * mode for mode in given]
     squares, turn = np.linalg.eigh(
         np.array([[np.real(g.dot(m)) for m in images] for g in given]).reshape(len(given), len(given))
@@ -176,7 +180,7 @@ def weighed_modes(
     out = {}
     for index, square, weights in zip(modes, squares, turn.T, strict=True):
         mode, image = combine(given, weights), combine(images, weights)
-        if square < MASSLESS * mass.norm(PETSc.NormType.INFINITY) * system.norm(mode) ** 2:
+        if square < least * system.norm(mode) ** 2:
             image = system.metric * mode
             square = float(np.real(image.dot(mode)))
         mode.scale(1.0 / np.sqrt(square))

@@ -9,7 +9,7 @@ from closed_forms import tip
 from scipy.optimize import brentq
 
 from forms.energy import bending_and_twist
-from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, Solver, clamped, free, trace
+from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, Solver, clamped, free, hinged, trace
 
 UNITS = [(1e4, 1e9, 1e3), (100.0, 1e7, 100.0), (300.0, 1e14, 3e5), (100.0, 1.0, 1.0), (1e-8, 2e-28, 1e-18)]
 """Length, bending stiffness and mass per length."""
@@ -68,3 +68,24 @@ def test_a_spectrum_along_a_branch() -> None:
     assert special.point.load == pytest.approx(np.pi**2 / 4 * stiffness / length**2, rel=1e-9)
     first = diagram[0].points[0]
     assert first.spectrum[0] == pytest.approx(12.362363368326239 * stiffness / (mass * length**4), rel=1e-8)
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_a_rod_that_turns_about_a_hinge(units: tuple[float, float, float]) -> None:
+    """Its free rotation left out, ``tan b = tanh b``: a rotation with a mass of its own, whatever the units."""
+    length, stiffness, mass = units
+    rod = classics.column(
+        "hinged",
+        (hinged((0.0, 1.0, 0.0)), free(follower=lambda c: (0.0, 0.0, -c.P))),
+        (0.0, stiffness / length**2),
+        interval=(0.0, length),
+        energy=lambda v, k, c: bending_and_twist(k, (1e3 * stiffness, stiffness, stiffness)),
+        ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]),
+        inertia=Inertia(rho_A=lambda c: mass),
+        planar="e2",
+    )
+    solver = Solver(rod, Discretization("pointwise", 5, 7))
+    point = solver.equilibrium(0.0)
+    exact = np.array([3.926602312047919, 7.068582745628732]) ** 4 * stiffness / (mass * length**4)
+    for method in ("auto", "shift-invert", "reduction", "dense"):
+        np.testing.assert_allclose(solver.assess(point, method, 2).values, exact, rtol=1e-7, err_msg=method)

@@ -1,0 +1,111 @@
+"""Where along a locus it turns, or ends: within bars of closed forms, in 30 digits, that are not too wide."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import pi
+
+import classics
+import numpy as np
+import pytest
+from hard.two_freedoms import scene
+
+from forms.energy import bending_and_twist
+from rodfem import Diagram, Discretization, Ordinate, Parameter, Plan, Scene, clamped, free, trace
+from rodfem.codim2.locus import Locus
+from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD
+
+pytestmark = pytest.mark.alone
+
+TURNS_IN_LOAD, TURNS_IN_SHARE, DIVERGES = (
+    (16.052461577163431, 0.5),
+    (19.422070332597733, 0.32112652696656004),
+    (pi**2, 0.5),
+)
+"""Load and share of a thrust that follows, of the column of two flutter loads and a divergence load."""
+DOUBLE_ZERO = 17.0695747744975, 0.3543133021536
+
+
+@cache
+def column(elements: int, degree: int) -> Diagram:
+    """Frequencies of a column under a thrust, of which 0.4 follows it: it diverges, and flutters twice."""
+    return trace(
+        classics.partly_following(0.4, (15.0, 30.0)), Discretization("pointwise", elements, degree), Plan(depth=0)
+    )
+
+
+@cache
+def of_column(kind: str, number: int, elements: int = 4, degree: int = 6) -> Locus:
+    diagram = column(elements, degree)
+    return diagram.locus(diagram.special(kind)[number], "share", (0.0, 1.2), (0.0, 40.0))
+
+
+def marked(found: Locus, kind: str, near: tuple[float, float]) -> int:
+    """The one row that is marked so ``near`` these values."""
+    rows = [m.row for m in found.marks if m.kind.startswith(kind)]
+    (row,) = (r for r in rows if np.allclose(found.values[r], near, rtol=1e-3, atol=1e-3))
+    return row
+
+
+def check(found: Locus, kind: str, exact: tuple[float, float]) -> None:
+    """The row that is marked so: its values within their bars, bars below 1e-8 of the bounds."""
+    row = marked(found, kind, exact)
+    assert np.all(abs(found.values[row] - exact) <= found.located_to[row])  # the mesh adds less
+    assert np.all(found.located_to[row] <= found.error[row])
+    assert np.all(found.error[row] <= 1e-8 * np.diff(found.bounds)[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("kind", "number", "mark", "exact"),
+    [
+        (FLUTTER, 0, "turns in P", TURNS_IN_LOAD),
+        (FLUTTER, 1, "turns in share", TURNS_IN_SHARE),
+        (DIVERGENCE, 0, "turns in share", DIVERGES),
+        (FLUTTER, 0, "the double eigenvalue vanishes", DOUBLE_ZERO),
+        (FLUTTER, 1, "the double eigenvalue vanishes", DOUBLE_ZERO),
+    ],
+)
+def test_column_whose_load_follows_in_part(kind: str, number: int, mark: str, exact: tuple[float, float]) -> None:
+    check(of_column(kind, number), mark, exact)
+
+
+@pytest.mark.parametrize(("number", "index"), [(0, [0, 2]), (1, [2, 2])])
+def test_a_double_zero_counts_as_the_row_before_it(number: int, index: list[int]) -> None:
+    found = of_column(FLUTTER, number)
+    (end,) = (m.row for m in found.marks if "vanishes" in m.kind)
+    assert end == 0 and abs(found.omega2[end]) < 1e-5
+    assert found.index[:3].tolist() == [index] * 3
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_coarse_mesh_displaces_turning_points_along_the_curve(number: int) -> None:
+    """The bar is the difference from a finer mesh whose own error is some 1e-5 of that."""
+    mark, exact = (("turns in P", TURNS_IN_LOAD), ("turns in share", TURNS_IN_SHARE))[number]
+    found = of_column(FLUTTER, number, 2, 4)
+    row = marked(found, mark, exact)
+    assert abs(found.values[row] - exact) == pytest.approx(found.error[row], rel=1e-3)
+
+
+def test_stiffness_with_a_minimum() -> None:
+    """``P = (1 + (b - 0.3)^2) pi^2/4``."""
+    rod = Scene(
+        "column", (0.0, 1.0), "unshearable and inextensible",
+        lambda v, k, c: (1 + (c.b - 0.3) ** 2) * bending_and_twist(k, (5.0, 1.0, 3.0)),
+        {"P": Parameter(0.0), "b": Parameter(0.0)}, "P", (clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
+        Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (0.0, 4.0), planar="e2",
+    )  # fmt: skip
+    diagram = trace(rod, Discretization("auto", 4, 6), Plan(depth=0))
+    check(diagram.locus(diagram.special(BRANCH_POINT)[0], "b", (0.0, 1.0), (0.0, 5.0)), "turns in P", (pi**2 / 4, 0.3))
+
+
+def test_fold_that_ends_on_a_branch_point() -> None:
+    """The branch ``P = f/sin f - 1 + b f2 + f2^2``, ``f2 = 2 - 2 cos f``, begins with ``(b + 1/6) f^2``."""
+    model = scene(
+        lambda u, f2, c: 0.5 * c.a * u * u - 0.5 * c.P * f2 + 0.25 * c.b * f2**2 + f2**3 / 6,
+        (-0.3, 0.3),
+        a=1.0,
+        b=-1 / 6 - 1e-2,
+    )
+    diagram = trace(model, Discretization("auto", 4, 3), Plan(depth=1))
+    found = diagram.locus(diagram.special(FOLD)[0], "b", (-0.3, 0.1), (-0.3, 0.3))
+    check(found, "the fold ends on a branch point", (0.0, -1 / 6))
