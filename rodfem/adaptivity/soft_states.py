@@ -137,10 +137,11 @@ class SoftStates:
     def judgement(
         self, point: Point, near: NearZero, *, fixed_load: bool, family: bool, vanishing: Sequence[PETSc.Vec]
     ) -> Judgement:
-        """Decide on eigenvalues ``near`` zero of a point as far as can be; the others as in :meth:`examine`.
+        """Decide on eigenvalues ``near`` zero of a ``point`` as far as can be.
 
-        Without a richer mesh those within the tolerance of a count are undecided, beyond round-off too: they are zero
-        in every count, and round-off alone does not tell what is zero for the rod.
+        ``fixed_load``, ``family`` and ``vanishing`` are those of :meth:`examine`.  Without a richer mesh those within
+        the tolerance of a count are undecided, beyond round-off too: they are zero in every count, and round-off alone
+        does not tell what is zero for the rod.
         """
         every, near = len(near.values), self._across_the_branch(point, near) if family else near
         names, tolerance = self.names(point.x, near.vectors), self.solver.inertia.tolerance
