@@ -96,6 +96,12 @@ FAULTS = {
         "return self.solver(point).assess(point, method, number)",
         AT_SPECIAL,
     ),
+    "special-of-a-coarser-mesh": Fault(
+        "rodfem/diagram/diagram.py",
+        "if not coarser:",
+        "if coarser:",
+        AT_SPECIAL,
+    ),
     "special-left": Fault(
         "rodfem/diagram/diagram.py",
         "return self[leaves].special[number]",

@@ -18,7 +18,7 @@ from rodfem.continuation.step_control import StepControl
 from rodfem.deflation.known import equilibria_at
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import MESH, METHOD, POINT, Solver, state_of
-from rodfem.errors import InputError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
 from rodfem.modes.typical import typical_modes
@@ -147,7 +147,16 @@ class Diagram:
         if not isinstance(solver, BranchSolver):
             guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
             return [self.solver(guess).equilibrium(load, guess)]
-        found = equilibria_at(solver, self.branches, load, lambda p: self._on(p, finest))
+        try:
+            found = equilibria_at(solver, self.branches, load, lambda p: self._on(p, finest))
+        except ConvergenceError as trouble:
+            coarser = [s for s in self.special() if s.kind.singular and s.point.mesh != finest and s.point.load == load]
+            if not coarser:
+                raise
+            raise ConvergenceError(
+                f"The {coarser[0].kind} at {self.scene.load} = {load:.10g} was located on a coarser mesh than the "
+                "finest, which has it at another load: take its own point, or ask for a load beside it."
+            ) from trouble
         return [self.solver(point).examined(point, special=self._special_at(point)) for point in found]
 
     @checked(point=POINT)

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from classics import pressed_ring
+from demo_cases import scene
 
 from forms.energy import bending_and_twist
-from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, SpecialPoint, load, pinned, trace
+from rodfem import ConvergenceError, Diagram, Discretization, Ordinate, Plan, Scene, SpecialPoint, load, pinned, trace
 
 pytestmark = pytest.mark.alone
 
@@ -107,3 +108,12 @@ def test_equilibria_at_the_load_of_a_special_point() -> None:
         if special.kind == "fold":
             below, above = (len(diagram.at(lam + d)) for d in (-1e-3, 1e-3))
             assert abs(below - above) == 2 and len(found) == (below + above) / 2
+
+
+def test_a_fold_of_a_coarser_mesh_is_at_no_load_of_the_finest() -> None:
+    diagram = trace(scene("cord"), Discretization("auto", 3, 3), Plan(depth=1, accuracy=1e-8))
+    (fold,) = diagram.special("fold")
+    assert fold.point.mesh < len(diagram.solvers) - 1
+    with pytest.raises(ConvergenceError, match="was located on a coarser mesh than the finest"):
+        diagram.at(fold.point.load)
+    assert diagram.assess(fold).undecided == 1
