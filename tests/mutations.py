@@ -102,6 +102,18 @@ FAULTS = {
         "if coarser:",
         AT_SPECIAL,
     ),
+    "compared-across-the-branch": Fault(
+        "rodfem/diagram/solver.py",
+        "fixed_load=special is None",
+        "fixed_load=True",
+        AT_SPECIAL,
+    ),
+    "left-out-by-vectors": Fault(
+        "rodfem/adaptivity/soft_states.py",
+        "if across(solver.system, [v], still)]",
+        "]",
+        AT_SPECIAL,
+    ),
     "special-left": Fault(
         "rodfem/diagram/diagram.py",
         "return self[leaves].special[number]",

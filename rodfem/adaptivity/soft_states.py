@@ -26,6 +26,7 @@ from rodfem.continuation.corrector import NEAR
 from rodfem.continuation.locate import across
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
+from rodfem.fem.system import System
 from rodfem.stability.inertia import NULL
 from rodfem.stability.motion_names import SHARE, MotionNames
 from rodfem.stability.near_zero import NearZero, judge, near_zero, soft_limit
@@ -152,7 +153,7 @@ class SoftStates:
         others = [m for m, is_zero in zip(modes, zero, strict=True) if not is_zero]
         if others and self._richer:
             with self.solver.system.clock.scope("error bars"):
-                others = self._refined(point, others, fixed_load, every - len(others))
+                others = self._refined(point, others, fixed_load, every - len(modes), vanishing)
         rest = iter(others)
         modes = [
             replace(m, uncertainty=max(abs(m.value), m.uncertainty)) if is_zero else next(rest)
@@ -177,17 +178,21 @@ class SoftStates:
             zero=near.zero + len(own),
         )  # fmt: skip
 
-    def _refined(self, point: Point, modes: list[SoftMode], fixed_load: bool, own: int) -> list[SoftMode]:
+    def _refined(
+        self, point: Point, modes: list[SoftMode], fixed_load: bool, own: int, vanishing: Sequence[PETSc.Vec]
+    ) -> list[SoftMode]:
         """The ``modes`` with values of richer meshes; of infinite uncertainty where those have no such state.
 
-        ``own`` eigenvalues nearest zero are those of the branch itself, or vanish at a special point.
+        ``own`` eigenvalues nearest zero are those of the branch itself.  Those of the ``vanishing`` null vectors are
+        left out, too, by their vectors: on a richer mesh others may be nearer to zero.
         """
-        out, values = modes, np.array([m.value for m in modes])
+        out, values, still = modes, np.array([m.value for m in modes]), list(vanishing)
         for level in range(REFINEMENTS):
             richer = self._companion(level)
             try:
                 point, rho = _on(richer, point, fixed_load, soft=True)
-                finer, rounding = _nearest(richer.solver, point, len(modes), own)
+                still = [_unit(richer.system, richer.transfer(v, state=False)) for v in still]
+                finer, rounding = _nearest(richer.solver, point, len(modes), own, still)
             except ConvergenceError:
                 return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
             left = rho / (1 - rho) * abs(finer - values) + rounding
@@ -247,16 +252,25 @@ def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False)
     return replace(point, x=again.x, tangent=tangent, load=again.load, ordinate=again.ordinate), again.rho
 
 
-def _nearest(solver: BranchSolver, point: Point, number: int, left_out: int) -> tuple[np.ndarray, np.ndarray]:
+def _unit(system: System, v: PETSc.Vec) -> PETSc.Vec:
+    """A vector of a system, which is changed, with metric norm 1."""
+    v.scale(1.0 / system.norm(v))
+    return v
+
+
+def _nearest(
+    solver: BranchSolver, point: Point, number: int, left_out: int, still: Sequence[PETSc.Vec]
+) -> tuple[np.ndarray, np.ndarray]:
     """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``.
 
-    The first ``left_out`` of them at the ``point`` are no part of that number.  What arithmetic leaves open of the
-    state, one more step of Newton's method tells, by the factors of the last one.
+    The first ``left_out`` of them at the ``point``, and those of the vectors ``still``, are no part of that number.
+    What arithmetic leaves open of the state, one more step of Newton's method tells, by the factors of the last one.
     """
     found = solver.inertia.at(point.x)
     found.count()
     kept, solver.inertia.vectors = solver.inertia.vectors, []
-    vectors = found.nearest(left_out + number + SPARE, NULL)[1][left_out : left_out + number]
+    nearest = found.nearest(left_out + len(still) + number + SPARE, NULL)[1][left_out:]
+    vectors = [v for v in nearest if across(solver.system, [v], still)][:number]
     solver.inertia.vectors = kept
     values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
     floor = TOLERANCE * solver.inertia.scale

@@ -24,20 +24,24 @@ ROUND_OFF = 1e-8
 """Of an eigenvalue in a metric in which the lowest one of bending is ten or so."""
 
 
-def bedded() -> Scene:
-    """A column on a foundation that is stiffer on one side: branches turn, and cross, where no symmetry has them."""
+def bedded(out_of_plane: float | None = None) -> Scene:
+    """A column on a foundation that is stiffer on one side: branches turn, and cross, where no symmetry has them.
+
+    It is in the plane, or in space, where its stiffness of bending ``out_of_plane`` is given, and that in it is 1.
+    """
+    planar = out_of_plane is None
     return Scene(
         "bedded column",
         (0.0, 1.0),
         "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist(k, (1.3, 1.0, 1.0)),
+        lambda v, k, c: bending_and_twist(k, (1.3 if planar else out_of_plane, 1.0, 1.0)),
         {"P": 0.0},
         "P",
         (pinned(), pinned(lambda c: (0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P))),
         Ordinate("m", s=0.5, of=lambda r, q: r[0]),
-        (0.0, 45.0),
-        planar="e2",
-        potential=lambda x, c: 100 * (x.r[0] ** 2 / 2 + x.r[0] ** 3 / 3),
+        (0.0, 45.0 if planar else 20.5),
+        planar="e2" if planar else None,
+        potential=lambda x, c: 100 * (x.r[0] ** 2 / 2 + x.r[0] ** 3 / 3) + 300 * x.r[1] ** 2,
     )
 
 
@@ -117,3 +121,18 @@ def test_a_fold_of_a_coarser_mesh_is_at_no_load_of_the_finest() -> None:
     with pytest.raises(ConvergenceError, match="was located on a coarser mesh than the finest"):
         diagram.at(fold.point.load)
     assert diagram.assess(fold).undecided == 1
+
+
+def test_a_second_soft_mode_at_a_fold() -> None:
+    """Ends that let the sections turn: by an angle a that costs ``(B1 - B2)/2 sin(a)^2`` times the curvature squared.
+
+    That is twice the energy of bending times ``B1 - B2``, with ``B2 = 1``.  On richer meshes the eigenvalue that
+    vanishes is farther from zero.
+    """
+    diagram = trace(bedded(1.0 + 1e-6), MESH, Plan(depth=1, most_branches=3))
+    folds = [s for s in diagram.special("fold") if s.multiplicity == 1]
+    assert len(folds) == 1 and folds[0].negative_before == 1
+    verdict = diagram.assess(folds[0])
+    assert (verdict.negative, verdict.undecided) == (0, 1)
+    (turning,) = [m for m in verdict.soft if m.name == "turning of the cross-sections about d3"]
+    assert abs(turning.value - 2e-6 * folds[0].point.energy) < turning.uncertainty < ROUND_OFF
