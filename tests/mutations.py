@@ -110,8 +110,8 @@ FAULTS = {
     ),
     "left-out-by-vectors": Fault(
         "rodfem/adaptivity/soft_states.py",
-        "if across(solver.system, [v], still)]",
-        "]",
+        "NULL)[1][left_out:]",
+        "NULL)[1][left_out + len(still) :]",
         AT_SPECIAL,
     ),
     "special-left": Fault(
