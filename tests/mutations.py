@@ -49,6 +49,7 @@ RESUME = "tests/hard/test_resume.py"
 WORK = "tests/continuation/test_work.py"
 RECORDED = "tests/modes/test_recorded.py"
 CLOSE = "tests/diagram/test_close_critical_loads.py"
+AT_SPECIAL = "tests/diagram/test_at_special_points.py"
 
 CONTINUATION, STABILITY = "rodfem/continuation/", "rodfem/stability/"
 
@@ -58,6 +59,66 @@ FAULTS = {
         "if a.load == load:",
         "if a.load == load and b is not None:",
         "tests/diagram/test_load_at_an_end.py",
+    ),
+    "known-singular": Fault(
+        "rodfem/deflation/known.py",
+        "if a.load == load and id(a.x) in singular:",
+        "if a.load == load and id(a) in singular:",
+        AT_SPECIAL,
+    ),
+    "vanishing": Fault(
+        "rodfem/adaptivity/soft_states.py",
+        "zero = self._zero(near, vanishing)",
+        "zero = self._zero(near, ())",
+        AT_SPECIAL,
+    ),
+    "vanishing-part": Fault(
+        "rodfem/adaptivity/soft_states.py",
+        "np.where(self._zero(near, vanishing), 0.0,",
+        "np.where(self._zero(near, ()), 0.0,",
+        AT_SPECIAL,
+    ),
+    "changed-by-itself": Fault(
+        "rodfem/adaptivity/soft_states.py",
+        "np.where(away > abs(coarse), left + away, left)",
+        "np.where(contrary, left + away, left)",
+        AT_SPECIAL,
+    ),
+    "another-state": Fault(
+        "rodfem/adaptivity/soft_states.py",
+        "if soft and not again.resolved:",
+        "if soft and again.changed < 0:",
+        AT_SPECIAL,
+    ),
+    "special-at": Fault(
+        "rodfem/diagram/diagram.py",
+        "return self.solver(point).assess(self._special_at(point) or point, method, number)",
+        "return self.solver(point).assess(point, method, number)",
+        AT_SPECIAL,
+    ),
+    "special-of-a-coarser-mesh": Fault(
+        "rodfem/diagram/diagram.py",
+        "if not coarser:",
+        "if coarser:",
+        AT_SPECIAL,
+    ),
+    "compared-across-the-branch": Fault(
+        "rodfem/diagram/solver.py",
+        "fixed_load=special is None",
+        "fixed_load=True",
+        AT_SPECIAL,
+    ),
+    "left-out-by-vectors": Fault(
+        "rodfem/adaptivity/soft_states.py",
+        "NULL)[1][left_out:]",
+        "NULL)[1][left_out + len(still) :]",
+        AT_SPECIAL,
+    ),
+    "special-left": Fault(
+        "rodfem/diagram/diagram.py",
+        "return self[leaves].special[number]",
+        "return None",
+        AT_SPECIAL,
     ),
     "known-twice": Fault(
         "rodfem/deflation/known.py",

@@ -2,25 +2,31 @@ r"""Soft modes of states, with what the mesh adds to their uncertainty, and refi
 
 The state is solved for again on a mesh of half the elements' length and one degree more.  With eigenvalues ``mu`` on
 the mesh and ``mu'`` on the richer one the error of ``mu'`` is at most ``rho |mu' - mu| / (1 - rho)``
-(:mod:`rodfem.adaptivity.error_estimate`).  A mode that this leaves undecided is computed on a still richer mesh.  One
-whose sign is another one than on the mesh itself is undecided there, whatever richer meshes say.
+(:mod:`rodfem.adaptivity.error_estimate`).  A mode that this leaves undecided is computed on a still richer mesh.  Where
+an eigenvalue changes by more than itself on the mesh that bound is none of what the mesh says of its sign: all of the
+change is added.  One whose sign is another one than on the mesh itself is undecided there, whatever richer meshes say,
+and so is one where the richer mesh has another state than the mesh, by the strains of the two.
+
+What vanishes at a special point is zero there by construction, and undecided.  The special point of a richer mesh is at
+another load, so that its other eigenvalues are compared across the branch.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import STEADY, Enriched
+from rodfem.adaptivity.error_estimate import RESOLVED_TO, STEADY, Enriched
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.corrector import NEAR
 from rodfem.continuation.locate import across
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
+from rodfem.fem.system import System
 from rodfem.stability.inertia import NULL
 from rodfem.stability.motion_names import SHARE, MotionNames
 from rodfem.stability.near_zero import NearZero, judge, near_zero, soft_limit
@@ -47,13 +53,22 @@ class SoftStates:
         self._richer = [richer] if richer is not None else []
         self._companions: list[Enriched] = []
 
-    def examine(self, point: Point, *, fixed_load: bool, compare: bool = False, family: bool = False) -> bool:
+    def examine(
+        self,
+        point: Point,
+        *,
+        fixed_load: bool,
+        compare: bool = False,
+        family: bool = False,
+        vanishing: Sequence[PETSc.Vec] = (),
+    ) -> bool:
         """Record the soft modes of a ``point``, and its index as far as they are decided; whether there are any.
 
         On a richer mesh the point is at the same load (``fixed_load``), or on the plane across the branch.  With
         ``compare`` the index there is asked for; eigenvalues that have another sign are soft, too.  Along a ``family``
-        of equilibria at one load that of the branch itself is zero.  Raises
-        :class:`ConvergenceError` where constraints that depend on each other leave less than no negative eigenvalue.
+        of equilibria at one load that of the branch itself is zero.  At a special point the eigenvalues of its null
+        vectors, which are ``vanishing``, are zero.  Raises :class:`ConvergenceError` where constraints that depend on
+        each other leave less than no negative eigenvalue.
         """
         inertia, nearest = self.solver.inertia, self._nearest(point)
         differing = self._differing(point, fixed_load) if compare and self._richer else 0
@@ -62,8 +77,8 @@ class SoftStates:
         if nearest and not differing and not sliding:
             return False
         least = max(differing, sliding + 1 if sliding else 0)  # another eigenvalue may be nearer to zero
-        near = self._with_the_mesh(point, near_zero(inertia.at(point.x), least=least), differing)
-        found = self.judgement(point, near, fixed_load=fixed_load, family=family)
+        near = self._with_the_mesh(point, near_zero(inertia.at(point.x), least=least), differing, vanishing)
+        found = self.judgement(point, near, fixed_load=fixed_load, family=family, vanishing=vanishing)
         if found.negative < 0:
             raise ConvergenceError(
                 f"The count of negative eigenvalues at load {point.load:.8g} gave {found.negative}: the constraints "
@@ -84,12 +99,14 @@ class SoftStates:
             for name, i in zip(names, kept, strict=True)
         ]
 
-    def _with_the_mesh(self, point: Point, near: NearZero, least: int) -> NearZero:
+    def _with_the_mesh(self, point: Point, near: NearZero, least: int, vanishing: Sequence[PETSc.Vec]) -> NearZero:
         """Eigenvalues with what the mesh makes of the motion along the rod in their uncertainty.
 
-        Those that are neither soft nor doubtful by that are left out, but for the ``least`` number of them.
+        Those that are neither soft nor doubtful by that are left out, but for the ``least`` number of them.  Where the
+        ``vanishing`` ones are zero the mesh is part of the load, not of them.
         """
-        uncertainty = near.uncertainty + self.sliding.parts(point.x, near.vectors)
+        parts = np.where(self._zero(near, vanishing), 0.0, self.sliding.parts(point.x, near.vectors))
+        uncertainty = near.uncertainty + parts
         limit = soft_limit(self.solver.inertia)
         away = abs(near.values)
         chosen = (away < limit) | (away <= uncertainty) | (np.argsort(np.argsort(away)) < least)
@@ -118,21 +135,35 @@ class SoftStates:
         own = point.zero - self.solver.system.active_drifts(point.x)
         return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
 
-    def judgement(self, point: Point, near: NearZero, *, fixed_load: bool, family: bool) -> Judgement:
-        """Decide on eigenvalues ``near`` zero of a point as far as can be; ``fixed_load`` and ``family`` as above.
+    def judgement(
+        self, point: Point, near: NearZero, *, fixed_load: bool, family: bool, vanishing: Sequence[PETSc.Vec]
+    ) -> Judgement:
+        """Decide on eigenvalues ``near`` zero of a ``point`` as far as can be.
 
-        Without a richer mesh those within the tolerance of a count are undecided, beyond round-off too: they are zero
-        in every count, and round-off alone does not tell what is zero for the rod.
+        ``fixed_load``, ``family`` and ``vanishing`` are those of :meth:`examine`.  Without a richer mesh those within
+        the tolerance of a count are undecided, beyond round-off too: they are zero in every count, and round-off alone
+        does not tell what is zero for the rod.
         """
         every, near = len(near.values), self._across_the_branch(point, near) if family else near
         names, tolerance = self.names(point.x, near.vectors), self.solver.inertia.tolerance
         least, bars = 0.0 if self._richer else tolerance, near.uncertainty
         bars = np.where(abs(near.values) > bars, np.maximum(bars, least), bars)
         modes = [SoftMode(*m) for m in zip(names, near.values.tolist(), bars.tolist(), strict=True)]
-        if modes and self._richer:
+        zero = self._zero(near, vanishing)
+        others = [m for m, is_zero in zip(modes, zero, strict=True) if not is_zero]
+        if others and self._richer:
             with self.solver.system.clock.scope("error bars"):
-                modes = self._refined(point, modes, fixed_load, every - len(modes))
+                others = self._refined(point, others, fixed_load, every - len(modes), vanishing)
+        rest = iter(others)
+        modes = [
+            replace(m, uncertainty=max(abs(m.value), m.uncertainty)) if is_zero else next(rest)
+            for m, is_zero in zip(modes, zero, strict=True)
+        ]
         return judge(near, modes, tolerance)
+
+    def _zero(self, near: NearZero, vanishing: Sequence[PETSc.Vec]) -> list[bool]:
+        """Whether each of some eigenvalues is one of the null vectors that are ``vanishing``."""
+        return [not across(self.solver.system, [v], vanishing) for v in near.vectors]
 
     def _across_the_branch(self, point: Point, near: NearZero) -> NearZero:
         """Eigenvalues without that of the branch itself, a family of equilibria at one load."""
@@ -147,25 +178,29 @@ class SoftStates:
             zero=near.zero + len(own),
         )  # fmt: skip
 
-    def _refined(self, point: Point, modes: list[SoftMode], fixed_load: bool, own: int) -> list[SoftMode]:
+    def _refined(
+        self, point: Point, modes: list[SoftMode], fixed_load: bool, own: int, vanishing: Sequence[PETSc.Vec]
+    ) -> list[SoftMode]:
         """The ``modes`` with values of richer meshes; of infinite uncertainty where those have no such state.
 
-        ``own`` eigenvalues nearest zero are those of the branch itself.
+        ``own`` eigenvalues nearest zero are those of the branch itself.  Those of the ``vanishing`` null vectors are
+        left out, too, by their vectors: on a richer mesh others may be nearer to zero.
         """
-        out, values = modes, np.array([m.value for m in modes])
+        out, values, still = modes, np.array([m.value for m in modes]), list(vanishing)
         for level in range(REFINEMENTS):
             richer = self._companion(level)
             try:
                 point, rho = _on(richer, point, fixed_load, soft=True)
-                finer, rounding = _nearest(richer.solver, point, len(modes), own)
+                still = [_unit(richer.system, richer.transfer(v, state=False)) for v in still]
+                finer, rounding = _nearest(richer.solver, point, len(modes), own, still)
             except ConvergenceError:
                 return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
             left = rho / (1 - rho) * abs(finer - values) + rounding
             values = finer
             # a sign that is another one than the mesh's own is not decided there
-            contrary = np.sign(values) != np.sign([m.value for m in modes])
-            away = abs(values - [m.value for m in modes])
-            bars = np.where(contrary, left + away, left)
+            coarse = np.array([m.value for m in modes])
+            contrary, away = np.sign(values) != np.sign(coarse), abs(values - coarse)
+            bars = np.where(away > abs(coarse), left + away, left)
             out = [replace(m, value=float(v), uncertainty=float(u))
                    for m, v, u in zip(modes, values, bars, strict=True)]  # fmt: skip
             if all(m.decided for m in out) or (contrary & (left < abs(values))).any():
@@ -183,7 +218,7 @@ def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False)
     """Point on a richer mesh, and the part of the errors that is left there.
 
     Beside a soft mode Newton's method slides away, or ends by chance: there it is damped, and elsewhere where it fails.
-    Raises :class:`ConvergenceError` where the mesh has no such point.
+    Raises :class:`ConvergenceError` where the mesh has no such point, with a soft mode also where it has another state.
 
     Parameters
     ----------
@@ -208,20 +243,34 @@ def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False)
             again = richer.again(point, fixed_load=fixed_load)
     finally:
         system.damping = given
+    if soft and not again.resolved:
+        raise ConvergenceError(
+            f"The richer mesh has another state at load {point.load:.8g}: its strains differ by {again.changed:.2g} of "
+            f"themselves, more than {RESOLVED_TO:g}; use more elements."
+        )
     tangent = None if point.tangent is None else richer.transfer(point.tangent, state=False)
     return replace(point, x=again.x, tangent=tangent, load=again.load, ordinate=again.ordinate), again.rho
 
 
-def _nearest(solver: BranchSolver, point: Point, number: int, left_out: int) -> tuple[np.ndarray, np.ndarray]:
+def _unit(system: System, v: PETSc.Vec) -> PETSc.Vec:
+    """A vector of a system, which is changed, with metric norm 1."""
+    v.scale(1.0 / system.norm(v))
+    return v
+
+
+def _nearest(
+    solver: BranchSolver, point: Point, number: int, left_out: int, still: Sequence[PETSc.Vec]
+) -> tuple[np.ndarray, np.ndarray]:
     """The ``number`` eigenvalues nearest zero in ascending order, and their uncertainty on the mesh of ``solver``.
 
-    The first ``left_out`` of them at the ``point`` are no part of that number.  What arithmetic leaves open of the
-    state, one more step of Newton's method tells, by the factors of the last one.
+    The first ``left_out`` of them at the ``point``, and those of the vectors ``still``, are no part of that number.
+    What arithmetic leaves open of the state, one more step of Newton's method tells, by the factors of the last one.
     """
     found = solver.inertia.at(point.x)
     found.count()
     kept, solver.inertia.vectors = solver.inertia.vectors, []
-    vectors = found.nearest(left_out + number + SPARE, NULL)[1][left_out : left_out + number]
+    nearest = found.nearest(left_out + len(still) + number + SPARE, NULL)[1][left_out:]
+    vectors = [v for v in nearest if across(solver.system, [v], still)][:number]
     solver.inertia.vectors = kept
     values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
     floor = TOLERANCE * solver.inertia.scale

@@ -30,17 +30,29 @@ def equilibria_at(
     """
     found, known = list[Point](), Orbits(solver.system)
     for branch in branches:
-        for point in _along(solver, [here(p) for p in branch.points], load):
+        for point in _along(solver, [here(p) for p in branch.points], load, singular_states(branch)):
             if all(apart >= SAME for apart, _ in known.nearest(point.x)):
                 found.append(point)
                 known.add(point.x)
     return found
 
 
-def _along(solver: BranchSolver, points: Sequence[Point], load: float) -> Iterator[Point]:
-    """Yield the equilibria at ``load`` at and between neighbouring ``points`` of a branch, which are on its mesh."""
+def singular_states(branch: Branch) -> set[int]:
+    """Ids of the states of a branch that are those of folds and branch points."""
+    first = {id(branch.points[0].x)} if branch.parent else set()
+    return first | {id(s.point.x) for s in branch.special if s.kind.singular}
+
+
+def _along(solver: BranchSolver, points: Sequence[Point], load: float, singular: set[int]) -> Iterator[Point]:
+    """Yield the equilibria at ``load`` at and between neighbouring ``points`` of a branch, which are on its mesh.
+
+    At those whose states are ``singular``, by their ids, Newton's method at the load itself has nothing to go by: they
+    are what was located.
+    """
     for a, b in zip(points, [*points[1:], None], strict=True):
-        if a.load == load:
+        if a.load == load and id(a.x) in singular:
+            yield solver.point(a.x, a.arclength, a.tangent)
+        elif a.load == load:
             x, outcome = solver.at_load(a.x, load, reach=1.0)
             if not outcome.converged:
                 raise ConvergenceError(

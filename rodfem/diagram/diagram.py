@@ -17,8 +17,8 @@ from rodfem.continuation.static_solver import StaticSolver
 from rodfem.continuation.step_control import StepControl
 from rodfem.deflation.known import equilibria_at
 from rodfem.diagram.plan import Plan
-from rodfem.diagram.solver import MESH, METHOD, POINT, Solver
-from rodfem.errors import InputError
+from rodfem.diagram.solver import MESH, METHOD, POINT, Solver, state_of
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.modes.modes import Modes
 from rodfem.modes.typical import typical_modes
@@ -131,7 +131,10 @@ class Diagram:
     def at(self, load: float) -> list[Point]:
         """All equilibria of the diagram at exactly ``load``, computed there, each with its own index.
 
-        In the order of their branches.  Raises :class:`~rodfem.errors.InputError` for a load outside the range.
+        In the order of their branches; at the load of a fold or branch point also the state there.  Raises
+        :class:`~rodfem.errors.InputError` for a load outside the range, and
+        :class:`~rodfem.errors.ConvergenceError` where no equilibrium is found between two rows on either side of it, or
+        at a fold of a mesh that is not the finest, whose own folds are at other loads.
         """
         low, high = sorted(self.span)
         if not low <= load <= high:
@@ -144,8 +147,17 @@ class Diagram:
         if not isinstance(solver, BranchSolver):
             guess = min(self.branches[0].points, key=lambda p: abs(p.load - load))
             return [self.solver(guess).equilibrium(load, guess)]
-        found = equilibria_at(solver, self.branches, load, lambda p: self._on(p, finest))
-        return [self.solver(point).examined(point) for point in found]
+        try:
+            found = equilibria_at(solver, self.branches, load, lambda p: self._on(p, finest))
+        except ConvergenceError as trouble:
+            coarser = [s for s in self.special() if s.kind.singular and s.point.mesh != finest and s.point.load == load]
+            if not coarser:
+                raise
+            raise ConvergenceError(
+                f"The {coarser[0].kind} at {self.scene.load} = {load:.10g} was located on a coarser mesh than the "
+                "finest, which has it at another load: take its own point, or ask for a load beside it."
+            ) from trouble
+        return [self.solver(point).examined(point, special=self._special_at(point)) for point in found]
 
     @checked(point=POINT)
     def solver(self, point: Point | SpecialPoint) -> Solver:
@@ -160,7 +172,7 @@ class Diagram:
     @checked(point=POINT, method=METHOD, number=count(4, 1))
     def assess(self, point: Point | SpecialPoint, method: str = "auto", number: int = 4) -> Verdict:
         """Decide the stability of a point with a given method: see :meth:`rodfem.Solver.assess`."""
-        return self.solver(point).assess(point, method, number)
+        return self.solver(point).assess(self._special_at(point) or point, method, number)
 
     @checked(point=POINT, number=count(3, 1), method=METHOD)
     def modes(self, point: Point | SpecialPoint, number: int = 3, method: str = "auto") -> Modes:
@@ -234,6 +246,18 @@ class Diagram:
         if discretization is None and plan.accuracy is not None and mesh.vertices is None:
             mesh = Discretization(mesh.formulation, factors=mesh.factors)
         return trace(self.scene, mesh, plan, comm=system.comm)
+
+    def _special_at(self, point: Point | SpecialPoint) -> SpecialPoint | None:
+        """The fold or branch point whose state that of a point is, where there is one."""
+        x = state_of(point)
+        for branch in self.branches:
+            if branch.parent is not None and branch.points[0].x is x:
+                leaves, number = branch.parent
+                return self[leaves].special[number]
+            for special in branch.special:
+                if special.kind.singular and special.point.x is x:
+                    return special
+        return None
 
     def _finest(self) -> int:
         """Number of the mesh with most unknowns."""

@@ -178,13 +178,17 @@ class Solver:
             return replace(self._sweep.at(x), kink=self._kinks(x).kink)
         return self.examined(self.equilibria.point(x, 0.0, self.equilibria.load_tangent(x, increasing=True)))
 
-    def examined(self, point: Point, *, compare: bool = False) -> Point:
-        """Record kink and soft modes of a ``point`` of this mesh: see :meth:`SoftStates.examine`; returns the point."""
+    def examined(self, point: Point, *, compare: bool = False, special: SpecialPoint | None = None) -> Point:
+        """Record kink and soft modes of a ``point`` of this mesh: see :meth:`SoftStates.examine`; returns the point.
+
+        ``special`` is the fold or branch point that is there, if any.
+        """
         point.kink = self._kinks(point.x).kink
         if isinstance(self.equilibria, BranchSolver):
             # by itself a state is on no branch: a tangent at a singular one is any null vector
-            tangent, point.tangent = point.tangent, None
-            self._soft.examine(point, fixed_load=True, compare=compare)
+            tangent, point.tangent = point.tangent, None if special is None else special.point.tangent
+            vanishing = () if special is None else special.null_vectors
+            self._soft.examine(point, fixed_load=special is None, compare=compare, vanishing=vanishing)
             point.tangent = tangent
         return point
 
@@ -228,6 +232,7 @@ class Solver:
         """Decide the stability of an equilibrium on this mesh by a given method.
 
         Eigenvalues near zero are computed again on richer meshes; those that have another sign there are undecided.
+        What vanishes at a special point is zero there, and undecided, if that is given itself.
 
         Parameters
         ----------
@@ -246,7 +251,8 @@ class Solver:
         verdict = assess(self.equilibria, x, method, number)
         if not isinstance(self.equilibria, BranchSolver):
             return replace(verdict, kink=self._kinks(x).kink)
-        return verdict.at(self.examined(self.equilibria.point(x, 0.0, None), compare=True))
+        special = point if isinstance(point, SpecialPoint) and point.kind.singular else None
+        return verdict.at(self.examined(self.equilibria.point(x, 0.0, None), compare=True, special=special))
 
     @checked(point=STATE, number=count(3, 1), method=METHOD)
     def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:
