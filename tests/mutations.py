@@ -403,7 +403,7 @@ FAULTS = {
         f"{CONTINUATION}static_solver.py",
         "return replace(outcome, converged=False), False",
         "return outcome, True",
-        "tests/diagram/test_useless_first_state.py",
+        "tests/stability/test_far_states.py",
     ),
     "zeros-beyond-a-row": Fault(
         f"{CONTINUATION}special_points.py", "return outside > max(", "return outside > 1e9 + max(", LOCATE

@@ -8,6 +8,7 @@ import ufl
 
 from rodfem import Discretization, Ordinate, Scene, Solver, clamped, free
 from rodfem.errors import ConvergenceError
+from rodfem.fem.newton import NewtonResult
 from rodfem.stability.round_off import decide
 
 
@@ -30,6 +31,7 @@ def test_the_band_of_a_far_state_is_not_kept() -> None:
     system.set_load(far, 0.5)
     with pytest.raises(ConvergenceError, match="out of all proportion"):
         solver.is_stable(far)
+    assert solver._examined(far, NewtonResult(True, 1, 0.0, 0.0)) == (NewtonResult(False, 1, 0.0, 0.0), False)
     assert solver.is_stable(x)
     assert decide(solver.inertia.at(x)).band < 1e-3
     assert system.verification.norm < 1e6
