@@ -88,7 +88,8 @@ def test_buckling_of_the_straight_rod() -> None:
     assert miss.max() < 1e-10
     assert known.sum() >= 5
     assert np.all(miss[known] <= 3 * found.error[known].sum(axis=1))
-    assert found.error[known].max() < 1e-9
+    assert found.error[known, 0].max() < 1e-9
+    assert found.error[known, 1].max() < 1e-8  # of turning points: along the curve, too
     assert found.ended == ("A = -3.1, its bound", "A = 1, its bound")
     assert (found.values[0, 1], found.values[-1, 1]) == (-3.1, 1.0)
     assert found.values[found.start] == pytest.approx([closed_form_hemitropic.loads(-3, 1, 1, 3)[1], -3.0], abs=1e-10)
@@ -100,7 +101,7 @@ def test_buckling_of_the_straight_rod() -> None:
             lam, A - 1e-4, 1, 1, 3
         )
         assert abs(slope) < 1e-10
-    assert turns[1][1] == pytest.approx(0, abs=1e-7)
+    assert abs(turns[1][1]) <= found.error[found.marks[1].row, 1]
 
 
 def test_straight_cord() -> None:
