@@ -113,7 +113,8 @@ def test_thrust_along_the_end() -> None:
     assert found.point.load == pytest.approx(109.69, abs=5e-3)
 
 
-def test_thrust_along_the_end_of_a_rod_with_a_mass_at_its_nose() -> None:
+@pytest.mark.parametrize("mesh", [MESH, Discretization("pointwise", 8, 5)])
+def test_thrust_along_the_end_of_a_rod_with_a_mass_at_its_nose(mesh: Discretization) -> None:
     """The compression is ``P (m + s)/(1 + m)``.  In each plane two eigenvalues are zero at all loads: by Galerkin.
 
     The determinant is ``mu^2 (a + b mu + ...)``, and the rod diverges where ``a``, a contour integral, vanishes.  Then
@@ -148,7 +149,7 @@ def test_thrust_along_the_end_of_a_rod_with_a_mass_at_its_nose() -> None:
         attachments=(Attachment(0.0, mass=lambda c: m),),
         energy=lambda v, k, c: bending_and_twist(k, (1.0, 1000.0, 1000.0)),
     )  # fmt: skip
-    found = rodfem.trace(rod, MESH)
+    found = rodfem.trace(rod, mesh)
     assert [(s.kind.words, s.negative_before, s.negative_after) for s in found.special()] == [
         ("divergence", 0, 1), ("divergence", 1, 2), ("flutter", 2, 2),
     ]  # fmt: skip
