@@ -17,8 +17,6 @@ from typing import Any
 import numpy as np
 import ufl
 from petsc4py import PETSc
-from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-from ufl.algorithms.apply_derivatives import apply_derivatives
 
 from forms.kinematics import curvature, strain
 from forms.rotation import rotation
@@ -40,7 +38,7 @@ class Resultants:
         self.shape, fields = shape, shape.system.fields
         count, mesh = fields.discretization.degree, fields.mesh
         self.places = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
-        vector = apply_derivatives(apply_algebra_lowering(ufl.as_vector(self._components())))
+        vector = ufl.as_vector(self._components())
         self._evaluate = form_compiler.expression(
             with_constants(vector, mesh), self.places.reshape(-1, 1), mesh, fields.owned_cells
         )
