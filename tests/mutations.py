@@ -551,6 +551,15 @@ FAULTS = {
     "threads-work-at-once": Fault(
         "rodfem/problem/arguments.py", "with ONE_THREAD:", "with RLock():", "tests/app/test_threads.py"
     ),
+    "free-rod-drifts-without-a-moment": Fault(
+        "rodfem/fem/drift_forces.py", "SHARE = 0.3", "SHARE = 0.0", "tests/literature/test_free_rods.py"
+    ),
+    "modes-without-their-parts-along-free-motions": Fault(
+        f"{STABILITY}nonsymmetric.py",
+        "            force.array[drifts] = 0.0\n",
+        "",
+        "tests/literature/test_free_rods.py",
+    ),
     "a-bent-rod-breaks-a-symmetry": Fault(
         "rodfem/fem/phase.py", "SYMMETRIC_STATE = 1e-4", "SYMMETRIC_STATE = 1e-6", "tests/fem/test_nearly_symmetric.py"
     ),

@@ -258,6 +258,6 @@ class CompiledStep:
         kept = combinations[[i for i in range(count) if i not in rows]]
         broken = {i: combinations[i] for i in active}
         make = self.system.generators.vector
-        phase = Phase(rows, corrector.offsets.copy(), broken, kept, x.copy(), make)
+        phase = Phase(rows, rows, corrector.offsets.copy(), broken, kept, x.copy(), make)
         self.system.at(x).phases[frozenset()] = phase
         return phase

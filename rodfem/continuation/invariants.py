@@ -29,7 +29,7 @@ from rodfem.continuation.branch import Point
 from rodfem.continuation.static_solver import StaticSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.generators import Generators
-from rodfem.fem.symmetries import elementary_generators, rigid_motions
+from rodfem.fem.symmetries import capable
 
 UNBALANCED = 1e-8
 """Residual of an equilibrium, in units of the rod's own energy."""
@@ -54,9 +54,8 @@ class Invariants:
 
     @cached_property
     def _rigid(self) -> Generators:
-        """Rigid motions of space of which the rod is capable, rotations by radian, translations by natural length."""
-        motions = rigid_motions(elementary_generators(self.system.fields))
-        return Generators(self.system, [motion for motion in motions.values() if motion.weights.any()])
+        """Rigid motions of space of which the rod is capable."""
+        return Generators(self.system, capable(self.system.fields))
 
     def __call__(self, point: Point) -> None:
         """Check a point; raises :class:`ConvergenceError` that names the equation, or the norm, that is violated."""

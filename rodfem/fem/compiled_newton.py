@@ -76,8 +76,9 @@ class CompiledNewton:
         The iterate that was factored last, and the equations there, (n,).
     border
         Derivative of the equations in the load at that state, (n,), where the factors are symmetric.
-    active, conditions, offsets
-        Of each drift scalar: whether it has a phase condition, that condition (drifts, n), and its offset.
+    active, conditions, offsets, forces
+        Of each drift scalar: whether it has a phase condition, that condition (drifts, n), its offset, and what a drift
+        of one adds to the equations (drifts, n).
     """
 
     @staticmethod
@@ -99,6 +100,7 @@ class CompiledNewton:
         drifts = np.array(system.drifts, dtype=np.int32)
         self.conditions, self.offsets = np.zeros((len(drifts), n)), np.zeros(len(drifts))
         self.active, self.border = np.zeros(len(drifts), dtype=np.int32), np.zeros(n)
+        self.forces = np.zeros_like(self.conditions) if system.drift_forces else self.conditions
         starts, load, every = own.pattern.indptr, system.load_index, np.arange(n)
         # scalars are the last columns of each row, and their own rows are dense
         column = {i: starts[1:] - (n - i) for i in (load, *system.drifts)}
@@ -110,6 +112,7 @@ class CompiledNewton:
         rod.load_row = self._ints(starts[load] + every)
         rod.drifts, rod.drift, rod.active = len(drifts), self._ints(drifts), self._ints(self.active)
         rod.conditions, rod.offsets = self._doubles(self.conditions), self._doubles(self.offsets)
+        rod.forces = self._doubles(self.forces)
         rod.drift_row = self._ints(np.array([starts[d] + every for d in drifts]))
         rod.drift_column = self._ints(np.array([column[d] for d in drifts]))
         rod.starts, rod.indices = self._ints(metric.pattern.indptr), self._ints(metric.pattern.indices)
@@ -146,6 +149,7 @@ class CompiledNewton:
         self.active[:], self.offsets[:] = 0, system.phase.offsets
         for i, row in system.phase.rows.items():
             self.active[i], self.conditions[i, : len(row)] = 1, row
+            self.forces[i, : len(row)] = system.phase.forces[i]
 
     def prepare(self, limits: Limits) -> None:
         """Use what the system has now, and these ``limits`` of Newton's method."""

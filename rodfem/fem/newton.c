@@ -32,6 +32,7 @@ typedef struct {
     const int *drift;           /* numbers of the drifts */
     const int *active;          /* whether each has a phase condition */
     const double *conditions;   /* drifts x n: phase conditions, M g */
+    const double *forces;       /* drifts x n: what a drift of one adds to the equations */
     const double *offsets;      /* g . M x0 */
     const int *drift_row, *drift_column; /* drifts x n: places in S */
     const int *starts, *indices;
@@ -102,10 +103,10 @@ int residual_at(const Rod *rod, const double *x, double *out)
     *rod->load_equation = out[rod->load];
     out[rod->load] = 0;
     for (int d = 0; d < rod->drifts; d++) {
-        const double *condition = rod->conditions + (size_t)d * rod->n;
+        const double *condition = rod->conditions + (size_t)d * rod->n, *force = rod->forces + (size_t)d * rod->n;
         double value = x[rod->drift[d]], row = value;
         if (rod->active[d]) {
-            for (int i = 0; i < rod->n; i++) out[i] += value * condition[i];
+            for (int i = 0; i < rod->n; i++) out[i] += value * force[i];
             row = dot(rod->n, condition, x) - rod->offsets[d];
         }
         out[rod->drift[d]] = row;
@@ -121,11 +122,11 @@ static int assemble_bordered(const Rod *rod, const double *x)
     if (((assemble_form *)rod->assemble)(rod->jacobian, rod->entry_places, rod->u, rod->jacobian_constants, rod->values)) return 1;
     for (int d = 0; d < rod->drifts; d++) {
         const int *row = rod->drift_row + (size_t)d * rod->n, *column = rod->drift_column + (size_t)d * rod->n;
-        const double *condition = rod->conditions + (size_t)d * rod->n;
+        const double *condition = rod->conditions + (size_t)d * rod->n, *force = rod->forces + (size_t)d * rod->n;
         if (!rod->active[d]) { rod->values[row[rod->drift[d]]] += 1; continue; }
-        for (int i = 0; i < rod->n; i++) if (condition[i] != 0) {
-            rod->values[row[i]] += condition[i];
-            rod->values[column[i]] += condition[i];
+        for (int i = 0; i < rod->n; i++) {
+            if (condition[i] != 0) rod->values[row[i]] += condition[i];
+            if (force[i] != 0) rod->values[column[i]] += force[i];
         }
     }
     return 0;

@@ -6,6 +6,12 @@ The symmetries form a linear space.  Those combinations ``g`` of their generator
     g . M (x - x0) = 0,
 
 and a drift scalar as its multiplier (Doedel, in: Numerical Continuation Methods for Dynamical Systems, 2007, ch. 1).
+
+Its force is ``M g``, but for a rod that nothing holds under loads without a potential.  There ``S`` is not symmetric,
+its left null vectors are others than the generators, and the bordered matrix is singular where ``M g`` is in the range
+of ``S``: under a thrust that follows its end, against dead loads, a tilted rod is at rest but for a force across it,
+``S v = -d M g``.  Forces of drifts are ``M (g + sum_j w_j m_j)`` there, with generic weights ``w`` of all rigid
+motions ``m``, of metric norm one: the drifts vanish at an equilibrium, whatever the forces are.
 """
 
 from __future__ import annotations
@@ -45,6 +51,8 @@ class Phase:
     ----------
     rows
         ``M g`` of each active condition by its drift scalar, this rank's rows.
+    forces
+        What one of each drift scalar of an active condition adds to the equations, this rank's rows.
     offsets
         ``g . M x0`` for each drift scalar.
     broken
@@ -58,6 +66,7 @@ class Phase:
     """
 
     rows: dict[int, np.ndarray]
+    forces: dict[int, np.ndarray]
     offsets: np.ndarray
     broken: dict[int, np.ndarray]
     kept: np.ndarray
@@ -68,6 +77,13 @@ class Phase:
     def conditions(self) -> tuple[PETSc.Vec | None, ...]:
         """``M g`` for each drift scalar as vectors, None where none is active."""
         return tuple(self.vector(self.rows[i]) if i in self.rows else None for i in range(len(self.offsets)))
+
+    @cached_property
+    def pushes(self) -> tuple[PETSc.Vec | None, ...]:
+        """Forces of the drift scalars as vectors, None where no condition is active."""
+        if self.forces is self.rows:
+            return self.conditions
+        return tuple(self.vector(self.forces[i]) if i in self.rows else None for i in range(len(self.offsets)))
 
     @property
     def count(self) -> int:
@@ -96,7 +112,7 @@ def _identity(count: int) -> np.ndarray:
 def no_phase(system: System, reference: PETSc.Vec | None = None) -> Phase:
     """No active condition for any drift scalar of the ``system``."""
     count, reference = len(system.drifts), None if reference is None else reference.copy()
-    return Phase({}, np.zeros(count), {}, np.eye(count), reference, system.generators.vector)
+    return Phase({}, {}, np.zeros(count), {}, np.eye(count), reference, system.generators.vector)
 
 
 def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
@@ -131,15 +147,17 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
         least.append(max(MESH * mismatch(state), 10 * SYMMETRIC_STATE))
     numbers = [i for i, (size, bound) in enumerate(zip(sizes, least, strict=True)) if size >= bound]
     if not numbers:  # a straight rod has all of them itself
-        return Phase({}, np.zeros(count), {}, combinations, reference.copy(), system.generators.vector)
+        return Phase({}, {}, np.zeros(count), {}, combinations, reference.copy(), system.generators.vector)
     weights = combinations[numbers] / np.array([sizes[i] for i in numbers])[:, None]
     rows, offsets = weights @ images, np.zeros(count)
     own = system.fields.free_owned
     offsets[numbers] = rows[:, : len(own)] @ state.local[own]
     if system.comm.size > 1:
         offsets = system.comm.allreduce(offsets, op=MPI.SUM)
+    conditions, more = dict(zip(numbers, rows, strict=True)), system.drift_forces
     return Phase(
-        dict(zip(numbers, rows, strict=True)),
+        conditions,
+        dict(zip(numbers, rows + more(state, numbers), strict=True)) if more else conditions,
         offsets,
         dict(zip(numbers, weights, strict=True)),
         combinations[[i for i in range(len(sizes)) if i not in numbers]],

@@ -152,9 +152,9 @@ class State(Evaluation):
                 out.setValues(system.equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)
                 out.assemble()
             for i, value in enumerate(self.drifts.tolist()):
-                phase = system.phase.conditions[i]
-                if phase is not None:
-                    out.axpy(value, phase)
+                phase, push = system.phase.conditions[i], system.phase.pushes[i]
+                if phase is not None and push is not None:
+                    out.axpy(value, push)
                     value = self.along(phase) - system.phase.offsets[i]
                 if system.has_scalars:
                     out.setValue(system.drifts[i], value)

@@ -173,6 +173,12 @@ def rigid_motions(parts: tuple[Elementary, ...]) -> dict[str, Symmetry]:
     return out
 
 
+def capable(fields: Fields) -> list[Symmetry]:
+    """Rigid motions of space of which the rod is capable: rotations by radian, translations by its natural length."""
+    motions = rigid_motions(elementary_generators(fields)).values()
+    return [motion for motion in motions if motion.weights.any()]
+
+
 def summed(parts: tuple[Elementary, ...], chosen: list[bool]) -> Symmetry:
     """Sum of the ``chosen`` of some elementary generators."""
     return Symmetry(np.array(chosen, dtype=float), parts)

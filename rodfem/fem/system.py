@@ -6,6 +6,7 @@ the load, and one drift scalar for each symmetry.  The last two kinds are border
 * the row of the load is the linear equation ``row . (x - x0) = 0`` (an arclength or "fixed load" equation);
 * a drift scalar ``d`` adds ``d g`` to the equations, ``g`` the metric times the symmetry's generator at a reference
   state, and its row is the phase condition ``g . (x - x0) = 0``.  By the symmetry ``d`` vanishes at an equilibrium.
+  Its force is another one for a rod that floats under loads without a potential (:mod:`rodfem.fem.phase`).
   At a state that the symmetry leaves alone the generator is zero, and the row is ``d = 0`` instead.
 """
 
@@ -24,6 +25,7 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.fem.assembly import Places, matrix_places, vector_places
 from rodfem.fem.compiled_newton import CompiledNewton
+from rodfem.fem.drift_forces import DriftForces
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import LOAD, Discretization, Fields
 from rodfem.fem.generators import Generators
@@ -33,13 +35,14 @@ from rodfem.fem.phase import no_phase, phase_at
 from rodfem.fem.sparsity import bordered_pattern, metric_pattern, new_matrix
 from rodfem.fem.spread_assembly import Layout, SpreadMatrix, spread_places
 from rodfem.fem.state import State
-from rodfem.fem.symmetries import Symmetry, may_slide
+from rodfem.fem.symmetries import Symmetry, capable, may_slide
 from rodfem.fem.values import NodalValues
 from rodfem.fem.verification import Verification
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
 from rodfem.linalg.selection import factors_of
+from rodfem.problem.local_state import floats
 from rodfem.problem.scene import Scene
 from rodfem.problem.unchanged import check_unchanged
 from rodfem.timing import Clock
@@ -68,6 +71,8 @@ class System:
         two parameters is followed.
     generators
         Changes of a state by the symmetries.
+    drift_forces
+        What is added to the forces of drift scalars of a rod that nothing holds, under loads without a potential.
     verification
         What verifies the symmetries at the states where the second variation is assembled.
     compiled
@@ -131,6 +136,8 @@ class System:
         own, fixed = shared(self.metric), self.fields.unknowns - len(self.drifts)
         self._weights = None if own is None else own.matrix[:fixed, :fixed]
         self.generators = Generators(self)
+        generic = floats(scene) and bool(self.symmetries) and bool(scene.without_potential())
+        self.drift_forces = DriftForces(self, Generators(self, capable(self.fields))) if generic else None
         self.phase = no_phase(self)
         self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
@@ -296,16 +303,16 @@ class System:
         return self._spread[matrix.handle], self._places[key]
 
     def add_drifts(self, matrix: PETSc.Mat) -> None:
-        """Add rows and columns of the drift scalars: the generators, or a one where a drift is switched off."""
-        for phase, index in zip(self.phase.conditions, self.drifts, strict=True):
-            if phase is None:
+        """Add rows and columns of the drift scalars: conditions and forces, or a one where a drift is switched off."""
+        for phase, push, index in zip(self.phase.conditions, self.phase.pushes, self.drifts, strict=True):
+            if phase is None or push is None:
                 if self.has_scalars:
                     matrix.setValue(index, index, 1.0, addv=True)
                 continue
             begin, end = phase.getOwnershipRange()
             own = np.arange(begin, end, dtype=PETSc.IntType)
             matrix.setValues([index], own, phase.array_r, addv=True)
-            matrix.setValues(own, [index], phase.array_r, addv=True)
+            matrix.setValues(own, [index], push.array_r, addv=True)
 
     @cached_property
     def stiffness_scale(self) -> float:

@@ -159,7 +159,7 @@ class Verification:
         if not state.drifts.any():
             return equations
         out = equations.copy()
-        for drift, phase in zip(state.drifts.tolist(), self.system.phase.conditions, strict=True):
+        for drift, phase in zip(state.drifts.tolist(), self.system.phase.pushes, strict=True):
             if phase is not None and drift:
                 out.axpy(-drift, phase)
         return out

@@ -270,14 +270,21 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         return orthonormal(self.system.comm, vectors, self.weighed(vectors))
 
     def _complete(self, values: np.ndarray, vectors: np.ndarray) -> None:
-        """Add to vectors, in place, their parts along free motions, which follow from their multipliers."""
+        """Add to vectors, in place, their parts along free motions ``g``: ``g . S x / mu``, of ``g . Mx = 0`` before.
+
+        From ``S (x + c g) = mu M (x + c g)``, with ``S g = 0``.  The multiplier of ``g . Mx = 0`` is ``-mu c`` as well,
+        but that of a vector which was predicted belongs to the basis ``g`` at the loads that it was predicted from.
+        """
         begin, end = self.matrix.getOwnershipRange()
-        for index, mode in self._free.items():
-            mine = vectors[index - begin] if begin <= index < end else np.zeros_like(values)
-            multipliers = self.system.comm.allreduce(mine)
-            moving = abs(values) > 0
-            shares = np.zeros_like(multipliers)
-            shares[moving] = -multipliers[moving] / values[moving]
+        drifts = [index - begin for index in self.system.drifts if begin <= index < end]
+        moving = abs(values) > 0
+        for mode in self._free.values():
+            force = mode.duplicate()
+            self.matrix.multTranspose(mode, force)
+            force.array[drifts] = 0.0
+            work = self.system.comm.allreduce(force.array_r.real @ vectors)
+            shares = np.zeros_like(work)
+            shares[moving] = work[moving] / values[moving]
             vectors += np.outer(mode.array_r.real, shares)
 
     def _dense(self, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
