@@ -30,7 +30,7 @@ from rodfem.fem.system import System
 from rodfem.stability.inertia import NULL
 from rodfem.stability.motion_names import SHARE, MotionNames
 from rodfem.stability.near_zero import NearZero, judge, near_zero, soft_limit
-from rodfem.stability.round_off import SPARE, quotient_error
+from rodfem.stability.round_off import SPARE, decide, quotient_error
 from rodfem.stability.sliding import Sliding
 from rodfem.stability.soft_mode import Judgement, SoftMode
 
@@ -125,13 +125,13 @@ class SoftStates:
             richer = self._companion(0)
             try:
                 there, _ = _on(richer, point, fixed_load)
-            except ConvergenceError:
+                found, inertia = richer.solver.inertia.at(there.x), richer.solver.inertia
+                below = found.below(-inertia.tolerance)
+                if below == point.negative:
+                    return 0
+                index = decide(found).index
+            except ConvergenceError:  # no such state, or arithmetic leaves too many signs open there
                 return 0
-            found, inertia = richer.solver.inertia.at(there.x), richer.solver.inertia
-            below = found.below(-inertia.tolerance)
-            if below == point.negative:
-                return 0
-            index = found.count()
         own = point.zero - self.solver.system.active_drifts(point.x)
         return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
 

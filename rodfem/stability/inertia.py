@@ -42,6 +42,8 @@ DEPENDENT = 1e-10
 """Part of a vector that is left across a space, below which it spans nothing new."""
 FRESH = 1e-3
 """Weight of a generic vector that is added to each vector of a block before it is iterated."""
+FAR = 0.1
+"""Shift of the factors, over the lowest bending eigenvalue, above which they lead to others than those near zero."""
 PIVOT = 1e-3
 """Threshold of MUMPS's pivots, relative to the largest entry of a column."""
 
@@ -303,9 +305,12 @@ class Factored:
         ``number`` wanted values change by less than ``accuracy`` relative to themselves (or by what the arithmetic
         resolves).  The block has ``spare`` more vectors.  It converges as the ratio of the eigenvalues inside it to the
         next one, slowly where these are close: every few iterations a Krylov space takes its place, where all converge
-        much faster.  At most ``most`` iterations are made.
+        much faster.  At most ``most`` iterations are made.  Factors of a count at the edge of a wide band of round-off
+        are replaced by others.
         """
         own, block = self._own(), number + spare
+        if own.factored == self._filled and abs(own.shift) > FAR * own.scale:
+            self.below(ZERO_BAND * own.scale)
         vectors = own.vectors[:block] + [own.seed(i) for i in range(len(own.vectors), block)]
         values = np.full(block, np.inf)
         for i, v in enumerate(vectors):

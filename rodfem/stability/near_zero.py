@@ -57,7 +57,7 @@ class NearZero:
 
 
 def soft_limit(inertia: Inertia) -> float:
-    """Distance from zero within which an eigenvalue is soft."""
+    """Distance from zero within which an eigenvalue may be soft: in the band of round-off its quotient decides."""
     return max(SOFT * inertia.scale, inertia.tolerance)
 
 
@@ -79,7 +79,7 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
         number *= 2
         values, vectors = found.nearest(number, FIRM)
     # what is far from zero need not be as sharp: the values there lie dense on coarse meshes, and converge slowly
-    close = max(int((abs(values) < CLEAR * limit).sum()), inside)
+    close = int((abs(values) < CLEAR * SOFT * inertia.scale).sum())
     if close:
         sharp = found.nearest(close, NULL, spare=number - close)
         values, vectors = np.append(sharp[0], values[close:]), [*sharp[1], *vectors[close:]]
@@ -98,7 +98,11 @@ def near_zero(found: Factored, index: Index | None = None, least: int = 0) -> Ne
     counted = np.argsort(abs(quotients))[inside:]
     firm = index.negative - int((quotients[counted] < 0).sum())
     order = np.argsort(quotients)
-    return NearZero(quotients[order], [members[i] for i in order], uncertainty[order], firm, found.drifts)
+    near = NearZero(quotients[order], [members[i] for i in order], uncertainty[order], firm, found.drifts)
+    # in a wide band of round-off most eigenvalues are told from zero by their quotients
+    away = abs(near.values)
+    soft = (away < SOFT * inertia.scale) | (away <= near.uncertainty) | (np.argsort(np.argsort(away)) < least)
+    return near.chosen(soft, near.uncertainty, 0.0)
 
 
 def judge(found: NearZero, modes: Sequence[SoftMode], tolerance: float) -> Judgement:

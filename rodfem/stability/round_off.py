@@ -27,10 +27,10 @@ MANY = 100
 """Most eigenvalues in the band that are decided one by one."""
 WILD = 1e6
 """Half width of the band, over the lowest bending eigenvalue, above which nothing is decided."""
-WIDE = 0.1
-"""Half width of the band, over the lowest bending eigenvalue, above which its edge is far from zero."""
 DECIDED = 1e-3
 """Relative accuracy of eigenvalues that decide a sign."""
+FAR = 1e-2
+"""Eigenvalue, over the lowest bending one, above which a relative accuracy of 1e-3 tells it from zero."""
 SPARE = 2
 """Vectors more than there are eigenvalues in the band."""
 
@@ -89,15 +89,17 @@ def decide(found: Factored) -> Decision:
 def _inside(found: Factored, number: int, accuracy: float = DECIDED) -> tuple[np.ndarray, list[PETSc.Vec]]:
     """Rayleigh quotients and vectors of the ``number`` eigenvalues inside the band of the count, which were counted.
 
-    Its factors, at the edge of the band, lead to the eigenvalues next to that edge: where the band is as wide as the
-    lowest bending eigenvalue, factors next to zero replace them.  Raises :class:`ConvergenceError` where others are
-    found than were counted.
+    Those near zero are as accurate as asked for, the others are accurate enough for their signs.  Raises
+    :class:`ConvergenceError` where others are found than were counted.
     """
     inertia = found.inertia
-    if inertia.tolerance > WIDE * inertia.scale:
-        found.below(ZERO_BAND * inertia.scale)
-    theta, vectors = found.nearest(number + SPARE, accuracy)
-    vectors = [vectors[i] for i in np.argsort(abs(theta))[:number]]
+    theta, vectors = found.nearest(number + SPARE, DECIDED)
+    vectors = [vectors[i] for i in np.argsort(abs(theta))]
+    small = int((abs(theta) < FAR * inertia.scale).sum())
+    if accuracy < DECIDED and small:  # the signs of all others are known
+        vectors[:small] = found.nearest(small, accuracy)[1]
+        inertia.vectors = list(vectors)
+    vectors = vectors[:number]
     theta = np.array([v.dot(found.matrix * v) for v in vectors]) + found.shift
     if (abs(theta) > 2 * inertia.tolerance).any():
         raise ConvergenceError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import classics
 import numpy as np
 import pytest
 import scipy.linalg
@@ -53,3 +54,23 @@ def test_values_and_what_they_cost(ruler: Diagram, monkeypatch: pytest.MonkeyPat
         nearest = found.values[np.argmin(abs(found.values))]
         assert abs(nearest - exact[0]) < 1e-6 * abs(exact[0])
         assert found.firm + int((found.values < 0).sum()) == point.negative
+
+
+@pytest.mark.parametrize("apart", [1e-6, 1e-7])
+def test_signs_in_a_band_as_wide_as_the_lowest_eigenvalue(apart: float) -> None:
+    """One element of 1e-6 makes the round-off of a count as large as bending: quotients tell all signs.
+
+    The clamped column buckles at 4 pi^2; beside that load on either side no sign is undecided.
+    """
+    beside = {39.475: 0, 39.4784: 0, 39.482: 1}
+    column = classics.column("graded", classics.SUPPORTS["clamped-clamped"], (39.0, 39.6))
+    mesh = Discretization("pointwise", 5, 6, vertices=(0.0, 0.2, 0.4, 0.4 + apart, 0.7, 1.0))
+    diagram = trace(column, mesh, Plan(depth=0, at=tuple(beside)))
+    inertia = diagram.solvers[0].inertia
+    assert inertia.resolution > 0.1 * inertia.scale
+    for point in diagram[0].points:
+        critical = 4 * np.pi**2
+        assert (point.negative, point.undecided) == (int(point.load > critical), 0) or abs(point.load - critical) < 1e-5
+    assert {p.load: p.negative for p in diagram[0].points if p.load in beside} == beside
+    (branch,) = diagram.special("branch point")
+    assert abs(branch.point.load - 4 * np.pi**2) < branch.error_estimate < 1e-5
