@@ -22,8 +22,9 @@ from rodfem.continuation.prediction import ROWS, weights
 from rodfem.errors import ConvergenceError
 from rodfem.fem import verification
 from rodfem.fem.newton import NewtonResult
-from rodfem.fem.phase import SYMMETRIC_STATE, Phase
+from rodfem.fem.phase import Phase
 from rodfem.fem.state import Energies
+from rodfem.fem.symmetries import SYMMETRIC_STATE
 from rodfem.linalg.compiled import module
 from rodfem.linalg.matrices import EPS, shared
 

@@ -6,9 +6,10 @@ Where the equations are equivariant their derivative along a generator ``g(x) = 
 
 at an equilibrium ``S g = 0``.  One generator is tried whenever ``S`` is assembled, a random combination of all: it
 costs one product with ``S``.  What is left must be round-off, relative to ``|S| |g|``, and so must the quotient
-``g.(S g + A^t F) / g.M g``, which is the eigenvalue that the symmetry explains.  A ring is closed by multipliers that
-are no part of a generator: what is left is taken across their columns.  The motion of a closed rod along itself is one
-of its mesh up to the mesh's error: of that the quotient alone is asked, with ``F`` along the change of ``g``.
+``g.(S g + A^t F) / g.M g``, which is the eigenvalue that the symmetry explains: that of its own terms, whatever the
+stiffest strain is.  A ring is closed by multipliers that are no part of a generator: what is left is taken across their
+columns.  The motion of a closed rod along itself is one of its mesh up to the mesh's error: of that the quotient alone
+is asked, with ``F`` along the change of ``g``.
 
 A symmetry that fails is dropped, with a notice.
 """
@@ -21,8 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.fem.phase import SYMMETRIC_STATE
-from rodfem.fem.symmetries import mismatch
+from rodfem.fem.symmetries import SYMMETRIC_STATE, mismatch
 from rodfem.linalg.matrices import rounding
 from rodfem.problem.contribution import Motion
 
