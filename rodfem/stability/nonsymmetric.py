@@ -60,14 +60,14 @@ The pencil has infinite eigenvalues with Jordan blocks of size two, one for each
 which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than the nearest: those are not kept.
 """
 DOUBT = 1e-4
-"""Relative round-off of an eigenvalue above which it is an infinite one: its vector hardly moves.
+"""Round-off of an eigenvalue, relative to it or its natural size, above which it is infinite: its vector hardly moves.
 
 It is that of the stiffness over the kinetic energy of the vector: 5e-4 and more for such, 2e-5 and less for others.
 Beside a body of 1e4 times its mass a light rod has them among the finite ones.
 """
 LOST = 1e-6
-"""Relative round-off of the kinetic energy above which an eigenvalue has no digits: of a rod, beside a body of 1e9 times
-its mass."""
+"""Relative round-off of the kinetic energy above which an eigenvalue has no digits: beside a body of 1e9 masses of the
+rod."""
 SHIFT = -10.0
 """Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix may be singular.
 
@@ -302,7 +302,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         heavy.array[:] = abs(heavy.array_r) > 0
         for i in sorted(range(len(values)), key=lambda i: abs(values[i] - target)):
             value = solver.getEigenpair(i, re, im)
-            size = max(abs(value), abs(value - target))
+            size = max(abs(value), abs(value - target), 1.0)
             kinetic = sum(abs(x.dot(mass * x)) for x in (re, im))
             moved = sum((x * heavy).norm() ** 2 for x in (re, im))
             if (
