@@ -547,7 +547,7 @@ FAULTS = {
     ),
     "stiff-strains-hide-the-load": Fault(
         "rodfem/continuation/special_points.py",
-        "max(INSENSITIVE * scale_in_units(system), ",
+        "max(INSENSITIVE * system.stiffness_scale, ",
         "max(INSENSITIVE * system.matrix_in_units(matrix).norm(), ",
         "tests/continuation/test_coupling.py",
     ),

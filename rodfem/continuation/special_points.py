@@ -25,7 +25,6 @@ from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.linalg.matrices import EPS
 from rodfem.stability.dependence import taut
 from rodfem.stability.inertia import NULL, Factored, Index
-from rodfem.stability.pencil import scale_in_units
 from rodfem.stability.round_off import Decision, decide, quotient_error, resolve
 from rodfem.tolerances import ROUND_OFF, SAME_LOAD
 
@@ -137,7 +136,7 @@ def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> f
     system.set_load(derivative, 0.0)
     derivative, null_vector = system.in_units(derivative, 1), system.in_units(null_vector, -1)
     # by a load of natural size; of a trivial state the equations do not feel it
-    least = max(INSENSITIVE * scale_in_units(system), ROUNDED * system.matrix_in_units(matrix).norm())
+    least = max(INSENSITIVE * system.stiffness_scale, ROUNDED * system.matrix_in_units(matrix).norm())
     if derivative.norm() * solver.units.load < least:
         return 0.0
     return float(abs(derivative.dot(null_vector)) / (derivative.norm() * null_vector.norm()))
