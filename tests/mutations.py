@@ -179,7 +179,7 @@ FAULTS = {
     ),
     "infinite-eigenvalues-are-kept": Fault(
         "rodfem/stability/nonsymmetric.py",
-        "noise > DOUBT * abs(value) * kinetic",
+        "noise > DOUBT * size * kinetic",
         "False",
         "tests/diagram/test_sweep.py",
     ),
