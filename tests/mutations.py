@@ -179,7 +179,7 @@ FAULTS = {
     ),
     "infinite-eigenvalues-are-kept": Fault(
         "rodfem/stability/nonsymmetric.py",
-        "noise > DOUBT * abs(value) * kinetic",
+        "noise > DOUBT * size * kinetic",
         "False",
         "tests/diagram/test_sweep.py",
     ),
@@ -436,10 +436,7 @@ FAULTS = {
         "rodfem/diagram/explorer.py", "and point.stretch > 0 and not", "and not", "tests/hard/test_fuzz.py"
     ),
     "eigenvalues-beside-the-edge-of-the-band": Fault(
-        f"{STABILITY}round_off.py",
-        "if inertia.tolerance > WIDE * inertia.scale:",
-        "if False:",
-        "tests/stability/test_round_off.py",
+        f"{STABILITY}inertia.py", "\nFAR = 0.1\n", "\nFAR = 1e9\n", "tests/stability/test_round_off.py"
     ),
     "stiffness-that-the-load-takes-away": Fault(
         f"{CONTINUATION}static_solver.py",
@@ -539,6 +536,18 @@ FAULTS = {
     "stiff-strains-hide-bending": Fault(
         "rodfem/fem/invariance.py", "INVARIANT = 1e-12", "INVARIANT = 1e-9", "tests/fem/test_symmetries.py"
     ),
+    "a-stiff-twist-hides-a-load": Fault(
+        "rodfem/fem/verification.py", "ZERO = 1e-10", "ZERO = 1e-4", "tests/fem/test_nearly_symmetric.py"
+    ),
+    "infinite-eigenvalues-beside-a-heavy-tip": Fault(
+        "rodfem/stability/nonsymmetric.py", "DOUBT = 1e-4", "DOUBT = 1e2", "tests/stability/test_heavy_tip.py"
+    ),
+    "stiff-strains-hide-the-load": Fault(
+        "rodfem/continuation/special_points.py",
+        "max(INSENSITIVE * system.stiffness_scale, ",
+        "max(INSENSITIVE * system.matrix_in_units(matrix).norm(), ",
+        "tests/continuation/test_coupling.py",
+    ),
     "a-fine-mesh-is-looked-at-once": Fault(
         "rodfem/diagram/unfollowed.py", "RARELY = 25", "RARELY = 1000", "tests/diagram/test_unfollowed.py"
     ),
@@ -560,11 +569,17 @@ FAULTS = {
         "",
         "tests/literature/test_free_rods.py",
     ),
-    "eigenvalues-near-the-edge-of-the-band": Fault(
-        f"{STABILITY}inertia.py", "\nFAR = 0.1\n", "\nFAR = 1e9\n", "tests/stability/test_near_zero.py"
+    "signs-by-the-edge-of-the-band": Fault(
+        f"{STABILITY}inertia.py",
+        "if own.factored == self._filled and abs(own.shift) > FAR * own.scale:",
+        "if False:",
+        "tests/stability/test_near_zero.py",
     ),
     "a-bent-rod-breaks-a-symmetry": Fault(
-        "rodfem/fem/phase.py", "SYMMETRIC_STATE = 1e-4", "SYMMETRIC_STATE = 1e-6", "tests/fem/test_nearly_symmetric.py"
+        "rodfem/fem/symmetries.py",
+        "SYMMETRIC_STATE = 1e-4",
+        "SYMMETRIC_STATE = 1e-6",
+        "tests/fem/test_nearly_symmetric.py",
     ),
     "step-keeps-the-phase-of-its-prediction": Fault(
         f"{CONTINUATION}step.c",

@@ -22,10 +22,11 @@ from rodfem.continuation.prediction import ROWS, weights
 from rodfem.errors import ConvergenceError
 from rodfem.fem import verification
 from rodfem.fem.newton import NewtonResult
-from rodfem.fem.phase import SYMMETRIC_STATE, Phase
+from rodfem.fem.phase import Phase
 from rodfem.fem.state import Energies
+from rodfem.fem.symmetries import SYMMETRIC_STATE
 from rodfem.linalg.compiled import module
-from rodfem.linalg.matrices import shared
+from rodfem.linalg.matrices import EPS, shared
 
 if TYPE_CHECKING:
     from rodfem.fem.compiled_newton import Limits
@@ -150,7 +151,7 @@ class CompiledStep:
         step.active = self._theirs("int *", rod.active)
         step.conditions, step.offsets = (self._theirs("double *", x) for x in (rod.conditions, rod.offsets))
         step.zero, step.tiny = verification.ZERO * system.stiffness_scale, verification.TINY
-        step.round_off, step.residual = verification.EPS, verification.RESIDUAL
+        step.round_off, step.residual = verification.ROUND_OFF * EPS, verification.RESIDUAL
         step.generators, step.images = (self._array(np.zeros(count * own)) for _ in range(2))
 
     def _theirs(self, kind: str, pointer: Any) -> Any:

@@ -22,6 +22,7 @@ from rodfem.continuation.locate import across, locate, locate_mode
 from rodfem.continuation.prediction import hermite
 from rodfem.continuation.states_between import solve_at
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
+from rodfem.linalg.matrices import EPS
 from rodfem.stability.dependence import taut
 from rodfem.stability.inertia import NULL, Factored, Index
 from rodfem.stability.round_off import Decision, decide, quotient_error, resolve
@@ -33,8 +34,8 @@ UNCOUPLED = 1e-9
 """Below this it is round-off.  Between the two the index decides, and then the unfolding parameters."""
 LEVEL = 1e-3
 """Slope of the load, relative to its span, below which it is taken for zero."""
-INSENSITIVE = 1e-10
-"""A derivative of the equations in the load smaller than this, relative to the Jacobian, is zero."""
+INSENSITIVE, ROUNDED = 1e-10, 10.0 * EPS
+"""A derivative of the equations in the load smaller than this, relative to bending, or to the Jacobian, is zero."""
 MISSED = 10.0
 """Eigenvalues within the band of a count are zero at a located point up to so many of its uncertainties."""
 APART = 1e-7
@@ -135,7 +136,8 @@ def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> f
     system.set_load(derivative, 0.0)
     derivative, null_vector = system.in_units(derivative, 1), system.in_units(null_vector, -1)
     # by a load of natural size; of a trivial state the equations do not feel it
-    if derivative.norm() * solver.units.load < INSENSITIVE * system.matrix_in_units(matrix).norm():
+    least = max(INSENSITIVE * system.stiffness_scale, ROUNDED * system.matrix_in_units(matrix).norm())
+    if derivative.norm() * solver.units.load < least:
         return 0.0
     return float(abs(derivative.dot(null_vector)) / (derivative.norm() * null_vector.norm()))
 

@@ -170,6 +170,18 @@ static void across_orbit(Step *step, const double *last)
     }
 }
 
+/* Root of the sum of the squares of all terms of g.Sg, of the first rows: times eps, its round-off.  */
+static double rounding(const Sparse *S, int rows, const double *g)
+{
+    double sum = 0;
+    for (int i = 0; i < rows; i++)
+        for (int k = S->starts[i]; k < S->starts[i + 1]; k++) {
+            double term = g[i] * S->values[k] * g[S->indices[k]];
+            sum += term * term;
+        }
+    return sqrt(sum);
+}
+
 /* Whether a generic combination of the generators is a null vector of S, at the state of the phase conditions.  */
 static int verified(Step *step)
 {
@@ -186,8 +198,9 @@ static int verified(Step *step)
         length += g[k] / unit * g[k] / unit;
         left += step->right[k] * unit * step->right[k] * unit;
     }
-    double zero = step->zero * fmax(size * size, step->tiny) + step->round_off * step->norm * length;
-    return sqrt(left) <= step->residual * step->norm * (sqrt(length) + step->tiny) && fabs(quotient) <= zero;
+    if (sqrt(left) > step->residual * step->norm * (sqrt(length) + step->tiny)) return 0;
+    double excess = fabs(quotient) - step->zero * fmax(size * size, step->symmetric * step->symmetric);
+    return excess <= 0 || excess <= step->round_off * rounding(&step->saddle, own, g);
 }
 
 /* Largest residual of the equations at x, in natural units, the sum of all, and largest difference of the squared norm of a quaternion

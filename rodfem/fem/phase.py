@@ -26,19 +26,12 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.fem.symmetries import Symmetry, mismatch
+from rodfem.fem.symmetries import SYMMETRIC_STATE, Symmetry, mismatch
 
 if TYPE_CHECKING:
     from rodfem.fem.state import State
     from rodfem.fem.system import System
 
-SYMMETRIC_STATE = 1e-4
-"""A generator smaller than this (in the metric) is zero: the state has the symmetry itself.
-
-Where symmetries are found an imperfection is round-off that is 1e-12 of the stiffest strain's terms: 1e-8 beside a
-twist 1e4 times as stiff as bending.  At a state that it moves by 1e-8/mu, the eigenvalue mu of that motion is not zero:
-it is counted as it is down to 1e-8/SYMMETRIC_STATE.
-"""
 MESH = 10.0
 """Times the mismatch of a mesh with the motion of a ring along itself, below which a generator is the mesh's error."""
 

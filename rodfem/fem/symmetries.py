@@ -26,6 +26,14 @@ from rodfem.problem.scene import Scene
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
 
+SYMMETRIC_STATE = 1e-4
+"""A generator smaller than this (in the metric) is zero: the state has the symmetry itself.
+
+Where symmetries are found an imperfection is round-off that is 1e-12 of the stiffest strain's terms: 1e-8 beside a
+twist 1e4 times as stiff as bending.  At a state that it moves by 1e-8/mu, the eigenvalue mu of that motion is not zero:
+it is counted as it is down to 1e-8/SYMMETRIC_STATE.  At states that it moves farther the symmetry is verified
+(:mod:`rodfem.fem.verification`) to the round-off of its eigenvalue, and dropped.
+"""
 NAMED = 1e-3
 """Weight of a part, relative to the greatest, above which it is named."""
 

@@ -6,9 +6,10 @@ Where the equations are equivariant their derivative along a generator ``g(x) = 
 
 at an equilibrium ``S g = 0``.  One generator is tried whenever ``S`` is assembled, a random combination of all: it
 costs one product with ``S``.  What is left must be round-off, relative to ``|S| |g|``, and so must the quotient
-``g.(S g + A^t F) / g.M g``, which is the eigenvalue that the symmetry explains.  A ring is closed by multipliers that
-are no part of a generator: what is left is taken across their columns.  The motion of a closed rod along itself is one
-of its mesh up to the mesh's error: of that the quotient alone is asked, with ``F`` along the change of ``g``.
+``g.(S g + A^t F) / g.M g``, which is the eigenvalue that the symmetry explains: that of its own terms, whatever the
+stiffest strain is.  A ring is closed by multipliers that are no part of a generator: what is left is taken across their
+columns.  The motion of a closed rod along itself is one of its mesh up to the mesh's error: of that the quotient alone
+is asked, with ``F`` along the change of ``g``.
 
 A symmetry that fails is dropped, with a notice.
 """
@@ -21,7 +22,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.fem.symmetries import mismatch
+from rodfem.fem.symmetries import SYMMETRIC_STATE, mismatch
+from rodfem.linalg.matrices import rounding
 from rodfem.problem.contribution import Motion
 
 if TYPE_CHECKING:
@@ -31,10 +33,15 @@ if TYPE_CHECKING:
 EPS = 100 * float(np.finfo(float).eps)
 RESIDUAL = 1e-8
 """Residual ``S g`` of a symmetry, relative to ``|S| |g|``."""
-ZERO = 1e-5
-"""Eigenvalue that a symmetry may have, over the rod's lowest bending eigenvalue, beside round-off."""
+ZERO = 1e-10
+"""Eigenvalue that a symmetry may have, over the rod's lowest bending eigenvalue, beside round-off: what Newton's method
+makes of a state."""
+ROUND_OFF = 10.0
+"""Times the effect of independent relative errors eps of all entries of ``S`` on the quotient: its round-off."""
 TINY = 0.01
 """A generator (of unit rotations and translations) of this size is small: the state has the symmetry itself, nearly."""
+ALONG = 1e-5
+"""The same as :data:`ZERO` of the motion of a ring along itself, whose state is no solution but on its mesh."""
 OF_THE_MESH = 100.0
 """Eigenvalue that a mesh makes of a motion along itself, at most, over the lowest bending one and its mismatch."""
 FAR = 1e-4
@@ -125,9 +132,9 @@ class Verification:
             left.setValues(system.drifts, self._none)  # phase conditions, no part of S
         left.assemble()
         size, length = system.norm(g) ** 2, system.in_units(g, -1).norm()
-        zero = ZERO * system.stiffness_scale * max(size, TINY) + EPS * self.norm * length**2
         quotient = float(np.real(left.dot(g)))
         if system.symmetries[chosen[0]].along:
+            zero = ALONG * system.stiffness_scale * max(size, TINY) + EPS * self.norm * length**2
             return abs(quotient) <= zero or self._of_the_mesh(chosen[0], g, quotient, zero, state, equations)
         small = RESIDUAL * self.norm * (length + TINY)
         if equations is not None:
@@ -137,7 +144,9 @@ class Verification:
         left = system.in_units(left, 1)
         if left.norm() > small:
             self._across_closing(matrix, left)
-        return left.norm() <= small and abs(quotient) <= zero
+        # a generator below SYMMETRIC_STATE explains no eigenvalue
+        excess = abs(quotient) - ZERO * system.stiffness_scale * max(size, SYMMETRIC_STATE**2)
+        return left.norm() <= small and (excess <= 0 or excess <= ROUND_OFF * rounding(matrix, g, g))
 
     def _of_the_mesh(
         self, symmetry: int, g: PETSc.Vec, quotient: float, zero: float, state: State, equations: PETSc.Vec | None

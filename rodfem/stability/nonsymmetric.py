@@ -59,11 +59,17 @@ FAR = 1e5
 The pencil has infinite eigenvalues with Jordan blocks of size two, one for each pair of constraint and multiplier,
 which round-off smears to finite ones about ``1/sqrt(eps)`` times farther than the nearest: those are not kept.
 """
+NEAR = 10.0
+"""Times the distance from the shift of the nearest eigenvalue, or of zero, within which another is none of those."""
 DOUBT = 1e-4
-"""Relative round-off of a far eigenvalue above which it is an infinite one: its vector hardly moves.
+"""Relative round-off of an eigenvalue above which it is infinite: its vector hardly moves.
 
 It is that of the stiffness over the kinetic energy of the vector: 5e-4 and more for such, 2e-5 and less for others.
+Beside a body of 1e4 times its mass a light rod has them among the finite ones.
 """
+LOST = 1e-6
+"""Relative round-off of the kinetic energy above which an eigenvalue has no digits: beside a body of 1e9 masses of the
+rod."""
 SHIFT = -10.0
 """Eigenvalues are sought next to this one, over their natural size: beside zero, where the matrix may be singular.
 
@@ -300,18 +306,24 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         solver = self._solve(matrix, mass, number, target if compat.COMPLEX else target.real)
         re, im = matrix.createVecRight(), matrix.createVecRight()
         values, out = [solver.getEigenvalue(i) for i in range(solver.getConverged())], []
-        order = sorted(range(len(values)), key=lambda i: abs(values[i] - target))[: number + SPARE]
-        far = FAR * abs(values[order[0]] - target)
-        round_off = EPS * matrix.norm(PETSc.NormType.INFINITY)
-        for i in order:
+        stiffness, inertia = (EPS * each.norm(PETSc.NormType.INFINITY) for each in (matrix, mass))
+        heavy = mass.getDiagonal()
+        heavy.array[:] = abs(heavy.array_r) > 0
+        nearest = min((abs(value - target) for value in values), default=0.0)
+        far = min(FAR * nearest, NEAR * max(nearest, -SHIFT))  # rigid motions have no kinetic energy here
+        for i in sorted(range(len(values)), key=lambda i: abs(values[i] - target)):
             value = solver.getEigenpair(i, re, im)
+            size = max(abs(value), abs(value - target))
             kinetic = sum(abs(x.dot(mass * x)) for x in (re, im))
-            noise = round_off * (re.norm() ** 2 + im.norm() ** 2)
-            if abs(value - target) > far and noise > DOUBT * abs(value) * kinetic:
+            moved = sum((x * heavy).norm() ** 2 for x in (re, im))
+            noise = stiffness * (re.norm() ** 2 + im.norm() ** 2)
+            if abs(value - target) > far and (noise > DOUBT * size * kinetic or inertia * moved > LOST * kinetic):
                 continue
             parts = mode_type.halves(re) if compat.COMPLEX else [re.array_r, im.array_r]
             error = solver.computeError(i, SLEPc.EPS.ErrorType.BACKWARD)
             out.append(_Pair(complex(value), [part[self._own].copy() for part in parts], error))
+            if len(out) == number + SPARE:
+                break
         solver.destroy()
         return out
 
