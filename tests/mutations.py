@@ -301,7 +301,10 @@ FAULTS = {
         "rodfem/problem/plane.py", "PUSHES = 1e-12", "PUSHES = 1e12", "tests/problem/test_scene_errors.py"
     ),
     "energies-are-tried-at-one-load": Fault(
-        "rodfem/problem/plane.py", "*map(scene.constants, scene.loads()), *(", "*(", "tests/problem/test_scene_errors.py"
+        "rodfem/problem/plane.py",
+        "*map(scene.constants, scene.loads()), *(",
+        "*(",
+        "tests/problem/test_scene_errors.py",
     ),
     "no-balance-of-the-rod": Fault(
         f"{CONTINUATION}invariants.py",
