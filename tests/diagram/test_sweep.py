@@ -110,6 +110,7 @@ def test_double_frequencies_have_one_name(monkeypatch: pytest.MonkeyPatch) -> No
         assert named(lambda name: name == "bending", swept(scene, monkeypatch)[1])
 
 
+@pytest.mark.alone
 def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> None:
     """A thrust that follows in part: one plane diverges, holds again and flutters, before the other one diverges."""
     share, strong = 0.45, 3.0
