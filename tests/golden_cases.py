@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from functools import cache
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import classics
@@ -110,11 +113,23 @@ def trace(scene: Scene, *, error_bars: bool = True) -> rodfem.Diagram:
     return rodfem.trace(scene, mesh, Plan(depth=0 if scene.name in FAMILIES else 1, error_bars=error_bars))
 
 
+@cache
+def numbers() -> dict[str, Any]:
+    """What is recorded, by the names of the cases."""
+    read: dict[str, Any] = json.loads((Path(__file__).parent / "golden" / "numbers.json").read_text())
+    return read
+
+
 def record(scene: Scene, *, error_bars: bool = True) -> list[dict[str, Any]]:
     """What is recorded of a scene: its branches, with their special points and the sequence of their indices.
 
     Without ``error_bars`` the bars are round-off, and no forms of a higher degree are compiled.
     """
+    return recorded(trace(scene, error_bars=error_bars))
+
+
+def recorded(diagram: rodfem.Diagram) -> list[dict[str, Any]]:
+    """What is recorded of a diagram."""
     return [
         {
             "name": branch.name,
@@ -122,7 +137,7 @@ def record(scene: Scene, *, error_bars: bool = True) -> list[dict[str, Any]]:
             "indices": [index for index, _ in groupby(p.negative for p in branch.points)],
             "special": [_point(s) for s in branch.special],
         }
-        for branch in trace(scene, error_bars=error_bars).branches
+        for branch in diagram.branches
     ]
 
 

@@ -300,6 +300,12 @@ FAULTS = {
     "energies-prefer-a-side": Fault(
         "rodfem/problem/plane.py", "PUSHES = 1e-12", "PUSHES = 1e12", "tests/problem/test_scene_errors.py"
     ),
+    "energies-are-tried-at-one-load": Fault(
+        "rodfem/problem/plane.py",
+        "*map(scene.constants, scene.loads()), *(",
+        "*(",
+        "tests/problem/test_scene_errors.py",
+    ),
     "no-balance-of-the-rod": Fault(
         f"{CONTINUATION}invariants.py",
         "return bool(total * max(largest, 1.0) <= UNBALANCED)",

@@ -66,7 +66,7 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
     """Find a basis of all exact symmetries; raises :class:`SceneError` where the equations are no numbers anywhere."""
     parts = elementary_generators(fields)
     single = [Symmetry(row, parts) for row in np.eye(len(parts))]
-    moved = np.zeros((len(parts),) * 2)
+    moved, dofs_held = np.zeros((len(parts),) * 2), _held(fields)
     rows, sizes, held = [], [], [np.zeros((1, len(parts)))]
     for seed in range(len(parts) + 6 if fields.scene.conservative else STATES):
         state = generic_state(equations, seed)
@@ -77,7 +77,7 @@ def find_symmetries(fields: Fields, equations: Equations) -> list[Symmetry]:
         sizes.append(size)
         # conditions on the weights a of a symmetry: invariance, and no motion of what an end holds
         changes /= fields.sizes  # conditions and motions are beside others in other units
-        held.append(changes[:, _held(fields)].T)
+        held.append(changes[:, dofs_held].T)
         free = changes[:, fields.number >= 0]
         moved += fields.comm.allreduce(free @ free.T, op=MPI.SUM)
     free = _null_space(np.vstack(fields.comm.allgather(np.linalg.qr(np.vstack(held), mode="r"))))

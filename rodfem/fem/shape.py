@@ -94,6 +94,10 @@ class Shape:
         starts = self.gather(self.start)
         self._sequence = np.argsort(starts)
         self._first = np.searchsorted(starts[self._sequence], self.start)
+        left = self.from_left(self.start)[:, None, None]
+        widths = np.diff(left, axis=0, append=system.scene.interval[1])
+        self._every_s = unique(left + widths * self.nodes[None, :, None])[:, 0]
+        self._natural = {b.name: f.dofs[b.name][cells][:, np.argsort(compat.nodes(b.degree))] for b in f.blocks}
 
     def ordinate(self, x: PETSc.Vec) -> float:
         """Ordinate of the scene at the state ``x``."""
@@ -121,12 +125,9 @@ class Shape:
         continuous ones (m, components), discontinuous ones (elements, nodes, components); scalars by name.
         """
         system, f, state = self.system, self.system.fields, self.system.at(x)
-        out: dict[str, Any] = {"elements": f.discretization.elements}
-        start = self.from_left(self.start)[:, None, None]
-        h = np.diff(start, axis=0, append=system.scene.interval[1])
-        out["s"] = unique(start + h * self.nodes[None, :, None])[:, 0]
+        out: dict[str, Any] = {"elements": f.discretization.elements, "s": self._every_s.copy()}
         for block in f.blocks:
-            values = state.values(block.name)[self.cells][:, np.argsort(compat.nodes(block.degree)), :]
+            values = state.local[self._natural[block.name]]
             out[block.name] = self.joined(values) if block.continuous else self.from_left(values)
         r, chord = f.formulation.nodal(self, state)
         out["r"] = r + f.formulation.offset(f, state, out["s"], chord)

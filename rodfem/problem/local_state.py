@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from math import sqrt
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -160,19 +161,27 @@ def functions_of_places(scene: Scene) -> Iterator[tuple[str, OfPlace, Place]]:
 
 
 def some_places(
-    scene: Scene, state: int = 0, wrap: Callable[[Any], Any] = lambda x: x, s: float | None = None
+    scene: Scene, state: int = 0, wrap: Callable[[Any], Any] | None = None, s: float | None = None
 ) -> tuple[Place, Place]:
-    """Return a point and a place along the rod of a ``scene``; vectors pass through ``wrap``.
+    """Return a point and a place along the rod of a ``scene``; vectors pass through ``wrap``, if it is given.
 
     The ``state`` is the number of one of :data:`STATES`.  The arclength ``s`` is by default one inside the rod: at an
     end a factor may vanish, or a logarithm have its pole.
     """
-    s, length = inside(scene.interval)[0] if s is None else s, scene.length
+    s = inside(scene.interval)[0] if s is None else s
+    return _known_places(scene.length, state, s) if wrap is None else _places(scene.length, state, s, wrap)
+
+
+def _places(length: float, state: int, s: float, wrap: Callable[[Any], Any] = lambda x: x) -> tuple[Place, Place]:
     units = (1.0, length, 1.0, 1.0 / length)
     numbers = ([float(unit * x) for x in values] for unit, values in zip(units, STATES[state], strict=True))
     q, r, v, k = (wrap(ufl.as_vector(values)) for values in numbers)
     R = rotation(q)
     return place(q, R, s, r, length=length), place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
+
+
+_known_places = lru_cache(maxsize=64)(_places)
+"""The same, made once: each check of a scene asks for these places."""
 
 
 def trials(scene: Scene, function: OfConstants) -> Iterator[Constants]:

@@ -7,20 +7,19 @@ the first variation out of the plane must vanish at states in it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
 from ufl.classes import Abs, Conditional, Division, Product, ScalarValue, Sqrt, Sum, Zero
 
-from forms.rotation import rotation
 from rodfem.errors import SceneError
 from rodfem.problem.end import SIDES
-from rodfem.problem.kinds import plain
-from rodfem.problem.local_state import STATES, Constants, place, trials, watched
+from rodfem.problem.local_state import STATES, Constants, place, trials
+from rodfem.problem.pointwise import LocalState, Places, along_rod
 from rodfem.problem.roles import functions_of
 from rodfem.problem.symbols import symbols
+from rodfem.problem.values import Values
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -107,70 +106,54 @@ def _check_loads(scene: Scene, normal: int, anywhere: Constants) -> None:
 
 
 def _check_functions_of_states(scene: Scene, normal: int) -> None:
-    energies: list[tuple[str, Callable[[Any, Constants], Any], bool]] = [
-        ("stored energy", lambda x, c: scene.energy(x.v, x.k, c), True)
+    at = LocalState(scene)
+    x, c, sides = along_rod(scene, at), at.constants, _sides(scene, normal, at)
+    point = place(x.q, x.R, x.s, x.r, length=x.length)
+    energies = [("stored energy", scene.energy(x.v, x.k, c))]
+    energies += [
+        (what, f(x if role.along else point, c)) for what, f, role in functions_of(scene) if role.call == "f(x, c)"
     ]
-    energies += [(what, f, role.along) for what, f, role in functions_of(scene) if role.call == "f(x, c)"]
-    for what, function, along in energies:
-        for c in _places(scene, function, along):
-            for sides in _sides(scene, normal, c.s):
-                one, other = (_value(function, x if along else _point(x), c) for x in sides)
-                if abs(one - other) > PUSHES * max(abs(one), abs(other)):
-                    raise SceneError(
-                        f"The {what} pushes the rod out of its plane across {scene.planar}: the two sides of the plane "
-                        "are not alike to it; leave that out, or planar out of the scene."
-                    )
+    for what, energy in energies:
+        value = Values(energy)
+        one, other = (_defined(value(side)) for side in sides)
+        if (abs(one - other) > PUSHES * np.maximum(abs(one), abs(other))).any():
+            raise SceneError(
+                f"The {what} pushes the rod out of its plane across {scene.planar}: the two sides of the plane "
+                "are not alike to it; leave that out, or planar out of the scene."
+            )
 
 
-def _places(scene: Scene, function: Callable[[Any, Constants], Any], along: bool) -> Iterator[Constants]:
-    """Constants at the loads, and at the arclengths, as far as a function of the state asks for them."""
-    c, asked = watched(scene.constants())
-    x = next(_sides(scene, 0, c.s))[0]
-    function(x if along else _point(x), c)
-    yield scene.constants()
-    yield from (scene.constants(load) for load in scene.loads() if scene.load in asked)
-    yield from (scene.constants(s=s) for s in scene.samples() if "s" in asked)
+def _sides(scene: Scene, normal: int, at: LocalState) -> tuple[Places, Places]:
+    """Places that differ from one in the plane by the same motion out of it, to one side and to the other.
 
-
-def _sides(scene: Scene, normal: int, s: float) -> Iterator[tuple[Any, Any]]:
-    """Pairs of places that differ from one in the plane by the same motion out of it, to either side."""
-    length, free = scene.length, [i in scene.free_strains for i in range(3)]
+    All motions out of all of :data:`STATES` are at the scene's own constants, at all of its loads, and at arclengths.
+    """
+    length, free = scene.length, np.isin(np.arange(3), scene.free_strains)
     in_plane = np.arange(3) != normal
+    units = np.concatenate([[1.0] * 4, [length] * 3, [1.0] * 3, [1 / length] * 3])
+    across = np.concatenate([[False], in_plane, ~in_plane, ~in_plane & free, in_plane])
+    flat = []
     for q, r, v, k in STATES:
         quaternion = np.array(q) * np.concatenate([[True], ~in_plane])
-        flat = np.concatenate(
-            [
-                quaternion / np.linalg.norm(quaternion),
-                length * np.array(r) * in_plane,
-                np.where(in_plane & free, v, np.eye(3)[2]),
-                np.where(~in_plane, k, 0.0) / length,
-            ]
-        )
-        units = np.concatenate([[1.0] * 4, [length] * 3, [1.0] * 3, [1 / length] * 3])
-        across = np.concatenate([[False], in_plane, ~in_plane, ~in_plane & free, in_plane])
-        for i in np.flatnonzero(across):
-            aside = ASIDE * units[i] * np.eye(13)[i]
-            one, other = (_place(x, s, length) for x in (flat + aside, flat - aside))
-            yield one, other
+        strains, curvatures = np.array(v) * in_plane, np.array(k) * ~in_plane
+        flat.append([*quaternion / np.linalg.norm(quaternion), *length * np.array(r) * in_plane, *strains,
+                     *curvatures / length])  # fmt: skip
+    aside = np.diag(ASIDE * units)[across]
+    places = [scene.constants(), *map(scene.constants, scene.loads()), *(scene.constants(s=s) for s in scene.samples())]
+    constants = {symbol: np.array([vars(c)[name] for c in places]) for name, symbol in vars(at.constants).items()}
+    state = dict(zip([*at.q, *at.r, *at.v, *at.k], np.flatnonzero([True] * 7 + list(free) + [True] * 3), strict=True))
+
+    def side(sign: float) -> Places:
+        every = np.concatenate([numbers + sign * aside for numbers in np.array(flat)])
+        moved = {symbol: np.repeat(every[:, i], len(places)) for symbol, i in state.items()}
+        return moved | {symbol: np.tile(values, len(every)) for symbol, values in constants.items()}
+
+    return side(1.0), side(-1.0)
 
 
-def _place(numbers: np.ndarray, s: float, length: float) -> Any:
-    q, r, v, k = (ufl.as_vector([float(x) for x in part]) for part in np.split(numbers, [4, 7, 10]))
-    R = rotation(q)
-    return place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
-
-
-def _point(x: Any) -> Any:
-    return place(x.q, x.R, x.s, x.r, length=x.length)
-
-
-def _value(function: Callable[[Any, Constants], Any], x: Any, c: Constants) -> float:
-    """Value of a function of the state, zero where it is undefined: at a state that the rod need not take."""
-    try:
-        value = plain(ufl.as_ufl(function(x, c))(()))
-    except (ArithmeticError, ValueError, TypeError):
-        return 0.0
-    return value if np.isfinite(value) else 0.0
+def _defined(values: np.ndarray) -> np.ndarray:
+    """Values, zero where one is undefined: at a state that the rod need not take."""
+    return np.where(np.isfinite(values), values, 0.0)
 
 
 def _size(quaternion: Any) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,8 +37,6 @@ class LocalState:
         self.units = dict.fromkeys([*self.q, *self.v], 1.0) | dict.fromkeys(self.r, length)
         self.units |= dict.fromkeys(self.k, 1.0 / length)
         self._slopes = [Symbol() for _ in range(4)]
-        k = curvature(ufl.as_vector(self.q), ufl.as_vector(self._slopes))
-        self._curvatures = [Values(k[i]) for i in range(3)]
 
     @property
     def constants(self) -> Constants:
@@ -48,6 +47,11 @@ class LocalState:
         """Curvatures of quaternions ``q`` with these ``slopes`` (4, places), by their symbols."""
         known = q | dict(zip(self._slopes, slopes, strict=True))
         return {symbol: of(known) for symbol, of in zip(self.k, self._curvatures, strict=True)}
+
+    @cached_property
+    def _curvatures(self) -> list[Values]:
+        k = curvature(ufl.as_vector(self.q), ufl.as_vector(self._slopes))
+        return [Values(k[i]) for i in range(3)]
 
 
 @dataclass(frozen=True)

@@ -27,9 +27,10 @@ from rodfem.problem.local_state import Constants, inside, watched
 from rodfem.problem.plane import check_plane
 from rodfem.problem.roles import Role, changes, functions_of, guarded, role_field
 from rodfem.problem.start import check_continuity
-from rodfem.problem.unchanged import check_unchanged, numbers_of
+from rodfem.problem.unchanged import numbers_of
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import LARGEST, TINIEST, check_kinds, check_scene, two_numbers
+from rodfem.problem.values import Symbol
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
 
 ASIDE = 1e-6
@@ -278,7 +279,7 @@ class Scene(Contribution):
         check_scene(self)
         check_plane(self)
         check_continuity(self)
-        check_unchanged(self)  # from now on: the first call keeps the numbers of all functions
+        _ = self.numbers  # kept from now on: see :mod:`rodfem.problem.unchanged`
 
     @cached_property
     def numbers(self) -> list[tuple[str, list[float]]]:
@@ -494,16 +495,22 @@ class Scene(Contribution):
         """Stiffness by the arclength, differentiated once: systems, their companions and pictures ask for it."""
         return {}
 
-    def _stiffness_at(self, s: float | None) -> np.ndarray:
-        free_v = self.free_strains
+    @cached_property
+    def _hessian(self) -> tuple[Symbol, Any]:
+        """Second derivative of ``W`` in the strains of :meth:`stiffness`, and the symbol of its arclength."""
+        free_v, s = self.free_strains, Symbol()
         x = ufl.variable(ufl.as_vector([UNDEFORMED[i] for i in free_v] + [0.0] * 3))
         v = [ufl.as_ufl(value) for value in UNDEFORMED]
         for position, component in enumerate(free_v):
             v[component] = x[position]
         k = ufl.as_vector([x[len(free_v) + i] for i in range(3)])
-        W = ufl.as_ufl(self.energy(ufl.as_vector(v), k, self.constants(s=s)))
-        hessian = apply_derivatives(apply_algebra_lowering(ufl.diff(ufl.diff(W, x), x)))
-        out = np.zeros((len(free_v) + 3,) * 2)
+        W = ufl.as_ufl(self.energy(ufl.as_vector(v), k, Constants(**vars(self.constants()) | {"s": s})))
+        return s, apply_derivatives(apply_algebra_lowering(ufl.diff(ufl.diff(W, x), x)))
+
+    def _stiffness_at(self, s: float | None) -> np.ndarray:
+        symbol, hessian = self._hessian
+        symbol.value = self.constants(s=s).s
+        out = np.zeros((len(self.free_strains) + 3,) * 2)
         for i, j in zip(*np.tril_indices(len(out)), strict=True):  # not hessian(...): it differentiates every time
             out[i, j] = out[j, i] = float(hessian.evaluate((), {}, (int(i), int(j)), StackDict()))
         return out

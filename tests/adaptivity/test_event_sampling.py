@@ -47,15 +47,18 @@ def rod() -> Scene:
 
 
 @cache
+def clamp(load: float) -> np.ndarray:
+    """Moment and force at the clamp, (2,), followed from no load by steps of 2."""
+    guess = clamp(2.0 * (np.ceil(load / 2) - 1)) if load > 0 else np.array([0.0, -1.5])
+    found = root(lambda p: integrated(p, load).y[[1, 2], -1], guess, tol=1e-12)
+    assert found.success
+    return np.asarray(found.x)
+
+
+@cache
 def shot(load: float) -> Curve:
-    """The equilibrium at a load: angle, moment, deflection, height, force across; followed from no load."""
-    p, before = np.array([0.0, -1.5]), 0.0
-    steps = max(1, int(np.ceil((load - before) / 2)))
-    for P in np.linspace(before, load, steps + 1):
-        found = root(lambda p, P=P: integrated(p, P).y[[1, 2], -1], p, tol=1e-12)
-        assert found.success
-        p = found.x
-    return integrated(p, load, dense=True).sol
+    """The equilibrium at a load: angle, moment, deflection, height, force across."""
+    return integrated(clamp(load), load, dense=True).sol
 
 
 def integrated(p: np.ndarray, load: float, *, dense: bool = False) -> Any:
@@ -119,7 +122,9 @@ def traced(mesh: tuple[int, int]) -> Diagram:
     return rodfem.trace(rod(), Discretization("auto", *mesh), Plan(depth=0, events=events))
 
 
-@pytest.mark.parametrize("name", EVENTS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(x, marks=[pytest.mark.alone] * (x != "largest deflection")) for x in EVENTS]
+)
 @pytest.mark.parametrize("mesh", MESHES)
 def test_bars_have_what_nodes_miss_of_the_rod(mesh: tuple[int, int], name: str) -> None:
     """The same function of the rod itself, by shooting, vanishes within the bar."""

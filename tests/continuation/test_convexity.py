@@ -39,7 +39,10 @@ def rod(energy: Energy, span: tuple[float, float] = (0.0, 2.0), **given: Any) ->
     return column("rod", given.pop("ends", (clamped(), free())), span, energy=energy, **given)
 
 
-@pytest.mark.parametrize(("energy", "until"), [(softening, 1.0), (coupled, 1.0), (bowl, 0.8)])
+@pytest.mark.parametrize(
+    ("energy", "until"),
+    [(coupled, 1.0), *(pytest.param(*case, marks=pytest.mark.alone) for case in [(softening, 1.0), (bowl, 0.8)])],
+)
 def test_a_stiffness_that_the_load_takes_away(energy: Energy, until: float) -> None:
     """Past it 48 eigenvalues of a mesh of 48 nodes were negative, and that was called a branch point."""
     (branch,) = trace(rod(energy), MESH, Plan(depth=0, error_bars=False))
@@ -56,14 +59,14 @@ def narrow(x: Any, width: float) -> Energy:
     return lambda v, k, c: bending_and_twist(k, (x(c) ** 2 - width**2, 2.0, 1.0))
 
 
-@pytest.mark.parametrize("width", [0.02, 0.003])
+@pytest.mark.parametrize("width", [0.02, pytest.param(0.003, marks=pytest.mark.alone)])
 def test_convexity_lost_and_regained_within_one_step(width: float) -> None:
     (branch,) = trace(rod(narrow(lambda c: 1.0 - c.P, width)), MESH, Plan(depth=0, error_bars=False))
     assert branch.ended == f"the stored energy is not convex any more at P = {1 - width:.6g}"
     assert branch.points[-1].load < 1 - width < 1 + width < branch.points[-1].load + 0.15
 
 
-@pytest.mark.parametrize("width", [0.1, 0.01, 0.001])
+@pytest.mark.parametrize("width", [0.1, *(pytest.param(x, marks=pytest.mark.alone) for x in (0.01, 0.001))])
 def test_a_state_that_passes_a_dent_of_the_energy_within_one_step(width: float) -> None:
     """A rod under tension, whose stretch jumps: ``W'' = 10 - 11/(1 + x^2)^(3/2)`` with ``x = (v - 1.3)/width``."""
 
@@ -117,7 +120,10 @@ def test_a_sweep(energy: Energy, until: float) -> None:
 
 @pytest.mark.parametrize(
     ("energy", "until"),
-    [(lambda v, k, c: bending_and_twist(k, (c.b**2 - 0.25, 2.0, 1.0)), 0.5), (narrow(lambda c: c.b - 0.3, 0.02), 0.32)],
+    [
+        (lambda v, k, c: bending_and_twist(k, (c.b**2 - 0.25, 2.0, 1.0)), 0.5),
+        pytest.param(narrow(lambda c: c.b - 0.3, 0.02), 0.32, marks=pytest.mark.alone),
+    ],
 )
 def test_a_locus(energy: Energy, until: float) -> None:
     """Euler's load ``pi^2/4`` times the stiffness, which is positive at both bounds of b, but not between them."""
@@ -132,7 +138,7 @@ def test_a_locus(energy: Energy, until: float) -> None:
     assert {tuple(row) for row in curve.index.tolist()} == {(0, 1)}
 
 
-@pytest.mark.parametrize("loss", [3.0, 3.99])
+@pytest.mark.parametrize("loss", [pytest.param(3.0, marks=pytest.mark.alone), 3.99])
 def test_convexity_lost_in_the_step_to_zero_stretch(loss: float) -> None:
     """A thrust squeezes a rod of ``EA = 4`` to nothing at 4; before that its twisting stiffness vanishes."""
     scene = rod(

@@ -7,6 +7,7 @@ its stiffness B2.  What the load does may be any function of a parameter, so tha
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from itertools import pairwise
 from math import sqrt
 from typing import Any
@@ -65,8 +66,12 @@ def adds_up(diagram: Diagram, say: bool = False) -> None:
     assert bool(diagram.warnings) == say
 
 
-def columns(strong: float, span: tuple[float, float], share: float = 1.0) -> Diagram:
+def swept(strong: float, span: tuple[float, float], share: float = 1.0) -> Diagram:
     return trace(classics.partly_following(share, span, strong), MESH, Plan(depth=0))
+
+
+columns = cache(swept)
+"""The same, once for each set of arguments."""
 
 
 @pytest.mark.alone
@@ -120,7 +125,7 @@ def by_values(comm: MPI.Comm, found: Frequencies, others: Frequencies) -> dict[i
 def test_a_pair_that_is_mistaken_is_put_right(span: tuple[float, float], monkeypatch: pytest.MonkeyPatch) -> None:
     """What is born within the step lies nearest to where the other one was; followed, the other one ends there, too."""
     monkeypatch.setattr("rodfem.diagram.collisions.paired", by_values)
-    diagram = columns(1.01, span)
+    diagram = swept(1.01, span)
     agree(critical(diagram[0]), [BECK, BECK * 1.01])
     adds_up(diagram)
 

@@ -5,15 +5,24 @@ The record guards the numbers while the code changes its shape.  It is no oracle
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Any
 
 import pytest
 from every_row import disagreements
-from golden_cases import DEMOS, FAMILIES, NOT_CONSERVATIVE, REPEATED, VARIED, cases, distinct, record, single_branches
+from golden_cases import (
+    DEMOS,
+    FAMILIES,
+    NOT_CONSERVATIVE,
+    REPEATED,
+    VARIED,
+    cases,
+    distinct,
+    numbers,
+    record,
+    single_branches,
+)
 
-NUMBERS: dict[str, Any] = json.loads((Path(__file__).parents[1] / "golden" / "numbers.json").read_text())
+NUMBERS = numbers()
 
 
 @pytest.mark.alone

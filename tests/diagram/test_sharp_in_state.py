@@ -159,6 +159,7 @@ def _integral(integrand: Any, s: np.ndarray, y: np.ndarray) -> float:
     return float(trapezoid(integrand(CubicSpline(s, y)(fine)), fine))
 
 
+@pytest.mark.alone
 def test_a_foundation_of_constant_force_has_a_kink() -> None:
     """``|y|``: its second derivative is zero on either side, and the first one jumps where the rod is straight."""
     rod = Scene(

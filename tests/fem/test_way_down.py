@@ -5,19 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hard.fuzz import wider
+from petsc4py import PETSc
 
 from rodfem import Discretization, Solver
+from rodfem.continuation.static_solver import StaticSolver
 from rodfem.fem.newton import along
 from rodfem.stability.blocks import Blocks
 
 
-@pytest.mark.parametrize("times", [1, 4, 8, 100])
-def test_a_step_is_uphill_where_it_is_too_long(times: float) -> None:
-    """``dx.(K + M/tau) dx`` by the blocks of the state; past the growth of the unstable mode it is negative."""
+@pytest.fixture(scope="module")
+def beside_a_saddle() -> tuple[StaticSolver, PETSc.Vec, float]:
+    """A solver, a state beside a saddle, and the longest time step of the way down from there."""
     solver = Solver(wider.scene(3, 144)[0], Discretization("pointwise", 5, 6))
     e, load = solver.equilibria, solver.scene.span[0]
     saddle, _ = e.at_load(e.start(load), load)
-    x, half = e.off(saddle, e.start(load))
+    return e, *e.off(saddle, e.start(load))
+
+
+@pytest.mark.parametrize("times", [1, 4, 8, 100])
+def test_a_step_is_uphill_where_it_is_too_long(
+    times: float, beside_a_saddle: tuple[StaticSolver, PETSc.Vec, float]
+) -> None:
+    """``dx.(K + M/tau) dx`` by the blocks of the state; past the growth of the unstable mode it is negative."""
+    e, x, half = beside_a_saddle
     equations, step, weighed = (e.system.new_vector() for _ in range(3))
     state = e.system.at(x)
     state.residual(equations)

@@ -10,7 +10,7 @@ The plane is that of e1 and e3; the section at ``s`` has the angle ``a``, with `
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import inf
 from typing import Any
 
@@ -23,30 +23,43 @@ STEP, APART = 1e-30, 1e-5
 """Complex step of a derivative, and real step of one of a determinant, which Newton's method alone uses."""
 ANGLE, X, Z, MOMENT, NX, NZ = range(6)
 """Rows of a state."""
+ROWS, WEIGHTS = DOP853.A.astype(complex), DOP853.B.astype(complex)
+"""Those coefficients."""
+Slope = Callable[[float, np.ndarray, np.ndarray], None]
+"""What writes the derivative of a state (m, columns), at a part of the length, into an array of the same shape."""
 Misfit = Callable[[np.ndarray], np.ndarray]
 """What has to vanish, (m, columns), of m + 1 unknowns, (m + 1, columns), the last of which is the load."""
 
 
+def steps(slope: Slope, y: np.ndarray, pieces: int, length: Any = 1.0) -> Iterator[np.ndarray]:
+    """States (m, columns) after each of the ``pieces`` of a ``length``, which may be that of each column."""
+    h, stages = length / pieces, np.zeros((len(DOP853.C), *y.shape), dtype=complex)
+    flat = stages.reshape(len(stages), -1)  # the same memory
+    for i in range(pieces):
+        for j, c in enumerate(DOP853.C):
+            slope((i + c) / pieces, y + h * (ROWS[j, :j] @ flat[:j]).reshape(y.shape), stages[j])
+        y = y + h * (WEIGHTS @ flat).reshape(y.shape)
+        yield y
+
+
 def integrate(
-    start: Any, B: Any = 1.0, EA: Any = inf, GA: Any = inf, k0: Any = 0.0, f: Any = (0.0, 0.0), length: float = 1.0
+    start: Any, B: Any = 1.0, EA: Any = inf, GA: Any = inf, k0: Any = 0.0, f: Any = (0.0, 0.0), length: Any = 1.0
 ) -> np.ndarray:
     """State at the end of a rod, (6, columns), from that at its start; constants may be those of columns."""
     rows = [np.asarray(row, dtype=complex) for row in start]
-    y0 = np.array(np.broadcast_arrays(*rows, np.asarray(f[0]))[:6], dtype=complex)
+    y = np.array(np.broadcast_arrays(*rows, np.asarray(f[0]), np.asarray(length))[:6], dtype=complex)
 
-    def slope(y: np.ndarray) -> np.ndarray:
+    def slope(_: float, y: np.ndarray, out: np.ndarray) -> None:
         a, _, _, m, nx, nz = y
         cos, sin = np.cos(a), np.sin(a)
         shear, stretch = (nx * cos - nz * sin) / GA, 1 + (nx * sin + nz * cos) / EA
         dx, dz = shear * cos + stretch * sin, -shear * sin + stretch * cos
-        return np.array([k0 + m / B, dx, dz, dx * nz - dz * nx, 0 * a - f[0], 0 * a - f[1]])
+        out[X], out[Z] = dx, dz
+        out[ANGLE], out[MOMENT] = k0 + m / B, dx * nz - dz * nx
+        out[NX], out[NZ] = -f[0], -f[1]
 
-    y, h = y0, length / PIECES
-    for _ in range(PIECES):
-        stages: list[np.ndarray] = []
-        for row in DOP853.A:
-            stages.append(slope(y + h * sum(a * k for a, k in zip(row, stages, strict=False) if a)))
-        y = y + h * sum(b * k for b, k in zip(DOP853.B, stages, strict=True) if b)
+    for end in steps(slope, y, PIECES, length):
+        y = end
     return y
 
 

@@ -21,8 +21,7 @@ from typing import Any
 
 import numpy as np
 from hard.case import Change
-from hard.shooting_plane import STEP, linear
-from scipy.integrate import DOP853
+from hard.shooting_plane import STEP, linear, steps
 from scipy.optimize import brentq
 
 COARSE, FINE = 32, 96
@@ -63,28 +62,29 @@ class Rod:
 
     def states(self, m: Any, n: Any, pieces: int = COARSE) -> np.ndarray:
         """State (10, columns) after each step, for moment and force (3, columns) at the first clamp."""
-        f = np.array(self.f)[:, None]
+        n = np.asarray(n, dtype=complex)
+        twist, k0, (f1, f2, f3) = 1 / self.C - 1, self.k0, self.f
 
-        def slope(s: float, y: np.ndarray) -> np.ndarray:
-            w, (x1, x2, x3), m = y[W], y[U], y[M]
-            d3 = np.array([2 * (x1 * x3 + w * x2), 2 * (x2 * x3 - w * x1), w * w - x1 * x1 - x2 * x2 + x3 * x3])
-            K = m + (1 / self.C - 1) * (m * d3).sum(0) * d3
-            if self.k0:
-                d2 = [2 * (x1 * x2 - w * x3), w * w - x1 * x1 + x2 * x2 - x3 * x3, 2 * (x2 * x3 + w * x1)]
-                K = K + self.k0 * np.array(d2)
-            u = y[U]
-            return np.concatenate([[-0.5 * (K * u).sum(0)], 0.5 * (w * K + cross(K, u)), cross(n - f * s, d3), d3])
+        def slope(s: float, y: np.ndarray, out: np.ndarray) -> None:
+            w, x1, x2, x3, m1, m2, m3 = y[:7]
+            a, b, c = 2 * (x1 * x3 + w * x2), 2 * (x2 * x3 - w * x1), w * w - x1 * x1 - x2 * x2 + x3 * x3  # d3
+            out[7], out[8], out[9] = a, b, c
+            t = twist * (m1 * a + m2 * b + m3 * c)
+            k1, k2, k3 = m1 + t * a, m2 + t * b, m3 + t * c
+            if k0:
+                k1 = k1 + 2 * k0 * (x1 * x2 - w * x3)
+                k2 = k2 + k0 * (w * w - x1 * x1 + x2 * x2 - x3 * x3)
+                k3 = k3 + 2 * k0 * (x2 * x3 + w * x1)
+            out[0] = -0.5 * (k1 * x1 + k2 * x2 + k3 * x3)
+            out[1] = 0.5 * (w * k1 + k2 * x3 - k3 * x2)
+            out[2] = 0.5 * (w * k2 + k3 * x1 - k1 * x3)
+            out[3] = 0.5 * (w * k3 + k1 * x2 - k2 * x1)
+            n1, n2, n3 = n[0] - f1 * s, n[1] - f2 * s, n[2] - f3 * s
+            out[4], out[5], out[6] = n2 * c - n3 * b, n3 * a - n1 * c, n1 * b - n2 * a
 
         y = np.zeros((10, np.shape(m)[1]), dtype=complex)
         y[W], y[M] = 1.0, m
-        h, passed = 1 / pieces, []
-        stages = np.zeros((len(DOP853.C), *y.shape), dtype=complex)
-        for i in range(pieces):
-            for j, (row, c) in enumerate(zip(DOP853.A, DOP853.C, strict=True)):
-                stages[j] = slope((i + c) * h, y + h * np.tensordot(row[:j], stages[:j], 1))
-            y = y + h * np.tensordot(DOP853.B, stages, 1)
-            passed.append(y)
-        return np.array(passed)
+        return np.array(list(steps(slope, y, pieces)))
 
     def index(self, m: Any, n: Any, *, pieces: int = COARSE, to_the_end: bool = False) -> int:
         """Number of conjugate points for moment and force (3,) at the first clamp, by so many ``pieces`` of the rod.
@@ -178,9 +178,12 @@ class Branch:
     def zero(self, i: int) -> float:
         """Load at which the determinant vanishes between a point and the next."""
         u, chord = self.points[i], self.points[i + 1] - self.points[i]
+        known = {0.0: u, 1.0: u + chord}
 
         def at(part: float) -> np.ndarray:
-            return self.correct(u + part * chord, chord / self.scale, FINE)[0]
+            near = min(known, key=lambda other: abs(other - part))
+            known[part] = self.correct(known[near] + (part - near) * chord, chord / self.scale, FINE)[0]
+            return known[part]
 
         def singular(part: float) -> float:
             return determinant(linear(lambda u: self.misfit(u, FINE), at(part))[1] * self.scale)

@@ -91,9 +91,10 @@ def snapping(distance: float, ratio: float) -> Measured:
 def conjugate(u: np.ndarray, ratio: float) -> int:
     """Index of an arch in its plane: places where turns and shifts are singular in moment and force at the start."""
     start = np.repeat(np.asarray(u[:3], dtype=complex)[:, None], 3, axis=1) + 1j * STEP * np.eye(3)
-    ends = (integrate((ratio * u[3], 0.0, 0.0, *start), length=s) for s in np.linspace(0.1, 0.99, 41))
-    signs = [np.linalg.slogdet(end[[ANGLE, X, Z]].imag / STEP)[0] for end in ends]
-    return int((np.diff(signs) != 0).sum())
+    lengths = np.linspace(0.1, 0.99, 41)
+    ends = integrate((ratio * u[3], 0.0, 0.0, *np.tile(start, len(lengths))), length=np.repeat(lengths, 3))
+    matrices = ends[[ANGLE, X, Z]].imag.reshape(3, len(lengths), 3).transpose(1, 0, 2) / STEP
+    return int((np.diff(np.linalg.slogdet(matrices)[0]) != 0).sum())
 
 
 def pitchfork(branch: Branch, across: Callable[[np.ndarray], float]) -> float:

@@ -73,7 +73,7 @@ def test_one_process(folder: Path, number: int) -> None:
     ],
 )
 def test_two_ranks(folder: Path, whom: str, number: int, status: int) -> None:
-    fine = ("--elements", "300") if whom == "mpirun" else ()  # its ranks hear of it a second later, still at work
+    fine = ("--elements", "80") if whom == "mpirun" else ()  # its ranks hear of it a second later, still at work
     ended = struck((*HEMITROPIC, str(folder), *fine), 2, SECOND_BRANCH, whom, number)
     assert ended.left == []
     assert ended.status == status

@@ -109,22 +109,31 @@ def test_interrupted_at_any_moment(folder: Path, name: str, monkeypatch: pytest.
     assert {file.name for file in (folder / "cut").iterdir()} == {"diagram.json", "states.h5"}
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a run on one rank, with all of its steps."""
+    folder, alone = Path(COMM.bcast(str(tmp_path_factory.mktemp("steps") / "whole"))), COMM.Split(COMM.rank)
+    if COMM.rank == 0:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(rodfem.app.run, "remove_steps", lambda folder: None)
+            found = run_of(CASES["hemitropic"][0](), CASES["hemitropic"][1], folder, alone)
+        assert len(list(folder.glob("resume-*"))) == len(found)
+    COMM.barrier()
+    alone.Free()
+    return folder
+
+
 @pytest.mark.versions
 @pytest.mark.parametrize("steps", [1, 2, 3])
-def test_every_step_is_recalled(folder: Path, steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_step_is_recalled(folder: Path, whole: Path, steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """After each step, and on another number of ranks."""
-    scene, plan = CASES["hemitropic"][0](), CASES["hemitropic"][1]
-    alone = COMM.Split(COMM.rank)
     monkeypatch.setattr(rodfem.app.run, "remove_steps", lambda folder: None)
     if COMM.rank == 0:
-        whole = run_of(scene, plan, folder / "whole", alone)
-        assert len(list((folder / "whole").glob("resume-*"))) == len(whole)
-        path_of(folder / "whole", steps + 1).unlink(missing_ok=True)
-        shutil.copytree(folder / "whole", folder / "cut")
+        shutil.copytree(whole, folder / "cut")
+        path_of(folder / "cut", steps + 1).unlink(missing_ok=True)
     COMM.barrier()
-    rodfem.resume(folder / "cut", scene, figures=False, quiet=True)
-    assert alike(contents(folder / "cut"), contents(folder / "whole"), 0.0 if COMM.size == 1 else CLOSE)
-    alone.Free()
+    rodfem.resume(folder / "cut", CASES["hemitropic"][0](), figures=False, quiet=True)
+    assert alike(contents(folder / "cut"), contents(whole), 0.0 if COMM.size == 1 else CLOSE)
 
 
 @pytest.mark.alone

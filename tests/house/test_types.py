@@ -99,10 +99,11 @@ def test_a_run_without_pictures_loads_nothing_else(tmp_path: Path) -> None:
         "runpy.run_path('demos/hemitropic.py', run_name='__main__'); print('LOADED', *sys.modules); "
         "import ufl, pkg_resources; print(ufl.__version__ == pkg_resources.get_distribution('fenics-ufl').version)"
     )
-    for _ in range(2):
+    for _ in range(2):  # the first run may compile
         done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=HOME)
-    out = done.stdout
-    loaded = out[out.index("LOADED") :].split()
+        loaded = done.stdout[done.stdout.index("LOADED") :].split()
+        if not {*UNUSED} & {*loaded}:
+            break
     assert {"dolfinx", "h5py", "rodfem.app.run"} <= {*loaded}
     assert not {*UNUSED} & {*loaded}
     assert loaded[-1] == "True"

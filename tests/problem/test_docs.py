@@ -65,7 +65,7 @@ def coiled_tip(k0: float, tension: float) -> float:
     """Ordinate of ``coiled`` by shooting, from the helix without tension on."""
     p = np.zeros(6)
     problem = Problem(Rod((1.0, 1.0, 0.7), (0.0, k0, 1.0)), rows=[4, 5, 6], shot=[3, 4, 5])
-    for p[2] in np.linspace(0.0, tension, 21):
+    for p[2] in np.linspace(0.0, tension, 6):
         p, end = problem.solve(p)
     return float(np.hypot(*end[7:9]))
 
