@@ -306,7 +306,7 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
         solver = self._solve(matrix, mass, number, target if compat.COMPLEX else target.real)
         re, im = matrix.createVecRight(), matrix.createVecRight()
         values, out = [solver.getEigenvalue(i) for i in range(solver.getConverged())], []
-        stiffness, inertia = (EPS * each.norm(PETSc.NormType.INFINITY) for each in (matrix, mass))
+        stiffness, inertia = EPS * self._stiffness(matrix), EPS * mass.norm(PETSc.NormType.INFINITY)
         heavy = mass.getDiagonal()
         heavy.array[:] = abs(heavy.array_r) > 0
         nearest = min((abs(value - target) for value in values), default=0.0)
@@ -326,6 +326,16 @@ class NonsymmetricPencil(StatePencil[NonsymmetricSolver]):
                 break
         solver.destroy()
         return out
+
+    def _stiffness(self, matrix: PETSc.Mat) -> float:
+        """Largest sum of the absolute entries of a row of ``matrix``, but for rows of the load and of drifts.
+
+        These have a one on the diagonal, which is no stiffness and has other units.
+        """
+        begin, end = matrix.getOwnershipRange()
+        sums = np.asarray(abs(local_rows(matrix)).sum(axis=1)).ravel()
+        sums[[i - begin for i in (self.system.load_index, *self.system.drifts) if begin <= i < end]] = 0.0
+        return float(matrix.comm.tompi4py().allreduce(float(sums.max(initial=0.0)), op=MPI.MAX))
 
     def _doubled(self, number: int, target: complex, matrix: PETSc.Mat, mass: PETSc.Mat) -> list[_Pair]:
         """Solve with a complex shift by the real matrix of twice the size."""
