@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from rodfem.fem.state import State
     from rodfem.fem.system import System
 
+ALONG = 1e-5
+"""The same of the motion of a closed rod along itself: what exact symmetries leave of it."""
 MESH = 10.0
 """Times the mismatch of a mesh with the motion of a ring along itself, below which a generator is the mesh's error."""
 
@@ -137,7 +139,7 @@ def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
         # by the difference of the vectors: in the Gram matrix half of the digits cancel
         sizes.append(system.norm(system.generators.vector(rest @ generators)))
         combinations = np.vstack([combinations, rest])
-        least.append(max(MESH * mismatch(state), 10 * SYMMETRIC_STATE))
+        least.append(max(MESH * mismatch(state), ALONG))
     numbers = [i for i, (size, bound) in enumerate(zip(sizes, least, strict=True)) if size >= bound]
     if not numbers:  # a straight rod has all of them itself
         return Phase({}, {}, np.zeros(count), {}, combinations, reference.copy(), system.generators.vector)
