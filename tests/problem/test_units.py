@@ -191,3 +191,9 @@ def test_recorded_scenes(name: str) -> None:
 def test_loads_have_units_too(name: str) -> None:
     """Loads of 1e7 newtons on a bar of steel."""
     assert not differences(name, *STEEL)
+
+
+@pytest.mark.alone
+def test_a_fold_feels_a_load_of_any_unit() -> None:
+    """In a unit of 1e-13 the derivative in the load is as small as that of equations that do not feel it."""
+    assert not differences("classic pressed arch", *STEEL[:2], 1e13)
