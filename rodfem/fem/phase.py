@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from rodfem.fem.system import System
 
 ALONG = 1e-5
-"""The same of the motion of a closed rod along itself: what exact symmetries leave of it."""
+"""As :data:`SYMMETRIC_STATE`, of the part of a ring's motion along itself that exact symmetries leave over."""
 MESH = 10.0
 """Times the mismatch of a mesh with the motion of a ring along itself, below which a generator is the mesh's error."""
 
