@@ -951,6 +951,24 @@ FAULTS = {
         "- values).max() < np.inf",
         "tests/problem/test_smoothness.py",
     ),
+    "peaks-between-places-are-not-looked-for": Fault(
+        "rodfem/problem/enclosure.py",
+        "wide = ~told &",
+        "wide = ~told & (length > 1e-5) &",
+        "tests/problem/test_enclosure.py",
+    ),
+    "what-jumps-is-continuous": Fault(
+        "rodfem/problem/enclosure.py",
+        "chosen(open_, ANY, chosen(",
+        "chosen(open_, hull(x.slope, y.slope), chosen(",
+        "tests/problem/test_enclosure.py",
+    ),
+    "tall-peaks-make-all-else-small": Fault(
+        "rodfem/problem/smoothness.py",
+        "(abs(values) if size else values)",
+        "(self.size + 0 * values if size else values)",
+        "tests/problem/test_enclosure.py",
+    ),
     "roots-have-no-kinks": Fault(
         "rodfem/problem/kinks.py",
         "    elif isinstance(part, Sqrt | Ln | Atan2):\n",

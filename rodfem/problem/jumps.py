@@ -21,11 +21,12 @@ from ufl.classes import GE, GT, LE, LT, Abs, MaxValue, MinValue
 from ufl.corealg.traversal import unique_pre_traversal
 
 from forms.rotation import rotation
+from rodfem.problem.enclosure import refined
 from rodfem.problem.local_state import STATES, inside, place
 from rodfem.problem.roles import functions_of
 from rodfem.problem.values import Symbol, Values
 from rodfem.roots import lowest_between, zero_between
-from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE
+from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
@@ -83,11 +84,18 @@ def _place(scene: Scene, s: Any, state: Any) -> Any:
     return place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=scene.length)
 
 
-def grid(scene: Scene) -> np.ndarray:
-    """Arclengths from one end to the other, of which no inner one is a simple fraction of the rod."""
+def known(f: Values, s: Symbol, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Arclengths from one end to the other between which a function has no peak, and its values there.
+
+    No inner one is a simple fraction of the rod.
+    """
     a, b = scene.interval
     inner = np.linspace(a, b, GRID + 1)[1:-1] + BESIDE * scene.length / GRID
-    return np.concatenate([[a], inner, [b]])
+    places = np.concatenate([[a], inner, [b]])
+    values = f({s: places})
+    size = float(abs(values[np.isfinite(values)]).max(initial=0.0))
+    more = refined(f.expression, s, places, max(size, TINY))
+    return more, values if len(more) == len(places) else f({s: more})
 
 
 def changes(expressions: list[Any], s: Symbol, scene: Scene, *, kinks: bool = False) -> Iterator[float]:
@@ -118,12 +126,12 @@ def difference(part: Any) -> Any:
 
 def _zeros(f: Values, s: Symbol, scene: Scene) -> Iterator[float]:
     """Where a function changes its sign, also between two points of the grid."""
-    places, within = grid(scene), NEGLIGIBLE * scene.length
+    within = NEGLIGIBLE * scene.length
 
     def at(x: float, sign: float = 1.0) -> float:
         return sign * float(f({s: np.array([x])})[0])
 
-    y = f({s: places})
+    places, y = known(f, s, scene)
     sign, size, steps = np.sign(y), abs(y), abs(np.diff(y))
     for i in np.flatnonzero(sign[1:] * sign[:-1] < 0):
         yield zero_between(at, float(places[i]), float(places[i + 1]), within)

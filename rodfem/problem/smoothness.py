@@ -6,10 +6,8 @@ Jumps are looked for by :mod:`rodfem.problem.jumps`; here a function of the arcl
 
 Where it is steep is found without a mesh: a piece of the rod on which Gauss quadrature differs from that of its two
 halves is halved, down to where it does not, and so is one where the function is not the polynomial through the points:
-at its ends, and at places a twenty thousandth of the rod apart, so that of a peak or a notch that is wider than this
-some place is seen.  A narrower one is seen where it is made of comparisons, absolute values, ``max_value`` or
-``min_value`` of the arclength, whose places are found whatever their distance.  On an element ``[a, b]`` that holds
-such a place the moments
+at its ends, and at places between which interval arithmetic bounds it (:mod:`rodfem.problem.enclosure`), so that no
+peak and no notch is too narrow to be seen.  On an element ``[a, b]`` that holds such a place the moments
 
     I_j = int f(s) P_j(t) ds,    s = (a + b)/2 + t (b - a)/2,    P_j the Legendre polynomials, j = 0, 1, 2,
 
@@ -28,9 +26,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ufl.corealg.traversal import unique_pre_traversal
 
-from rodfem.problem.jumps import along, changes, grid, jumps
+from rodfem.problem.jumps import along, changes, jumps, known
 from rodfem.problem.values import Symbol, Values
-from rodfem.tolerances import SAME_PLACE, TINY
+from rodfem.tolerances import NEGLIGIBLE, TINY
 
 if TYPE_CHECKING:
     from rodfem.problem.scene import Scene
@@ -48,10 +46,10 @@ BESIDE = 1e-9
 ENDS = 1e-6
 """Difference, on a piece and at its ends, of a function and the polynomial through its points, over the largest one."""
 SEEN = 1e-8
-"""Error of a moment, relative to the largest value times the length of the element, that no bar needs to hold."""
+"""Error of a moment, relative to the integral of the absolute value on the element, that no bar needs to hold."""
 EPS, NOISE = float(np.finfo(float).eps), 10.0
 """Relative round-off of an arclength, and how often it counts over the length of a piece."""
-MANY = 300
+MANY = 1000
 """Most pieces: of what varies everywhere on so small a scale the elements say more than this."""
 
 Pieces = list[tuple[float, float]]
@@ -81,19 +79,21 @@ def unresolved(scene: Scene, elements: Callable[[float], Pieces], rules: Rules) 
     rules
         Quadrature of the elements.
     """
-    s, known = Symbol(), [place for places in jumps(scene).values() for place in places]
+    s, jumping = Symbol(), [place for places in jumps(scene).values() for place in places]
     for what, expressions in along(scene, s):
         for f in (_Function(e, s, scene) for e in expressions if s in unique_pre_traversal(e)):
-            for a, b in f.steep(scene, known):
+            examined: set[tuple[float, float]] = set()
+            for a, b in f.steep(scene, jumping):
                 at = (a + b) / 2
                 for element in elements(at):
-                    if not f.resolved(element, rules):
+                    if element not in examined and not f.resolved(element, rules):
                         return (
                             f"The {what} changes too sharply about s = {at:.6g}, within {b - a:.1g}, for the element "
                             f"from {element[0]:.6g} to {element[1]:.6g}, and error bars need not hold: give the "
                             f"Discretization vertices near {at:.6g}, or, for a jump or a kink, the scene "
                             f"breaks=({at:.6g},)."
                         )
+                    examined.add(element)
     return ""
 
 
@@ -106,7 +106,7 @@ class _Function:
         self.pieces: Pieces = []
         kinks = np.unique([*scene.interval, *changes([expression], s, scene, kinks=True)])
         between = (kinks[1:] + kinks[:-1]) / 2
-        places = np.unique([*grid(scene), *kinks, *between])
+        places = np.unique([*known(self.values, s, scene)[0], *kinks, *between])
         values = self(places)
         finite = np.isfinite(values)
         self.places, self.known = places[finite], values[finite]
@@ -116,28 +116,30 @@ class _Function:
         """Values at arclengths."""
         return self.values({self.s: places})
 
-    def steep(self, scene: Scene, known: list[float]) -> Iterator[tuple[float, float]]:
-        """Yield where it is smooth on the smallest pieces only, for each run of pieces that are smaller than at first.
+    def steep(self, scene: Scene, jumping: list[float]) -> Iterator[tuple[float, float]]:
+        """Yield where it is smooth on smaller pieces than at first only: the smallest ones, by runs, and the others.
 
-        At joints of the scene, and where jumps are ``known``, it may jump.
+        At joints of the scene, and where it is ``jumping``, it may jump.
         """
         a, b = scene.interval
-        ends = np.unique([*np.linspace(a, b, PIECES + 1), *scene.joints, *known]).tolist()
+        ends = np.unique([*np.linspace(a, b, PIECES + 1), *scene.joints, *jumping]).tolist()
         first = list(pairwise(ends))
-        open_, least = first[::-1], SAME_PLACE * scene.length
-        while open_ and len(self.pieces) < MANY:
-            low, high = open_.pop()
-            middle = (low + high) / 2
-            if high - low < least or self._smooth(low, high):
-                self.pieces.append((low, high))
-            else:
-                open_ += [(middle, high), (low, middle)]
-        for whole, run in groupby(self.pieces, set(first).__contains__):
+        open_, least = first, NEGLIGIBLE * scene.length
+        while open_ and len(self.pieces) + len(open_) < MANY:
+            rough = [(low, high) for low, high in open_ if high - low > least and not self._smooth(low, high)]
+            self.pieces += sorted({*open_} - {*rough})
+            open_ = [half for low, high in rough for half in pairwise((low, (low + high) / 2, high))]
+        self.pieces = sorted(self.pieces + open_)
+        others: Pieces = []
+        for whole, run in groupby(self.pieces, {*first}.__contains__):
             if not whole:
                 pieces = list(run)
                 smallest = min(high - low for low, high in pieces)
                 sharp = [piece for piece in pieces if piece[1] - piece[0] < 1.5 * smallest]
-                yield sharp[0][0], sharp[-1][1]
+                together = sharp[0][0], sharp[-1][1]
+                yield together if together[1] - together[0] < scene.length / PIECES else sharp[0]
+                others += pieces
+        yield from sorted(others, key=lambda piece: piece[1] - piece[0])
 
     def _smooth(self, low: float, high: float) -> bool:
         middle = (low + high) / 2
@@ -164,15 +166,18 @@ class _Function:
         richer = sum(self._moments(element, half, rules.richer) for half in ((a, middle), (middle, b)))
         inside = [(max(a, low), min(b, high)) for low, high in self.pieces if low < b and high > a]
         true = sum(self._moments(element, piece, POINTS) for piece in inside if piece[1] > piece[0])
+        size = sum(self._moments(element, piece, POINTS, size=True)[0] for piece in inside if piece[1] > piece[0])
         most = rules.left / (1 - rules.left) * abs(richer - own)
-        return bool((abs(richer - true) <= np.maximum(most, SEEN * self.size * (b - a))).all())
+        return bool((abs(richer - true) <= np.maximum(most, SEEN * size)).all())
 
-    def _moments(self, element: tuple[float, float], piece: tuple[float, float], points: int) -> np.ndarray:
-        """Parts on a ``piece`` of the moments on an element, by that many points."""
+    def _moments(
+        self, element: tuple[float, float], piece: tuple[float, float], points: int, *, size: bool = False
+    ) -> np.ndarray:
+        """Parts on a ``piece`` of the moments on an element, by that many points; or of those of the absolute value."""
         t, w = np.polynomial.legendre.leggauss(points)
         half = (piece[1] - piece[0]) / 2
         places = (piece[0] + piece[1]) / 2 + half * t
         values = self(places)
         self.size = max(self.size, float(abs(values).max()), TINY)
         local = (2 * places - element[0] - element[1]) / (element[1] - element[0])
-        return half * (w * values) @ np.polynomial.legendre.legvander(local, MOMENTS - 1)
+        return half * (w * (abs(values) if size else values)) @ np.polynomial.legendre.legvander(local, MOMENTS - 1)

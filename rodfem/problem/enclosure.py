@@ -1,0 +1,230 @@
+"""Places along the rod between which a function of the arclength has no peak and no notch, however narrow.
+
+A function is known where it is evaluated.  Between two places it is bounded by interval arithmetic: on a piece of
+length h on which its slope is within ``[d, D]`` it is within ``(D - d) h / 2`` of the straight line through its ends,
+so that its integral is known to ``(D - d) h^2 / 2``.  Pieces on which this is more than round-off of the rod's are
+halved.  Slopes are bounded by differentiation in forward mode, each step in intervals (L. B. Rall, Automatic
+Differentiation, LNCS 120 (1981), with Moore's arithmetic).
+
+Where a comparison has both answers on a piece the function may jump, and the piece is halved to round-off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf, pi, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from ufl import classes
+from ufl.corealg.traversal import unique_post_traversal
+
+from rodfem.problem.intervals import Interval, chosen, hull, number
+from rodfem.problem.values import Symbol, scalar
+
+PIECES = 256
+"""Pieces of the rod to begin with, about."""
+KNOWN = 1e-9
+"""Integral of a function that is not looked for on a piece, over its largest value times the length of the rod."""
+MOST = 200_000
+"""Places that are added: of what varies everywhere on so small a scale the elements say more."""
+ROUND_OFF = 4 * float(np.finfo(float).eps)
+"""Length of a piece that is not halved, over the largest arclength."""
+SPLIT = 0.4993
+"""Part of a piece to one side of the place that divides it: no simple fraction of the rod is such a place."""
+ONE, ANY = number(1.0), Interval(np.asarray(-inf), np.asarray(inf))
+
+
+class Jet(NamedTuple):
+    """Bounds of a function and of its slope."""
+
+    value: Interval
+    slope: Interval
+
+
+class Answer(NamedTuple):
+    """Where a comparison is surely true, and where it is possibly so."""
+
+    surely: np.ndarray
+    possibly: np.ndarray
+
+
+def refined(expression: Any, s: Symbol, places: np.ndarray, size: float) -> np.ndarray:
+    """Places, with those that a scalar ``expression`` needs besides to be known between them, in ascending order.
+
+    Parameters
+    ----------
+    expression, s
+        Expression of UFL of the arclength ``s``.
+    places
+        Arclengths from one end of the rod to the other, of shape (n,).
+    size
+        Largest value of the expression at them.
+    """
+    nodes = list(unique_post_traversal(scalar(expression)))
+    a, b = float(places[0]), float(places[-1])
+    ends = np.unique([*places[:: max(1, len(places) // PIECES)], b])
+    low, high, found, number_of = ends[:-1], ends[1:], [places], 0
+    while len(low) and number_of < MOST:
+        try:
+            slope = _jet(nodes, s, Interval(low, high)).slope
+        except NotImplementedError:  # a function without bounds, as those of Bessel
+            return places
+        length = high - low
+        told = slope.high - slope.low <= 2 * KNOWN * size * (b - a) / length**2
+        wide = ~told & (length > ROUND_OFF * max(abs(a), abs(b)))
+        low, high, length = low[wide], high[wide], length[wide]
+        middle = low + SPLIT * length
+        found.append(middle)
+        number_of += len(middle)
+        low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
+    return np.unique(np.concatenate(found))
+
+
+def _jet(nodes: list[Any], s: Symbol, pieces: Interval) -> Jet:
+    """Bounds of the last of some ``nodes`` on pieces of the rod."""
+    known: dict[Any, Any] = {s: Jet(pieces, ONE)}
+    with np.errstate(all="ignore"):
+        for node in nodes:
+            if node not in known:
+                known[node] = _bounded(node, [known[x] for x in node.ufl_operands])
+    jet: Jet = known[nodes[-1]]
+    shape = pieces.low.shape
+    return Jet(*(Interval(np.broadcast_to(x.low, shape), np.broadcast_to(x.high, shape)) for x in jet))
+
+
+def _bounded(node: Any, of: list[Any]) -> Any:
+    """Jet or answer of a ``node`` by those of its operands."""
+    kind = type(node)
+    if isinstance(node, classes.ScalarValue | classes.Zero):
+        return Jet(number(float(node)), number(0.0))
+    if isinstance(node, classes.Variable):
+        return of[0]
+    if isinstance(node, classes.Label):
+        return None
+    if kind is classes.Power and isinstance(exponent := node.ufl_operands[1], classes.ScalarValue):
+        return _power(of[0], float(exponent))
+    if kind in RULES:
+        return RULES[kind](*of)
+    if isinstance(node, classes.MathFunction) and node._name in FUNCTIONS:
+        (x,), (function, slope) = of, FUNCTIONS[node._name]
+        value = function(x.value)
+        return Jet(value, slope(x.value, value) * x.slope)
+    raise NotImplementedError(kind.__name__)
+
+
+def _product(x: Jet, y: Jet) -> Jet:
+    return Jet(x.value * y.value, x.slope * y.value + x.value * y.slope)
+
+
+def _quotient(x: Jet, y: Jet) -> Jet:
+    value = x.value / y.value
+    return Jet(value, (x.slope + -(value * y.slope)) / y.value)
+
+
+def _power(x: Jet, exponent: float) -> Jet:
+    return Jet(x.value.power(exponent), number(exponent) * x.value.power(exponent - 1) * x.slope)
+
+
+def _general_power(x: Jet, y: Jet) -> Jet:
+    logarithm = x.value.monotone(np.log)
+    value = (y.value * logarithm).monotone(np.exp)
+    return Jet(value, value * (y.slope * logarithm + y.value * x.slope / x.value))
+
+
+def _larger(x: Jet, y: Jet) -> Jet:
+    value = Interval(np.maximum(x.value.low, y.value.low), np.maximum(x.value.high, y.value.high))
+    slope = chosen(y.value.high < x.value.low, x.slope, hull(x.slope, y.slope))
+    return Jet(value, chosen(x.value.high < y.value.low, y.slope, slope))
+
+
+def _angle(y: Jet, x: Jet) -> Jet:
+    """Angle of a direction in the plane, which jumps where it points backwards."""
+    slope = (x.value * y.slope + -(y.value * x.slope)) / (x.value.power(2.0) + y.value.power(2.0))
+    backwards = (x.value.low <= 0) & (y.value.low <= 0) & (y.value.high >= 0)
+    return Jet(Interval(np.asarray(-pi), np.asarray(pi)), chosen(backwards, ANY, slope))
+
+
+def _negative(x: Jet) -> Jet:
+    return Jet(-x.value, -x.slope)
+
+
+def _conditional(if_: Answer, x: Jet, y: Jet) -> Jet:
+    """Either, where the answer is sure; elsewhere there may be a jump between them."""
+    open_ = if_.possibly & ~if_.surely
+    value = chosen(open_, hull(x.value, y.value), chosen(if_.surely, x.value, y.value))
+    return Jet(value, chosen(open_, ANY, chosen(if_.surely, x.slope, y.slope)))
+
+
+def _less(x: Jet, y: Jet) -> Answer:
+    return Answer(x.value.high < y.value.low, x.value.low < y.value.high)
+
+
+def _not_greater(x: Jet, y: Jet) -> Answer:
+    return Answer(x.value.high <= y.value.low, x.value.low <= y.value.high)
+
+
+def _equal(x: Jet, y: Jet) -> Answer:
+    possibly = (x.value.low <= y.value.high) & (y.value.low <= x.value.high)
+    alike = (x.value.low == x.value.high) & (y.value.low == y.value.high)
+    return Answer(possibly & alike, possibly)
+
+
+def _not(x: Answer) -> Answer:
+    return Answer(~np.asarray(x.possibly), ~np.asarray(x.surely))
+
+
+RULES: dict[Any, Callable[..., Any]] = {
+    classes.Sum: lambda x, y: Jet(x.value + y.value, x.slope + y.slope),
+    classes.Product: _product,
+    classes.Division: _quotient,
+    classes.Power: _general_power,
+    classes.Abs: lambda x: Jet(x.value.size(), x.value.sign() * x.slope),
+    classes.Atan2: _angle,
+    classes.MaxValue: _larger,
+    classes.MinValue: lambda x, y: _negative(_larger(_negative(x), _negative(y))),
+    classes.Conditional: _conditional,
+    classes.LT: _less,
+    classes.GT: lambda x, y: _less(y, x),
+    classes.LE: _not_greater,
+    classes.GE: lambda x, y: _not_greater(y, x),
+    classes.EQ: _equal,
+    classes.NE: lambda x, y: _not(_equal(x, y)),
+    classes.AndCondition: lambda x, y: Answer(x.surely & y.surely, x.possibly & y.possibly),
+    classes.OrCondition: lambda x, y: Answer(x.surely | y.surely, x.possibly | y.possibly),
+    classes.NotCondition: _not,
+}
+"""Bounds of what UFL makes of others."""
+
+
+def _erf(x: np.ndarray) -> np.ndarray:
+    from scipy import special  # takes a tenth of a second to load
+
+    return np.asarray(special.erf(x))
+
+
+def _shifted(x: Interval) -> Interval:
+    return x + number(pi / 2)
+
+
+def _bell(x: Interval) -> Interval:
+    return (-x.power(2.0)).monotone(np.exp)
+
+
+Function = Callable[[Interval], Interval]
+FUNCTIONS: dict[str, tuple[Function, Callable[[Interval, Interval], Interval]]] = {
+    "sqrt": (lambda x: x.monotone(np.sqrt), lambda x, y: number(0.5) / y),
+    "exp": (lambda x: x.monotone(np.exp), lambda x, y: y),
+    "ln": (lambda x: x.monotone(np.log), lambda x, y: ONE / x),
+    "sin": (Interval.sine, lambda x, y: _shifted(x).sine()),
+    "cos": (lambda x: _shifted(x).sine(), lambda x, y: -x.sine()),
+    "tan": (Interval.tangent, lambda x, y: ONE + y.power(2.0)),
+    "sinh": (lambda x: x.monotone(np.sinh), lambda x, y: x.even(np.cosh)),
+    "cosh": (lambda x: x.even(np.cosh), lambda x, y: x.monotone(np.sinh)),
+    "tanh": (lambda x: x.monotone(np.tanh), lambda x, y: ONE + -y.power(2.0)),
+    "asin": (lambda x: x.monotone(np.arcsin), lambda x, y: (ONE + -x.power(2.0)).power(-0.5)),
+    "acos": (lambda x: number(pi / 2) + -x.monotone(np.arcsin), lambda x, y: -(ONE + -x.power(2.0)).power(-0.5)),
+    "atan": (lambda x: x.monotone(np.arctan), lambda x, y: ONE / (ONE + x.power(2.0))),
+    "erf": (lambda x: x.monotone(_erf), lambda x, y: number(2 / sqrt(pi)) * _bell(x)),
+}
+"""Bounds of functions, and of their slopes by those of the argument and of the value."""
