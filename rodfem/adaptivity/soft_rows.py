@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
-from math import inf
+from math import inf, isfinite
 
 from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.adaptivity.soft_states import SoftStates
@@ -34,6 +34,7 @@ class SoftRows:
         """Nothing is computed before a branch is given."""
         self.meshes, self.error_bars = meshes, error_bars
         self._states: dict[int, SoftStates] = {}
+        self._uncompared: dict[str, tuple[float, str]] = {}
 
     def examine(self, branch: Branch) -> None:
         """Record soft modes, and undecided eigenvalues, at the points of a branch."""
@@ -46,7 +47,10 @@ class SoftRows:
         counted = {id(s.point): s.point.negative for s in given}
         for s in {id(s.point): s for s in given}.values():  # a load asked for may be that of the end
             fixed = s.kind.given
-            self._of(s.point).examine(s.point, fixed_load=fixed, compare=self.error_bars, family=family)
+            states = self._of(s.point)
+            states.examine(s.point, fixed_load=fixed, compare=self.error_bars, family=family)
+            if states.uncompared and isfinite(s.error_estimate) and s.resolved:  # else the special point says so
+                self._uncompared.setdefault(branch.name, (s.point.load, states.uncompared))
             doubtful |= s.point.undecided > 0
         for s in given:
             if s.negative_before == s.negative_after == counted[id(s.point)]:
@@ -104,7 +108,11 @@ class SoftRows:
             fold.negative_before, fold.negative_after = left, right
 
     def undecided(self, branch: Branch) -> Iterator[str]:
-        """Yield a sentence on each piece of a branch whose index is not decided."""
+        """Yield a sentence on each piece of a branch whose index is not decided, or not compared with a richer mesh."""
+        if branch.name in self._uncompared:
+            at, why = self._uncompared.pop(branch.name)
+            name = self.meshes.solvers[0].system.scene.load
+            yield f"{branch.name}: At {name} = {at:.8g} the index is not compared with that of a richer mesh. {why}"
         for words, group in groupby(branch.points, lambda p: p.undecided and index_range(p.negative, p.undecided)):
             if words:
                 points = list(group)

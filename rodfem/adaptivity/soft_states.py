@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import RESOLVED_TO, STEADY, Enriched
+from rodfem.adaptivity.error_estimate import RESOLVED_TO, STEADY, Again, Enriched
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.corrector import NEAR
@@ -44,6 +44,7 @@ class SoftStates:
     """Finds and names the soft modes of states of one solver.
 
     With ``richer``, which makes a companion of its mesh, their uncertainty has the error of the mesh in it.
+    ``uncompared`` says why the index of the last state was not compared with that of the richer mesh, if it was to be.
     """
 
     def __init__(self, solver: BranchSolver, richer: Callable[[], Enriched] | None) -> None:
@@ -52,6 +53,7 @@ class SoftStates:
         self.sliding = Sliding(self.names)
         self._richer = [richer] if richer is not None else []
         self._companions: list[Enriched] = []
+        self.uncompared = ""
 
     def examine(
         self,
@@ -70,7 +72,7 @@ class SoftStates:
         vectors, which are ``vanishing``, are zero.  Raises :class:`ConvergenceError` where constraints that depend on
         each other leave less than no negative eigenvalue.
         """
-        inertia, nearest = self.solver.inertia, self._nearest(point)
+        inertia, nearest, self.uncompared = self.solver.inertia, self._nearest(point), ""
         differing = self._differing(point, fixed_load) if compare and self._richer else 0
         least = max(NEAR * inertia.scale, SURE * nearest) if nearest else soft_limit(inertia)
         sliding = self.sliding.suspects(inertia, point.x, least)
@@ -124,13 +126,15 @@ class SoftStates:
         with self.solver.system.clock.scope("error bars"):
             richer = self._companion(0)
             try:
-                there, _ = _on(richer, point, fixed_load)
+                there, again = _on(richer, point, fixed_load)
                 found, inertia = richer.solver.inertia.at(there.x), richer.solver.inertia
                 below = found.below(-inertia.tolerance)
                 if below == point.negative:
+                    self.uncompared = "" if again.resolved else _other_state(point.load, again)
                     return 0
                 index = decide(found).index
-            except ConvergenceError:  # no such state, or arithmetic leaves too many signs open there
+            except ConvergenceError as trouble:  # no such state, or arithmetic leaves too many signs open there
+                self.uncompared = str(trouble)
                 return 0
         own = point.zero - self.solver.system.active_drifts(point.x)
         return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
@@ -190,12 +194,12 @@ class SoftStates:
         for level in range(REFINEMENTS):
             richer = self._companion(level)
             try:
-                point, rho = _on(richer, point, fixed_load, soft=True)
+                point, again = _on(richer, point, fixed_load, soft=True)
                 still = [_unit(richer.system, richer.transfer(v, state=False)) for v in still]
                 finer, rounding = _nearest(richer.solver, point, len(modes), own, still)
             except ConvergenceError:
                 return out if level else [replace(m, uncertainty=float("inf")) for m in modes]
-            left = rho / (1 - rho) * abs(finer - values) + rounding
+            left = again.rho / (1 - again.rho) * abs(finer - values) + rounding
             values = finer
             # a sign that is another one than the mesh's own is not decided there
             coarse = np.array([m.value for m in modes])
@@ -214,8 +218,8 @@ class SoftStates:
         return self._companions[level]
 
 
-def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, float]:
-    """Point on a richer mesh, and the part of the errors that is left there.
+def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, Again]:
+    """Point on a richer mesh, and what was found when it was computed there.
 
     Beside a soft mode Newton's method slides away, or ends by chance: there it is damped, and elsewhere where it fails.
     Raises :class:`ConvergenceError` where the mesh has no such point, with a soft mode also where it has another state.
@@ -244,12 +248,16 @@ def _on(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False)
     finally:
         system.damping = given
     if soft and not again.resolved:
-        raise ConvergenceError(
-            f"The richer mesh has another state at load {point.load:.8g}: its strains differ by {again.changed:.2g} of "
-            f"themselves, more than {RESOLVED_TO:g}; use more elements."
-        )
+        raise ConvergenceError(_other_state(point.load, again))
     tangent = None if point.tangent is None else richer.transfer(point.tangent, state=False)
-    return replace(point, x=again.x, tangent=tangent, load=again.load, ordinate=again.ordinate), again.rho
+    return replace(point, x=again.x, tangent=tangent, load=again.load, ordinate=again.ordinate), again
+
+
+def _other_state(load: float, again: Again) -> str:
+    return (
+        f"The richer mesh has another state at load {load:.8g}: its strains differ by {again.changed:.2g} of "
+        f"themselves, more than {RESOLVED_TO:g}; use more elements."
+    )
 
 
 def _unit(system: System, v: PETSc.Vec) -> PETSc.Vec:

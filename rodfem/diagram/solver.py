@@ -252,7 +252,8 @@ class Solver:
         if not isinstance(self.equilibria, BranchSolver):
             return replace(verdict, kink=self._kinks(x).kink)
         special = point if isinstance(point, SpecialPoint) and point.kind.singular else None
-        return verdict.at(self.examined(self.equilibria.point(x, 0.0, None), compare=True, special=special))
+        found = self.examined(self.equilibria.point(x, 0.0, None), compare=True, special=special)
+        return replace(verdict.at(found), uncompared=self._soft.uncompared)
 
     @checked(point=STATE, number=count(3, 1), method=METHOD)
     def modes(self, point: Point | SpecialPoint | PETSc.Vec, number: int = 3, method: str = "auto") -> Modes:

@@ -196,7 +196,7 @@ def _warn_of_what_is_sharp(scene: Scene, system: System, observer: Observer) -> 
         mine = [(float(a), float(b)) for a, b in ends[(ends[:, 0] <= s) & (s <= ends[:, 1])]]
         return sorted({element for part in system.comm.allgather(mine) for element in part})
 
-    if doubt := unresolved(scene, elements, Rules(own, richer, halved(k))):
+    if doubt := unresolved(scene, elements, Rules(own, richer, halved(k), strains=(k - 1, k))):
         observer.warn(doubt)
 
 

@@ -24,7 +24,7 @@ from rodfem.problem.values import Symbol, scalar
 
 PIECES = 256
 """Pieces of the rod to begin with, about."""
-KNOWN = 1e-9
+KNOWN = 1e-12
 """Integral of a function that is not looked for on a piece, over its largest value times the length of the rod."""
 MOST = 200_000
 """Places that are added: of what varies everywhere on so small a scale the elements say more."""

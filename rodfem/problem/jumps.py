@@ -37,6 +37,8 @@ MOST = 200
 """Places of a difference that are looked for."""
 BESIDE = 1e-4
 """Part of a piece by which the grid is moved: no simple fraction of the rod is a point of it."""
+ENERGY = "stored energy"
+"""Words for what the strains of the rod are stored in."""
 JUMP = 1e-9
 """Least jump, relative to the greater of the two values."""
 
@@ -68,7 +70,7 @@ def along(scene: Scene, s: Any) -> Iterator[tuple[str, list[Any]]]:
     """Functions that hold along the rod, in words, as expressions of the arclength ``s`` at some states."""
     c = scene.constants(max(inside(scene.span), key=abs), s)  # at an end of the range what jumps may be 0
     places = [_place(scene, s, state) for state in STATES]
-    yield "stored energy", [ufl.as_ufl(scene.energy(x.v, x.k, c)) for x in places]
+    yield ENERGY, [ufl.as_ufl(scene.energy(x.v, x.k, c)) for x in places]
     for what, function, role in functions_of(scene):
         if role.along and role.call == "f(c)":
             values = function(c)

@@ -14,6 +14,13 @@ peak and no notch is too narrow to be seen.  On an element ``[a, b]`` that holds
 by the rule of the element, of its halves with one degree more, as for an error bar, and by the pieces are compared: a
 bar of the moments has to hold, the difference of the first two enlarged by what is left in the second.  A kink may be
 as bad as a step: at 0.751, beside the end of an element, one had the bar 2e-11 and an error of 2e-7.
+
+Strains vary along the rod as the stored energy does.  What polynomials of their degree miss of it,
+
+    E = int (f - Pi f)^2 ds,    Pi the projection in L2,
+
+is to loads what the error of the strains is, by its square.  On the halves with one degree more as much of it has to be
+left as the bar assumes: a layer that cubic elements resolve in part had a bar of a third of its error.
 """
 
 from __future__ import annotations
@@ -26,7 +33,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ufl.corealg.traversal import unique_pre_traversal
 
-from rodfem.problem.jumps import along, changes, jumps, known
+from rodfem.problem.jumps import ENERGY, along, changes, jumps, known
 from rodfem.problem.values import Symbol, Values
 from rodfem.tolerances import NEGLIGIBLE, TINY
 
@@ -37,16 +44,16 @@ PIECES = 16
 """Pieces of the rod to begin with."""
 POINTS = 8
 """Points of the Gauss quadrature of a piece."""
-AGREE = 1e-10
+AGREE = 1e-13
 """Difference of two rules, relative to the largest value times the length of the piece, below which both are right."""
 MOMENTS = 3
 """Number of moments that are compared."""
 BESIDE = 1e-9
 """Part of a piece by which its ends are inside of it: at a break the function may jump."""
-ENDS = 1e-6
+ENDS = 1e-9
 """Difference, on a piece and at its ends, of a function and the polynomial through its points, over the largest one."""
-SEEN = 1e-8
-"""Error of a moment, relative to the integral of the absolute value on the element, that no bar needs to hold."""
+SEEN = 1e-12
+"""Error, relative to the integral of the absolute value or of the square on the element, that no bar needs to hold."""
 EPS, NOISE = float(np.finfo(float).eps), 10.0
 """Relative round-off of an arclength, and how often it counts over the length of a piece."""
 MANY = 1000
@@ -59,12 +66,14 @@ Pieces = list[tuple[float, float]]
 class Rules:
     """Numbers of points of the Gauss rules of an element, its ``own``, and of its halves, the ``richer`` one.
 
-    An error bar assumes that the part ``left`` of the first rule's error is left in the second.
+    An error bar assumes that the part ``left`` of the first rule's error is left in the second.  The ``strains`` are
+    polynomials of one degree on the element, and of another on its halves.
     """
 
     own: int
     richer: int
     left: float
+    strains: tuple[int, int]
 
 
 def unresolved(scene: Scene, elements: Callable[[float], Pieces], rules: Rules) -> str:
@@ -86,7 +95,7 @@ def unresolved(scene: Scene, elements: Callable[[float], Pieces], rules: Rules) 
             for a, b in f.steep(scene, jumping):
                 at = (a + b) / 2
                 for element in elements(at):
-                    if element not in examined and not f.resolved(element, rules):
+                    if element not in examined and not f.resolved(element, rules, strained=what == ENERGY):
                         return (
                             f"The {what} changes too sharply about s = {at:.6g}, within {b - a:.1g}, for the element "
                             f"from {element[0]:.6g} to {element[1]:.6g}, and error bars need not hold: give the "
@@ -143,8 +152,8 @@ class _Function:
 
     def _smooth(self, low: float, high: float) -> bool:
         middle = (low + high) / 2
-        whole = self._moments((low, high), (low, high), POINTS)
-        halves = sum(self._moments((low, high), half, POINTS) for half in ((low, middle), (middle, high)))
+        whole = self._moments((low, high), [(low, high)], POINTS)
+        halves = self._moments((low, high), [(low, middle), (middle, high)], POINTS)
         noise = EPS * max(abs(low), abs(high)) / (high - low)  # places are rounded
         if abs(whole - halves).max() > (AGREE + NOISE * noise) * self.size * (high - low):
             return False
@@ -158,26 +167,50 @@ class _Function:
         told = np.polynomial.legendre.legval((2 * places - low - high) / (high - low), through)
         return bool(abs(told - values).max() <= ENDS * self.size)
 
-    def resolved(self, element: tuple[float, float], rules: Rules) -> bool:
-        """Whether the error bar of the moments on an element holds."""
+    def resolved(self, element: tuple[float, float], rules: Rules, *, strained: bool) -> bool:
+        """Whether the error bar of the moments on an element holds, and, of what is ``strained``, that of a load."""
         a, b = element
-        middle = (a + b) / 2
-        own = self._moments(element, element, rules.own)
-        richer = sum(self._moments(element, half, rules.richer) for half in ((a, middle), (middle, b)))
-        inside = [(max(a, low), min(b, high)) for low, high in self.pieces if low < b and high > a]
-        true = sum(self._moments(element, piece, POINTS) for piece in inside if piece[1] > piece[0])
-        size = sum(self._moments(element, piece, POINTS, size=True)[0] for piece in inside if piece[1] > piece[0])
-        most = rules.left / (1 - rules.left) * abs(richer - own)
-        return bool((abs(richer - true) <= np.maximum(most, SEEN * size)).all())
+        halves = [(a, (a + b) / 2), ((a + b) / 2, b)]
+        true = self._moments(element, self._inside(element), POINTS)
+        own, richer = self._moments(element, [element], rules.own), self._moments(element, halves, rules.richer)
+        _, weights, values = self._sampled(self._inside(element), POINTS)
+        least = SEEN * np.array([weights @ abs(values), weights @ values**2])
+        left = rules.left / (1 - rules.left)
+        if (abs(richer - true) > np.maximum(left * abs(richer - own), least[0])).any():
+            return False
+        missed = self._missed(element, rules.strains[0])
+        still = sum(self._missed(half, rules.strains[1]) for half in halves) if missed > least[1] and strained else 0.0
+        return bool(still <= max(left * (missed - still), least[1]))
 
-    def _moments(
-        self, element: tuple[float, float], piece: tuple[float, float], points: int, *, size: bool = False
-    ) -> np.ndarray:
-        """Parts on a ``piece`` of the moments on an element, by that many points; or of those of the absolute value."""
+    def _inside(self, element: tuple[float, float]) -> Pieces:
+        """Parts of the pieces that are inside of an element."""
+        a, b = element
+        return [(max(a, low), min(b, high)) for low, high in self.pieces if low < b and high > a]
+
+    def _sampled(self, pieces: Pieces, points: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Places and weights of the Gauss rule of that many points on each of some pieces, and the values there."""
         t, w = np.polynomial.legendre.leggauss(points)
-        half = (piece[1] - piece[0]) / 2
-        places = (piece[0] + piece[1]) / 2 + half * t
+        low, high = np.array(pieces).T[:, :, None]
+        places, weights = ((low + high) / 2 + (high - low) / 2 * t).ravel(), ((high - low) / 2 * w).ravel()
         values = self(places)
         self.size = max(self.size, float(abs(values).max()), TINY)
-        local = (2 * places - element[0] - element[1]) / (element[1] - element[0])
-        return half * (w * (abs(values) if size else values)) @ np.polynomial.legendre.legvander(local, MOMENTS - 1)
+        return places, weights, values
+
+    def _moments(self, element: tuple[float, float], pieces: Pieces, points: int) -> np.ndarray:
+        """The moments on an element, by that many points on each of the ``pieces`` that it is made of."""
+        places, weights, values = self._sampled(pieces, points)
+        return np.asarray((weights * values) @ _legendre(places, element, MOMENTS - 1))
+
+    def _missed(self, element: tuple[float, float], degree: int) -> float:
+        """Squared norm on an element of what polynomials of a degree miss of the function."""
+        places, weights, values = self._sampled(self._inside(element), max(POINTS, degree + 3))
+        polynomials = _legendre(places, element, degree) * np.sqrt(2 * np.arange(degree + 1) + 1)
+        polynomials /= np.sqrt(element[1] - element[0])
+        rest = values - polynomials @ ((weights * values) @ polynomials)
+        return float(weights @ rest**2)
+
+
+def _legendre(places: np.ndarray, element: tuple[float, float], degree: int) -> np.ndarray:
+    """Legendre polynomials of an element up to a degree, at places on it: (places, degree + 1)."""
+    a, b = element
+    return np.asarray(np.polynomial.legendre.legvander((2 * places - a - b) / (b - a), degree))

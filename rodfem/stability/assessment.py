@@ -63,6 +63,8 @@ class Verdict:
     kink
         Names of the functions on a kink of which the state is, by :meth:`rodfem.Solver.assess`: the numbers are those
         of one side, and stability is undecided.
+    uncompared
+        Why :meth:`rodfem.Solver.assess` could not compare the index with that of a richer mesh; empty where it did.
     """
 
     negative: int
@@ -81,6 +83,7 @@ class Verdict:
     undecided: int = 0
     soft: tuple[SoftMode, ...] = ()
     kink: str = ""
+    uncompared: str = ""
 
     @property
     def stable(self) -> bool | None:
@@ -99,12 +102,14 @@ class Verdict:
         """One line for the terminal."""
         values = ", ".join(f"{v:.10g}" for v in self.values) or "none computed"
         proof = ", none missing" if self.certified and len(self.values) else ""
+        alone = f"; not compared with a richer mesh: {self.uncompared}" if self.uncompared else ""
         inside = f"; {len(self.inside)} inside the band {self.band:.1e} of the count" if len(self.inside) else ""
         undecided = f", {self.undecided} undecided" if self.undecided else ""
         undecided += f", {ONE_SIDE} of the {self.kink}" if self.kink else ""
         return (
             f"{self.negative} negative, {self.zero} zero{undecided}{inside}; left-most: {values}{proof} "
             f"({self.method}: {self.reason}; {self.factorisations} factorisations, {1e3 * self.seconds:.1f} ms)"
+            f"{alone}"
         )
 
 

@@ -42,7 +42,7 @@ def test_pieces_are_known(f: Callable[[Any], Any]) -> None:
     left, right = values({s: ends[:-1] + 1e-12}), values({s: ends[1:] - 1e-12})
     lines = left[:, None] + (right - left)[:, None] * np.linspace(0, 1, 66)[1:-1]
     missed = abs(values({s: among.ravel()}).reshape(among.shape) - lines).mean(axis=1)
-    assert len(ends) < 20_000 and (missed * np.diff(ends)).max() < 2e-9 * size
+    assert len(ends) < 50_000 and (missed * np.diff(ends)).max() < 2e-12 * size
 
 
 def test_intervals_hold_their_values() -> None:

@@ -20,7 +20,7 @@ from rodfem.problem.smoothness import Rules, unresolved
 pytestmark = pytest.mark.alone
 
 STEEP, WIDTH = 0.786, 1e-4
-RULES = Rules(7, 8, 0.5**7)
+RULES = Rules(7, 8, 0.5**7, strains=(5, 6))
 
 
 def scene(stiffness: Callable[[Any], Any], **more: Any) -> Scene:
