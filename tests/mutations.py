@@ -969,6 +969,12 @@ FAULTS = {
         "(self.size + 0 * values if size else values)",
         "tests/problem/test_enclosure.py",
     ),
+    "a-search-finds-states-that-are-not-convex": Fault(
+        "rodfem/diagram/explorer.py",
+        "(others if self.solver.lost_convexity(point.x) else convex).append(point)",
+        "convex.append(point)",
+        "tests/continuation/test_convexity.py",
+    ),
     "roots-have-no-kinks": Fault(
         "rodfem/problem/kinks.py",
         "    elif isinstance(part, Sqrt | Ln | Atan2):\n",

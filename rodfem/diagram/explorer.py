@@ -59,7 +59,7 @@ class Explorer(Tracer):
     def _search(self, load: float) -> None:
         """Look for equilibria at ``load`` that no branch has reached, and trace what goes through them."""
         found, before = self._found(load), len(self.branches)
-        for i, point in enumerate(found):
+        for i, point in enumerate(self._convex(found)):
             if not self._on_branch(point, before):
                 self.trace_whole(point, self._unused("found ", f" at {load:g}", i + 1), 0)
         self._branch_off(before)
@@ -87,13 +87,26 @@ class Explorer(Tracer):
             known.add(other.x)
         return any(apart < SAME for apart, _ in known.nearest(point.x))
 
+    def _convex(self, points: list[Point]) -> list[Point]:
+        """Those ``points`` along which the stored energy is convex; the others are mentioned."""
+        self.use(points[0].mesh if points else self.solver.mesh)
+        convex, others = list[Point](), list[Point]()
+        for point in points:
+            (others if self.solver.lost_convexity(point.x) else convex).append(point)
+        if others:
+            many, near = f"{len(others)} equilibri{'a' if others[1:] else 'um'}", f"{others[0].load:.6g}"
+            self.observer.note(
+                f"  {many} near {self.scene.load} = {near}: not followed, the stored energy is not convex there"
+            )
+        return convex
+
     def _detached(self, gap: Gap, depth: int) -> None:
         """Trace the branch on the other side of a gap, which no step from this side reaches.
 
         A state that is squeezed to nothing, or through it, is none of a rod.
         """
         self.use(gap.point.mesh)
-        for point in arms(self.solver, gap):
+        for point in self._convex(arms(self.solver, gap)):
             if self.low < point.load < self.high and point.stretch > 0 and not self._on_branch(point):
                 number = 1 + sum(b.name.startswith("detached") for b in self.branches)
                 self.trace_whole(point, f"detached {number}", depth)

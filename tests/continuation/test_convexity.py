@@ -54,6 +54,14 @@ def test_a_stiffness_that_the_load_takes_away(energy: Energy, until: float) -> N
         Solver(rod(energy), MESH).equilibrium(1.0)
 
 
+@pytest.mark.alone
+def test_a_search_where_it_is_lost() -> None:
+    """Equilibria that a search finds there begin no branch."""
+    diagram = trace(rod(softening), MESH, Plan(at=(1.5,), depth=0, tries=4, error_bars=False))
+    assert [b.name for b in diagram] == ["straight"]
+    assert any("near P = 1.5: not followed, the stored energy is not convex there" in note for note in diagram.notes)
+
+
 def narrow(x: Any, width: float) -> Energy:
     """Convex but where ``x(c)`` is nearer to zero than the ``width``."""
     return lambda v, k, c: bending_and_twist(k, (x(c) ** 2 - width**2, 2.0, 1.0))
