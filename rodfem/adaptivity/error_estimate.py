@@ -35,7 +35,7 @@ from rodfem.continuation.event_location import Found, nearest_event, noise_of
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.locate import NEAREST, WINDOW, refine
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
-from rodfem.continuation.states_between import Curve
+from rodfem.continuation.states_between import STEADY, Curve
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import correct
 from rodfem.fem.transfer import Transfer, halved, richer_system
@@ -54,8 +54,6 @@ NARROW = 1 / 128
 """Part of the usual window on which a special point is located again."""
 REACH = 0.2
 """Distance along the branch, in the metric, to which an event is sought whose function receives more places."""
-STEADY = 3.0
-"""Uncertainty of a result, in units of its change by one more step of Newton's method."""
 
 
 @dataclass(frozen=True)

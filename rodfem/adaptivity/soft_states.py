@@ -19,11 +19,12 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.error_estimate import RESOLVED_TO, STEADY, Again, Enriched
+from rodfem.adaptivity.error_estimate import RESOLVED_TO, Again, Enriched
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.corrector import NEAR
 from rodfem.continuation.locate import across
+from rodfem.continuation.states_between import STEADY
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_samples import Samples, sampled
 from rodfem.continuation.event_zeros import EXACT, SURE, Zero, Zeros
-from rodfem.continuation.states_between import ASIDE, Curve, EventCurve, solved_on
+from rodfem.continuation.states_between import ASIDE, STEADY, Curve, EventCurve, solved_on
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.linalg.orthogonal import generic
 from rodfem.problem.events import Event
@@ -62,7 +62,8 @@ class OnCurve:
 
     def noise(self, s: float) -> float:
         """How much it varies there with the round-off of a state."""
-        return noise_of(self.solver, self.event, self.curve(s)[0])
+        left = self.curve.nearest(s).left if self.curve.solved else None
+        return noise_of(self.solver, self.event, self.curve(s)[0], left)
 
     @cached_property
     def rough(self) -> float:
@@ -133,13 +134,19 @@ def event_at(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:
     return event(solver.shape.sample(x))
 
 
-def noise_of(solver: BranchSolver, event: Event, x: PETSc.Vec) -> float:
-    """How much the value of an event varies with the round-off of a state; collective."""
+def noise_of(solver: BranchSolver, event: Event, x: PETSc.Vec, left: PETSc.Vec | None = None) -> float:
+    """How much the value of an event varies with the round-off of a state ``x``; collective.
+
+    Newton's method has ``left`` that much there, if it is known: the more the worse the equations are conditioned.
+    """
     first, last = x.getOwnershipRange()
-    here, most = event_at(solver, event, x), 0.0
+    here, most, others = event_at(solver, event, x), 0.0, list[PETSc.Vec]()
     for which in range(TRIED):
-        other = x.copy()
-        other.array[:] += ROUND_OFF * generic(np.arange(first, last), which)
+        others.append(x.copy())
+        others[-1].array[:] += ROUND_OFF * generic(np.arange(first, last), which)
+    if left is not None:
+        others += [x + left * sign for sign in (-STEADY, STEADY)]
+    for other in others:
         try:
             most = max(most, abs(event_at(solver, event, other) - here))
         except SceneError:  # the state is at the edge of those at which there is a value

@@ -28,6 +28,8 @@ ASIDE = 1e-6
 """Distance beside a singular point at which the equations are solved, relative to the curve."""
 APART = 1e-9
 """Least distance of two states of the curve, relative to it: two that are nearer tell no direction."""
+STEADY = 3.0
+"""Uncertainty of a result, in units of its change by one more step of Newton's method."""
 ALONG = 0.9
 """Cosine between the curve and the tangent of a branch below which that is the tangent of another one."""
 Curve = Callable[[float], tuple[PETSc.Vec, PETSc.Vec]]
@@ -128,13 +130,15 @@ def point_between(solver: BranchSolver, a: Point, b: Point, s: float) -> Point |
 class Solved(NamedTuple):
     """An equilibrium ``x`` on the plane across the curve at ``s``: it is at ``arclength``, ``s`` or beside it.
 
-    The ``tangent`` is the derivative of a curve through it.
+    The ``tangent`` is the derivative of a curve through it.  One more step of Newton's method has ``left`` that much:
+    the round-off of the state, by which equilibria that are solved for in another way differ.
     """
 
     s: float
     arclength: float
     x: PETSc.Vec
     tangent: PETSc.Vec
+    left: PETSc.Vec
 
 
 class EventCurve:
@@ -173,6 +177,10 @@ def solved_on(solver: BranchSolver, curve: Curve, s: float, aside: float) -> Sol
     ``solver`` has the mesh.
     """
     x, there = solve_beside(solver, curve, s, aside)
+    system = solver.system
+    equations, left = system.new_vector(), system.new_vector()
+    system.at(x).residual(equations)
+    system.solve(equations, left)
     direction = curve(there)[1]
     row = solver.row(direction)
     try:
@@ -181,6 +189,6 @@ def solved_on(solver: BranchSolver, curve: Curve, s: float, aside: float) -> Sol
     except ConvergenceError:  # a singular state
         slope = 0.0
     if slope < ALONG:  # the curve knows the direction better
-        return Solved(s, there, x, direction)
-    tangent.scale(solver.system.norm(direction) / slope)
-    return Solved(s, there, x, tangent)
+        return Solved(s, there, x, direction, left)
+    tangent.scale(system.norm(direction) / slope)
+    return Solved(s, there, x, tangent, left)

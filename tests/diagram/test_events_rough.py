@@ -8,9 +8,12 @@ from dataclasses import replace
 import classics
 import numpy as np
 import pytest
+from petsc4py import PETSc
 
 import rodfem
 from rodfem import Discretization, Event, InputError, Plan
+from rodfem.continuation import states_between
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.event_samples import Samples, sampled
 from rodfem.continuation.event_zeros import Zeros
 
@@ -136,3 +139,23 @@ def test_zeros_beside_a_row_that_is_nearly_zero() -> None:
     zeros.locate()
     zeros.look_around()
     assert [zero.s for zero in zeros.found] == pytest.approx([5e-8], rel=0, abs=1e-12)
+
+
+def test_states_with_round_off_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Equilibria that are solved for differ by 1e-8, as beside a soft mode: what touches zero is within its bar."""
+    chosen, solve = np.random.default_rng(4), states_between.solve_at
+
+    def rough(solver: BranchSolver, curve: states_between.Curve, s: float) -> PETSc.Vec:
+        x, direction, aside = solve(solver, curve, s), curve(s)[1], solver.system.new_vector()
+        solver.system.set_load(aside, 1.0)
+        row = solver.row(direction)
+        aside.axpy(-row.dot(aside) / row.dot(direction), direction)  # on the plane on which the state is solved for
+        return x + aside * (1e-8 * chosen.normal())
+
+    monkeypatch.setattr(states_between, "solve_at", rough)
+    exact = [float(b) for b in np.linspace(1.5, 3.5, 41)]
+    events = tuple(Event(f"at {b:.2f}", of=lambda state, b=b: (state.load - b) ** 2) for b in exact)
+    diagram = rodfem.trace(COLUMN, MESH, replace(PLAN, events=events))
+    found = [s for s in diagram[0].special if s.event]
+    assert len(found) == len(exact)
+    assert all(abs(s.point.load - b) <= s.located_to < 1e-6 for s, b in zip(found, exact, strict=True))
