@@ -13,6 +13,7 @@ from hard import (
     snapping,
     springy_rings,
     stiffness,
+    uneven,
     writhing,
 )
 from hard.case import Case
@@ -48,6 +49,11 @@ STIFFNESS = (
         "rotations past 2 pi and 4 pi", "a double point at ends turned by several radian", EXACT,
         "Greenhill, C phi = 8.98681891582", "C, at the angle 8.99/C", stiffness.turned, (2.0, 0.6),
         (4.0, 2.0, 1.2, 0.8, 0.6),
+    ),
+    Case(
+        "a stiffness that varies on any scale", "layers, peaks and tails of 1e-8 to 0.2 of the rod, ripple in step "
+        "with the elements", SAID, "Magnus' expansion of fourth order, on graded pieces", "number of a random draw",
+        uneven.stiffness, (193, 432, 3), (*range(40), 193, 290, 378, 393, 432, 458),
     ),
 )  # fmt: skip
 BIFURCATIONS = (
