@@ -55,6 +55,16 @@ STIFFNESS = (
         "with the elements", SAID, "Magnus' expansion of fourth order, on graded pieces", "number of a random draw",
         uneven.stiffness, (193, 432, 3), (*range(40), 193, 290, 378, 393, 432, 458),
     ),
+    Case(
+        "a weight that varies on any scale", "the same, of a force along the rod", SAID,
+        "Magnus' expansion of fourth order, on graded pieces", "number of a random draw", uneven.weight,
+        (7,), tuple(range(20)),
+    ),
+    Case(
+        "a foundation that varies on any scale", "the same, of springs along the rod", SAID,
+        "Magnus' expansion of fourth order, on graded pieces", "number of a random draw", uneven.bed,
+        (5,), tuple(range(20)),
+    ),
 )  # fmt: skip
 BIFURCATIONS = (
     Case(
