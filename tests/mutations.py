@@ -369,6 +369,18 @@ FAULTS = {
     "ends-of-folds-counted": Fault(
         "rodfem/codim2/curve.py", ", dx=dx / size, rest=a.rest)", ", dx=dx / size)", "tests/codim2/test_locus.py"
     ),
+    "special-points-of-small-loads-are-one": Fault(
+        "rodfem/codim2/locus.py", "unit(x, y, one=one)", "unit(x, y, one=1.0)", "tests/codim2/test_locus.py"
+    ),
+    "loci-of-small-loads-start-everywhere": Fault(
+        "rodfem/report/loci.py", "one=natural.get(name, 1.0)", "one=1.0", "tests/codim2/test_locus.py"
+    ),
+    "scales-start-from-one": Fault(
+        "rodfem/linalg/chain.c",
+        "memcpy(s, c->natural, c->n * sizeof(double));",
+        "for (int i = 0; i < c->n; i++) s[i] = 1.0;",
+        "tests/problem/test_units.py",
+    ),
     "quaternions-of-one-sign": Fault(
         "rodfem/deflation/group_orbit.py",
         "for each in (y, *same_rotations(self.system, y)):",
