@@ -378,6 +378,18 @@ FAULTS = {
     "moments-without-a-natural-size": Fault(
         "rodfem/output/files.py", '"length", "force", "moment")', '"length", "force")', FILES
     ),
+    "mirrors-asked-of-a-molecule-in-metres": Fault(
+        "rodfem/deflation/discrete_symmetries.py",
+        "amplitude * units.of_field(block) * sum(",
+        "amplitude * sum(",
+        "tests/deflation/test_deflation.py",
+    ),
+    "deflated-steps-in-newtons": Fault(
+        "rodfem/deflation/deflated_newton.py",
+        "system.in_units(step, -1).norm() / (1.0 + system.in_units(x, -1).norm())",
+        "step.norm() / (1.0 + x.norm())",
+        "tests/deflation/test_deflation.py",
+    ),
     "scales-start-from-one": Fault(
         "rodfem/linalg/chain.c",
         "memcpy(s, c->natural, c->n * sizeof(double));",
