@@ -120,13 +120,10 @@ def generic_state(system: System, like: PETSc.Vec, amplitude: float, seed: int) 
     rng = np.random.default_rng(seed)
     a, b = system.scene.interval
     for block in f.blocks:
-        x = (f.coordinates(block.degree) - a) / (b - a)
+        x, size = (f.coordinates(block.degree) - a) / (b - a), amplitude * units.of_field(block)
         for i in range(block.size):
-            named[block.name][:, :, i] += (
-                amplitude
-                * units.of_field(block)
-                * sum(c * np.sin(k * np.pi * x + p) for k, (c, p) in enumerate(rng.uniform(0.3, 1.0, (3, 2)), start=1))
-            )
+            waves = enumerate(rng.uniform(0.3, 1.0, (3, 2)), start=1)
+            named[block.name][:, :, i] += size * sum(c * np.sin(k * np.pi * x + p) for k, (c, p) in waves)
     for i in f.forces:
         named[f"n{i + 1}"] += amplitude * units.force * rng.uniform(0.3, 1.0)
     return system.vector(f.filled(named))
