@@ -390,6 +390,9 @@ FAULTS = {
         "step.norm() / (1.0 + x.norm())",
         "tests/deflation/test_deflation.py",
     ),
+    "sections-that-turn-without-their-shear": Fault(
+        "rodfem/fem/symmetries.py", "    out += _of_strains(fields)\n", "", "tests/fem/test_symmetries.py"
+    ),
     "scales-start-from-one": Fault(
         "rodfem/linalg/chain.c",
         "memcpy(s, c->natural, c->n * sizeof(double));",
