@@ -227,7 +227,7 @@ failed:
     return NULL;
 }
 
-#define NOTHING 1e-30 /* an entry smaller than this, over the largest one, is zero to the equilibration */
+#define NOTHING 1e-30 /* an entry smaller than this, over the largest one off the border, is zero to the equilibration */
 
 /* Natural sizes of the unknowns, as powers of two: the scale of the next matrix starts from them.  Where a stiffness is
    many orders below the constraints beside it the largest entries of all rows are those of constraints, which tell
@@ -467,7 +467,7 @@ int chain_factor(chain *c, const double *values)
         for (int k = c->starts[i]; k < c->starts[i + 1]; k++) {
             double a = in_units(c, values, i, k);
             sum += a;
-            if (a > most) most = a;
+            if (a > most && !(c->of_border[i] && c->of_border[c->indices[k]])) most = a;
         }
     if (!isfinite(sum)) return 3;
     c->order.used = c->panel.used = c->pivot.used = 0;
